@@ -1,0 +1,1 @@
+"""What moves the axis: linear controllers, compensators, filters."""

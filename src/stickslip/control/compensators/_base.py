@@ -1,0 +1,41 @@
+"""What compensators share: a law with parameters, a gain and a filter on the velocity it sees."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from stickslip.errors import ParameterError
+from stickslip.model import Model
+
+__all__ = ["Compensator"]
+
+
+@dataclass(frozen=True)
+class Compensator:
+    """A friction law driven by a velocity.
+
+    Attributes
+    ----------
+    model : Model
+        The law and its parameters.
+    gain : float
+        Factor on the compensating torque; 1 cancels the whole model.
+    filter_hz : float or None
+        Corner of a second-order Butterworth low-pass on the velocity, Hz (the 10 Hz of thesis chapter 4).
+    """
+
+    model: Model
+    gain: float = 1.0
+    filter_hz: float | None = None
+
+    name: ClassVar[str] = ""
+    prefix: ClassVar[str] = ""
+    velocity: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.gain):
+            raise ParameterError(f"{self.name}: gain = {self.gain:g} must be a finite number")
+        if self.filter_hz is not None and not (self.filter_hz > 0.0 and math.isfinite(self.filter_hz)):
+            raise ParameterError(f"{self.name}: filter_hz = {self.filter_hz:g} Hz must be greater than 0")

@@ -1,0 +1,23 @@
+"""Model-based feedback: the law runs on the measured velocity; thesis figure 3.4."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from stickslip.control.compensators._base import Compensator
+
+__all__ = ["Feedback"]
+
+
+@dataclass(frozen=True)
+class Feedback(Compensator):
+    """T_hat = gain * law(measured velocity).
+
+    In continuous time the sign of the velocity is the exact limit: it changes where v passes through zero, and
+    a feedback that cancels friction repels from there. With a sample time it is what the samples say.
+    """
+
+    name: ClassVar[str] = "feedback"
+    prefix: ClassVar[str] = "FB"
+    velocity: ClassVar[str] = "measured"

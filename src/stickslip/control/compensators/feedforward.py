@@ -1,0 +1,19 @@
+"""Model-based feedforward: the law runs on the reference velocity; thesis figure 3.3."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from stickslip.control.compensators._base import Compensator
+
+__all__ = ["Feedforward"]
+
+
+@dataclass(frozen=True)
+class Feedforward(Compensator):
+    """T_hat = gain * law(reference velocity). Its state depends on time alone."""
+
+    name: ClassVar[str] = "feedforward"
+    prefix: ClassVar[str] = "FF"
+    velocity: ClassVar[str] = "reference"

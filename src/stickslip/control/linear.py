@@ -1,0 +1,75 @@
+"""Linear controllers and their gains by pole placement; thesis 3.1.1.
+
+T = kp (theta_d - theta) + kr theta_d' - kd theta' + ki integral of (theta_d - theta)
+
+PR ("proportional with rate feedback", eq. 3.4) has kr = 0, PD (eq. 3.5) and PID (eq. 3.11) have kr = kd.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+from stickslip.errors import ParameterError
+from stickslip.spec import Par
+
+__all__ = ["LINEAR", "Gains", "pd", "pid", "place", "pr"]
+
+
+class Gains(NamedTuple):
+    """Gains of the linear controller."""
+
+    kp: Annotated[float, Par("N·m/rad", "k_p", "proportional gain", lower=0.0)]
+    ki: Annotated[float, Par("N·m/(rad·s)", "k_i", "integral gain", lower=0.0, default=0.0)] = 0.0
+    kd: Annotated[float, Par("N·m·s/rad", "k_d", "gain on the measured velocity", lower=0.0, default=0.0)] = 0.0
+    kr: Annotated[float, Par("N·m·s/rad", "k_r", "gain on the reference velocity", lower=0.0, default=0.0)] = 0.0
+
+
+def pr(kp: float, kd: float) -> Gains:
+    """Proportional with rate feedback; thesis eq. 3.4."""
+    return Gains(kp=kp, kd=kd)
+
+
+def pd(kp: float, kd: float) -> Gains:
+    """Proportional with derivative; thesis eq. 3.5."""
+    return Gains(kp=kp, kd=kd, kr=kd)
+
+
+def pid(kp: float, ki: float, kd: float) -> Gains:
+    """Proportional, integral and derivative; thesis eq. 3.11."""
+    return Gains(kp=kp, ki=ki, kd=kd, kr=kd)
+
+
+def place(kind: str, inertia: float, bandwidth: float, damping: float) -> Gains:
+    """Gains that place the poles of the loop without friction; thesis eqs. 3.10 and 3.15.
+
+    Parameters
+    ----------
+    kind : {"PR", "PD", "PID"}
+    inertia : float
+        kg·m²
+    bandwidth : float
+        Natural frequency of the poles, Hz. The PID's third pole lies at the same frequency (eq. 3.13).
+    damping : float
+        Damping ratio of the pair.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not positive or the kind is unknown.
+    """
+    for name, value in (("inertia", inertia), ("bandwidth", bandwidth), ("damping", damping)):
+        if not value > 0.0 or not math.isfinite(value):
+            raise ParameterError(f"controller: {name} = {value:g} must be greater than 0")
+    w = 2.0 * math.pi * bandwidth
+    if kind == "PR":
+        return pr(inertia * w * w, 2.0 * inertia * damping * w)
+    if kind == "PD":
+        return pd(inertia * w * w, 2.0 * inertia * damping * w)
+    if kind == "PID":
+        spread = 1.0 + 2.0 * damping
+        return pid(inertia * w * w * spread, inertia * w**3, inertia * w * spread)
+    raise ParameterError(f"controller: unknown kind {kind!r}; choose from {', '.join(LINEAR)}")
+
+
+LINEAR = ("PR", "PD", "PID")

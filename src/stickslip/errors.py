@@ -1,0 +1,102 @@
+"""What can go wrong, and who is meant by it.
+
+StickslipError                    everything this package raises on purpose
+├── InputError                    the user can mend it; the command line prints one line and exits with 2
+│   ├── ParameterError            a parameter is missing, unknown or out of bounds
+│   ├── UnknownName               a law, compensator, reference, integrator, ... that is not registered
+│   ├── ConfigError               a key or value of a TOML file
+│   └── LawError                  a law's file says something that cannot be run (outside the scalar subset, say)
+└── SimulationError               a run ended early: when, why, and the record of what was computed
+    ├── Divergence                position or velocity left every reasonable bound, or is not a number
+    ├── EventStorm                more switches than the limit in a short time
+    └── StepFailure               no step that meets the tolerance was found
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from stickslip.record import Record
+
+__all__ = [
+    "ConfigError",
+    "Divergence",
+    "EventStorm",
+    "InputError",
+    "LawError",
+    "ParameterError",
+    "SimulationError",
+    "StepFailure",
+    "StickslipError",
+    "UnknownName",
+    "suggestion",
+]
+
+
+class StickslipError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+class InputError(StickslipError):
+    """Something the user gave; the message names the thing, the value and the remedy in one line."""
+
+
+class ParameterError(InputError):
+    """A parameter is missing, unknown or out of bounds."""
+
+
+class UnknownName(InputError):
+    """A name that is not registered in its family."""
+
+    def __init__(self, family: str, name: object, known: Iterable[str]) -> None:
+        names = sorted(known)
+        super().__init__(f"unknown {family} {name!r}; {suggestion(str(name), names)}")
+
+
+class ConfigError(InputError):
+    """A key or value of a TOML file."""
+
+
+class LawError(InputError):
+    """A law's file cannot be run."""
+
+
+class SimulationError(StickslipError):
+    """A run ended early.
+
+    Attributes
+    ----------
+    time : float
+        When it ended, s.
+    record : Record or None
+        What was computed until then.
+    """
+
+    def __init__(self, message: str, time: float, record: Record | None = None) -> None:
+        super().__init__(message)
+        self.time = time
+        self.record = record
+
+
+class Divergence(SimulationError):
+    """Position or velocity left every reasonable bound, or is not a number."""
+
+
+class EventStorm(SimulationError):
+    """More switches than the limit in a short time."""
+
+
+class StepFailure(SimulationError):
+    """No step that meets the tolerance was found."""
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return the remedy for a misspelt `name`: the nearest known one, or all of them."""
+    names = list(known)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    if near:
+        return f"did you mean {near[0]!r}?"
+    return f"choose from {', '.join(names)}" if names else "none is registered"

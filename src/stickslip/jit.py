@@ -1,0 +1,244 @@
+"""Compilation: the only file that imports numba.
+
+Kernels (the loops of the engines) are compiled once and cached in a folder named after the content of the
+package's own kernels, so that a cached kernel is never older than any function it calls. Laws and references
+are translated by `stickslip.subset` to a file named after its own content, compiled to functions with one C
+signature each, and handed to kernels as addresses: a kernel is compiled once, whatever laws it runs.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import hashlib
+import importlib.util
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import config, types
+from numba.extending import intrinsic
+
+from stickslip.spec import Law
+from stickslip.subset import Layout, law_layouts, lower
+
+__all__ = [
+    "LawPointers",
+    "call_guards",
+    "call_holding",
+    "call_profile",
+    "call_rate",
+    "call_step",
+    "call_value",
+    "compiled_law",
+    "compiled_profile",
+    "kernel",
+    "pointer",
+]
+
+FLOAT = types.float64
+ARRAY = types.CPointer(types.float64)
+SIGNATURES = {
+    "step": FLOAT(FLOAT, FLOAT, FLOAT, ARRAY, ARRAY, ARRAY),
+    "rate": FLOAT(FLOAT, ARRAY, ARRAY, ARRAY, ARRAY),
+    "guards": types.void(FLOAT, ARRAY, ARRAY, ARRAY, ARRAY),
+    "switch": types.void(FLOAT, ARRAY, ARRAY, ARRAY, ARRAY),
+    "steady": FLOAT(FLOAT, ARRAY),
+    "sliding": FLOAT(FLOAT, ARRAY),
+    "holding": FLOAT(FLOAT, ARRAY, ARRAY, ARRAY),
+    "profile": types.void(FLOAT, ARRAY, ARRAY),
+}
+
+# ---- where compiled code is kept --------------------------------------------------------------------------
+
+
+@functools.cache
+def cache_folder() -> Path:
+    """The folder for compiled code: STICKSLIP_CACHE, else the user's cache folder, else a temporary one."""
+    package = Path(__file__).parent
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version} {platform.machine()}".encode())
+    for file in sorted([Path(__file__), *package.glob("simulate/*.py"), *package.glob("study/*.py")]):
+        digest.update(file.read_bytes())
+    home = os.environ.get("STICKSLIP_CACHE") or os.path.join(
+        os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "stickslip"
+    )
+    folder = Path(home) / digest.hexdigest()[:16]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if os.access(folder, os.W_OK):
+            return folder
+    except OSError:
+        pass
+    return Path(tempfile.mkdtemp(prefix="stickslip-"))
+
+
+def _cached(make: Callable[[], Any]) -> Any:
+    """Run `make` with numba's cache in our folder; numba reads the folder when a function is decorated."""
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_folder())
+    try:
+        return make()
+    finally:
+        config.CACHE_DIR = before
+
+
+def kernel(*, exact: bool = True) -> Callable[[Any], Any]:
+    """Compile a function of an engine; it releases the interpreter's lock and is cached.
+
+    ``exact=False`` lets the compiler contract and reassociate by reciprocals (never for laws, whose compiled
+    form equals plain Python bit for bit).
+    """
+    fast: Any = False if exact else {"contract", "arcp", "nsz"}
+
+    def decorate(function: Any) -> Any:
+        return _cached(
+            lambda: numba.njit(function, cache=True, nogil=True, fastmath=fast, error_model="numpy")
+        )
+
+    return decorate
+
+
+# ---- calls through addresses ------------------------------------------------------------------------------
+
+
+@intrinsic
+def pointer(typingctx: Any, array: Any, offset: Any) -> Any:
+    """The address of ``array[offset]``, array contiguous."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        struct = context.make_array(signature.args[0])(context, builder, arguments[0])
+        return builder.gep(struct.data, [arguments[1]])
+
+    return ARRAY(array, types.intp), generate
+
+
+def _caller(name: str, count: int, returns: bool) -> Any:
+    """Build an intrinsic that calls the function at an address with the signature `name`."""
+    signature = SIGNATURES[name]
+    result: Any = ir.DoubleType() if returns else ir.VoidType()
+    kinds = [ir.DoubleType() if a is FLOAT else ir.DoubleType().as_pointer() for a in signature.args]
+
+    def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        function = builder.inttoptr(arguments[0], ir.FunctionType(result, kinds).as_pointer())
+        out = builder.call(function, arguments[1:])
+        return out if returns else context.get_dummy_value()
+
+    typed = signature.return_type(types.intp, *signature.args)
+    names = ", ".join(f"a{i}" for i in range(count))
+    scope: dict[str, Any] = {"typed": typed, "generate": generate}
+    exec(f"def call(typingctx, address, {names}):\n    return typed, generate", scope)
+    return intrinsic(scope["call"])
+
+
+call_step = _caller("step", 6, True)
+call_rate = _caller("rate", 5, True)
+call_guards = _caller("guards", 5, False)
+call_value = _caller("steady", 2, True)
+call_holding = _caller("holding", 4, True)
+call_profile = _caller("profile", 3, False)
+
+
+# ---- laws and references ----------------------------------------------------------------------------------
+
+
+class LawPointers(NamedTuple):
+    """Addresses of a law's compiled functions; 0 where the law has none."""
+
+    step: int
+    rate: int
+    guards: int
+    switch: int
+    steady: int
+    sliding: int
+    holding: int
+
+
+_laws: dict[int, tuple[Law, LawPointers]] = {}
+
+
+def compiled_law(law: Law) -> LawPointers:
+    """Compile a law, or fetch it from the cache.
+
+    Raises
+    ------
+    LawError
+        If a function of the law is outside the scalar subset.
+    """
+    if id(law) not in _laws:
+        entries: dict[str, Callable[..., Any]] = {
+            name: function
+            for name in ("step", "rate", "guards", "switch", "steady", "holding")
+            if (function := getattr(law, name)) is not None
+        }
+        for choice in law.choices:
+            if choice.replaces == "sliding":
+                entries["sliding"] = law.option(choice).function
+        addresses = _compile(law.name, entries, law_layouts(law))
+        _laws[id(law)] = (law, LawPointers(*(addresses.get(name, 0) for name in LawPointers._fields)))
+    return _laws[id(law)][1]
+
+
+@functools.cache
+def compiled_profile(name: str, function: Callable[..., Any], layout: Layout) -> int:
+    """Compile a reference's ``profile(t, p, out)``; returns its address."""
+    motion = Layout(("position", "velocity", "acceleration"))
+    return _compile(name, {"profile": function}, {"p": layout, "out": motion})["profile"]
+
+
+def _compile(
+    name: str, entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout]
+) -> dict[str, int]:
+    """Translate, write to a file named after its content, compile; returns name to address."""
+    functions = lower({f"_{entry}_": function for entry, function in entries.items()}, layouts)
+    lines = ["import math", "from stickslip.jit import compile_entry, compile_inner", ""]
+    for function in functions.values():
+        lines += ["@compile_inner", ast.unparse(function), ""]
+    for entry in entries:
+        arguments = ", ".join(a.arg for a in functions[f"_{entry}_"].args.args)
+        lines += [f"@compile_entry({entry!r})", f"def {entry}({arguments}):", f"    return _{entry}_({arguments})", ""]
+    text = "\n".join(lines)
+    module = _loaded(f"{name.replace('-', '_')}_{hashlib.sha256(text.encode()).hexdigest()[:16]}", text)
+    return {entry: int(getattr(module, entry).address) for entry in entries}
+
+
+def _loaded(name: str, text: str) -> Any:
+    path = cache_folder() / f"{name}.py"
+    if not path.exists():
+        # Written aside and renamed, so that a second process never reads half a file.
+        draft = path.with_suffix(f".{os.getpid()}.tmp")
+        draft.write_text(text)
+        os.replace(draft, path)
+    spec = importlib.util.spec_from_file_location(f"stickslip._compiled.{name}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def compile_inner(function: Any) -> Any:
+    """Decorator of generated files: a function that entries call."""
+    return numba.njit(function, error_model="numpy")
+
+
+def compile_entry(name: str) -> Callable[[Any], Any]:
+    """Decorator of generated files: a function with a C signature and an address."""
+
+    def decorate(function: Any) -> Any:
+        return _cached(lambda: numba.cfunc(SIGNATURES[name], cache=True, error_model="numpy")(function))
+
+    return decorate
+
+
+def flat(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Return a contiguous array with at least one element, so that its address exists."""
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    return array if array.size else np.zeros(1)

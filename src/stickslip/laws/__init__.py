@@ -1,0 +1,6 @@
+"""What friction is: one file a law. `LAWS` names them; `stickslip.plugins.law` looks them up.
+
+To add a law, write its file and add its name to this tuple.
+"""
+
+LAWS = ("coulomb", "stribeck", "lugre", "gms")

@@ -1,0 +1,27 @@
+"""The one rule from stick to slip, in its two readings.
+
+An element that sticks slips once its load reaches its share of s(v). The thesis writes |F_i| > alpha_i s(v)
+(after eq. 2.17); taken literally, an element still loaded against the motion slips the wrong way after a
+reversal and feeds energy in. The signed reading counts only the load that resists the motion, and is passive.
+"""
+
+from __future__ import annotations
+
+from stickslip.spec import Choice, Option
+
+__all__ = ["SLIP_RULE", "literal", "signed"]
+
+
+def signed(direction: float, force: float) -> float:
+    """Load of an element: the part of its force that resists motion in `direction` (+1 or -1), N·m."""
+    return direction * force
+
+
+def literal(direction: float, force: float) -> float:
+    """Load of an element as the thesis prints it: |F_i|, N·m, whatever the direction."""
+    return abs(force)
+
+
+SLIP_RULE = Choice(
+    "slip_rule", replaces="load_of", options={"signed": Option(signed), "literal": Option(literal)}, default="signed"
+)

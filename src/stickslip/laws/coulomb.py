@@ -1,0 +1,65 @@
+"""Coulomb with viscous friction: F = F_C sign(v) + sigma2 v.
+
+Thesis eqs. 2.1, 2.3 and 3.19 (Table 2). At rest the contact withstands F_C; called with the velocity known, as
+a compensator is, it returns 0 there, which is sign(0) of eq. 2.2.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from stickslip.spec import Elements, Law, Par
+
+__all__ = ["LAW"]
+
+
+class Params(NamedTuple):
+    """Parameters of Coulomb with viscous friction, thesis Table 2."""
+
+    fc: Annotated[float, Par("N·m", "F_C", "Coulomb torque", lower=0.0)]
+    sigma2: Annotated[float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)]
+
+
+def steady(v: float, p: Any) -> float:
+    """Torque at constant velocity, N·m; thesis eq. 3.19."""
+    if v > 0.0:
+        return p.fc + p.sigma2 * v
+    if v < 0.0:
+        return p.sigma2 * v - p.fc
+    return 0.0
+
+
+def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
+    """Torque at the end of the step, N·m: the law has no memory."""
+    return steady(v1, p)
+
+
+def rate(v: float, z: Any, p: Any, u: Any, dz: Any) -> float:
+    """Torque now, N·m."""
+    return steady(v, p)
+
+
+def holding(direction: float, z: Any, p: Any, u: Any) -> float:
+    """Largest torque withstood at rest, N·m."""
+    return p.fc
+
+
+def modes(p: Any) -> Elements:
+    """One rigid element that slips at F_C at once."""
+    inf = float("inf")
+    return Elements((inf,), (1.0,), inf, p.sigma2, p.fc, 0.0, constant_curve=True)
+
+
+LAW = Law(
+    "coulomb",
+    Params,
+    step,
+    title="Coulomb with viscous friction",
+    equation=r"F = F_C\,\mathrm{sign}(v) + \sigma_2 v",
+    source=("thesis eq. 3.19", "armstrong1994"),
+    rate=rate,
+    steady=steady,
+    holding=holding,
+    modes=modes,
+    rate_independent=False,
+)

@@ -1,0 +1,101 @@
+"""LuGre: the mean deflection z of elastic bristles.
+
+dz/dt = v - sigma0 |v| z / s(v),  F = sigma0 z + sigma1 dz/dt + sigma2 v; thesis eqs. 2.8 to 2.10 (Table 4),
+Canudas de Wit et al. 1995. Passive for sigma2 >= sigma1 (F_S - F_C)/F_C (Barabanov and Ortega 2000).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+from stickslip.laws._curve import CURVE, check_levels
+from stickslip.laws._curve import stribeck as sliding
+from stickslip.spec import Law, Par
+
+__all__ = ["LAW"]
+
+
+class Params(NamedTuple):
+    """Parameters besides the sliding curve's, thesis Table 4."""
+
+    sigma0: Annotated[float, Par("N·m/rad", "sigma_0", "bristle stiffness", positive=True)]
+    sigma1: Annotated[float, Par("N·m·s/rad", "sigma_1", "micro-viscous damping", lower=0.0, default=0.0)]
+    sigma2: Annotated[float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)]
+
+
+class State(NamedTuple):
+    """Internal state."""
+
+    z: Annotated[float, Par("rad", "z", "mean bristle deflection")]
+
+
+def rate(v: float, z: Any, p: Any, u: Any, dz: Any) -> float:
+    """Torque now, N·m; writes dz/dt, rad/s. Thesis eqs. 2.8, 2.9."""
+    dz.z = v - p.sigma0 * abs(v) / sliding(v, p) * z.z
+    return p.sigma0 * z.z + p.sigma1 * dz.z + p.sigma2 * v
+
+
+def steady(v: float, p: Any) -> float:
+    """Torque at constant velocity, N·m; thesis eq. 2.11."""
+    if v > 0.0:
+        return sliding(v, p) + p.sigma2 * v
+    if v < 0.0:
+        return p.sigma2 * v - sliding(v, p)
+    return 0.0
+
+
+def relax(v0: float, v1: float, dt: float, z: float, p: Any) -> float:
+    """Deflection after `dt` at velocities of one sign, rad: exact where v is constant.
+
+    With q = |v|/s the equation reads dz/dt = sigma0 q (z_ss - z); z_ss is taken linear in time and the
+    exponent by Simpson's rule, so that the bristle follows its steady value however large sigma0 q dt is.
+    """
+    vm = 0.5 * (v0 + v1)
+    s0 = sliding(v0, p)
+    s1 = sliding(v1, p)
+    exponent = p.sigma0 * dt / 6.0 * (abs(v0) / s0 + 4.0 * abs(vm) / sliding(vm, p) + abs(v1) / s1)
+    if vm < 0.0:
+        s0 = -s0
+        s1 = -s1
+    decay = math.exp(-exponent)
+    if exponent > 1e-4:
+        lag = (1.0 - decay) / exponent
+    else:
+        lag = 1.0 - 0.5 * exponent
+    return (s1 + (z * p.sigma0 - s0) * decay - (s1 - s0) * lag) / p.sigma0
+
+
+def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
+    """Torque at the end of the step, N·m; advances z.z. A reversal inside the step is cut at v = 0."""
+    if v0 * v1 < 0.0:
+        part = dt * v0 / (v0 - v1)
+        z.z = relax(v0, 0.0, part, z.z, p)
+        z.z = relax(0.0, v1, dt - part, z.z, p)
+    else:
+        z.z = relax(v0, v1, dt, z.z, p)
+    dz = v1 - p.sigma0 * abs(v1) / sliding(v1, p) * z.z
+    return p.sigma0 * z.z + p.sigma1 * dz + p.sigma2 * v1
+
+
+def is_passive(p: Any) -> bool:
+    """Barabanov and Ortega's condition: necessary and sufficient."""
+    return p.sigma2 >= p.sigma1 * (p.fs - p.fc) / p.fc
+
+
+LAW = Law(
+    "lugre",
+    Params,
+    step,
+    title="LuGre",
+    equation=r"\dot z = v - \sigma_0 \frac{|v|}{s(v)} z,\quad F = \sigma_0 z + \sigma_1 \dot z + \sigma_2 v",
+    source=("thesis eqs. 2.8 to 2.10", "canudas1995", "barabanov2000"),
+    State=State,
+    rate=rate,
+    steady=steady,
+    check=check_levels,
+    velocity_scale=lambda p: p.vs,
+    choices=(CURVE,),
+    passive="sigma2 >= sigma1 (fs - fc) / fc",
+    is_passive=is_passive,
+)

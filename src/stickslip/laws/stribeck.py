@@ -1,0 +1,58 @@
+"""Stribeck friction with the steep slope through zero velocity: F = k v where |k v| <= |s(v)|, else s(v).
+
+Thesis eq. 3.20 (Table 3) with the sliding curve of eq. 2.10, or any other. The slope makes the law continuous,
+so that a contact at rest creeps instead of holding: at a torque T it slides with T/k.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from stickslip.laws._curve import CURVE, check_levels
+from stickslip.laws._curve import stribeck as sliding
+from stickslip.spec import Law, Par
+
+__all__ = ["LAW"]
+
+
+class Params(NamedTuple):
+    """Parameters besides the sliding curve's, thesis Table 3."""
+
+    k: Annotated[float, Par("N·m·s/rad", "k", "steep slope through zero velocity", positive=True)]
+    sigma2: Annotated[float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)]
+
+
+def steady(v: float, p: Any) -> float:
+    """Torque at constant velocity, N·m; thesis eq. 3.20."""
+    s = sliding(v, p) + p.sigma2 * abs(v)
+    if p.k * abs(v) <= s:
+        return p.k * v
+    if v > 0.0:
+        return s
+    return -s
+
+
+def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
+    """Torque at the end of the step, N·m: the law has no memory."""
+    return steady(v1, p)
+
+
+def rate(v: float, z: Any, p: Any, u: Any, dz: Any) -> float:
+    """Torque now, N·m."""
+    return steady(v, p)
+
+
+LAW = Law(
+    "stribeck",
+    Params,
+    step,
+    title="Stribeck friction with a steep slope",
+    equation=r"F = \begin{cases} k v & |k v| \le |s(v)| \\ s(v) & \text{otherwise}\end{cases},\quad "
+    r"s(v) = \mathrm{sign}(v)\left(F_C + (F_S - F_C)e^{-|v/v_s|^{\delta_s}}\right) + \sigma_2 v",
+    source=("thesis eq. 3.20", "armstrong1994"),
+    rate=rate,
+    steady=steady,
+    check=check_levels,
+    velocity_scale=lambda p: p.vs,
+    choices=(CURVE,),
+)

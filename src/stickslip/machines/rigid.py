@@ -1,0 +1,35 @@
+"""The rigid axis: J dv/dt = T_m - T_f; thesis eq. 3.1."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from stickslip.errors import ParameterError
+from stickslip.model import Model
+
+__all__ = ["RigidAxis"]
+
+
+@dataclass(frozen=True)
+class RigidAxis:
+    """One inertia with friction.
+
+    Attributes
+    ----------
+    inertia : float
+        J, kg·m² (all that turns, seen at the motor).
+    friction : Model
+        The friction torque that opposes its motion.
+    """
+
+    inertia: float
+    friction: Model
+
+    def __post_init__(self) -> None:
+        value: Any = self.inertia
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ParameterError(f"axis: inertia = {value!r} must be a number in kg·m²")
+        if not math.isfinite(value) or value <= 0.0:
+            raise ParameterError(f"axis: inertia = {value:g} kg·m² must be greater than 0")

@@ -1,0 +1,129 @@
+"""A law with parameters, and a reference with parameters: what an axis, a compensator and a file hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from stickslip import plugins
+from stickslip.errors import ParameterError, suggestion
+from stickslip.spec import Law, ReferenceKind
+
+__all__ = ["Model", "Reference"]
+
+
+class Model:
+    """A friction law with its parameters.
+
+    Parameters
+    ----------
+    law : str or Law
+        A registered name, the path of a law's file, or a law.
+    choices : mapping, optional
+        Options of the law by name, ``{"slip_rule": "literal"}``.
+    **parameters
+        The law's parameters in SI units; a list for those with one value per element.
+
+    Raises
+    ------
+    UnknownName, ParameterError
+        One line that names the thing, its value and the remedy.
+    """
+
+    __slots__ = ("law", "parameters")
+
+    def __init__(self, law: str | Law, choices: Mapping[str, str] | None = None, **parameters: Any) -> None:
+        found = plugins.law(law) if isinstance(law, str) else law
+        self.law: Law = found.having(**choices) if choices else found
+        self.parameters: Any = self.law.parameters(parameters)
+
+    def having(self, **choices: str) -> Model:
+        """This model under other options of its law; options that the law does not have are left out."""
+        known = {c.name for c in self.law.choices}
+        wanted = {name: option for name, option in choices.items() if name in known}
+        same = all(self.law.chosen.get(n, _default(self.law, n)) == o for n, o in wanted.items())
+        return self if same else Model(self.law, wanted, **self.parameters._asdict())
+
+    def scaled(self, **factors: float) -> Model:
+        """This model with some parameters multiplied, ``model.scaled(fs=1.1, fc=1.1)``.
+
+        Raises
+        ------
+        ParameterError
+            If the law has no such parameter, or the result is out of bounds.
+        """
+        values = self.parameters._asdict()
+        for name, factor in factors.items():
+            if name not in values:
+                raise ParameterError(f"{self.law.name}: no parameter {name!r}; {suggestion(name, values)}")
+            value = values[name]
+            values[name] = tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
+        return Model(self.law, **values)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Law, choices and parameters as plain data."""
+        parameters = {k: list(v) if isinstance(v, tuple) else v for k, v in self.parameters._asdict().items()}
+        return {"law": self.law.name, **dict(self.law.chosen), **parameters}
+
+    def __repr__(self) -> str:
+        inside = ", ".join(f"{k}={v!r}" for k, v in self.parameters._asdict().items())
+        return f"Model({self.law.name!r}, {inside})"
+
+
+def _default(law: Law, choice: str) -> str:
+    return next(c.default for c in law.choices if c.name == choice)
+
+
+class Reference:
+    """A reference motion: a kind with its parameters.
+
+    Parameters
+    ----------
+    kind : str
+        A registered kind: sine, harmonic, step, ramp, staircase, scurve, table.
+    **parameters
+        The kind's parameters in SI units.
+    """
+
+    __slots__ = ("kind", "parameters")
+
+    def __init__(self, kind: str | ReferenceKind, **parameters: Any) -> None:
+        self.kind: ReferenceKind = plugins.reference_kind(kind) if isinstance(kind, str) else kind
+        self.parameters: Any = self.kind.parameters(parameters)
+
+    @classmethod
+    def table(
+        cls, time: Sequence[float], position: Sequence[float], velocity: Sequence[float] | None = None
+    ) -> Reference:
+        """A reference through points (s, rad); velocities (rad/s) of a cubic spline where none are given."""
+        if velocity is None:
+            from stickslip.references.table import with_velocities
+
+            velocity = with_velocities(time, position)
+        return cls("table", **{k: [float(x) for x in v] for k, v in
+                               (("time", time), ("position", position), ("velocity", velocity))})  # fmt: skip
+
+    def breaks(self, duration: float) -> list[float]:
+        """Times inside (0, duration) that integrators step onto, s."""
+        return sorted(t for t in self.kind.breaks(self.parameters, duration) if 0.0 < t < duration)
+
+    def sample(self, time: Sequence[float] | np.ndarray[Any, Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Position (rad), velocity (rad/s) and acceleration (rad/s²) at the times, shape (n, 3)."""
+        from types import SimpleNamespace
+
+        out, rows = SimpleNamespace(position=0.0, velocity=0.0, acceleration=0.0), []
+        for t in time:
+            self.kind.profile(float(t), self.parameters, out)
+            rows.append((out.position, out.velocity, out.acceleration))
+        return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Kind and parameters as plain data."""
+        parameters = {k: list(v) if isinstance(v, tuple) else v for k, v in self.parameters._asdict().items()}
+        return {"kind": self.kind.name, **parameters}
+
+    def __repr__(self) -> str:
+        inside = ", ".join(f"{k}={v!r}" for k, v in self.parameters._asdict().items())
+        return f"Reference({self.kind.name!r}, {inside})"

@@ -1,0 +1,99 @@
+"""The one container for simulated and measured runs."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from stickslip.errors import InputError, suggestion
+
+if TYPE_CHECKING:
+    import pandas
+
+__all__ = ["Record"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Channels over time, with their units and where they come from.
+
+    Attributes
+    ----------
+    time : array, shape (n,)
+        s, ascending; a time may occur twice where a signal jumps.
+    channels : mapping of str to array, shape (n,)
+    units : mapping of str to str
+        The unit of every channel.
+    meta : mapping
+        What was run or measured, when, with which machine, versions and seed; metrics and energies of a
+        simulation. Plain data: it is saved as JSON.
+    """
+
+    time: Array
+    channels: Mapping[str, Array]
+    units: Mapping[str, str]
+    meta: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    def __post_init__(self) -> None:
+        for name, values in self.channels.items():
+            if values.shape != self.time.shape:
+                raise InputError(f"channel {name!r} has shape {values.shape}, time has {self.time.shape}")
+            if name not in self.units:
+                raise InputError(f"channel {name!r} has no unit; add it to `units`")
+
+    def __getitem__(self, name: str) -> Array:
+        if name == "time":
+            return self.time
+        try:
+            return self.channels[name]
+        except KeyError:
+            raise InputError(f"no channel {name!r}; {suggestion(name, self.channels)}") from None
+
+    def __len__(self) -> int:
+        return int(self.time.size)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the record as .npz: arrays, and units and meta as JSON (no pickle). Returns the path."""
+        target = Path(path)
+        header = json.dumps({"units": dict(self.units), "meta": dict(self.meta)})
+        draft = target.with_name(target.name + ".part")
+        with draft.open("wb") as file:
+            arrays: dict[str, Any] = {"time": self.time, **self.channels}
+            np.savez(file, __header__=np.array(header), **arrays)
+        os.replace(draft, target)
+        return target
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Record:
+        """Read a record that `save` wrote.
+
+        Raises
+        ------
+        InputError
+            If there is no such file, or it is not a record.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                header = json.loads(str(data["__header__"]))
+                channels = {k: data[k] for k in data.files if k not in ("time", "__header__")}
+                return cls(data["time"], channels, header["units"], header["meta"])
+        except FileNotFoundError:
+            raise InputError(f"no record at {path}; check the path") from None
+        except (ValueError, KeyError, OSError) as error:
+            raise InputError(f"{path} is not a record of this package ({error})") from None
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The channels as a data frame indexed by time (needs pandas: `pip install stickslip[pandas]`)."""
+        import pandas
+
+        frame = pandas.DataFrame(dict(self.channels), index=pandas.Index(self.time, name="time"))
+        frame.attrs.update(units=dict(self.units), meta=dict(self.meta))
+        return frame

@@ -1,0 +1,1 @@
+"""How axis, controller and reference run together."""

@@ -1,0 +1,195 @@
+"""A closed loop laid out in flat arrays: what every kernel of the engine reads.
+
+Kernels share the columns of the rows they write, the codes they end with, and the entries of `Case.numbers`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.control.controller import Controller
+from stickslip.jit import LawPointers, compiled_law, compiled_profile, flat
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model, Reference
+from stickslip.subset import Layout
+
+__all__ = ["COLUMNS", "UNITS", "Case", "Outcome", "Side", "lay_out"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+# ---- rows: what a kernel writes at every output time and event ---------------------------------------------------
+COLUMNS = (
+    "time", "position_reference", "velocity_reference", "position", "velocity", "motor_torque", "friction_torque",
+    "compensation_torque", "event",
+)  # fmt: skip
+UNITS = {
+    "position_reference": "rad", "velocity_reference": "rad/s", "position": "rad", "velocity": "rad/s",
+    "motor_torque": "N·m", "friction_torque": "N·m", "compensation_torque": "N·m", "event": "-",
+}  # fmt: skip
+
+# ---- how a kernel ended ------------------------------------------------------------------------------------------
+DONE, DIVERGED, NOT_FINITE, STORM, NO_STEP, ROWS_FULL = range(6)
+
+# ---- entries of Case.numbers -------------------------------------------------------------------------------------
+(
+    INERTIA, KP, KI, KD, KR, TORQUE_LIMIT, DURATION, TOLERANCE, SOURCE, GAIN, FILTER, POSITION_0, VELOCITY_0,
+    PLANT_SCALE, COMPENSATOR_SCALE, STIFFNESS, MAX_STEP, POSITION_LIMIT, VELOCITY_LIMIT, METERED, SAMPLE_TIME,
+    ENCODER, NUMBERS,
+) = range(23)  # fmt: skip
+NO_COMPENSATOR, FROM_REFERENCE, FROM_MEASUREMENT = 0.0, 1.0, 2.0
+
+STORM_EVENTS, STORM_TIME = 4000, 5e-3
+"""More switches than this within this time (s) end a run."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """A law in the loop, as plant or as compensator: its functions' addresses, parameters and state at rest."""
+
+    model: Model | None
+    pointers: LawPointers
+    parameters: Array
+    state: Array
+    modes: np.ndarray[Any, np.dtype[np.bool_]]
+    velocity_scale: float
+
+    @property
+    def addresses(self) -> np.ndarray[Any, np.dtype[np.int64]]:
+        """step, rate, guards, switch, steady, sliding, holding; 0 where the law has none."""
+        return np.array(self.pointers, dtype=np.int64)
+
+    @staticmethod
+    def of(model: Model | None) -> Side:
+        """Lay out a model; None gives an empty side."""
+        if model is None:
+            return Side(None, LawPointers(*[0] * 7), np.zeros(1), np.zeros(0), np.zeros(0, np.bool_), 0.0)
+        law, p = model.law, model.parameters
+        scale = law.velocity_scale(p) if law.velocity_scale else 0.0
+        return Side(
+            model,
+            compiled_law(law),
+            flat(law.pack(p)),
+            np.array(law.pack_state(law.state(p)), dtype=np.float64),
+            np.array(law.mode_mask(p), dtype=np.bool_),
+            scale,
+        )
+
+
+@dataclass(frozen=True)
+class Case:
+    """A closed loop in flat arrays.
+
+    Attributes
+    ----------
+    numbers : array
+        Scalars, by the index names of this module.
+    plant, compensator : Side
+    profile : int
+        Address of the reference's profile; ``reference_parameters`` are its parameters.
+    breaks : array
+        Ascending times that kernels step onto: kinks and zeros of the reference, half and 80 % of the run, its
+        end (last).
+    grid : array
+        Times at which rows are wanted.
+    """
+
+    axis: RigidAxis
+    controller: Controller
+    reference: Reference
+    numbers: Array
+    plant: Side
+    compensator: Side
+    profile: int
+    reference_parameters: Array
+    breaks: Array
+    grid: Array
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What an integrator returns.
+
+    Attributes
+    ----------
+    rows : array, shape (n, len(COLUMNS))
+        Ascending in time: the grid, and the events (``event`` = 1; at a jump of the torque, the row before it
+        and the row after it at the same time). Nothing after `time`.
+    code : int
+        DONE, or why the run ended early.
+    time : float
+        When it ended, s.
+    meter, turns : array
+        `stickslip.simulate._meter`'s accumulator and turning points; untouched where the case is not metered.
+    counts : mapping
+        steps, rejected, events.
+    """
+
+    rows: Array
+    code: int
+    time: float
+    meter: Array
+    turns: Array
+    counts: dict[str, int]
+
+
+def contact_stiffness(model: Model) -> float:
+    """Slope of the torque over a displacement of 1e-9 rad from rest, N·m/rad; at least 1."""
+    z = model.law.state(model.parameters)
+    from stickslip.spec import Surroundings
+
+    torque = model.law.step(1e-9, 1e-9, 1.0, z, model.parameters, Surroundings())
+    return max(1.0, abs(torque) / 1e-9) if model.law.state_fields else 1.0
+
+
+def lay_out(
+    axis: RigidAxis,
+    controller: Controller,
+    reference: Reference,
+    duration: float,
+    *,
+    tolerance: float,
+    grid: Array,
+    slip_rule: str = "signed",
+    initial: tuple[float, float] = (0.0, 0.0),
+    metered: bool = True,
+    max_step: float = math.inf,
+    limits: tuple[float, float] = (1e6, 1e6),
+) -> Case:
+    """Lay a closed loop out in flat arrays (compiles its laws and reference if they are not cached)."""
+    helper = controller.compensator
+    plant = Side.of(axis.friction.having(slip_rule=slip_rule))
+    assist = Side.of(helper.model.having(slip_rule=slip_rule) if helper else None)
+    numbers = np.zeros(NUMBERS)
+    numbers[INERTIA] = axis.inertia
+    gains = controller.gains
+    numbers[[KP, KI, KD, KR]] = gains.kp, gains.ki, gains.kd, gains.kr
+    numbers[TORQUE_LIMIT] = controller.torque_limit
+    numbers[DURATION], numbers[TOLERANCE], numbers[MAX_STEP] = duration, tolerance, max_step
+    if helper:
+        numbers[SOURCE] = FROM_REFERENCE if helper.velocity == "reference" else FROM_MEASUREMENT
+        numbers[GAIN] = helper.gain
+        numbers[FILTER] = 2.0 * math.pi * helper.filter_hz if helper.filter_hz else 0.0
+    numbers[POSITION_0], numbers[VELOCITY_0] = initial
+    numbers[PLANT_SCALE], numbers[COMPENSATOR_SCALE] = plant.velocity_scale, assist.velocity_scale
+    numbers[STIFFNESS] = contact_stiffness(axis.friction)
+    numbers[POSITION_LIMIT], numbers[VELOCITY_LIMIT] = limits
+    numbers[METERED] = 1.0 if metered else 0.0
+    numbers[SAMPLE_TIME], numbers[ENCODER] = controller.sample_time, controller.encoder_counts
+    kind = reference.kind
+    breaks = sorted({*reference.breaks(duration), 0.5 * duration, 0.8 * duration})
+    return Case(
+        axis,
+        controller,
+        reference,
+        numbers,
+        plant,
+        assist,
+        compiled_profile(kind.name, kind.profile, Layout.of(kind.fields, counted=True)),
+        flat(kind.pack(reference.parameters)),
+        np.array([*breaks, duration]),
+        grid,
+    )

@@ -1,0 +1,234 @@
+"""Metrics, accumulated inside the integrators while a run goes on.
+
+An integrator hands every stretch of time (at most 2 ms long, inside one half of the run and not across 80 % of
+it) to `meter`, with five equally spaced nodes of each signal. Integrals are taken by Boole's rule (order 6),
+extremes of the error from its slope, the 50 Hz high-pass exactly for the interpolated velocity.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from stickslip.jit import kernel
+
+# Thresholds, all stated by the study (issue and reference README).
+HIGH_PASS = 2.0 * math.pi * 50.0  # rad/s
+TRIGGER = 1e-3  # rad/s, Schmitt trigger of the reversals, and standstill
+MOVING = 2e-3  # rad/s, the reference moves
+STANDSTILL = 10e-3  # s, shortest standstill that counts
+MAX_WINDOW = 2e-3  # s
+
+# ---- layout of the accumulator --------------------------------------------------------------------------------
+(
+    DURATION, SETTLE_BAND, E2, E_MAX, EV2, TM2, TM_MAX, DF2, HP2, V_MAX, REVERSALS, SS_E, E_END,
+    W2_E2, W2_E_MAX, W2_E_LOW, W2_E_HIGH, W2_EV2, W2_TM2, W2_HP2, W2_REVERSALS,
+    LOW_PASS, SIDE, STILL_SINCE, STILL_COUNT, STILL_LONGEST, OUTSIDE_LAST, WORK, LOSS, COMPENSATION_WORK,
+    REFERENCE_SIDE, REFERENCE_REVERSALS, TURN_TIME, TURN_POSITION, TURN_COUNT, SIZE,
+) = range(36)  # fmt: skip
+
+
+def new_meter(duration: float, settle_band: float) -> Any:
+    """Return an empty accumulator for a run of `duration` s; `settle_band` in rad, 0 for none."""
+    acc = np.zeros(SIZE)
+    acc[DURATION] = duration
+    acc[SETTLE_BAND] = settle_band
+    acc[STILL_SINCE] = -1.0
+    acc[W2_E_LOW] = math.inf
+    acc[W2_E_HIGH] = -math.inf
+    return acc
+
+
+@kernel(exact=False)
+def boole(y: Any, h: float) -> float:
+    """Integral over h of a signal at five nodes."""
+    return h / 90.0 * (7.0 * (y[0] + y[4]) + 32.0 * (y[1] + y[3]) + 12.0 * y[2])
+
+
+@kernel(exact=False)
+def meter(
+    acc: Any, turns: Any, t: float, h: float, e: Any, ev: Any, x: Any, v: Any, vd: Any, tm: Any, tf: Any, th: Any
+) -> None:
+    """Add the stretch [t, t + h] to the accumulator.
+
+    Arrays of five nodes: position error, velocity error, position, velocity, reference velocity, motor torque,
+    friction torque, compensating torque. ``turns`` (n, 2) receives time and position of every reversal, as
+    long as it has room.
+    """
+    second = t >= 0.5 * acc[DURATION] * (1.0 - 1e-12)
+    e2 = 0.0
+    ev2 = 0.0
+    tm2 = 0.0
+    df2 = 0.0
+    mean = 0.0
+    work = 0.0
+    loss = 0.0
+    helped = 0.0
+    for i in range(5):
+        w = 7.0 if i == 0 or i == 4 else (12.0 if i == 2 else 32.0)
+        e2 += w * e[i] * e[i]
+        ev2 += w * ev[i] * ev[i]
+        tm2 += w * tm[i] * tm[i]
+        df2 += w * (tf[i] - th[i]) * (tf[i] - th[i])
+        mean += w * e[i]
+        work += w * tm[i] * v[i]
+        loss += w * tf[i] * v[i]
+        helped += w * th[i] * v[i]
+        acc[TM_MAX] = max(acc[TM_MAX], abs(tm[i]))
+    scale = h / 90.0
+    acc[E2] += scale * e2
+    acc[EV2] += scale * ev2
+    acc[TM2] += scale * tm2
+    acc[DF2] += scale * df2
+    acc[WORK] += scale * work
+    acc[LOSS] += scale * loss
+    acc[COMPENSATION_WORK] += scale * helped
+    if t >= 0.8 * acc[DURATION] * (1.0 - 1e-12):
+        acc[SS_E] += scale * mean
+    acc[E_END] = e[4]
+    low, high = extremes(e, ev, 0.25 * h)
+    acc[E_MAX] = max(acc[E_MAX], -low, high)
+    acc[V_MAX] = max(acc[V_MAX], peak(v))
+    high_pass(acc, h, v, second)
+    if second:
+        acc[W2_E2] += scale * e2
+        acc[W2_EV2] += scale * ev2
+        acc[W2_TM2] += scale * tm2
+        acc[W2_E_MAX] = max(acc[W2_E_MAX], -low, high)
+        acc[W2_E_LOW] = min(acc[W2_E_LOW], low)
+        acc[W2_E_HIGH] = max(acc[W2_E_HIGH], high)
+    reversals(acc, turns, t, h, x, v, vd, second)
+    standstill(acc, t, h, v, vd)
+    band = acc[SETTLE_BAND]
+    if band > 0.0:
+        for i in range(5):
+            if abs(e[i]) > band:
+                acc[OUTSIDE_LAST] = t + 0.25 * h * i
+                if i < 4 and abs(e[i + 1]) <= band:
+                    acc[OUTSIDE_LAST] += 0.25 * h * (abs(e[i]) - band) / (abs(e[i]) - abs(e[i + 1]))
+
+
+@kernel(exact=False)
+def extremes(e: Any, ev: Any, d: float) -> tuple[float, float]:
+    """Smallest and largest error over the nodes, spaced d apart, and between them where its slope changes sign."""
+    low = e[0]
+    high = e[0]
+    for i in range(1, 5):
+        low = min(low, e[i])
+        high = max(high, e[i])
+        if ev[i - 1] * ev[i] < 0.0:
+            x = ev[i - 1] / (ev[i - 1] - ev[i])
+            y = 1.0 - x
+            between = (
+                y * y * (1.0 + 2.0 * x) * e[i - 1]
+                + x * x * (3.0 - 2.0 * x) * e[i]
+                + x * y * d * (y * ev[i - 1] - x * ev[i])
+            )
+            low = min(low, between)
+            high = max(high, between)
+    return low, high
+
+
+@kernel(exact=False)
+def peak(v: Any) -> float:
+    """Largest |v|, by parabolas through three nodes."""
+    top = max(abs(v[0]), abs(v[4]))
+    for i in range(1, 4):
+        m = abs(v[i])
+        top = max(top, m)
+        a, b = abs(v[i - 1]), abs(v[i + 1])
+        if m >= a and m >= b and 2.0 * m - a - b > 0.0:
+            top = max(top, m + (b - a) * (b - a) / (8.0 * (2.0 * m - a - b)))
+    return top
+
+
+@kernel(exact=False)
+def high_pass(acc: Any, h: float, v: Any, second: bool) -> None:
+    """Advance the 50 Hz low-pass y' = w (v - y) and add the integral of (v - y)²."""
+    # v as a quartic in s = 0..4 through the five nodes (Newton's forward differences), then y's particular
+    # polynomial p with p' + w p = w v, and its decaying part.
+    d1 = v[1] - v[0]
+    d2 = v[2] - 2.0 * v[1] + v[0]
+    d3 = v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]
+    d4 = v[4] - 4.0 * v[3] + 6.0 * v[2] - 4.0 * v[1] + v[0]
+    c4 = d4 / 24.0
+    c3 = d3 / 6.0 - d4 / 4.0
+    c2 = d2 / 2.0 - d3 / 2.0 + 11.0 * d4 / 24.0
+    c1 = d1 - d2 / 2.0 + d3 / 3.0 - d4 / 4.0
+    u = 4.0 / (HIGH_PASS * h)
+    p4 = c4
+    p3 = c3 - 4.0 * u * p4
+    p2 = c2 - 3.0 * u * p3
+    p1 = c1 - 2.0 * u * p2
+    p0 = v[0] - u * p1
+    decay = math.exp(-0.25 * HIGH_PASS * h)
+    rest = acc[LOW_PASS] - p0
+    total = 0.0
+    y = acc[LOW_PASS]
+    for i in range(5):
+        if i > 0:
+            rest *= decay
+            y = p0 + i * (p1 + i * (p2 + i * (p3 + i * p4))) + rest
+        w = 7.0 if i == 0 or i == 4 else (12.0 if i == 2 else 32.0)
+        total += w * (v[i] - y) * (v[i] - y)
+    acc[LOW_PASS] = y
+    acc[HP2] += h / 90.0 * total
+    if second:
+        acc[W2_HP2] += h / 90.0 * total
+
+
+@kernel(exact=False)
+def reversals(acc: Any, turns: Any, t: float, h: float, x: Any, v: Any, vd: Any, second: bool) -> None:
+    """Count sign reversals of v and of the reference with a Schmitt trigger; keep the turning points."""
+    for i in range(1, 5):
+        # The last zero of v is the turning point, if the trigger then confirms a reversal.
+        if v[i - 1] * v[i] <= 0.0 and v[i - 1] != v[i]:
+            f = v[i - 1] / (v[i - 1] - v[i])
+            acc[TURN_TIME] = t + 0.25 * h * (i - 1 + f)
+            acc[TURN_POSITION] = x[i - 1] + f * (x[i] - x[i - 1])
+        side = 0.0
+        if v[i] > TRIGGER:
+            side = 1.0
+        elif v[i] < -TRIGGER:
+            side = -1.0
+        if side != 0.0:
+            if side * acc[SIDE] < 0.0:
+                acc[REVERSALS] += 1.0
+                if second:
+                    acc[W2_REVERSALS] += 1.0
+                n = int(acc[TURN_COUNT])
+                if n < turns.shape[0]:
+                    turns[n, 0] = acc[TURN_TIME]
+                    turns[n, 1] = acc[TURN_POSITION]
+                    acc[TURN_COUNT] += 1.0
+            acc[SIDE] = side
+        if abs(vd[i]) > TRIGGER:
+            side = 1.0 if vd[i] > 0.0 else -1.0
+            if side * acc[REFERENCE_SIDE] < 0.0:
+                acc[REFERENCE_REVERSALS] += 1.0
+            acc[REFERENCE_SIDE] = side
+
+
+@kernel(exact=False)
+def standstill(acc: Any, t: float, h: float, v: Any, vd: Any) -> None:
+    """Find standstills: |v| below the trigger for at least 10 ms while the reference moves."""
+    for i in range(5):
+        still = abs(v[i]) < TRIGGER and abs(vd[i]) > MOVING
+        now = t + 0.25 * h * i
+        if still and acc[STILL_SINCE] < 0.0:
+            acc[STILL_SINCE] = now
+        elif not still and acc[STILL_SINCE] >= 0.0:
+            close_standstill(acc, now)
+
+
+@kernel(exact=False)
+def close_standstill(acc: Any, now: float) -> None:
+    """End a standstill, counting it if it was long enough; integrators call it at the end of a run too."""
+    if acc[STILL_SINCE] >= 0.0:
+        length = now - acc[STILL_SINCE]
+        if length >= STANDSTILL:
+            acc[STILL_COUNT] += 1.0
+            acc[STILL_LONGEST] = max(acc[STILL_LONGEST], length)
+        acc[STILL_SINCE] = -1.0

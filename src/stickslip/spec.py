@@ -1,0 +1,393 @@
+"""The one description of a law: its parameters, its state and its functions.
+
+Everything that reads a law (the engines, the command line, the documentation, identification, export) reads
+this description, so that a law is written once, in one file.
+
+Argument order, everywhere: velocity, time step, state ``z``, parameters ``p``, surroundings ``u``.
+
+=====================================  =============================================================
+``step(v0, v1, dt, z, p, u)``          torque at the end of a step; advances ``z`` in place. The velocity
+                                       runs from ``v0`` to ``v1`` (linearly). Stable for any ``dt``
+``rate(v, z, p, u, dz)``               torque now; writes the time derivative of every state but the modes
+``guards(v, z, p, u, g)``              writes one value per mode; a mode is left when its value rises to zero
+``switch(v, z, p, u, g)``              changes the modes whose value in ``g`` is not negative
+``steady(v, p)``                       torque at constant velocity; 0 at rest unless declared otherwise
+``holding(direction, z, p, u)``        the largest torque a contact at rest withstands in that direction
+                                       (laws whose torque jumps at zero velocity)
+``check(p)``                           a sentence that says what is wrong with the parameters, or ""
+``modes(p)``                           the law as elements that stick as springs and slip along one curve
+                                       (what the exact integrator runs on)
+=====================================  =============================================================
+
+All but the last two are written in the scalar subset (see `stickslip.subset`): they run as plain Python, are
+compiled by numba and exported to C, from the same lines. Friction torque is positive when it opposes positive
+velocity, as in J dv/dt = T_m - T_f (thesis eq. 3.1).
+"""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
+
+from stickslip.errors import ParameterError, UnknownName, suggestion
+
+__all__ = ["Choice", "Described", "Elements", "Field", "Law", "Mode", "Option", "Par", "ReferenceKind", "Surroundings"]
+
+
+@dataclass(frozen=True, slots=True)
+class Par:
+    """What a number means: its unit, symbol, meaning and bounds.
+
+    ``positive`` makes the lower bound 0, excluded. A parameter without ``default`` must be given.
+    """
+
+    unit: str
+    symbol: str
+    meaning: str
+    lower: float = -math.inf
+    upper: float = math.inf
+    positive: bool = False
+    default: float | None = None
+
+    def complaint(self, value: float) -> str:
+        """Say what is wrong with `value`, or return the empty string."""
+        if not math.isfinite(value):
+            return "must be a finite number"
+        if self.positive and value <= 0.0:
+            return "must be greater than 0"
+        if value < self.lower:
+            return f"must be at least {self.lower:g}"
+        if value > self.upper:
+            return f"must be at most {self.upper:g}"
+        return ""
+
+    @property
+    def bounds(self) -> str:
+        """The bounds as an interval, for people."""
+        low = "(0" if self.positive else (f"[{self.lower:g}" if self.lower > -math.inf else "(-inf")
+        high = f"{self.upper:g}]" if self.upper < math.inf else "inf)"
+        return f"{low}, {high}"
+
+
+class Mode(Par):
+    """A state that only switches: 0 sticks, +1 or -1 slips in that direction."""
+
+
+class Surroundings(NamedTuple):
+    """What a contact depends on besides its velocity (2.1.5 to 2.1.7 of the thesis)."""
+
+    position: float = 0.0
+    """rad (or m)"""
+    load: float = 1.0
+    """normal load over the load at which the parameters hold"""
+    temperature: float = 20.0
+    """degrees Celsius"""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One parameter or state: its name in code, what it means, and whether each element has its own."""
+
+    name: str
+    par: Par
+    per_element: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """One way to fill a `Choice`: a function in the scalar subset and the parameters it brings along."""
+
+    function: Callable[..., float]
+    params: type | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A part of a law that can be exchanged by name: its sliding curve, its rule from stick to slip.
+
+    ``replaces`` is the name by which the law's functions call it.
+    """
+
+    name: str
+    replaces: str
+    options: Mapping[str, Option]
+    default: str
+
+
+@dataclass(frozen=True, slots=True)
+class Elements:
+    """A law as parallel elements: springs while they stick, one common curve s(v) while they slip.
+
+    Element i sticks with dF_i/dt = k_i v up to share_i s(v), and slips with
+    dF_i/dt = attraction (share_i sign(v) - F_i / s(v)); thesis eqs. 2.16 to 2.18.
+
+    ``stiffness`` may be infinite (the element holds rigidly: Coulomb, Stribeck), and ``attraction`` may be
+    infinite (the slipping force is share_i s(v) at once: Maxwell-slip). ``curve`` tells whether s depends on
+    the velocity; where it does not, ``breakaway`` is its value.
+    """
+
+    stiffness: tuple[float, ...]
+    share: tuple[float, ...]
+    attraction: float
+    viscous: float
+    breakaway: float
+    velocity_scale: float
+    constant_curve: bool = False
+
+
+def fields_of(description: type | None) -> tuple[Field, ...]:
+    """Read the annotations of a ``Params`` or ``State`` class."""
+    if description is None:
+        return ()
+    out: list[Field] = []
+    for name, hint in get_type_hints(description, include_extras=True).items():
+        if get_origin(hint) is not Annotated:
+            raise TypeError(f"{description.__name__}.{name} needs Annotated[float, Par(...)]")
+        kind, par = get_args(hint)[:2]
+        out.append(Field(name, par, get_origin(kind) is tuple))
+    return tuple(out)
+
+
+class Described:
+    """Something with a name and described parameters: a law, a reference."""
+
+    name: str
+    fields: tuple[Field, ...]
+    Parameters: Any
+    check: Callable[[Any], str] | None
+
+    @property
+    def has_elements(self) -> bool:
+        """Whether some parameters have a value per element."""
+        return any(f.per_element for f in self.fields)
+
+    def parameters(self, values: Mapping[str, Any]) -> Any:
+        """Check `values` and return them as this law's NamedTuple.
+
+        Raises
+        ------
+        ParameterError
+            One line that names the parameter, its value and the bound.
+        """
+        names = [f.name for f in self.fields]
+        for name in values:
+            if name not in names:
+                raise ParameterError(f"{self.name}: no parameter {name!r}; {suggestion(name, names)}")
+        checked = {f.name: self._checked(f, values.get(f.name, f.par.default)) for f in self.fields}
+        sizes = {f.name: len(checked[f.name]) for f in self.fields if f.per_element}
+        if len(set(sizes.values())) > 1:
+            listing = ", ".join(f"{name} has {size}" for name, size in sizes.items())
+            raise ParameterError(f"{self.name}: every element needs a value of each: {listing}")
+        p = self.Parameters(**checked)
+        complaint = self.check(p) if self.check else ""
+        if complaint:
+            raise ParameterError(f"{self.name}: {complaint}")
+        return p
+
+    def _checked(self, f: Field, value: Any) -> Any:
+        if value is None:
+            raise ParameterError(f"{self.name}: parameter {f.name!r} ({f.par.meaning}, {f.par.unit}) is missing")
+        if f.per_element:
+            if isinstance(value, str) or not isinstance(value, Sequence):
+                raise ParameterError(f"{self.name}: {f.name} = {value!r} must be a list, one number per element")
+            if not value:
+                raise ParameterError(f"{self.name}: {f.name} is empty; give at least one element")
+            return tuple(self._number(f, v, f"{f.name}[{i}]") for i, v in enumerate(value))
+        return self._number(f, value, f.name)
+
+    def _number(self, f: Field, value: Any, label: str) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ParameterError(f"{self.name}: {label} = {value!r} must be a number in {f.par.unit}")
+        complaint = f.par.complaint(float(value))
+        if complaint:
+            raise ParameterError(f"{self.name}: {label} = {value:g} {f.par.unit} {complaint}")
+        return float(value)
+
+    def elements_in(self, p: Any) -> int:
+        """The number of elements in `p` (0 for a law without)."""
+        return next((len(getattr(p, f.name)) for f in self.fields if f.per_element), 0)
+
+    def pack(self, p: Any) -> list[float]:
+        """Return `p` as the flat list that compiled functions read.
+
+        Scalars in order, then (where there are elements) their number, then one block per field.
+        """
+        flat = [getattr(p, f.name) for f in self.fields if not f.per_element]
+        if self.has_elements:
+            flat.append(float(self.elements_in(p)))
+            for f in self.fields:
+                if f.per_element:
+                    flat.extend(getattr(p, f.name))
+        return flat
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceKind(Described):
+    """A kind of reference motion.
+
+    Attributes
+    ----------
+    profile : callable
+        ``profile(t, p, out)`` writes ``out.position``, ``out.velocity`` and ``out.acceleration`` at time t,
+        in the scalar subset.
+    breaks : callable
+        ``breaks(p, duration)``: times inside (0, duration) where the motion is not smooth or its velocity
+        passes through zero; integrators step onto them.
+    """
+
+    name: str
+    Params: type
+    profile: Callable[..., None]
+    breaks: Callable[[Any, float], Sequence[float]]
+    title: str
+    equation: str
+    check: Callable[[Any], str] | None = None
+    fields: tuple[Field, ...] = field(init=False)
+    Parameters: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "fields", fields_of(self.Params))
+        object.__setattr__(self, "Parameters", self.Params)
+
+
+def rescoped(function: types.FunctionType, scope: dict[str, Any]) -> types.FunctionType:
+    """Return `function` with other globals."""
+    copy = types.FunctionType(
+        function.__code__, scope, function.__name__, function.__defaults__, function.__closure__
+    )
+    copy.__doc__ = function.__doc__
+    copy.__module__ = function.__module__
+    return copy
+
+
+@dataclass(frozen=True, eq=False)
+class Law(Described):
+    """A friction law (see the module's docstring for its functions and their arguments).
+
+    Attributes
+    ----------
+    name : str
+        The name by which people and files call it.
+    Params : type
+        A NamedTuple with ``Annotated[float, Par(...)]`` or, for a value per element,
+        ``Annotated[tuple[float, ...], Par(...)]`` fields. Fields of the chosen options are added to them.
+    equation, source : str
+        Its equation in LaTeX; thesis equation numbers and keys of ``references.bib``.
+    odd, rate_independent : bool
+        Declarations that the contract tests hold it to.
+    passive : str
+        "always", "never", or the condition under which it only dissipates; tested by `is_passive`.
+    velocity_scale : callable or None
+        ``velocity_scale(p)``: a velocity over which the torque changes much; steps near rest stay below it.
+    """
+
+    name: str
+    Params: type
+    step: Callable[..., float]
+    title: str
+    equation: str
+    source: tuple[str, ...]
+    State: type | None = None
+    rate: Callable[..., float] | None = None
+    guards: Callable[..., None] | None = None
+    switch: Callable[..., None] | None = None
+    steady: Callable[..., float] | None = None
+    holding: Callable[..., float] | None = None
+    check: Callable[[Any], str] | None = None
+    modes: Callable[[Any], Elements] | None = None
+    velocity_scale: Callable[[Any], float] | None = None
+    choices: tuple[Choice, ...] = ()
+    odd: bool = True
+    passive: str = "always"
+    is_passive: Callable[[Any], bool] | None = None
+    rate_independent: bool = False
+    chosen: Mapping[str, str] = field(default_factory=dict[str, str])
+    variants: dict[tuple[tuple[str, str], ...], Law] = field(default_factory=dict[Any, Any], repr=False)
+    """Laws made from this one by `having`; shared with them, so that each exists (and is compiled) once."""
+
+    def __post_init__(self) -> None:
+        own = fields_of(self.Params)
+        brought = [f for choice in self.choices for f in fields_of(self.option(choice).params)]
+        own_names = {f.name for f in own}
+        object.__setattr__(self, "fields", own + tuple(f for f in brought if f.name not in own_names))
+        object.__setattr__(self, "state_fields", fields_of(self.State))
+        names = [f.name for f in self.fields]
+        joined: Any = NamedTuple(self.Params.__name__, [(n, Any) for n in names])  # type: ignore[misc]
+        object.__setattr__(self, "Parameters", joined)
+        for function in ("step", "rate", "guards", "switch", "steady", "holding", "check", "modes"):
+            raw = getattr(self, function)
+            if raw is not None:
+                object.__setattr__(self, function, self._bound(raw))
+
+    fields: tuple[Field, ...] = field(init=False)
+    state_fields: tuple[Field, ...] = field(init=False)
+    Parameters: Any = field(init=False)
+
+    # ---- choices -------------------------------------------------------------------------------------
+
+    def option(self, choice: Choice) -> Option:
+        """The option in force for `choice`."""
+        return choice.options[self.chosen.get(choice.name, choice.default)]
+
+    def having(self, **names: str) -> Law:
+        """Return this law with other options, ``law.having(slip_rule="literal")``.
+
+        Raises
+        ------
+        UnknownName
+            If the law has no such choice, or the choice no such option.
+        """
+        known = {choice.name: choice for choice in self.choices}
+        for name, option in names.items():
+            if name not in known:
+                raise UnknownName(f"choice of law {self.name!r}", name, known)
+            if option not in known[name].options:
+                raise UnknownName(name.replace("_", " "), option, known[name].options)
+        key = tuple(sorted({**self.chosen, **names}.items()))
+        if key not in self.variants:
+            self.variants[key] = replace(self, chosen=dict(key))
+        return self.variants[key]
+
+    def _bound(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Let `function`, and the functions of its file that it calls, call the chosen options."""
+        if not self.choices or not isinstance(function, types.FunctionType):
+            return function
+        home = function.__globals__
+        scope = dict(home)
+        for name, value in home.items():
+            if isinstance(value, types.FunctionType) and value.__globals__ is home:
+                scope[name] = rescoped(value, scope)
+        scope.update({choice.replaces: self.option(choice).function for choice in self.choices})
+        return rescoped(function, scope)
+
+    # ---- state ---------------------------------------------------------------------------------------
+
+    def state(self, p: Any) -> types.SimpleNamespace:
+        """Return the state at rest, everything zero and sticking, for the plain Python functions."""
+        n = self.elements_in(p)
+        return types.SimpleNamespace(
+            **{f.name: [0.0] * n if f.per_element else 0.0 for f in self.state_fields}
+        )
+
+    def state_size(self, p: Any) -> int:
+        """The length of the flat state."""
+        n = self.elements_in(p)
+        return sum(n if f.per_element else 1 for f in self.state_fields)
+
+    def pack_state(self, z: types.SimpleNamespace) -> list[float]:
+        """Return a state as the flat list that compiled functions read."""
+        flat = [getattr(z, f.name) for f in self.state_fields if not f.per_element]
+        for f in self.state_fields:
+            if f.per_element:
+                flat.extend(getattr(z, f.name))
+        return flat
+
+    def mode_mask(self, p: Any) -> list[bool]:
+        """Which entries of the flat state are modes."""
+        n = self.elements_in(p)
+        scalars = [isinstance(f.par, Mode) for f in self.state_fields if not f.per_element]
+        blocks = [isinstance(f.par, Mode) for f in self.state_fields if f.per_element for _ in range(n)]
+        return scalars + blocks

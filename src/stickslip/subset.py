@@ -1,0 +1,290 @@
+"""The scalar subset: the Python in which laws, references and filters are written, and its translation.
+
+A function of the subset works on numbers: arithmetic, comparisons, ``if``/``else``, ``for i in range(n)``,
+local names, ``math`` functions, other functions of the subset, and the fields of its structured arguments
+(``p.fc``, ``z.force[i]``, ``len(p.k)``). It runs as it stands in Python. `lower` rewrites the fields into
+elements of flat arrays (``p[3]``), which is what numba compiles and what C export will read.
+
+A construct outside the subset is refused with file, line and what to write instead.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import math
+import textwrap
+import types
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from stickslip.errors import LawError, suggestion
+from stickslip.spec import Field, Law, Surroundings
+
+__all__ = ["Layout", "law_layouts", "lower"]
+
+BUILTINS = {"abs", "min", "max", "range", "len", "float", "int"}
+MATH = {
+    "exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
+    "floor", "ceil", "fabs", "copysign", "pi", "inf", "pow", "hypot",
+}  # fmt: skip
+STATEMENTS = (ast.Assign, ast.AugAssign, ast.AnnAssign, ast.If, ast.For, ast.Return, ast.Expr, ast.Pass, ast.Break)
+EXPRESSIONS = (
+    ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp, ast.Constant, ast.Name, ast.Attribute,
+    ast.Subscript, ast.Call, ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.expr_context,
+)  # fmt: skip
+REMEDY = {
+    ast.While: "use `for i in range(n)` with a `break`",
+    ast.ListComp: "use a `for` loop over the elements",
+    ast.GeneratorExp: "use a `for` loop over the elements",
+    ast.Tuple: "assign one name at a time",
+    ast.List: "keep values in the state or in names",
+    ast.Dict: "keep values in the state or in names",
+    ast.Try: "test the value with `if` before using it",
+    ast.Raise: "refuse bad parameters in `check`",
+    ast.Lambda: "write a function at the top of the file",
+    ast.With: "leave it out: a law only computes",
+    ast.JoinedStr: "leave text out: a law only computes",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where the fields of a structured argument lie in its flat array."""
+
+    scalars: tuple[str, ...]
+    blocks: tuple[str, ...] = ()
+    counted: bool = False
+    """The array holds its number of elements after its scalars (parameters do, states ask the parameters)."""
+
+    @staticmethod
+    def of(fields: Sequence[Field], *, counted: bool) -> Layout:
+        """Scalars in order, then one block per field that has a value per element."""
+        return Layout(
+            tuple(f.name for f in fields if not f.per_element),
+            tuple(f.name for f in fields if f.per_element),
+            counted,
+        )
+
+
+def law_layouts(law: Law) -> dict[str, Layout]:
+    """The layouts of a law's structured arguments, by argument name."""
+    state = Layout.of(law.state_fields, counted=False)
+    return {
+        "p": Layout.of(law.fields, counted=True),
+        "z": state,
+        "dz": state,
+        "g": state,
+        "u": Layout(Surroundings._fields),
+    }
+
+
+def lower(entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout]) -> dict[str, ast.FunctionDef]:
+    """Translate functions and everything they call into functions on flat arrays.
+
+    Parameters
+    ----------
+    entries : mapping
+        Name in the result to function.
+    layouts : mapping
+        Argument name to layout, for the structured arguments.
+
+    Returns
+    -------
+    dict of str to ast.FunctionDef
+        Callees first. Names of callees start with an underscore.
+
+    Raises
+    ------
+    LawError
+        With file, line and what to write instead.
+    """
+    done: dict[str, ast.FunctionDef] = {}
+    for name, function in entries.items():
+        _lower_one(name, function, layouts, done, stack=())
+    return done
+
+
+def _lower_one(
+    name: str,
+    function: Callable[..., Any],
+    layouts: Mapping[str, Layout],
+    done: dict[str, ast.FunctionDef],
+    stack: tuple[str, ...],
+) -> None:
+    if name in done:
+        return
+    tree, where = _parsed(function)
+    if name in stack:
+        raise LawError(f"{where.at(tree)}: {function.__name__} calls itself; use a `for` loop instead")
+    translator = _Translator(where, layouts, [a.arg for a in tree.args.args], function.__globals__)
+    body = [s for s in (translator.visit(statement) for statement in tree.body) if s is not None]
+    for callee, target in translator.calls.items():
+        _lower_one(callee, target, layouts, done, (*stack, name))
+    arguments = ast.arguments([], [ast.arg(a.arg) for a in tree.args.args], None, [], [], None, [])
+    done[name] = ast.fix_missing_locations(
+        ast.FunctionDef(name=name, args=arguments, body=body or [ast.Pass()], decorator_list=[], type_params=[])
+    )
+
+
+@dataclass
+class _Place:
+    file: str
+    first_line: int
+
+    def at(self, node: ast.AST) -> str:
+        return f"{self.file}, line {self.first_line + getattr(node, 'lineno', 1) - 1}"
+
+
+def _parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, _Place]:
+    try:
+        lines, first = inspect.getsourcelines(function)
+    except (OSError, TypeError) as error:
+        name = getattr(function, "__name__", str(function))
+        raise LawError(f"the source of {name!r} cannot be read; write the law in a file of its own") from error
+    tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
+    where = _Place(inspect.getsourcefile(function) or "<unknown>", max(first, 1))
+    if not isinstance(tree, ast.FunctionDef):
+        raise LawError(f"{where.at(tree)}: a law's function is a `def`; write it as one")
+    return tree, where
+
+
+@dataclass
+class _Translator(ast.NodeTransformer):
+    where: _Place
+    layouts: Mapping[str, Layout]
+    arguments: list[str]
+    scope: dict[str, Any]
+    calls: dict[str, Callable[..., Any]] = field(default_factory=dict[str, Callable[..., Any]])
+    locals: set[str] = field(default_factory=set[str])
+
+    def refuse(self, node: ast.AST, what: str, remedy: str) -> LawError:
+        return LawError(f"{self.where.at(node)}: {what} is outside the scalar subset; {remedy}")
+
+    # ---- statements ----------------------------------------------------------------------------------
+
+    def visit(self, node: ast.AST) -> Any:
+        if not isinstance(node, (*STATEMENTS, *EXPRESSIONS)):
+            kind = type(node).__name__
+            raise self.refuse(node, f"`{kind}`", REMEDY.get(type(node), "use arithmetic, if/else and for loops"))
+        return super().visit(node)
+
+    def visit_Expr(self, node: ast.Expr) -> Any:
+        if isinstance(node.value, ast.Constant):
+            return None  # a docstring
+        return self.generic_visit(node)
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> Any:
+        if node.value is None:
+            return None
+        return self.visit(ast.copy_location(ast.Assign([node.target], node.value), node))
+
+    def visit_Assign(self, node: ast.Assign) -> Any:
+        for target in node.targets:
+            if isinstance(target, ast.Name):
+                self.locals.add(target.id)
+        return self.generic_visit(node)
+
+    def visit_For(self, node: ast.For) -> Any:
+        call = node.iter
+        ranged = isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "range"
+        if not ranged or not isinstance(node.target, ast.Name) or node.orelse:
+            raise self.refuse(node, "this loop", "write `for i in range(n):`")
+        self.locals.add(node.target.id)
+        return self.generic_visit(node)
+
+    # ---- expressions ---------------------------------------------------------------------------------
+
+    def visit_Name(self, node: ast.Name) -> Any:
+        if isinstance(node.ctx, ast.Store) or node.id in self.locals or node.id in self.arguments:
+            return node
+        value = self.scope.get(node.id)
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            return ast.copy_location(ast.Constant(float(value)), node)
+        raise self.refuse(node, f"the name {node.id!r}", "use an argument, a local name or a numeric constant")
+
+    def visit_Attribute(self, node: ast.Attribute) -> Any:
+        owner = node.value
+        if isinstance(owner, ast.Name) and self.scope.get(owner.id) is math:
+            if node.attr not in MATH:
+                raise self.refuse(node, f"math.{node.attr}", suggestion(node.attr, MATH))
+            return node
+        name, layout = self.structure(node)
+        if node.attr in layout.blocks:
+            raise self.refuse(node, f"{name}.{node.attr} as a whole", f"use {name}.{node.attr}[i]")
+        if node.attr not in layout.scalars:
+            raise LawError(
+                f"{self.where.at(node)}: {name} has no field {node.attr!r}; "
+                f"{suggestion(node.attr, layout.scalars + layout.blocks)}"
+            )
+        return self.element(name, ast.Constant(layout.scalars.index(node.attr)), node)
+
+    def visit_Subscript(self, node: ast.Subscript) -> Any:
+        if not isinstance(node.value, ast.Attribute):
+            raise self.refuse(node, "this index", "index a field of the state or parameters, z.force[i]")
+        name, layout = self.structure(node.value)
+        if node.value.attr not in layout.blocks:
+            raise self.refuse(node, f"{name}.{node.value.attr}[...]", "it has one value, not one per element")
+        first = len(layout.scalars) + (1 if layout.counted else 0)
+        block = layout.blocks.index(node.value.attr)
+        index: ast.expr = self.visit(node.slice)
+        if block:
+            offset = ast.BinOp(ast.Constant(block), ast.Mult(), self.count(node))
+            index = ast.BinOp(offset, ast.Add(), index)
+        if first:
+            index = ast.BinOp(ast.Constant(first), ast.Add(), index)
+        return self.element(name, index, node)
+
+    def visit_Call(self, node: ast.Call) -> Any:
+        if node.keywords:
+            raise self.refuse(node, "a keyword argument", "pass arguments by position")
+        if isinstance(node.func, ast.Attribute):
+            node.func = self.visit(node.func)
+            node.args = [self.visit(a) for a in node.args]
+            return node
+        if not isinstance(node.func, ast.Name):
+            raise self.refuse(node, "this call", "call a function by its name")
+        name = node.func.id
+        if name == "len":
+            return self.length(node)
+        if name in BUILTINS:
+            node.args = [self.visit(a) for a in node.args]
+            return node
+        target = self.scope.get(name)
+        if not isinstance(target, types.FunctionType):
+            known = [n for n, v in self.scope.items() if isinstance(v, types.FunctionType)]
+            raise self.refuse(node, f"{name}()", suggestion(name, [*known, *BUILTINS]))
+        self.calls["_" + name] = target
+        node.func = ast.copy_location(ast.Name("_" + name, ast.Load()), node)
+        node.args = [a if self.is_structure(a) else self.visit(a) for a in node.args]
+        return node
+
+    # ---- structured arguments --------------------------------------------------------------------------
+
+    def is_structure(self, node: ast.expr) -> bool:
+        return isinstance(node, ast.Name) and node.id in self.layouts and node.id in self.arguments
+
+    def structure(self, node: ast.Attribute) -> tuple[str, Layout]:
+        owner = node.value
+        if not isinstance(owner, ast.Name) or not self.is_structure(owner):
+            raise self.refuse(node, f"`.{node.attr}` here", f"fields belong to {', '.join(self.layouts)}")
+        return owner.id, self.layouts[owner.id]
+
+    def element(self, name: str, index: ast.expr, like: ast.expr) -> ast.expr:
+        return ast.copy_location(
+            ast.Subscript(ast.Name(name, ast.Load()), index, getattr(like, "ctx", ast.Load())), like
+        )
+
+    def count(self, node: ast.AST) -> ast.expr:
+        """The number of elements, which the parameters hold after their scalars."""
+        if "p" not in self.arguments:
+            raise self.refuse(node, "a field per element without `p`", "pass the parameters `p` to this function")
+        place = ast.Constant(len(self.layouts["p"].scalars))
+        return ast.Call(ast.Name("int", ast.Load()), [ast.Subscript(ast.Name("p", ast.Load()), place, ast.Load())], [])
+
+    def length(self, node: ast.Call) -> ast.expr:
+        of = node.args[0] if len(node.args) == 1 else None
+        if not isinstance(of, ast.Attribute) or of.attr not in self.structure(of)[1].blocks:
+            raise self.refuse(node, "this len()", "use len(p.field) of a field that has a value per element")
+        return ast.copy_location(self.count(node), node)
