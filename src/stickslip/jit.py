@@ -36,6 +36,7 @@ __all__ = [
     "call_profile",
     "call_rate",
     "call_step",
+    "call_switch",
     "call_value",
     "compiled_law",
     "compiled_profile",
@@ -140,6 +141,7 @@ def _caller(name: str, count: int, returns: bool) -> Any:
 call_step = _caller("step", 6, True)
 call_rate = _caller("rate", 5, True)
 call_guards = _caller("guards", 5, False)
+call_switch = _caller("switch", 5, False)
 call_value = _caller("steady", 2, True)
 call_holding = _caller("holding", 4, True)
 call_profile = _caller("profile", 3, False)

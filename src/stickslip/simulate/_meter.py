@@ -232,3 +232,69 @@ def close_standstill(acc: Any, now: float) -> None:
             acc[STILL_COUNT] += 1.0
             acc[STILL_LONGEST] = max(acc[STILL_LONGEST], length)
         acc[STILL_SINCE] = -1.0
+
+
+# ---- reading the accumulator -----------------------------------------------------------------------------------
+
+
+def settle_band_of(reference: Any, duration: float) -> float:
+    """2 % of the way the reference goes, where it comes to rest before the end of the run; else 0. rad."""
+    start, late, end = reference.sample([0.0, 0.9 * duration, duration])
+    first = 0.0 if reference.kind.name == "step" else start[0]
+    travel = abs(end[0] - first)
+    at_rest = abs(end[0] - late[0]) <= 1e-3 * travel and abs(end[1]) * duration <= 1e-3 * travel
+    return 0.02 * travel if travel > 0.0 and at_rest else 0.0
+
+
+def limit_cycle(turns: Any, duration: float) -> tuple[float, float]:
+    """Amplitude (rad) and period (s) of a limit cycle in the last 40 % of a run, or two NaN.
+
+    There is one where at least 5 periods have amplitudes and periods that spread (standard deviation over
+    mean) by less than 5 %. ``turns`` has time and position of the velocity's reversals, shape (n, 2).
+    """
+    none = (math.nan, math.nan)
+    late = turns[turns[:, 0] >= 0.6 * duration]
+    if late.shape[0] < 11:
+        return none
+    periods = late[2:, 0] - late[:-2, 0]
+    swings = np.abs(np.diff(late[:, 1]))
+    for values in (periods, swings):
+        if values.mean() <= 0.0 or values.std() >= 0.05 * values.mean():
+            return none
+    return float(0.5 * swings.mean()), float(periods.mean())
+
+
+def metrics(acc: Any, turns: Any) -> dict[str, float]:
+    """Read a finished accumulator: one number a metric, its unit in the name; NaN where there is none."""
+    duration = acc[DURATION]
+    half = 0.5 * duration
+    settled = acc[SETTLE_BAND] > 0.0 and abs(acc[E_END]) <= acc[SETTLE_BAND]
+    amplitude, period = limit_cycle(turns, duration)
+    return {
+        "position_rms_rad": math.sqrt(acc[E2] / duration),
+        "position_peak_rad": acc[E_MAX],
+        "steady_state_error_rad": acc[SS_E] / (0.2 * duration),
+        "end_error_rad": acc[E_END],
+        "settling_s": acc[OUTSIDE_LAST] if settled else math.nan,
+        "velocity_rms_rad_s": math.sqrt(acc[EV2] / duration),
+        "velocity_peak_rad_s": acc[V_MAX],
+        "torque_rms_Nm": math.sqrt(acc[TM2] / duration),
+        "torque_peak_Nm": acc[TM_MAX],
+        "friction_residual_rms_Nm": math.sqrt(acc[DF2] / duration),
+        "standstills": acc[STILL_COUNT],
+        "longest_standstill_s": acc[STILL_LONGEST],
+        "reversals_per_s": acc[REVERSALS] / duration,
+        "reversals_beyond_reference_per_s": (acc[REVERSALS] - acc[REFERENCE_REVERSALS]) / duration,
+        "velocity_above_50Hz_rms_rad_s": math.sqrt(acc[HP2] / duration),
+        "limit_cycle_amplitude_rad": amplitude,
+        "limit_cycle_period_s": period,
+        "second_half_position_rms_rad": math.sqrt(acc[W2_E2] / half),
+        "second_half_position_peak_rad": acc[W2_E_MAX],
+        "second_half_position_span_rad": acc[W2_E_HIGH] - acc[W2_E_LOW],
+        "second_half_velocity_rms_rad_s": math.sqrt(acc[W2_EV2] / half),
+        "second_half_torque_rms_Nm": math.sqrt(acc[W2_TM2] / half),
+        "second_half_velocity_above_50Hz_rms_rad_s": math.sqrt(acc[W2_HP2] / half),
+        "second_half_reversals_per_s": acc[W2_REVERSALS] / half,
+        "motor_work_J": acc[WORK],
+        "friction_loss_J": acc[LOSS],
+    }
