@@ -35,43 +35,53 @@ from stickslip.simulate._case import (
     KP,
     KR,
     NO_COMPENSATOR,
+    NUMBERS,
     PLANT_SCALE,
     SOURCE,
     TORQUE_LIMIT,
     Case,
 )
+from stickslip.spec import Surroundings
 
-MOTION, SIGN, FILTERED_SIGN, REFERENCE_SIGN, SATURATED, SIDES = range(6)
+# ---- where things lie -------------------------------------------------------------------------------------------
+# The state vector; the laws' states follow.
 POSITION, VELOCITY, INTEGRAL, FILTER_1, FILTER_2, LAWS = range(6)
-# Events beside the laws' modes, after them in the array of event values.
-KINK, FILTER_KINK, RELEASE, LIMIT, EXTRA = range(5)
-# Offsets of the addresses: the profile, then step, rate, guards, switch, steady, sliding, holding of each law.
+# The workspace w: Case.numbers, then what is remembered, the reference, the torques (the demand is the motor
+# torque before its limit), the surroundings, and the parameters of plant, compensator and reference.
+(
+    MOTION, SIGN, FILTERED_SIGN, REFERENCE_SIGN, SATURATED, THETA_D, OMEGA_D, ALPHA_D, MOTOR_TORQUE,
+    FRICTION_TORQUE, COMPENSATION_TORQUE, DEMAND, SURROUNDINGS,
+) = range(NUMBERS, NUMBERS + 13)  # fmt: skip
+PLANT_PARAMETERS = SURROUNDINGS + 3
+# The integers a: addresses of the profile and of each law's functions, sizes and places, then which state
+# entries are modes.
 PROFILE, PLANT, COMPENSATOR = 0, 1, 8
 RATE, GUARDS, SWITCH, HOLDING = 1, 2, 3, 6
-MOTOR_TORQUE, FRICTION_TORQUE, COMPENSATION_TORQUE, DEMAND = range(4)
+PLANT_SIZE, LAWS_SIZE, COMPENSATOR_PARAMETERS, PROFILE_PARAMETERS, MODES = range(15, 20)
+# Events beside the laws' modes, after them in the array of event values.
+KINK, FILTER_KINK, RELEASE, LIMIT, EXTRA = range(5)
 TINY = 1e-300
 ROOT_2 = math.sqrt(2.0)
 
 
-def arrays_of(case: Case) -> tuple[Any, ...]:
-    """What the kernels below call `loop`: addresses, sizes, numbers, parameters, scratch."""
-    addresses = np.concatenate([[case.profile], case.plant.addresses, case.compensator.addresses])
-    sizes = np.array([case.plant.state.size, case.compensator.state.size], dtype=np.int64)
-    modes = np.concatenate([case.plant.modes, case.compensator.modes])
-    surroundings = np.array([0.0, 1.0, 20.0])
-    return (
-        addresses,
-        sizes,
-        modes,
-        case.numbers,
-        case.plant.parameters,
-        case.compensator.parameters,
-        case.reference_parameters,
-        surroundings,
-        np.zeros(SIDES),
-        np.zeros(3),  # reference: position, velocity, acceleration
-        np.zeros(4),  # torques: motor, friction, compensation, demand before the limit
+def arrays_of(case: Case) -> tuple[Any, Any]:
+    """Integers a and workspace w of a case, laid out as above."""
+    plant, helper = case.plant, case.compensator
+    place = PLANT_PARAMETERS + plant.parameters.size
+    sizes = [plant.state.size, plant.state.size + helper.state.size, place, place + helper.parameters.size]
+    integers = [case.profile, *plant.addresses, *helper.addresses, *sizes, *plant.modes, *helper.modes]
+    remembered = np.zeros(SURROUNDINGS - NUMBERS)
+    workspace = np.concatenate(
+        [
+            case.numbers,
+            remembered,
+            np.array(Surroundings()),
+            plant.parameters,
+            helper.parameters,
+            case.reference_parameters,
+        ]
     )
+    return np.array(integers, dtype=np.int64), workspace
 
 
 @kernel()
@@ -85,234 +95,243 @@ def one_sided(v: float, side: float) -> float:
 
 
 @kernel()
-def compensator_velocity(loop: Any, y: Any) -> float:
+def compensator_velocity(a: Any, w: Any, y: Any) -> float:
     """The velocity that the compensator's law sees; needs the reference to be up to date."""
-    addresses, _, _, numbers, _, _, _, _, side, reference, _ = loop
-    filtered = numbers[FILTER] > 0.0
-    jumps = addresses[COMPENSATOR + HOLDING] != 0
-    if numbers[SOURCE] == FROM_REFERENCE:
+    filtered = w[FILTER] > 0.0
+    jumps = a[COMPENSATOR + HOLDING] != 0
+    if w[SOURCE] == FROM_REFERENCE:
         if filtered:
-            return one_sided(y[FILTER_1], side[FILTERED_SIGN]) if jumps else y[FILTER_1]
-        return one_sided(reference[1], side[REFERENCE_SIGN])
+            return one_sided(y[FILTER_1], w[FILTERED_SIGN]) if jumps else y[FILTER_1]
+        return one_sided(w[OMEGA_D], w[REFERENCE_SIGN])
     if filtered:
-        return one_sided(y[FILTER_1], side[FILTERED_SIGN]) if jumps else y[FILTER_1]
-    return one_sided(y[VELOCITY], side[SIGN]) if jumps else y[VELOCITY]
+        return one_sided(y[FILTER_1], w[FILTERED_SIGN]) if jumps else y[FILTER_1]
+    return one_sided(y[VELOCITY], w[SIGN]) if jumps else y[VELOCITY]
 
 
 @kernel()
-def is_held(loop: Any) -> bool:
+def is_held(a: Any, w: Any) -> bool:
     """Whether the plant's law holds the axis at rest."""
-    addresses, side = loop[0], loop[8]
-    return addresses[PLANT + HOLDING] != 0 and side[MOTION] == 0.0
+    return a[PLANT + HOLDING] != 0 and w[MOTION] == 0.0
 
 
 @kernel()
-def rates(loop: Any, t: float, y: Any, k: Any, row: int) -> None:
+def rates(a: Any, w: Any, t: float, y: Any, k: Any, row: int) -> None:
     """Write the time derivative of y into row `row` of k, and the torques; thesis eqs. 3.1, 3.3, 3.11."""
-    addresses, sizes, _, numbers, pp, pc, pr, u, side, reference, torque = loop
     n = y.shape[0]
-    compensator = LAWS + sizes[0]
-    call_profile(addresses[PROFILE], t, pointer(pr, 0), pointer(reference, 0))
-    u[0] = y[POSITION]
+    compensator = LAWS + a[PLANT_SIZE]
+    call_profile(a[PROFILE], t, pointer(w, a[PROFILE_PARAMETERS]), pointer(w, THETA_D))
+    w[SURROUNDINGS] = y[POSITION]
     v = y[VELOCITY]
     helped = 0.0
-    if numbers[SOURCE] != NO_COMPENSATOR:
-        seen = compensator_velocity(loop, y)
-        helped = numbers[GAIN] * call_rate(
-            addresses[COMPENSATOR + RATE],
+    if w[SOURCE] != NO_COMPENSATOR:
+        seen = compensator_velocity(a, w, y)
+        helped = w[GAIN] * call_rate(
+            a[COMPENSATOR + RATE],
             seen,
             pointer(y, compensator),
-            pointer(pc, 0),
-            pointer(u, 0),
+            pointer(w, a[COMPENSATOR_PARAMETERS]),
+            pointer(w, SURROUNDINGS),
             pointer(k, row * n + compensator),
         )
-        if numbers[FILTER] > 0.0:
-            w = numbers[FILTER]
-            raw = reference[1] if numbers[SOURCE] == FROM_REFERENCE else v
+        if w[FILTER] > 0.0:
+            corner = w[FILTER]
+            raw = w[OMEGA_D] if w[SOURCE] == FROM_REFERENCE else v
             k[row, FILTER_1] = y[FILTER_2]
-            k[row, FILTER_2] = w * w * (raw - y[FILTER_1]) - ROOT_2 * w * y[FILTER_2]
-    error = reference[0] - y[POSITION]
-    demand = numbers[KP] * error + numbers[KR] * reference[1] - numbers[KD] * v + numbers[KI] * y[INTEGRAL] + helped
-    motor = min(max(demand, -numbers[TORQUE_LIMIT]), numbers[TORQUE_LIMIT])
-    if is_held(loop):
+            k[row, FILTER_2] = corner * corner * (raw - y[FILTER_1]) - ROOT_2 * corner * y[FILTER_2]
+    error = w[THETA_D] - y[POSITION]
+    demand = w[KP] * error + w[KR] * w[OMEGA_D] - w[KD] * v + w[KI] * y[INTEGRAL] + helped
+    motor = min(max(demand, -w[TORQUE_LIMIT]), w[TORQUE_LIMIT])
+    if is_held(a, w):
         friction = motor
         k[row, POSITION] = 0.0
         k[row, VELOCITY] = 0.0
     else:
-        seen = one_sided(v, side[MOTION]) if addresses[PLANT + HOLDING] != 0 else v
+        seen = one_sided(v, w[MOTION]) if a[PLANT + HOLDING] != 0 else v
         friction = call_rate(
-            addresses[PLANT + RATE],
+            a[PLANT + RATE],
             seen,
             pointer(y, LAWS),
-            pointer(pp, 0),
-            pointer(u, 0),
+            pointer(w, PLANT_PARAMETERS),
+            pointer(w, SURROUNDINGS),
             pointer(k, row * n + LAWS),
         )
         k[row, POSITION] = v
-        k[row, VELOCITY] = (motor - friction) / numbers[INERTIA]
+        k[row, VELOCITY] = (motor - friction) / w[INERTIA]
     k[row, INTEGRAL] = error
-    torque[MOTOR_TORQUE] = motor
-    torque[FRICTION_TORQUE] = friction
-    torque[COMPENSATION_TORQUE] = helped
-    torque[DEMAND] = demand
+    w[MOTOR_TORQUE] = motor
+    w[FRICTION_TORQUE] = friction
+    w[COMPENSATION_TORQUE] = helped
+    w[DEMAND] = demand
 
 
 @kernel()
-def held_limit(loop: Any, y: Any, direction: float) -> float:
+def held_limit(a: Any, w: Any, y: Any, direction: float) -> float:
     """Net torque that the axis at rest withstands, N·m: a feedback that jumps with the velocity reduces it."""
-    addresses, sizes, _, numbers, pp, pc, _, u, _, _, _ = loop
-    limit = call_holding(addresses[PLANT + HOLDING], direction, pointer(y, LAWS), pointer(pp, 0), pointer(u, 0))
-    if (
-        numbers[SOURCE] == FROM_MEASUREMENT
-        and numbers[FILTER] == 0.0
-        and addresses[COMPENSATOR + HOLDING] != 0
-    ):
-        place = LAWS + sizes[0]
-        limit -= numbers[GAIN] * call_holding(
-            addresses[COMPENSATOR + HOLDING], direction, pointer(y, place), pointer(pc, 0), pointer(u, 0)
+    limit = call_holding(
+        a[PLANT + HOLDING],
+        direction,
+        pointer(y, LAWS),
+        pointer(w, PLANT_PARAMETERS),
+        pointer(w, SURROUNDINGS),
+    )
+    if w[SOURCE] == FROM_MEASUREMENT and w[FILTER] == 0.0 and a[COMPENSATOR + HOLDING] != 0:
+        place = LAWS + a[PLANT_SIZE]
+        limit -= w[GAIN] * call_holding(
+            a[COMPENSATOR + HOLDING],
+            direction,
+            pointer(y, place),
+            pointer(w, a[COMPENSATOR_PARAMETERS]),
+            pointer(w, SURROUNDINGS),
         )
     return limit
 
 
 @kernel()
-def events(loop: Any, t: float, y: Any, k: Any, row: int, g: Any) -> float:
+def events(a: Any, w: Any, t: float, y: Any, k: Any, row: int, g: Any) -> float:
     """Write every event's value into g (an event is due when its value is not negative); return the largest.
 
     Row `row` of k is scratch: the torque is needed where the axis is held or limited.
     """
-    addresses, sizes, modes, numbers, pp, pc, pr, u, side, reference, torque = loop
-    laws = sizes[0] + sizes[1]
+    laws = a[LAWS_SIZE]
     for i in range(laws + EXTRA):
         g[i] = -1.0
     v = y[VELOCITY]
-    u[0] = y[POSITION]
-    if numbers[TORQUE_LIMIT] < np.inf or addresses[PLANT + HOLDING] != 0:
-        rates(loop, t, y, k, row)
-        if is_held(loop):
-            g[laws + RELEASE] = abs(torque[MOTOR_TORQUE]) - held_limit(loop, y, np.sign(torque[MOTOR_TORQUE]))
-        if side[SATURATED] == 0.0:
-            g[laws + LIMIT] = abs(torque[DEMAND]) - numbers[TORQUE_LIMIT]
+    w[SURROUNDINGS] = y[POSITION]
+    if w[TORQUE_LIMIT] < np.inf or a[PLANT + HOLDING] != 0:
+        rates(a, w, t, y, k, row)
+        if is_held(a, w):
+            g[laws + RELEASE] = abs(w[MOTOR_TORQUE]) - held_limit(a, w, y, np.sign(w[MOTOR_TORQUE]))
+        if w[SATURATED] == 0.0:
+            g[laws + LIMIT] = abs(w[DEMAND]) - w[TORQUE_LIMIT]
         else:
-            g[laws + LIMIT] = numbers[TORQUE_LIMIT] - side[SATURATED] * torque[DEMAND]
-        if numbers[TORQUE_LIMIT] == np.inf:
+            g[laws + LIMIT] = w[TORQUE_LIMIT] - w[SATURATED] * w[DEMAND]
+        if w[TORQUE_LIMIT] == np.inf:
             g[laws + LIMIT] = -1.0
-    if addresses[PLANT + GUARDS] != 0:
-        call_guards(addresses[PLANT + GUARDS], v, pointer(y, LAWS), pointer(pp, 0), pointer(u, 0), pointer(g, 0))
-    if numbers[SOURCE] != NO_COMPENSATOR and addresses[COMPENSATOR + GUARDS] != 0:
-        if numbers[SOURCE] == FROM_REFERENCE:
-            call_profile(addresses[PROFILE], t, pointer(pr, 0), pointer(reference, 0))
+    if a[PLANT + GUARDS] != 0:
         call_guards(
-            addresses[COMPENSATOR + GUARDS],
-            compensator_velocity(loop, y),
-            pointer(y, LAWS + sizes[0]),
-            pointer(pc, 0),
-            pointer(u, 0),
-            pointer(g, sizes[0]),
+            a[PLANT + GUARDS],
+            v,
+            pointer(y, LAWS),
+            pointer(w, PLANT_PARAMETERS),
+            pointer(w, SURROUNDINGS),
+            pointer(g, 0),
         )
-    kinked = addresses[PLANT + GUARDS] == 0 or (
-        numbers[SOURCE] == FROM_MEASUREMENT and numbers[FILTER] == 0.0 and addresses[COMPENSATOR + GUARDS] == 0
+    if w[SOURCE] != NO_COMPENSATOR and a[COMPENSATOR + GUARDS] != 0:
+        if w[SOURCE] == FROM_REFERENCE:
+            call_profile(a[PROFILE], t, pointer(w, a[PROFILE_PARAMETERS]), pointer(w, THETA_D))
+        call_guards(
+            a[COMPENSATOR + GUARDS],
+            compensator_velocity(a, w, y),
+            pointer(y, LAWS + a[PLANT_SIZE]),
+            pointer(w, a[COMPENSATOR_PARAMETERS]),
+            pointer(w, SURROUNDINGS),
+            pointer(g, a[PLANT_SIZE]),
+        )
+    kinked = a[PLANT + GUARDS] == 0 or (
+        w[SOURCE] == FROM_MEASUREMENT and w[FILTER] == 0.0 and a[COMPENSATOR + GUARDS] == 0
     )
-    if kinked and side[SIGN] != 0.0 and not is_held(loop):
-        g[laws + KINK] = -side[SIGN] * v
-    if side[FILTERED_SIGN] != 0.0:
-        g[laws + FILTER_KINK] = -side[FILTERED_SIGN] * y[FILTER_1]
+    if kinked and w[SIGN] != 0.0 and not is_held(a, w):
+        g[laws + KINK] = -w[SIGN] * v
+    if w[FILTERED_SIGN] != 0.0:
+        g[laws + FILTER_KINK] = -w[FILTERED_SIGN] * y[FILTER_1]
     largest = -1e9
     for i in range(laws + EXTRA):
-        if (i >= laws or modes[i]) and g[i] > largest:
+        if (i >= laws or a[MODES + i] != 0) and g[i] > largest:
             largest = g[i]
     return largest
 
 
 @kernel()
-def switch(loop: Any, t: float, y: Any, k: Any, row: int, g: Any) -> None:
+def switch(a: Any, w: Any, t: float, y: Any, k: Any, row: int, g: Any) -> None:
     """Change every mode whose event is due."""
-    addresses, sizes, modes, numbers, pp, pc, pr, u, side, reference, torque = loop
-    laws = sizes[0] + sizes[1]
+    laws = a[LAWS_SIZE]
     for i in range(laws):
-        if not modes[i]:
+        if a[MODES + i] == 0:
             g[i] = -1.0
-    if addresses[PLANT + GUARDS] != 0:
+    if a[PLANT + GUARDS] != 0:
         call_switch(
-            addresses[PLANT + SWITCH], y[VELOCITY], pointer(y, LAWS), pointer(pp, 0), pointer(u, 0), pointer(g, 0)
+            a[PLANT + SWITCH],
+            y[VELOCITY],
+            pointer(y, LAWS),
+            pointer(w, PLANT_PARAMETERS),
+            pointer(w, SURROUNDINGS),
+            pointer(g, 0),
         )
-    if numbers[SOURCE] != NO_COMPENSATOR and addresses[COMPENSATOR + GUARDS] != 0:
-        if numbers[SOURCE] == FROM_REFERENCE:
-            call_profile(addresses[PROFILE], t, pointer(pr, 0), pointer(reference, 0))
+    if w[SOURCE] != NO_COMPENSATOR and a[COMPENSATOR + GUARDS] != 0:
+        if w[SOURCE] == FROM_REFERENCE:
+            call_profile(a[PROFILE], t, pointer(w, a[PROFILE_PARAMETERS]), pointer(w, THETA_D))
         call_switch(
-            addresses[COMPENSATOR + SWITCH],
-            compensator_velocity(loop, y),
-            pointer(y, LAWS + sizes[0]),
-            pointer(pc, 0),
-            pointer(u, 0),
-            pointer(g, sizes[0]),
+            a[COMPENSATOR + SWITCH],
+            compensator_velocity(a, w, y),
+            pointer(y, LAWS + a[PLANT_SIZE]),
+            pointer(w, a[COMPENSATOR_PARAMETERS]),
+            pointer(w, SURROUNDINGS),
+            pointer(g, a[PLANT_SIZE]),
         )
     if g[laws + FILTER_KINK] >= 0.0:
-        side[FILTERED_SIGN] = -side[FILTERED_SIGN]
+        w[FILTERED_SIGN] = -w[FILTERED_SIGN]
     if g[laws + LIMIT] >= 0.0:
-        side[SATURATED] = np.sign(torque[DEMAND]) if side[SATURATED] == 0.0 else 0.0
+        w[SATURATED] = np.sign(w[DEMAND]) if w[SATURATED] == 0.0 else 0.0
     if g[laws + KINK] >= 0.0:
-        reverse(loop, t, y, k, row)
+        reverse(a, w, t, y, k, row)
     elif g[laws + RELEASE] >= 0.0:
-        rates(loop, t, y, k, row)
-        side[MOTION] = np.sign(torque[MOTOR_TORQUE])
-        side[SIGN] = side[MOTION]
+        rates(a, w, t, y, k, row)
+        w[MOTION] = np.sign(w[MOTOR_TORQUE])
+        w[SIGN] = w[MOTION]
 
 
 @kernel()
-def reverse(loop: Any, t: float, y: Any, k: Any, row: int) -> None:
+def reverse(a: Any, w: Any, t: float, y: Any, k: Any, row: int) -> None:
     """The velocity has reached zero: go on in the other direction, or be held there."""
-    addresses, side, torque = loop[0], loop[8], loop[10]
-    onward = -side[SIGN]
-    if addresses[PLANT + HOLDING] != 0:
+    onward = -w[SIGN]
+    if a[PLANT + HOLDING] != 0:
         # The applied torque is what is left without the jumps of plant and feedback at zero velocity.
         y[VELOCITY] = 0.0
-        side[MOTION] = 0.0
-        side[SIGN] = 0.0
-        rates(loop, t, y, k, row)
-        applied = torque[MOTOR_TORQUE]
-        limit = held_limit(loop, y, np.sign(applied))
+        w[MOTION] = 0.0
+        w[SIGN] = 0.0
+        rates(a, w, t, y, k, row)
+        applied = w[MOTOR_TORQUE]
+        limit = held_limit(a, w, y, np.sign(applied))
         if abs(applied) <= limit:
             return
         if limit > 0.0:
             onward = np.sign(applied)
-        side[MOTION] = onward
-    side[SIGN] = onward
+        w[MOTION] = onward
+    w[SIGN] = onward
 
 
 @kernel()
-def begin_side(loop: Any, t: float, soon: float, y: Any, k: Any, row: int) -> None:
+def begin_side(a: Any, w: Any, t: float, soon: float, y: Any, k: Any, row: int) -> None:
     """Set the remembered signs for a stretch that starts at t; `soon` lies inside it.
 
     At rest the direction is that of the applied torque just after t.
     """
-    addresses, _, _, numbers, _, _, pr, _, side, reference, torque = loop
-    call_profile(addresses[PROFILE], soon, pointer(pr, 0), pointer(reference, 0))
-    side[REFERENCE_SIGN] = np.sign(reference[1])
-    if numbers[FILTER] > 0.0 and side[FILTERED_SIGN] == 0.0:
-        ahead = reference[1] if numbers[SOURCE] == FROM_REFERENCE else y[VELOCITY]
-        side[FILTERED_SIGN] = np.sign(y[FILTER_1]) if y[FILTER_1] != 0.0 else np.sign(ahead)
-    if side[SIGN] == 0.0:
+    call_profile(a[PROFILE], soon, pointer(w, a[PROFILE_PARAMETERS]), pointer(w, THETA_D))
+    w[REFERENCE_SIGN] = np.sign(w[OMEGA_D])
+    if w[FILTER] > 0.0 and w[FILTERED_SIGN] == 0.0:
+        ahead = w[OMEGA_D] if w[SOURCE] == FROM_REFERENCE else y[VELOCITY]
+        w[FILTERED_SIGN] = np.sign(y[FILTER_1]) if y[FILTER_1] != 0.0 else np.sign(ahead)
+    if w[SIGN] == 0.0:
         if y[VELOCITY] != 0.0:
-            side[SIGN] = np.sign(y[VELOCITY])
-            side[MOTION] = side[SIGN]
-        elif not is_held(loop):
-            call_profile(addresses[PROFILE], t + 1e-9, pointer(pr, 0), pointer(reference, 0))
+            w[SIGN] = np.sign(y[VELOCITY])
+            w[MOTION] = w[SIGN]
+        elif not is_held(a, w):
+            call_profile(a[PROFILE], t + 1e-9, pointer(w, a[PROFILE_PARAMETERS]), pointer(w, THETA_D))
             # Only the reference pushes an axis at rest whose laws are at rest too.
-            push = numbers[KP] * (reference[0] - y[POSITION]) + numbers[KR] * reference[1]
-            side[SIGN] = np.sign(push)
+            push = w[KP] * (w[THETA_D] - y[POSITION]) + w[KR] * w[OMEGA_D]
+            w[SIGN] = np.sign(push)
 
 
 @kernel()
-def small_enough(loop: Any, before: Any, after: Any) -> float:
+def small_enough(a: Any, w: Any, before: Any, after: Any) -> float:
     """Factor by which a step must shrink so that the velocity near rest changes by little of its scale.
 
     A sticking element's limit depends on s(v), which the error control does not see.
     """
-    numbers = loop[3]
     change = abs(after[VELOCITY] - before[VELOCITY])
-    scale = numbers[PLANT_SCALE]
-    if numbers[SOURCE] == FROM_MEASUREMENT and numbers[COMPENSATOR_SCALE] > 0.0:
-        scale = min(scale, numbers[COMPENSATOR_SCALE]) if scale > 0.0 else numbers[COMPENSATOR_SCALE]
+    scale = w[PLANT_SCALE]
+    if w[SOURCE] == FROM_MEASUREMENT and w[COMPENSATOR_SCALE] > 0.0:
+        scale = min(scale, w[COMPENSATOR_SCALE]) if scale > 0.0 else w[COMPENSATOR_SCALE]
     near = min(abs(after[VELOCITY]), abs(before[VELOCITY]))
     if scale > 0.0 and near < 3.0 * scale and change > 0.1 * scale:
         return 0.09 * scale / change

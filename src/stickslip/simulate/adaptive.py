@@ -42,10 +42,11 @@ from stickslip.simulate._loop import (
     COMPENSATION_TORQUE,
     EXTRA,
     FRICTION_TORQUE,
-    INTEGRAL,
     LAWS,
     MOTOR_TORQUE,
+    OMEGA_D,
     POSITION,
+    THETA_D,
     VELOCITY,
     arrays_of,
     begin_side,
@@ -60,6 +61,10 @@ __all__ = ["can_run", "run"]
 
 EVENT_ROWS = 20_000
 SHORTEST = 1e-14
+LOCAL = 1e-3
+"""Error allowed in one step over the tolerance of a run: thousands of steps add up, and events carry them on."""
+RESOLVED = 1.6
+"""Step times the largest eigenvalue; explicit Runge-Kutta amplifies ringing beyond about 1.6."""
 # Stages of the pair; the scratch row after them serves events and output.
 STAGES, SCRATCH = 7, 7
 
@@ -77,13 +82,15 @@ def can_run(case: Case) -> str:
 def run(case: Case) -> Outcome:
     """Integrate the case; see `Outcome`."""
     numbers = case.numbers
-    y = np.concatenate([[numbers[POSITION_0], numbers[VELOCITY_0], 0.0, 0.0, 0.0], case.plant.state, case.compensator.state])
+    y = np.concatenate(
+        [[numbers[POSITION_0], numbers[VELOCITY_0], 0.0, 0.0, 0.0], case.plant.state, case.compensator.state]
+    )
     rows = np.empty((case.grid.size + EVENT_ROWS, len(COLUMNS)))
     acc = new_meter(numbers[DURATION], settle_band(case))
     turns = np.empty((4096, 2))
     counts = np.zeros(4, dtype=np.int64)
     code, time = integrate(
-        arrays_of(case), y, tolerances(case), case.breaks, case.grid, rows, acc, turns, counts
+        *arrays_of(case), y, tolerances(case), case.breaks, case.grid, rows, acc, turns, counts
     )
     names = ("steps", "rejected", "events")
     return Outcome(
@@ -107,16 +114,22 @@ def settle_band(case: Case) -> float:
 
 
 def tolerances(case: Case) -> Any:
-    """Absolute tolerance of every state: that of the position, carried over by the contact's stiffness.
+    """Absolute tolerance of every state in one step: the position's, carried over by the contact's stiffness.
 
     A torque error of tolerance x stiffness moves a stuck contact by the tolerance; the velocity's share is a
     quarter of the ringing frequency times it.
     """
     numbers = case.numbers
-    position, stiffness = numbers[TOLERANCE], numbers[STIFFNESS]
+    position, stiffness = LOCAL * numbers[TOLERANCE], numbers[STIFFNESS]
     ringing = math.sqrt(max(stiffness, numbers[KP]) / numbers[INERTIA])
     integral = position * numbers[KP] / numbers[KI] if numbers[KI] > 0.0 else 1.0
-    out = [position, 0.25 * position * ringing, integral, 0.25 * position * ringing, 0.25 * position * ringing**2]
+    out = [
+        position,
+        0.25 * position * ringing,
+        integral,
+        0.25 * position * ringing,
+        0.25 * position * ringing**2,
+    ]
     for side in (case.plant, case.compensator):
         if side.model is None:
             continue
@@ -129,18 +142,18 @@ def tolerances(case: Case) -> Any:
 
 
 @kernel()
-def stages(loop: Any, t: float, h: float, y: Any, k: Any, end: Any, error: Any, u: Any) -> None:
+def stages(a: Any, w: Any, t: float, h: float, y: Any, k: Any, end: Any, error: Any, u: Any) -> None:
     """One Dormand-Prince step from y; row 0 of k holds the rates at its start, row 6 receives those at its end."""
     n = y.shape[0]
     for j in range(n):
         u[j] = y[j] + h * (0.2 * k[0, j])
-    rates(loop, t + 0.2 * h, u, k, 1)
+    rates(a, w, t + 0.2 * h, u, k, 1)
     for j in range(n):
         u[j] = y[j] + h * (3.0 / 40.0 * k[0, j] + 9.0 / 40.0 * k[1, j])
-    rates(loop, t + 0.3 * h, u, k, 2)
+    rates(a, w, t + 0.3 * h, u, k, 2)
     for j in range(n):
         u[j] = y[j] + h * (44.0 / 45.0 * k[0, j] - 56.0 / 15.0 * k[1, j] + 32.0 / 9.0 * k[2, j])
-    rates(loop, t + 0.8 * h, u, k, 3)
+    rates(a, w, t + 0.8 * h, u, k, 3)
     for j in range(n):
         u[j] = y[j] + h * (
             19372.0 / 6561.0 * k[0, j]
@@ -148,7 +161,7 @@ def stages(loop: Any, t: float, h: float, y: Any, k: Any, end: Any, error: Any, 
             + 64448.0 / 6561.0 * k[2, j]
             - 212.0 / 729.0 * k[3, j]
         )
-    rates(loop, t + 8.0 / 9.0 * h, u, k, 4)
+    rates(a, w, t + 8.0 / 9.0 * h, u, k, 4)
     for j in range(n):
         u[j] = y[j] + h * (
             9017.0 / 3168.0 * k[0, j]
@@ -157,7 +170,7 @@ def stages(loop: Any, t: float, h: float, y: Any, k: Any, end: Any, error: Any, 
             + 49.0 / 176.0 * k[3, j]
             - 5103.0 / 18656.0 * k[4, j]
         )
-    rates(loop, t + h, u, k, 5)
+    rates(a, w, t + h, u, k, 5)
     for j in range(n):
         end[j] = y[j] + h * (
             35.0 / 384.0 * k[0, j]
@@ -166,7 +179,7 @@ def stages(loop: Any, t: float, h: float, y: Any, k: Any, end: Any, error: Any, 
             - 2187.0 / 6784.0 * k[4, j]
             + 11.0 / 84.0 * k[5, j]
         )
-    rates(loop, t + h, end, k, 6)
+    rates(a, w, t + h, end, k, 6)
     for j in range(n):
         error[j] = h * (
             71.0 / 57600.0 * k[0, j]
@@ -199,7 +212,7 @@ def dense(h: float, y: Any, k: Any, end: Any, x: float, out: Any) -> None:
 
 @kernel()
 def locate(
-    loop: Any, t: float, h: float, y: Any, k: Any, end: Any, error: Any, u: Any, g: Any, before: float, after: float,
+    a: Any, w: Any, t: float, h: float, y: Any, k: Any, end: Any, error: Any, u: Any, g: Any, before: float, after: float,
     precision: float,
 ) -> float:  # fmt: skip
     """Shorten a step of length h to the first moment at which an event is due; returns its length.
@@ -216,8 +229,8 @@ def locate(
         x = (low * g_high - high * g_low) / (g_high - g_low)
         if not low < x < high or i > 12:
             x = 0.5 * (low + high)
-        stages(loop, t, x, y, k, end, error, u)
-        now = events(loop, t + x, end, k, SCRATCH, g)
+        stages(a, w, t, x, y, k, end, error, u)
+        now = events(a, w, t + x, end, k, SCRATCH, g)
         if now >= 0.0:
             high, g_high = x, now
             if side == 1:
@@ -228,33 +241,33 @@ def locate(
             if side == -1:
                 g_high *= 0.5
             side = -1
-    stages(loop, t, high, y, k, end, error, u)
+    stages(a, w, t, high, y, k, end, error, u)
     return high
 
 
 @kernel()
-def emit(loop: Any, t: float, y: Any, k: Any, rows: Any, n: int, event: float) -> int:
+def emit(a: Any, w: Any, t: float, y: Any, k: Any, rows: Any, n: int, event: float) -> int:
     """Write a row at t; returns the number of rows."""
     if n >= rows.shape[0]:
         return n
-    reference, torque = loop[9], loop[10]
-    rates(loop, t, y, k, SCRATCH)
+    rates(a, w, t, y, k, SCRATCH)
     rows[n, 0] = t
-    rows[n, 1] = reference[0]
-    rows[n, 2] = reference[1]
+    rows[n, 1] = w[THETA_D]
+    rows[n, 2] = w[OMEGA_D]
     rows[n, 3] = y[POSITION]
     rows[n, 4] = y[VELOCITY]
-    rows[n, 5] = torque[MOTOR_TORQUE]
-    rows[n, 6] = torque[FRICTION_TORQUE]
-    rows[n, 7] = torque[COMPENSATION_TORQUE]
+    rows[n, 5] = w[MOTOR_TORQUE]
+    rows[n, 6] = w[FRICTION_TORQUE]
+    rows[n, 7] = w[COMPENSATION_TORQUE]
     rows[n, 8] = event
     return n + 1
 
 
 @kernel()
-def measure(loop: Any, t: float, h: float, y: Any, k: Any, end: Any, u: Any, nodes: Any, acc: Any, turns: Any) -> None:
+def measure(
+    a: Any, w: Any, t: float, h: float, y: Any, k: Any, end: Any, u: Any, nodes: Any, acc: Any, turns: Any
+) -> None:
     """Hand an accepted step to the meter, at five nodes of its dense output."""
-    reference, torque = loop[9], loop[10]
     for i in range(5):
         if i == 0:
             u[:] = y
@@ -262,53 +275,52 @@ def measure(loop: Any, t: float, h: float, y: Any, k: Any, end: Any, u: Any, nod
             u[:] = end
         else:
             dense(h, y, k, end, 0.25 * i, u)
-        rates(loop, t + 0.25 * i * h, u, k, SCRATCH)
-        nodes[0, i] = reference[0] - u[POSITION]
-        nodes[1, i] = reference[1] - u[VELOCITY]
+        rates(a, w, t + 0.25 * i * h, u, k, SCRATCH)
+        nodes[0, i] = w[THETA_D] - u[POSITION]
+        nodes[1, i] = w[OMEGA_D] - u[VELOCITY]
         nodes[2, i] = u[POSITION]
         nodes[3, i] = u[VELOCITY]
-        nodes[4, i] = reference[1]
-        nodes[5, i] = torque[MOTOR_TORQUE]
-        nodes[6, i] = torque[FRICTION_TORQUE]
-        nodes[7, i] = torque[COMPENSATION_TORQUE]
+        nodes[4, i] = w[OMEGA_D]
+        nodes[5, i] = w[MOTOR_TORQUE]
+        nodes[6, i] = w[FRICTION_TORQUE]
+        nodes[7, i] = w[COMPENSATION_TORQUE]
     meter(acc, turns, t, h, nodes[0], nodes[1], nodes[2], nodes[3], nodes[4], nodes[5], nodes[6], nodes[7])
 
 
 @kernel()
-def settle(loop: Any, t: float, y: Any, k: Any, g: Any) -> int:
+def settle(a: Any, w: Any, t: float, y: Any, k: Any, g: Any) -> int:
     """Switch until no event is due at this moment; returns how many rounds it took (9 where it never ends)."""
     for i in range(9):
-        if events(loop, t, y, k, SCRATCH, g) < 0.0:
+        if events(a, w, t, y, k, SCRATCH, g) < 0.0:
             return i
-        switch(loop, t, y, k, SCRATCH, g)
+        switch(a, w, t, y, k, SCRATCH, g)
     return 9
 
 
 @kernel()
-def inside(loop: Any, t: float, h: float, y: Any, k: Any, end: Any, u: Any, g: Any) -> float:
+def inside(a: Any, w: Any, t: float, h: float, y: Any, k: Any, end: Any, u: Any, g: Any) -> float:
     """Fraction of a step at which an event is due though none is at its end, or 0.
 
     Looked for half way, and where the velocity has an extreme: a grazing reversal dips through zero and back.
     """
-    a0, a1 = k[0, VELOCITY], k[6, VELOCITY]
+    start, stop = k[0, VELOCITY], k[6, VELOCITY]
     for i in range(2):
-        if i == 1 and a0 * a1 >= 0.0:
+        if i == 1 and start * stop >= 0.0:
             break
-        x = 0.5 if i == 0 else a0 / (a0 - a1)
+        x = 0.5 if i == 0 else start / (start - stop)
         dense(h, y, k, end, x, u)
-        if events(loop, t + x * h, u, k, SCRATCH, g) >= 0.0:
+        if events(a, w, t + x * h, u, k, SCRATCH, g) >= 0.0:
             return x
     return 0.0
 
 
 @kernel()
-def broken(loop: Any, y: Any) -> int:
+def broken(a: Any, w: Any, y: Any) -> int:
     """Whether the state is beyond every reasonable bound or no number; DONE where it is fine."""
-    numbers = loop[3]
     for j in range(y.shape[0]):
         if not np.isfinite(y[j]):
             return NOT_FINITE
-    if abs(y[POSITION]) > numbers[POSITION_LIMIT] or abs(y[VELOCITY]) > numbers[VELOCITY_LIMIT]:
+    if abs(y[POSITION]) > w[POSITION_LIMIT] or abs(y[VELOCITY]) > w[VELOCITY_LIMIT]:
         return DIVERGED
     return DONE
 
@@ -326,39 +338,61 @@ def ratio(error: Any, tolerance: Any) -> float:
 
 
 @kernel()
+def stiffness_limit(h: float, k: Any, end: Any, u: Any, tolerance: Any) -> float:
+    """Longest next step that follows the fastest motion present instead of ringing at the border of stability.
+
+    The last two stages belong to the same time: the difference of their rates over that of their states tells
+    the largest eigenvalue (Hairer and Wanner, Solving ODEs II, IV.2). ``u`` holds the state of stage 6.
+    """
+    above, below = 0.0, 0.0
+    for j in range(u.shape[0]):
+        above += ((k[6, j] - k[5, j]) / tolerance[j]) ** 2
+        below += ((end[j] - u[j]) / tolerance[j]) ** 2
+    return RESOLVED * math.sqrt(below / above) if above > 0.0 and below > 0.0 else math.inf
+
+
+@kernel()
 def integrate(
-    loop: Any, y: Any, tolerance: Any, breaks: Any, grid: Any, rows: Any, acc: Any, turns: Any, counts: Any
+    a: Any,
+    w: Any,
+    y: Any,
+    tolerance: Any,
+    breaks: Any,
+    grid: Any,
+    rows: Any,
+    acc: Any,
+    turns: Any,
+    counts: Any,
 ) -> tuple[int, float]:
     """Run the loop from rest to the last break. Returns how it ended and when.
 
     ``counts`` receives steps, rejected steps, events and rows.
     """
-    numbers = loop[3]
     n = y.shape[0]
     k = np.zeros((STAGES + 1, n))
     end, error, u = np.zeros(n), np.zeros(n), np.zeros(n)
     g = np.zeros(n - LAWS + EXTRA)
     nodes = np.zeros((8, 5))
-    longest = min(numbers[MAX_STEP], MAX_WINDOW)
-    t, h, last = 0.0, 1e-6, 0.0
+    longest = min(w[MAX_STEP], MAX_WINDOW)
+    t, h = 0.0, 1e-6
     written, storm_start, storm_events = 0, 0.0, 0
     out = 0
     for b in range(breaks.shape[0]):
         stop = breaks[b]
-        begin_side(loop, t, 0.5 * (t + stop), y, k, SCRATCH)
-        settle(loop, t, y, k, g)
+        begin_side(a, w, t, 0.5 * (t + stop), y, k, SCRATCH)
+        settle(a, w, t, y, k, g)
         if out < grid.shape[0] and grid[out] <= t:
-            written = emit(loop, t, y, k, rows, written, 0.0)
+            written = emit(a, w, t, y, k, rows, written, 0.0)
             out += 1
-        rates(loop, t, y, k, 0)
+        rates(a, w, t, y, k, 0)
         h = min(h, 1e-4)
         while t < stop:
             h = min(h, longest)
             final = t + h * (1.0 + 1e-9) >= stop
             step = stop - t if final else h
-            stages(loop, t, step, y, k, end, error, u)
+            stages(a, w, t, step, y, k, end, error, u)
             worst = ratio(error, tolerance)
-            shrink = small_enough(loop, y, end)
+            shrink = small_enough(a, w, y, end)
             if (worst > 1.0 or shrink < 1.0) and step > SHORTEST:
                 h = step * min(shrink, max(0.2, 0.9 * worst**-0.2) if worst > 1.0 else 1.0)
                 counts[1] += 1
@@ -367,51 +401,52 @@ def integrate(
                 counts[3] = written
                 return (NOT_FINITE if not worst < np.inf else NO_STEP), t
             grow = min(5.0, 0.9 * worst**-0.2) if worst > 1e-4 else 5.0
-            now = events(loop, t + step, end, k, SCRATCH, g)
+            resolved = stiffness_limit(step, k, end, u, tolerance)
+            now = events(a, w, t + step, end, k, SCRATCH, g)
             event = now >= 0.0
             if not event:
-                early = inside(loop, t, step, y, k, end, u, g)
+                early = inside(a, w, t, step, y, k, end, u, g)
                 if early > 0.0 and step > SHORTEST:
                     step *= early
                     final = False
-                    stages(loop, t, step, y, k, end, error, u)
-                    now = events(loop, t + step, end, k, SCRATCH, g)
+                    stages(a, w, t, step, y, k, end, error, u)
+                    now = events(a, w, t + step, end, k, SCRATCH, g)
                     event = now >= 0.0
             if event:
                 final = False
-                before = events(loop, t, y, k, SCRATCH, g)
-                precision = max(1e-3 * numbers[TOLERANCE], 4e-16 * t)
-                step = locate(loop, t, step, y, k, end, error, u, g, before, now, min(precision, 1e-10))
+                before = events(a, w, t, y, k, SCRATCH, g)
+                precision = max(LOCAL * w[TOLERANCE], 4e-16 * t)
+                step = locate(a, w, t, step, y, k, end, error, u, g, before, now, min(precision, 1e-10))
             counts[0] += 1
             while out < grid.shape[0] and grid[out] <= t + step:
                 dense(step, y, k, end, min(1.0, (grid[out] - t) / step), u)
-                written = emit(loop, grid[out], u, k, rows, written, 0.0)
+                written = emit(a, w, grid[out], u, k, rows, written, 0.0)
                 out += 1
-            if numbers[METERED] != 0.0:
-                measure(loop, t, step, y, k, end, u, nodes, acc, turns)
+            if w[METERED] != 0.0:
+                measure(a, w, t, step, y, k, end, u, nodes, acc, turns)
             t = stop if final else t + step
             y[:] = end
             k[0, :] = k[6, :]
-            code = broken(loop, y)
+            code = broken(a, w, y)
             if code == DONE and event:
                 counts[2] += 1
                 storm_events += 1
                 if rows.shape[0] - written > grid.shape[0] - out + 2:
-                    written = emit(loop, t, y, k, rows, written, 1.0)
-                events(loop, t, y, k, SCRATCH, g)
-                switch(loop, t, y, k, SCRATCH, g)
-                rounds = settle(loop, t, y, k, g)
-                begin_side(loop, t, 0.5 * (t + stop), y, k, SCRATCH)
+                    written = emit(a, w, t, y, k, rows, written, 1.0)
+                events(a, w, t, y, k, SCRATCH, g)
+                switch(a, w, t, y, k, SCRATCH, g)
+                rounds = settle(a, w, t, y, k, g)
+                begin_side(a, w, t, 0.5 * (t + stop), y, k, SCRATCH)
                 if rows.shape[0] - written > grid.shape[0] - out + 2:
-                    written = emit(loop, t, y, k, rows, written, 1.0)
-                rates(loop, t, y, k, 0)
+                    written = emit(a, w, t, y, k, rows, written, 1.0)
+                rates(a, w, t, y, k, 0)
                 if t - storm_start > STORM_TIME:
                     storm_start, storm_events = t, 0
                 if storm_events > STORM_EVENTS or rounds == 9:
                     code = STORM
-                h = max(min(h, step * grow, 1e-4), 1e-8)
+                h = max(min(h, step * grow, 1e-4, resolved), 1e-8)
             elif not final or step >= h:
-                h = step * grow
+                h = min(step * grow, resolved)
             if code != DONE:
                 counts[3] = written
                 return code, t
