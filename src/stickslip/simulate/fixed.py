@@ -1,0 +1,330 @@
+"""Fixed-step integrator: for any law, through its ``step`` alone; the one that runs sampled controllers.
+
+Second order and A-stable (`stickslip.simulate._fixed_step`): the implicit trapezoid with steps cut at
+reversals, break-away and every kink of the reference. Where a step does not resolve the contact at rest, that is
+where ``dt`` times the slope of its torque against the velocity exceeds `RESOLVED` inertias (a spring k:
+omega dt > 2 with omega = sqrt(k / J)), the whole run uses an L-stable method of the same order instead, since the
+trapezoid would let a stuck contact ring without damping. That method does not cut its steps: what it does not
+resolve, it damps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import ParameterError
+from stickslip.jit import call_profile, kernel, pointer
+from stickslip.simulate._case import (
+    COLUMNS,
+    DIVERGED,
+    DONE,
+    DURATION,
+    FROM_MEASUREMENT,
+    GAIN,
+    INERTIA,
+    METERED,
+    NO_STEP,
+    NOT_FINITE,
+    POSITION_0,
+    POSITION_LIMIT,
+    SAMPLE_TIME,
+    SOURCE,
+    STORM,
+    STORM_EVENTS,
+    STORM_TIME,
+    VELOCITY_0,
+    VELOCITY_LIMIT,
+    Case,
+    Outcome,
+    Side,
+)
+from stickslip.simulate._fixed_sampled import COMPENSATION, HELD, MEMORY, sample
+from stickslip.simulate._fixed_step import (
+    FRICTION,
+    HEAD,
+    HELP,
+    LANDING,
+    MOTOR,
+    NUDGE,
+    POSITION,
+    SIDE,
+    STEP,
+    VELOCITY,
+    Loop,
+    advance,
+    copy,
+    restart,
+    sign,
+    step_plant,
+)
+from stickslip.simulate._meter import MAX_WINDOW, TURN_COUNT, close_standstill, meter, new_meter, settle_band_of
+from stickslip.spec import Surroundings
+
+__all__ = ["can_run", "run"]
+
+RESOLVED = 2.0
+"""dt * slope / J up to which the trapezoid runs; omega dt = 2 after `contact_slope` of a spring."""
+STEPS, ROWS, EVENTS = range(3)
+
+
+def can_run(case: Case) -> str:
+    """Why this integrator cannot run the case: it always can, so the empty string."""
+    return ""
+
+
+def run(case: Case, dt: float) -> Outcome:
+    """Integrate the case with steps of at most `dt`.
+
+    Parameters
+    ----------
+    case : Case
+    dt : float
+        Step, s. Output times, sample times and kinks of the reference are met whatever it is.
+
+    Returns
+    -------
+    Outcome
+        One row per entry of ``case.grid`` (values interpolated inside steps; from the right where a sampled
+        controller's torque jumps), and one per reversal, standstill and break-away. A run that ends early says
+        so in ``code`` and keeps its rows.
+
+    Raises
+    ------
+    ParameterError
+        If `dt` is not a positive number.
+    """
+    if not (dt > 0.0 and math.isfinite(dt)):
+        raise ParameterError(f"fixed integrator: dt = {dt:g} s must be greater than 0")
+    n = case.numbers
+    loop = loop_of(case, dt)
+    start = np.zeros(HEAD + case.plant.state.size + case.compensator.state.size)
+    start[HEAD:] = np.concatenate([case.plant.state, case.compensator.state])
+    start[POSITION], start[VELOCITY] = n[POSITION_0], n[VELOCITY_0]
+    start[SIDE] = np.sign(start[VELOCITY])
+    memory = np.concatenate([np.zeros(MEMORY), case.compensator.state])
+    accumulator = new_meter(float(n[DURATION]), settle_band_of(case.reference, float(n[DURATION])))
+    turns = np.zeros((4096, 2))
+    counts = np.zeros(3, dtype=np.int64)
+    grid = np.ascontiguousarray(case.grid, dtype=np.float64)
+    stops = stops_of(case)
+    rows, code, time = integrate(loop, start, memory, stops, grid, dt, accumulator, turns, counts)
+    return Outcome(
+        rows, int(code), float(time), accumulator, turns[: int(accumulator[TURN_COUNT])],
+        {"steps": int(counts[STEPS]), "rejected": 0, "events": int(counts[EVENTS])},
+    )  # fmt: skip
+
+
+def loop_of(case: Case, dt: float) -> Loop:
+    """Lay out what a step reads, and decide how the run is damped (see the module's docstring)."""
+    size = HEAD + case.plant.state.size + case.compensator.state.size
+    n = case.numbers
+    measured = n[SOURCE] == FROM_MEASUREMENT and n[SAMPLE_TIME] == 0.0
+    help_slope = n[GAIN] * contact_slope(case.compensator, dt) if measured else 0.0
+    return Loop(
+        n,
+        case.plant.addresses,
+        case.plant.parameters,
+        case.compensator.addresses,
+        case.compensator.parameters,
+        case.profile,
+        case.reference_parameters,
+        case.plant.state.size,
+        bool(dt * contact_slope(case.plant, dt) > RESOLVED * n[INERTIA]),
+        bool(dt * help_slope > RESOLVED * n[INERTIA]),
+        np.array(Surroundings()),
+        np.zeros(3),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+    )
+
+
+def contact_slope(side: Side, dt: float) -> float:
+    """Slope of a law's torque against the end velocity of a step from rest, N·m·s/rad (k dt / 2 of a spring).
+
+    0 for a law that holds at rest: there the engine itself finds the jump.
+    """
+    model = side.model
+    if model is None or model.law.holding is not None:
+        return 0.0
+    tiny = 1e-12
+    z = model.law.state(model.parameters)
+    return abs(model.law.step(0.0, tiny, dt, z, model.parameters, Surroundings())) / tiny
+
+
+def stops_of(case: Case) -> Any:
+    """Times at which a segment ends, with a mark: 1 where the controller samples; shape (n, 2)."""
+    period, duration = float(case.numbers[SAMPLE_TIME]), float(case.numbers[DURATION])
+    samples = np.zeros(0)
+    if period > 0.0:
+        samples = period * np.arange(1, math.ceil(duration / period - 1e-9))
+    times = np.concatenate([case.breaks, samples])
+    marks = np.concatenate([np.zeros(case.breaks.size), np.ones(samples.size)])
+    order = np.argsort(times, kind="stable")
+    times, marks = times[order], marks[order]
+    # A break within rounding of a sample is that sample.
+    first = np.concatenate([[True], np.diff(times) > 1e-12 * duration])
+    groups = np.cumsum(first) - 1
+    merged = np.zeros((int(first.sum()), 2))
+    merged[:, 0] = times[first]
+    np.maximum.at(merged[:, 1], groups, marks)
+    return merged
+
+
+# ---- the loop over time -------------------------------------------------------------------------------------------
+
+
+@kernel()
+def integrate(
+    loop: Loop, a: Any, memory: Any, stops: Any, grid: Any, dt: float, accumulator: Any, turns: Any, counts: Any
+) -> tuple[Any, int, float]:
+    """Run from 0 to the last stop; returns rows, code and the time reached."""
+    n = loop.numbers
+    b = a.copy()
+    nodes = np.zeros((8, 5))
+    rows = np.zeros((grid.size + 256, len(COLUMNS)))
+    storm = np.full(STORM_EVENTS, -1.0)
+    t, cap, code, written = 0.0, dt, DONE, 0
+    a[FRICTION] = step_plant(loop, a, a[VELOCITY], a[VELOCITY], 0.0)
+    for segment in range(stops.shape[0]):
+        restart(loop, a, t)
+        if n[SAMPLE_TIME] > 0.0 and (segment == 0 or stops[segment - 1, 1] > 0.0):
+            act(loop, a, memory)
+        begin, stop = t, stops[segment, 0]
+        pieces = max(1, int(math.ceil((stop - begin) / dt * (1.0 - 1e-12))))
+        for piece in range(pieces):
+            goal = stop if piece == pieces - 1 else begin + (stop - begin) * (piece + 1) / pieces
+            while goal - t > 1e-12 * dt:
+                if loop.steep:
+                    cap = LANDING * dt if a[VELOCITY] == 0.0 else min(4.0 * cap, dt)
+                taken, event = advance(loop, a, b, t, min(goal - t, cap))
+                code = verdict(n, b, taken)
+                if code != DONE:
+                    break
+                if goal - t - taken < 1e-12 * dt:
+                    taken = goal - t
+                rows, written = record(loop, a, b, t, taken, event, grid, rows, written, counts)
+                if n[METERED] != 0.0:
+                    measure(loop, a, b, t, taken, nodes, accumulator, turns)
+                copy(b, a)
+                t += taken
+                counts[STEPS] += 1
+                if event:
+                    counts[EVENTS] += 1
+                    last = counts[EVENTS] % STORM_EVENTS
+                    if storm[last] >= 0.0 and t - storm[last] < STORM_TIME:
+                        code = STORM
+                        break
+                    storm[last] = t
+            if code != DONE:
+                break
+            t = goal
+        if code != DONE:
+            break
+    if code == DONE and counts[ROWS] < grid.size:
+        rows, written = write(loop, a, a, t, 1.0, 0.0, t, 0.0, rows, written)
+    if n[METERED] != 0.0:
+        close_standstill(accumulator, t)
+    return rows[:written].copy(), code, t
+
+
+@kernel()
+def act(loop: Loop, a: Any, memory: Any) -> None:
+    """Let the sampled controller act on the state a and hold its output."""
+    sample(
+        loop.numbers, memory, loop.helper[STEP], loop.helper_parameters, loop.surroundings, a[POSITION],
+        loop.motion[0] - NUDGE * loop.motion[1], loop.motion[1],
+    )  # fmt: skip
+    a[MOTOR], a[HELP] = memory[HELD], memory[COMPENSATION]
+
+
+@kernel()
+def verdict(n: Any, b: Any, taken: float) -> int:
+    """DONE if a step may be kept, else why the run ends."""
+    for i in range(b.size):
+        if not math.isfinite(b[i]):
+            return NOT_FINITE
+    if abs(b[POSITION]) > n[POSITION_LIMIT] or abs(b[VELOCITY]) > n[VELOCITY_LIMIT]:
+        return DIVERGED
+    return NO_STEP if taken < 0.0 else DONE
+
+
+# ---- inside a step ------------------------------------------------------------------------------------------------
+
+
+@kernel()
+def position_inside(a: Any, b: Any, h: float, x: float) -> float:
+    """Position at the fraction x of a step: the cubic through positions and velocities of its ends, rad."""
+    y = 1.0 - x
+    return (
+        y * y * (1.0 + 2.0 * x) * a[POSITION]
+        + x * x * (3.0 - 2.0 * x) * b[POSITION]
+        + x * y * h * (y * a[VELOCITY] - x * b[VELOCITY])
+    )
+
+
+@kernel()
+def write(
+    loop: Loop, a: Any, b: Any, t: float, x: float, h: float, time: float, event: float, rows: Any, written: int
+) -> tuple[Any, int]:
+    """Add the row at the fraction x of the step [t, t + h]; returns the rows (grown where full) and their number."""
+    if written == rows.shape[0]:
+        grown = np.zeros((2 * written, rows.shape[1]))
+        grown[:written] = rows
+        rows = grown
+    call_profile(loop.profile, time, pointer(loop.reference_parameters, 0), pointer(loop.motion, 0))
+    row = rows[written]
+    row[0] = time
+    row[1], row[2] = loop.motion[0], loop.motion[1]
+    row[3] = position_inside(a, b, h, x)
+    row[4] = a[VELOCITY] + x * (b[VELOCITY] - a[VELOCITY])
+    row[5] = a[MOTOR] + x * (b[MOTOR] - a[MOTOR])
+    row[6] = a[FRICTION] + x * (b[FRICTION] - a[FRICTION])
+    row[7] = a[HELP] + x * (b[HELP] - a[HELP])
+    row[8] = event
+    return rows, written + 1
+
+
+@kernel()
+def record(
+    loop: Loop, a: Any, b: Any, t: float, h: float, event: bool, grid: Any, rows: Any, written: int, counts: Any
+) -> tuple[Any, int]:
+    """Write the rows of the output times inside [t, t + h), and of the event at its end."""
+    while counts[ROWS] < grid.size and grid[counts[ROWS]] < t + h - 1e-12 * max(1.0, t):
+        time = grid[counts[ROWS]]
+        x = min(max((time - t) / h, 0.0), 1.0)
+        rows, written = write(loop, a, b, t, x, h, time, 0.0, rows, written)
+        counts[ROWS] += 1
+    if event:
+        rows, written = write(loop, a, b, t, 1.0, h, t + h, 1.0, rows, written)
+    return rows, written
+
+
+@kernel()
+def measure(loop: Loop, a: Any, b: Any, t: float, h: float, nodes: Any, accumulator: Any, turns: Any) -> None:
+    """Hand the step to the meter in windows of at most MAX_WINDOW, torques and velocity linear inside it."""
+    if h <= 0.0:
+        return
+    windows = int(math.ceil(h / MAX_WINDOW * (1.0 - 1e-9)))
+    for window in range(windows):
+        for i in range(5):
+            x = (window + 0.25 * i) / windows
+            inside = min(max(t + x * h, t + min(NUDGE, 0.5 * h)), t + h - min(NUDGE, 0.5 * h))
+            call_profile(loop.profile, inside, pointer(loop.reference_parameters, 0), pointer(loop.motion, 0))
+            position = position_inside(a, b, h, x)
+            v = a[VELOCITY] + x * (b[VELOCITY] - a[VELOCITY])
+            nodes[0, i] = loop.motion[0] - position
+            nodes[1, i] = loop.motion[1] - v
+            nodes[2, i] = position
+            nodes[3, i] = v
+            nodes[4, i] = loop.motion[1]
+            nodes[5, i] = a[MOTOR] + x * (b[MOTOR] - a[MOTOR])
+            nodes[6, i] = a[FRICTION] + x * (b[FRICTION] - a[FRICTION])
+            nodes[7, i] = a[HELP] + x * (b[HELP] - a[HELP])
+        meter(
+            accumulator, turns, t + h * window / windows, h / windows,
+            nodes[0], nodes[1], nodes[2], nodes[3], nodes[4], nodes[5], nodes[6], nodes[7],
+        )  # fmt: skip
