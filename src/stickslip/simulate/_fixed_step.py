@@ -47,7 +47,8 @@ STEP, HOLDING = 0, 6  # places in a Side's addresses
 GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
 VELOCITY_ROUNDING = 1e-14  # rad/s, relative above 1 rad/s
 NUDGE = 1e-11  # s, by which one-sided values of the reference lie inside the step
-APPROACH, LANDING = 0.9, 1e-3  # of a step: how a steep compensator's zero is approached, and left
+FINE = 0.1  # of the sliding curve's velocity scale, by which the velocity near rest may change in a step
+APPROACH, LANDING, GROWTH = 0.9, 1e-3, 4.0  # of a step: how a steep compensator's zero is approached, and left
 
 
 class Loop(NamedTuple):
@@ -63,6 +64,7 @@ class Loop(NamedTuple):
     plant_states: int
     damped: bool
     steep: bool
+    fine: float
     surroundings: Any
     motion: Any
     ahead: Any
@@ -397,6 +399,18 @@ def rest_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> float:
 
 
 @kernel()
+def near_rest(loop: Loop, v0: float, v1: float) -> float:
+    """Factor by which a step shrinks so that the velocity near rest changes by little of the curve's scale.
+
+    A sticking element breaks away where s(v) falls to its load, and s falls within that scale.
+    """
+    scale, change = loop.fine, abs(v1 - v0)
+    if change <= FINE * scale or min(abs(v0), abs(v1)) > 3.0 * scale:
+        return 1.0
+    return 0.9 * FINE * scale / change
+
+
+@kernel()
 def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, bool]:
     """A step of the trapezoid, cut where the velocity passes through zero; time taken (< 0: no solution), cut."""
     side = sign(a[VELOCITY]) if a[VELOCITY] != 0.0 else a[LEAVING]
@@ -404,6 +418,14 @@ def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, 
     look_ahead(loop, a, t, h)
     if not solve(loop, a, b, h, jumping, 0.5):
         return -1.0, False
+    for _ in range(10):
+        shorter = h * near_rest(loop, a[VELOCITY], b[VELOCITY])
+        if shorter == h:
+            break
+        h = shorter
+        look_ahead(loop, a, t, h)
+        if not solve(loop, a, b, h, jumping, 0.5):
+            return -1.0, False
     if side == 0.0 or b[VELOCITY] * side > 0.0:
         b[SIDE] = sign(b[VELOCITY])
         return h, False
@@ -437,8 +459,9 @@ def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, 
 
 
 @kernel()
-def advance(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, bool]:
-    """One step from a to b, at most h long; returns the time taken (< 0: no solution) and whether an event ended it."""
+def advance(loop: Loop, a: Any, b: Any, t: float, h: float, cap: float) -> tuple[float, bool]:
+    """One step from a to b, at most h long (in motion at most cap); time taken (< 0: no solution), ended by an event.
+    """
     if loop.damped:
         return (h, False) if damped_step(loop, a, b, t, h) else (-1.0, False)
     if a[VELOCITY] == 0.0 and a[LEAVING] == 0.0 and (loop.plant[HOLDING] != 0 or helper_jumps(loop)):
@@ -447,4 +470,4 @@ def advance(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, bool
             taken = rest_step(loop, a, b, t, h)
             return taken, b[LEAVING] != 0.0
         leave(loop, a, side)
-    return moving_step(loop, a, b, t, h)
+    return moving_step(loop, a, b, t, min(h, cap))

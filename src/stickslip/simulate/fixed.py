@@ -19,6 +19,7 @@ from stickslip.errors import ParameterError
 from stickslip.jit import call_profile, kernel, pointer
 from stickslip.simulate._case import (
     COLUMNS,
+    COMPENSATOR_SCALE,
     DIVERGED,
     DONE,
     DURATION,
@@ -28,6 +29,7 @@ from stickslip.simulate._case import (
     METERED,
     NO_STEP,
     NOT_FINITE,
+    PLANT_SCALE,
     POSITION_0,
     POSITION_LIMIT,
     SAMPLE_TIME,
@@ -44,6 +46,7 @@ from stickslip.simulate._case import (
 from stickslip.simulate._fixed_sampled import COMPENSATION, HELD, MEMORY, sample
 from stickslip.simulate._fixed_step import (
     FRICTION,
+    GROWTH,
     HEAD,
     HELP,
     LANDING,
@@ -134,6 +137,7 @@ def loop_of(case: Case, dt: float) -> Loop:
         case.plant.state.size,
         bool(dt * contact_slope(case.plant, dt) > RESOLVED * n[INERTIA]),
         bool(dt * help_slope > RESOLVED * n[INERTIA]),
+        velocity_scale(case),
         np.array(Surroundings()),
         np.zeros(3),
         np.zeros(size),
@@ -153,6 +157,15 @@ def contact_slope(side: Side, dt: float) -> float:
     tiny = 1e-12
     z = model.law.state(model.parameters)
     return abs(model.law.step(0.0, tiny, dt, z, model.parameters, Surroundings())) / tiny
+
+
+def velocity_scale(case: Case) -> float:
+    """The smallest velocity scale of the laws that see the axis's velocity, rad/s; infinite where none has one."""
+    n = case.numbers
+    scales = [n[PLANT_SCALE]]
+    if n[SOURCE] == FROM_MEASUREMENT and n[SAMPLE_TIME] == 0.0:
+        scales.append(n[COMPENSATOR_SCALE])
+    return float(min((x for x in scales if x > 0.0), default=math.inf))
 
 
 def stops_of(case: Case) -> Any:
@@ -199,8 +212,8 @@ def integrate(
             goal = stop if piece == pieces - 1 else begin + (stop - begin) * (piece + 1) / pieces
             while goal - t > 1e-12 * dt:
                 if loop.steep:
-                    cap = LANDING * dt if a[VELOCITY] == 0.0 else min(4.0 * cap, dt)
-                taken, event = advance(loop, a, b, t, min(goal - t, cap))
+                    cap = LANDING * dt if a[VELOCITY] == 0.0 else min(GROWTH * cap, dt)
+                taken, event = advance(loop, a, b, t, goal - t, cap)
                 code = verdict(n, b, taken)
                 if code != DONE:
                     break
