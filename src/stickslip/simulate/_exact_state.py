@@ -1,0 +1,222 @@
+"""What the exact integrator remembers: elements, slipping forces, and the state of the loop.
+
+Flat arrays with named columns. A *side* is a law in the loop: 0 the plant's friction, 1 the law of a feedback
+compensator (weighted by minus its gain). The slipping elements of a side share one curve s(v), so that their sum
+S alone is integrated, dS/dt = C (A sigma - S/s(v)) with A the sum of their shares; each element's force follows
+from the decay exp(-integral of C/s) when a mode changes. Where C is infinite, S = A sigma s(v).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from stickslip.jit import call_profile, call_value, kernel, pointer
+from stickslip.simulate._case import GAIN, INERTIA, KD, KI, KP, KR, NUMBERS
+from stickslip.simulate._exact_flow import Linear, linear
+
+# ---- columns of `elements` (those of finite stiffness) -------------------------------------------------------
+STIFFNESS, SHARE, PER_SHARE, FORCE, OFFSET, SLIPS, ELEMENT_SIZE = range(7)
+
+# ---- columns of `sides` --------------------------------------------------------------------------------------
+(
+    WEIGHT, ATTRACTION, BREAKAWAY, LOWEST, SCALE, VISCOUS, RIGID, SLIPPING, STICKING, SPRING, SPRING_OFFSET,
+    VARIES, S, DS, Q, S_START, EXPONENT, S_MID, S_END, DS_END, Q_MID, Q_END, S_NOW, SIDE_SIZE,
+) = range(24)  # fmt: skip
+
+# ---- entries of `loop`: the state, and the reference where it stands -----------------------------------------
+(
+    TIME, POSITION, VELOCITY, SIGMA, HELD, INTEGRAL, ADDED, WATCHED, NONLINEAR, BASE,
+    R, DR, GOAL, GOAL_RATE, EDGE_LOW, EDGE_HIGH, CELL, PROFILE_OUT,
+) = range(18)  # fmt: skip
+LOOP_SIZE = PROFILE_OUT + 3
+
+# ---- entries of `plan` (integers): addresses, and where parameters begin -------------------------------------
+(
+    CURVE_0,
+    PARAMETERS_0,
+    CURVE_1,
+    PARAMETERS_1,
+    PROFILE,
+    PROFILE_PARAMETERS,
+    LITERAL,
+    FIRST_1,
+    ELEMENTS,
+    SIDES,
+    PLAN_SIZE,
+) = range(11)
+"""``parameters`` begins with Case.numbers; elements of side 1 begin at FIRST_1."""
+
+assert NUMBERS > 0  # Case.numbers lie at the front of `parameters`
+EDGE = 1e-12
+"""One-sided limits at a break are taken this far from it, s."""
+
+
+@kernel(exact=False)
+def sliding(parameters: Any, plan: Any, sides: Any, side: int, v: float) -> float:
+    """The sliding curve of a side, N·m."""
+    address = plan[CURVE_0 + 2 * side]
+    if address == 0:
+        return sides[side, BREAKAWAY]
+    return call_value(address, v, pointer(parameters, plan[PARAMETERS_0 + 2 * side]))
+
+
+@kernel(exact=False)
+def command(parameters: Any, plan: Any, cells: Any, loop: Any, t: float) -> tuple[float, float, float, float]:
+    """Torque commanded by time alone, its slope, and the reference's position and velocity, at t.
+
+    kp theta_d + kr theta_d' + gain T_hat(t); ``cells`` hold the feedforward torque (`_forcing`).
+    """
+    t = min(max(t, loop[EDGE_LOW]), loop[EDGE_HIGH])
+    call_profile(plan[PROFILE], t, pointer(parameters, plan[PROFILE_PARAMETERS]), pointer(loop, PROFILE_OUT))
+    goal = loop[PROFILE_OUT]
+    rate = loop[PROFILE_OUT + 1]
+    r = parameters[KP] * goal + parameters[KR] * rate
+    dr = parameters[KP] * rate + parameters[KR] * loop[PROFILE_OUT + 2]
+    last = cells.shape[0] - 1
+    if last >= 0:
+        i = int(loop[CELL])
+        while i < last and t >= cells[i + 1, 0]:
+            i += 1
+        while i > 0 and t < cells[i, 0]:
+            i -= 1
+        loop[CELL] = i
+        x = (t - cells[i, 0]) * cells[i, 1]
+        r += parameters[GAIN] * (
+            cells[i, 2] + x * (cells[i, 3] + x * (cells[i, 4] + x * (cells[i, 5] + x * cells[i, 6])))
+        )
+        dr += (
+            parameters[GAIN]
+            * cells[i, 1]
+            * (cells[i, 3] + x * (2.0 * cells[i, 4] + x * (3.0 * cells[i, 5] + x * 4.0 * cells[i, 6])))
+        )
+    return r, dr, goal, rate
+
+
+@kernel(exact=False)
+def arrange(
+    parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, stiffness_floor: float
+) -> Linear:
+    """Set the loop up for the modes as they are: springs, slipping sums, flow.
+
+    Where the stiffness nearly vanishes, a spring is added (and taken off again by the corrector), so that the
+    cubic particular solution exists.
+    """
+    theta = loop[POSITION]
+    v = loop[VELOCITY]
+    total = parameters[KP]
+    damping = parameters[KD]
+    loop[BASE] = 0.0
+    slips = False
+    loop[NONLINEAR] = 1.0 if parameters[KI] != 0.0 else 0.0
+    for side in range(plan[SIDES]):
+        w = sides[side, WEIGHT]
+        damping += w * sides[side, VISCOUS]
+        gather(plan, elements, sides, side, theta)
+        sides[side, SLIPPING] += sides[side, RIGID] * abs(loop[SIGMA])
+        total += w * sides[side, SPRING]
+        loop[BASE] += w * sides[side, SPRING_OFFSET]
+        if sides[side, SLIPPING] > 0.0:
+            slips = True
+            begin_slip(parameters, plan, sides, loop, side, v)
+            if sides[side, VARIES] > 0.0:
+                loop[NONLINEAR] = 1.0
+    loop[WATCHED] = 1.0 if slips else 0.0
+    loop[ADDED] = 0.0
+    if abs(total) < stiffness_floor:
+        loop[ADDED] = 2.0 * stiffness_floor
+        loop[NONLINEAR] = 1.0
+    lin = linear(parameters[INERTIA], damping, total + loop[ADDED])
+    begin_slopes(parameters, plan, sides, loop, lin)
+    return lin
+
+
+@kernel(exact=False)
+def first_of(plan: Any, side: int) -> int:
+    """Index of the first element of a side; that of side 2 ends side 1."""
+    return 0 if side == 0 else (plan[FIRST_1] if side == 1 else plan[ELEMENTS])
+
+
+@kernel(exact=False)
+def gather(plan: Any, elements: Any, sides: Any, side: int, theta: float) -> None:
+    """Sum up the springs of the sticking elements, and shares and forces of the slipping ones."""
+    spring = 0.0
+    offset = 0.0
+    share = 0.0
+    force = 0.0
+    sticking = 0.0
+    for i in range(first_of(plan, side), first_of(plan, side + 1)):
+        if elements[i, SLIPS] > 0.0:
+            share += elements[i, SHARE]
+            force += elements[i, FORCE]
+        else:
+            sticking += 1.0
+            elements[i, OFFSET] = elements[i, FORCE] - elements[i, STIFFNESS] * theta
+            spring += elements[i, STIFFNESS]
+            offset += elements[i, OFFSET]
+    sides[side, SPRING] = spring
+    sides[side, SPRING_OFFSET] = offset
+    sides[side, STICKING] = sticking
+    sides[side, SLIPPING] = share
+    sides[side, S] = force
+    sides[side, S_START] = force
+    sides[side, S_NOW] = force
+    sides[side, EXPONENT] = 0.0
+    sides[side, DS] = 0.0
+
+
+@kernel(exact=False)
+def begin_slip(parameters: Any, plan: Any, sides: Any, loop: Any, side: int, v: float) -> None:
+    """Curve and slope of a side's slipping force at the start of a stretch."""
+    s = sliding(parameters, plan, sides, side, v)
+    attraction = sides[side, ATTRACTION]
+    if attraction < math.inf:
+        sides[side, Q] = 1.0 / s
+        sides[side, DS] = attraction * (sides[side, SLIPPING] * loop[SIGMA] - sides[side, S] / s)
+    else:
+        sides[side, S] = sides[side, SLIPPING] * loop[SIGMA] * s
+        sides[side, S_NOW] = sides[side, S]
+
+
+@kernel(exact=False)
+def begin_slopes(parameters: Any, plan: Any, sides: Any, loop: Any, lin: Linear) -> None:
+    """Slopes of the forces that follow the curve at once, from the acceleration."""
+    pull = loop[R] + parameters[KI] * loop[INTEGRAL] - loop[BASE]
+    pull -= (lin.stiffness - loop[ADDED]) * loop[POSITION] + lin.damping * loop[VELOCITY]
+    for side in range(plan[SIDES]):
+        pull -= sides[side, WEIGHT] * sides[side, S]
+    for side in range(plan[SIDES]):
+        if sides[side, ATTRACTION] == math.inf and sides[side, SLIPPING] > 0.0 and sides[side, VARIES] > 0.0:
+            slope = curve_slope(parameters, plan, sides, side, loop[VELOCITY])
+            sides[side, DS] = sides[side, SLIPPING] * loop[SIGMA] * slope * pull / lin.inertia
+
+
+@kernel(exact=False)
+def curve_slope(parameters: Any, plan: Any, sides: Any, side: int, v: float) -> float:
+    """ds/dv by a central difference, one-sided at rest."""
+    d = 1e-4 * sides[side, SCALE]
+    low = v - d if abs(v) >= d else v
+    high = v + d if v >= 0.0 or abs(v) >= d else v
+    if low == v:
+        low, high = (v, v + d) if v >= 0.0 else (v - d, v)
+    return (sliding(parameters, plan, sides, side, high) - sliding(parameters, plan, sides, side, low)) / (
+        high - low
+    )
+
+
+@kernel(exact=False)
+def torques(
+    parameters: Any, plan: Any, sides: Any, loop: Any, r: float, goal: float, rate: float, integral: float,
+    theta: float, v: float, s_plant: float, s_helper: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Motor, friction and compensating torque, N·m."""
+    helped = r - parameters[KP] * goal - parameters[KR] * rate
+    if plan[SIDES] > 1:
+        model = sides[1, SPRING] * theta + sides[1, SPRING_OFFSET] + s_helper + sides[1, VISCOUS] * v
+        helped -= sides[1, WEIGHT] * model
+    motor = parameters[KP] * (goal - theta) + parameters[KR] * rate - parameters[KD] * v
+    motor += parameters[KI] * integral + helped
+    if loop[HELD] > 0.0:
+        return motor, motor, helped
+    friction = sides[0, SPRING] * theta + sides[0, SPRING_OFFSET] + s_plant + sides[0, VISCOUS] * v
+    return motor, friction, helped

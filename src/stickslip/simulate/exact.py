@@ -1,0 +1,249 @@
+"""The exact integrator: event-driven flow of a loop that is linear between events.
+
+J dv/dt = T_m - T_f with linear control (thesis eqs. 3.1 and 3.3) and friction made of elements that stick as
+springs and slip along one curve (eqs. 2.16 to 2.18; rigid elements: eq. 2.1). Between two events the motion is a
+matrix exponential under smooth forcing; slipping forces and the integral controller enter through a corrector.
+Nothing is stepped over: break-aways and reversals are located on the exact flow. Tolerance is the error in
+position per step, rad.
+
+`_exact_flow` the flow, `_exact_state` what is remembered, `_exact_step` one stretch, `_exact_events` modes,
+`_exact_rest` stiction, `_exact_output` rows and metrics, `_exact_kernel` the loop, `_forcing` feedforward.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.jit import flat
+from stickslip.simulate import _exact_state as col
+from stickslip.simulate._case import (
+    COLUMNS,
+    FROM_MEASUREMENT,
+    FROM_REFERENCE,
+    GAIN,
+    KD,
+    METERED,
+    NUMBERS,
+    SOURCE,
+    Array,
+    Case,
+    Outcome,
+    Side,
+)
+from stickslip.simulate._exact_kernel import LONGEST_STEP, solve
+from stickslip.simulate._forcing import NO_CELLS, feedforward
+from stickslip.simulate._meter import SIZE, new_meter
+from stickslip.spec import Elements
+
+__all__ = ["Prepared", "can_run", "prepare", "run"]
+
+EVENT_ROWS = 20_000
+TURNS = 20_000
+
+
+def elements_of(side: Side) -> Elements | None:
+    """The law of a side as elements, or None."""
+    if side.model is None or side.model.law.modes is None:
+        return None
+    return side.model.law.modes(side.model.parameters)
+
+
+def can_run(case: Case) -> str:
+    """Say why the exact integrator cannot run `case`, in one sentence; "" if it can."""
+    controller = case.controller
+    if controller.sample_time > 0.0:
+        return "the exact integrator runs controllers in continuous time, not with a sample time"
+    if math.isfinite(controller.torque_limit):
+        return "the exact integrator needs a controller without a torque limit"
+    helper = controller.compensator
+    if helper is not None and helper.filter_hz is not None:
+        return "the exact integrator needs a compensator without a velocity filter"
+    sides = [("plant", case.plant)]
+    if case.numbers[SOURCE] == FROM_MEASUREMENT:
+        sides.append(("compensator", case.compensator))
+    for where, side in sides:
+        complaint = _complaint(side)
+        if complaint:
+            return f"the exact integrator cannot take the {where}: {complaint}"
+    return ""
+
+
+def _complaint(side: Side) -> str:
+    name = side.model.law.name if side.model else "no law"
+    e = elements_of(side)
+    if e is None:
+        return f"law {name!r} is not made of sticking and slipping elements"
+    rigid = [k for k in e.stiffness if math.isinf(k)]
+    if rigid and math.isfinite(e.attraction):
+        return f"law {name!r} has rigid elements with a finite attraction"
+    if not e.constant_curve and not side.pointers.sliding:
+        return f"law {name!r} has no sliding curve"
+    if not e.constant_curve and e.velocity_scale <= 0.0:
+        return f"law {name!r} has a sliding curve without a velocity scale"
+    return ""
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A case laid out for the kernel; `run` does nothing but run it.
+
+    Attributes
+    ----------
+    plan : array of int64
+        Addresses and offsets, by the names of `_exact_state`.
+    parameters, elements, sides, cells, breaks : arrays
+        What the kernel reads; elements and sides are its starting values.
+    """
+
+    case: Case
+    plan: np.ndarray[Any, np.dtype[np.int64]]
+    parameters: Array
+    elements: Array
+    sides: Array
+    cells: Array
+    breaks: Array
+    spacing: float
+    stiffness_floor: float
+
+    def run(self) -> tuple[Array, int, float]:
+        """Run without metrics; returns position (rad) and velocity (rad/s) on the grid, why and when it ended.
+
+        Returns
+        -------
+        motion : array, shape (n, 2)
+            Cut where the run ended early.
+        code : int
+        time : float
+        """
+        out = np.empty((self.case.grid.size, 2))
+        code, time, written, _ = self._solve(
+            out, np.empty((0, len(COLUMNS))), False, np.zeros(1), np.zeros((0, 2))
+        )
+        return out[: written[1]], code, time
+
+    def record(self) -> Outcome:
+        """Run with all rows, and the metrics if the case wants them."""
+        metered = bool(self.case.numbers[METERED])
+        acc = new_meter(float(self.case.breaks[-1]), 0.0) if metered else np.zeros(SIZE)
+        turns = np.zeros((TURNS if metered else 0, 2))
+        rows = np.empty((self.case.grid.size + EVENT_ROWS, len(COLUMNS)))
+        code, time, written, counts = self._solve(np.empty((0, 2)), rows, metered, acc, turns)
+        named = {"steps": int(counts[0]), "rejected": int(counts[1]), "events": int(counts[2])}
+        return Outcome(rows[: written[0]].copy(), code, time, acc, turns, named)
+
+    def _solve(self, out: Array, rows: Array, metered: bool, acc: Array, turns: Array) -> Any:
+        counts = np.zeros(3, np.int64)
+        written = np.zeros(2, np.int64)
+        code, time = solve(
+            self.parameters, self.plan, self.cells, self.elements.copy(), self.sides.copy(), self.breaks,
+            self.case.grid, self.spacing, out, rows, metered, acc, turns, counts, written, self.stiffness_floor,
+        )  # fmt: skip
+        return int(code), float(time), written, counts
+
+
+def prepare(case: Case) -> Prepared:
+    """Lay `case` out for the kernel; a feedforward torque is computed here, once per reference and law.
+
+    Raises
+    ------
+    ValueError
+        If `can_run` refuses the case.
+    """
+    refusal = can_run(case)
+    if refusal:
+        raise ValueError(refusal)
+    feedback = case.numbers[SOURCE] == FROM_MEASUREMENT
+    members = [(case.plant, 1.0)]
+    if feedback:
+        members.append((case.compensator, -case.numbers[GAIN]))
+    plan = np.zeros(col.PLAN_SIZE, np.int64)
+    blocks = [case.numbers]
+    finite: list[list[float]] = []
+    sides = np.zeros((len(members), col.SIDE_SIZE))
+    for i, (side, weight) in enumerate(members):
+        e = elements_of(side)
+        assert e is not None
+        plan[col.CURVE_0 + 2 * i] = 0 if e.constant_curve else side.pointers.sliding
+        plan[col.PARAMETERS_0 + 2 * i] = sum(b.size for b in blocks)
+        blocks.append(side.parameters)
+        finite += [
+            [k, a, 1.0 / a, 0.0, 0.0, 0.0]
+            for k, a in zip(e.stiffness, e.share, strict=True)
+            if math.isfinite(k)
+        ]
+        if i == 0:
+            plan[col.FIRST_1] = len(finite)
+        fill_side(sides[i], side, e, weight)
+    plan[col.ELEMENTS], plan[col.SIDES] = len(finite), len(members)
+    plan[col.PROFILE], plan[col.PROFILE_PARAMETERS] = case.profile, sum(b.size for b in blocks)
+    blocks.append(case.reference_parameters)
+    law = case.plant.model.law if case.plant.model else None
+    plan[col.LITERAL] = 1 if law and law.chosen.get("slip_rule", "signed") == "literal" else 0
+    cells, kinks = feedforward(case) if case.numbers[SOURCE] == FROM_REFERENCE else (NO_CELLS, [])
+    damping = case.numbers[KD] + float(np.sum(sides[:, col.WEIGHT] * sides[:, col.VISCOUS]))
+    inertia = case.axis.inertia
+    return Prepared(
+        case,
+        plan,
+        flat(np.concatenate(blocks)),
+        np.array(finite, dtype=np.float64).reshape(-1, col.ELEMENT_SIZE),
+        sides,
+        cells,
+        merged(case.breaks, kinks),
+        even_spacing(case.grid),
+        max(0.01 * damping * damping / inertia, 0.01 * inertia / LONGEST_STEP**2),
+    )
+
+
+def fill_side(into: Array, side: Side, e: Elements, weight: float) -> None:
+    """Write the constants of one side."""
+    into[col.WEIGHT], into[col.ATTRACTION], into[col.VISCOUS] = weight, e.attraction, e.viscous
+    into[col.BREAKAWAY], into[col.SCALE] = e.breakaway, 0.0 if e.constant_curve else e.velocity_scale
+    into[col.LOWEST] = lowest(side, e)
+    into[col.RIGID] = sum(a for k, a in zip(e.stiffness, e.share, strict=True) if math.isinf(k))
+    into[col.VARIES] = 0.0 if e.constant_curve and math.isinf(e.attraction) else 1.0
+
+
+def lowest(side: Side, e: Elements) -> float:
+    """A level just below the sliding curve, below which no element breaks away."""
+    if e.constant_curve or side.model is None:
+        return 0.999 * e.breakaway
+    law, p = side.model.law, side.model.parameters
+    curve = next(law.option(c).function for c in law.choices if c.replaces == "sliding")
+    speeds = e.velocity_scale * np.concatenate([np.linspace(0.0, 10.0, 21), np.geomspace(10.0, 1e4, 13)])
+    return 0.99 * min(curve(sign * float(v), p) for v in speeds for sign in (1.0, -1.0))
+
+
+def merged(breaks: Array, kinks: list[float]) -> Array:
+    """Breaks of the reference and kinks of the feedforward torque, ascending, none nearer than 1e-9 s."""
+    kept: list[float] = []
+    for t in sorted([*breaks.tolist(), *kinks]):
+        if kept and t - kept[-1] < 1e-9:
+            # The later one of a pair: the end of the run stays.
+            kept[-1] = t
+        else:
+            kept.append(t)
+    return np.array(kept)
+
+
+def even_spacing(grid: Array) -> float:
+    """The grid's spacing where it is even, else 0."""
+    if grid.size < 3:
+        return 0.0
+    step = float(grid[-1] - grid[0]) / (grid.size - 1)
+    return step if float(np.max(np.abs(np.diff(grid) - step))) < 1e-11 * max(1.0, float(grid[-1])) else 0.0
+
+
+def run(case: Case) -> Outcome:
+    """Run `case`; see `stickslip.simulate._case.Outcome`.
+
+    Raises
+    ------
+    ValueError
+        If `can_run` refuses the case.
+    """
+    return prepare(case).record()
