@@ -1,3 +1,87 @@
-"""stickslip finds the friction of a servo axis from its records, simulates it and compensates it."""
+"""stickslip finds the friction of a servo axis from its records, simulates it and compensates it.
+
+The public names below are loaded when first used, so that importing the package costs nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from stickslip.control.compensators.feedback import Feedback
+    from stickslip.control.compensators.feedforward import Feedforward
+    from stickslip.control.controller import Controller
+    from stickslip.control.linear import Gains, pd, pid, place, pr
+    from stickslip.errors import InputError, SimulationError, StickslipError
+    from stickslip.machines.rigid import RigidAxis
+    from stickslip.model import Model, Reference
+    from stickslip.plugins import law, law_names
+    from stickslip.record import Record
+    from stickslip.simulate.closed_loop import simulate
+    from stickslip.simulate.open_loop import respond
+    from stickslip.spec import Law, Mode, Par
 
 __version__ = "0.1.0"
+
+_HOME = {
+    "Controller": "control.controller",
+    "Feedback": "control.compensators.feedback",
+    "Feedforward": "control.compensators.feedforward",
+    "Gains": "control.linear",
+    "InputError": "errors",
+    "Law": "spec",
+    "Mode": "spec",
+    "Model": "model",
+    "Par": "spec",
+    "Record": "record",
+    "Reference": "model",
+    "RigidAxis": "machines.rigid",
+    "SimulationError": "errors",
+    "StickslipError": "errors",
+    "law": "plugins",
+    "law_names": "plugins",
+    "pd": "control.linear",
+    "pid": "control.linear",
+    "place": "control.linear",
+    "pr": "control.linear",
+    "respond": "simulate.open_loop",
+    "simulate": "simulate.closed_loop",
+}
+
+__all__ = [
+    "Controller",
+    "Feedback",
+    "Feedforward",
+    "Gains",
+    "InputError",
+    "Law",
+    "Mode",
+    "Model",
+    "Par",
+    "Record",
+    "Reference",
+    "RigidAxis",
+    "SimulationError",
+    "StickslipError",
+    "law",
+    "law_names",
+    "pd",
+    "pid",
+    "place",
+    "pr",
+    "respond",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'stickslip' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"stickslip.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

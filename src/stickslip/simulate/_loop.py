@@ -231,7 +231,8 @@ def events(a: Any, w: Any, t: float, y: Any, k: Any, row: int, g: Any) -> float:
         w[SOURCE] == FROM_MEASUREMENT and w[FILTER] == 0.0 and a[COMPENSATOR + GUARDS] == 0
     )
     if kinked and w[SIGN] != 0.0 and not is_held(a, w):
-        g[laws + KINK] = -w[SIGN] * v
+        # At exactly zero the side is still the remembered one.
+        g[laws + KINK] = -w[SIGN] * v if v != 0.0 else -TINY
     if w[FILTERED_SIGN] != 0.0:
         g[laws + FILTER_KINK] = -w[FILTERED_SIGN] * y[FILTER_1]
     largest = -1e9

@@ -2,7 +2,7 @@
 
 An integrator hands every stretch of time (at most 2 ms long, inside one half of the run and not across 80 % of
 it) to `meter`, with five equally spaced nodes of each signal. Integrals are taken by Boole's rule (order 6),
-extremes of the error from its slope, the 50 Hz high-pass exactly for the interpolated velocity.
+extremes of the error from its slope, the 50 Hz high-pass by its convolution with the velocity.
 """
 
 from __future__ import annotations
@@ -76,7 +76,6 @@ def meter(
         work += w * tm[i] * v[i]
         loss += w * tf[i] * v[i]
         helped += w * th[i] * v[i]
-        acc[TM_MAX] = max(acc[TM_MAX], abs(tm[i]))
     scale = h / 90.0
     acc[E2] += scale * e2
     acc[EV2] += scale * ev2
@@ -90,9 +89,9 @@ def meter(
     acc[E_END] = e[4]
     low, high = extremes(e, ev, 0.25 * h)
     acc[E_MAX] = max(acc[E_MAX], -low, high)
-    largest = max(abs(v[0]), abs(v[1]), abs(v[2]), abs(v[3]), abs(v[4]))
-    if 1.3 * largest > acc[V_MAX]:
-        acc[V_MAX] = max(acc[V_MAX], peak(v))
+    acc[V_MAX] = max(acc[V_MAX], peak(v, acc[V_MAX]))
+    for i in range(5):
+        acc[TM_MAX] = max(acc[TM_MAX], abs(tm[i]))
     high_pass(acc, h, v, second)
     if second:
         acc[W2_E2] += scale * e2
@@ -134,8 +133,13 @@ def extremes(e: Any, ev: Any, d: float) -> tuple[float, float]:
 
 
 @kernel(exact=False)
-def peak(v: Any) -> float:
-    """Largest |v| of the quartic through the five nodes, sampled finely and refined by a parabola."""
+def peak(v: Any, so_far: float) -> float:
+    """Largest |v| of the quartic through the five nodes, where it may exceed the one so far; else 0.
+
+    Sampled finely and refined by a parabola.
+    """
+    if 1.3 * max(abs(v[0]), abs(v[1]), abs(v[2]), abs(v[3]), abs(v[4])) < so_far:
+        return 0.0
     d1 = v[1] - v[0]
     d2 = v[2] - 2.0 * v[1] + v[0]
     d3 = v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]
@@ -157,32 +161,21 @@ def peak(v: Any) -> float:
 @kernel(exact=False)
 def high_pass(acc: Any, h: float, v: Any, second: bool) -> None:
     """Advance the 50 Hz low-pass y' = w (v - y) and add the integral of (v - y)²."""
-    # v as a quartic in s = 0..4 through the five nodes (Newton's forward differences), then y's particular
-    # polynomial p with p' + w p = w v, and its decaying part.
-    d1 = v[1] - v[0]
-    d2 = v[2] - 2.0 * v[1] + v[0]
-    d3 = v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]
-    d4 = v[4] - 4.0 * v[3] + 6.0 * v[2] - 4.0 * v[1] + v[0]
-    c4 = d4 / 24.0
-    c3 = d3 / 6.0 - d4 / 4.0
-    c2 = d2 / 2.0 - d3 / 2.0 + 11.0 * d4 / 24.0
-    c1 = d1 - d2 / 2.0 + d3 / 3.0 - d4 / 4.0
-    u = 4.0 / (HIGH_PASS * h)
-    p4 = c4
-    p3 = c3 - 4.0 * u * p4
-    p2 = c2 - 3.0 * u * p3
-    p1 = c1 - 2.0 * u * p2
-    p0 = v[0] - u * p1
-    decay = math.exp(-0.25 * HIGH_PASS * h)
-    rest = acc[LOW_PASS] - p0
-    total = 0.0
+    half = math.exp(-0.125 * HIGH_PASS * h)
+    weight = HIGH_PASS * h / 24.0
     y = acc[LOW_PASS]
-    for i in range(5):
-        if i > 0:
-            rest *= decay
-            y = p0 + i * (p1 + i * (p2 + i * (p3 + i * p4))) + rest
-        w = 7.0 if i == 0 or i == 4 else (12.0 if i == 2 else 32.0)
-        total += w * (v[i] - y) * (v[i] - y)
+    total = 7.0 * (v[0] - y) * (v[0] - y)
+    for i in range(4):
+        # Simpson's rule on the convolution over a quarter; its middle value from the cubic through four nodes.
+        if i == 0:
+            middle = (5.0 * v[0] + 15.0 * v[1] - 5.0 * v[2] + v[3]) / 16.0
+        elif i == 3:
+            middle = (5.0 * v[4] + 15.0 * v[3] - 5.0 * v[2] + v[1]) / 16.0
+        else:
+            middle = (9.0 * (v[i] + v[i + 1]) - v[i - 1] - v[i + 2]) / 16.0
+        y = half * half * y + weight * (half * half * v[i] + 4.0 * half * middle + v[i + 1])
+        w = 7.0 if i == 3 else (12.0 if i == 1 else 32.0)
+        total += w * (v[i + 1] - y) * (v[i + 1] - y)
     acc[LOW_PASS] = y
     acc[HP2] += h / 90.0 * total
     if second:

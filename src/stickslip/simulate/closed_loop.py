@@ -1,0 +1,212 @@
+"""One call for a closed loop: `simulate(axis, controller, reference, duration) -> Record`."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+import stickslip
+from stickslip.control.controller import Controller
+from stickslip.errors import (
+    Divergence,
+    EventStorm,
+    InputError,
+    ParameterError,
+    SimulationError,
+    StepFailure,
+    UnknownName,
+)
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Reference
+from stickslip.record import Record
+from stickslip.simulate import _case
+from stickslip.simulate._case import COLUMNS, UNITS, Case, Outcome, lay_out
+from stickslip.simulate._meter import metrics
+
+__all__ = ["INTEGRATORS", "prepare", "simulate"]
+
+INTEGRATORS = ("exact", "adaptive", "fixed")
+"""In the order in which `integrator="auto"` tries them."""
+
+REASONS: dict[int, tuple[type[SimulationError], str]] = {
+    _case.DIVERGED: (Divergence, "position or velocity left every reasonable bound"),
+    _case.NOT_FINITE: (Divergence, "the state is no longer a number"),
+    _case.STORM: (
+        EventStorm,
+        f"more than {_case.STORM_EVENTS} switches within {_case.STORM_TIME * 1e3:g} ms",
+    ),
+    _case.NO_STEP: (StepFailure, "no step that meets the tolerance was found"),
+    _case.ROWS_FULL: (StepFailure, "the record is full"),
+}
+
+
+def simulate(
+    axis: RigidAxis,
+    controller: Controller,
+    reference: Reference,
+    duration: float,
+    *,
+    integrator: str = "auto",
+    tolerance: float = 1e-9,
+    time_step: float = 1e-4,
+    slip_rule: str = "signed",
+    output: float | Sequence[float] | np.ndarray[Any, Any] = 1e-3,
+    initial: tuple[float, float] = (0.0, 0.0),
+    metered: bool = True,
+) -> Record:
+    """Run an axis with friction under a controller along a reference.
+
+    Parameters
+    ----------
+    axis : RigidAxis
+    controller : Controller
+    reference : Reference
+    duration : float
+        s
+    integrator : {"auto", "exact", "adaptive", "fixed"}
+        "auto" takes the first that can run the case.
+    tolerance : float
+        Position error that a well-conditioned run may gather, rad (exact and adaptive).
+    time_step : float
+        Longest step of the fixed integrator, s.
+    slip_rule : {"signed", "literal"}
+        The rule from stick to slip of every law in the loop that has one (`stickslip.laws._stick`).
+    output : float or array
+        Spacing of the record's time grid, s, or its times.
+    initial : tuple of float
+        Position (rad) and velocity (rad/s) at the start; every law starts at rest, sticking.
+    metered : bool
+        Whether metrics and energies are accumulated during the run.
+
+    Returns
+    -------
+    Record
+        The grid and the events; channels as in ``record.units``. ``record.meta["metrics"]`` holds the metrics,
+        ``record.meta["energy"]`` the balance: motor work = friction loss + kinetic energy + residual, J.
+
+    Raises
+    ------
+    InputError
+        If the integrator cannot run the case, or an argument is out of bounds.
+    SimulationError
+        If the run diverges, leaves the finite numbers or switches without end; it says when and why, and its
+        ``record`` holds what was computed.
+    """
+    case = prepare(
+        axis, controller, reference, duration,
+        tolerance=tolerance, slip_rule=slip_rule, output=output, initial=initial, metered=metered,
+    )  # fmt: skip
+    name, run = _integrator(integrator, case)
+    outcome: Outcome = run(case, time_step) if name == "fixed" else run(case)
+    record = _record(case, outcome, {"integrator": name, "slip_rule": slip_rule})
+    if outcome.code != _case.DONE:
+        kind, why = REASONS[outcome.code]
+        raise kind(f"the run ended at {outcome.time:.6g} s: {why}", outcome.time, record)
+    return record
+
+
+def prepare(
+    axis: RigidAxis,
+    controller: Controller,
+    reference: Reference,
+    duration: float,
+    *,
+    tolerance: float = 1e-9,
+    slip_rule: str = "signed",
+    output: float | Sequence[float] | np.ndarray[Any, Any] = 1e-3,
+    initial: tuple[float, float] = (0.0, 0.0),
+    metered: bool = True,
+) -> Case:
+    """Check the arguments of `simulate` and lay the loop out for an integrator's ``run``."""
+    for name, value, unit in (("duration", duration, "s"), ("tolerance", tolerance, "rad")):
+        if not (math.isfinite(value) and value > 0.0):
+            raise ParameterError(f"simulate: {name} = {value:g} {unit} must be greater than 0")
+    if not all(math.isfinite(x) for x in initial):
+        raise ParameterError(f"simulate: initial = {initial} must be two finite numbers")
+    if slip_rule not in ("signed", "literal"):
+        raise UnknownName("slip rule", slip_rule, ("signed", "literal"))
+    return lay_out(
+        axis, controller, reference, float(duration),
+        tolerance=tolerance, grid=_grid(output, duration), slip_rule=slip_rule, initial=initial, metered=metered,
+    )  # fmt: skip
+
+
+def _grid(output: float | Sequence[float] | np.ndarray[Any, Any], duration: float) -> Any:
+    """The times at which rows are wanted."""
+    if isinstance(output, (int, float)):
+        if not (math.isfinite(output) and output > 0.0):
+            raise ParameterError(f"simulate: output = {output:g} s must be greater than 0")
+        count = math.floor(duration / output * (1.0 + 1e-12))
+        if count > 50_000_000:
+            raise ParameterError(f"simulate: output = {output:g} s gives {count} rows; use a larger spacing")
+        # Multiples of the spacing, not a running sum, so that the grid is what a person would write down.
+        return np.minimum(np.arange(count + 1) * float(output), duration)
+    times = np.asarray(output, dtype=np.float64)
+    if times.ndim != 1 or not np.all(np.isfinite(times)) or np.any(np.diff(times) < 0.0):
+        raise ParameterError("simulate: output times must be finite and ascend")
+    if times.size and (times[0] < 0.0 or times[-1] > duration):
+        raise ParameterError(f"simulate: output times must lie within 0 and {duration:g} s")
+    return times
+
+
+def _integrator(name: str, case: Case) -> tuple[str, Any]:
+    """The integrator of that name, or the first that can run the case."""
+    if name != "auto":
+        if name not in INTEGRATORS:
+            raise UnknownName("integrator", name, (*INTEGRATORS, "auto"))
+        module = importlib.import_module(f"stickslip.simulate.{name}")
+        if why := module.can_run(case):
+            raise InputError(f"the {name} integrator cannot run this: {why}")
+        return name, module.run
+    reasons: list[str] = []
+    for candidate in INTEGRATORS:
+        module = importlib.import_module(f"stickslip.simulate.{candidate}")
+        why = module.can_run(case)
+        if not why:
+            return candidate, module.run
+        reasons.append(f"{candidate}: {why}")
+    raise InputError("no integrator can run this (" + "; ".join(reasons) + ")")
+
+
+def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
+    rows = outcome.rows
+    columns = np.ascontiguousarray(rows.T)
+    meta: dict[str, Any] = {
+        "what": "simulation",
+        "version": stickslip.__version__,
+        **how,
+        "tolerance": float(case.numbers[_case.TOLERANCE]),
+        "duration": float(case.numbers[_case.DURATION]),
+        "ended": outcome.time,
+        "inertia": case.axis.inertia,
+        "friction": case.axis.friction.as_dict(),
+        "gains": case.controller.gains._asdict(),
+        "reference": case.reference.as_dict(),
+        "counts": outcome.counts,
+    }
+    helper = case.controller.compensator
+    if helper:
+        meta["compensator"] = {
+            "kind": helper.name,
+            "gain": helper.gain,
+            "filter_hz": helper.filter_hz,
+            **helper.model.as_dict(),
+        }
+    if case.numbers[_case.METERED] and outcome.code == _case.DONE:
+        meta["metrics"] = {k: float(v) for k, v in metrics(outcome.meter, outcome.turns).items()}
+        meta["energy"] = _energy(case, columns, meta["metrics"])
+    channels = {name: columns[i] for i, name in enumerate(COLUMNS) if name != "time"}
+    return Record(columns[0], channels, UNITS, meta)
+
+
+def _energy(case: Case, columns: Any, found: dict[str, float]) -> dict[str, float]:
+    """Motor work = friction loss + change of kinetic energy + residual, J."""
+    last = columns[COLUMNS.index("velocity"), -1] if columns.shape[1] else 0.0
+    first = case.numbers[_case.VELOCITY_0]
+    kinetic = 0.5 * case.axis.inertia * float(last * last - first * first)
+    work, loss = found["motor_work_J"], found["friction_loss_J"]
+    return {"motor_work": work, "friction_loss": loss, "kinetic": kinetic, "residual": work - loss - kinetic}
