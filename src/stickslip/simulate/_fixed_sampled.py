@@ -26,8 +26,10 @@ from stickslip.simulate._case import (
     TORQUE_LIMIT,
 )
 
-# ---- what the drive remembers from sample to sample; the compensator's state follows ------------------------------
-STARTED, LAST_POSITION, LAST_ERROR, ERROR_SUM, SEEN, IN_1, IN_2, OUT_1, OUT_2, HELD, COMPENSATION, MEMORY = range(12)
+# ---- what the drive remembers from sample to sample; the compensator's state follows ----------------------
+STARTED, LAST_POSITION, LAST_ERROR, ERROR_SUM, SEEN, IN_1, IN_2, OUT_1, OUT_2, HELD, COMPENSATION, MEMORY = (
+    range(12)
+)
 
 
 @kernel()
@@ -66,7 +68,9 @@ def compensation(n: Any, m: Any, law: int, p: Any, u: Any, seen: float, position
 
 
 @kernel()
-def sample(n: Any, m: Any, law: int, p: Any, u: Any, position: float, wanted: float, wanted_velocity: float) -> None:
+def sample(
+    n: Any, m: Any, law: int, p: Any, u: Any, position: float, wanted: float, wanted_velocity: float
+) -> None:
     """One sample of the drive: measure, control, compensate, limit; the output lies in the memory m, N·m."""
     measured = measured_position(position, n[ENCODER])
     velocity = 0.0

@@ -5,9 +5,9 @@ The end velocity solves J (v1 - v0) / h = mean over the step of (T_m - T_f). Two
 * the trapezoid (A-stable, second order) where the step resolves the contact, with the step cut where the
   velocity passes through zero (Hairer, Norsett and Wanner 1993, II.6: integration with stopping at a
   discontinuity);
-* Alexander's two-stage SDIRK (L-stable, second order; Alexander 1977, SIAM J. Numer. Anal. 14) where it does
-  not: there the trapezoid would ring without damping. Each stage is a step of backward Euler, over which the law
-  sees a constant velocity.
+* Alexander's two-stage SDIRK (L-stable, second order; Alexander 1977, SIAM J. Numer. Anal. 14) where it
+  does not: there the trapezoid would ring without damping. Each stage is a step of backward Euler, over which
+  the law sees a constant velocity.
 
 A law whose torque jumps at zero velocity is continued across zero by its one-sided value while a step is
 solved, so that the crossing can be located. At v = 0 the axis rests while neither one-sided net torque drives
@@ -17,194 +17,48 @@ it away; a feedback compensator that jumps there takes its part of that interval
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
-from stickslip.jit import call_holding, call_profile, call_step, kernel, pointer
-from stickslip.simulate._case import (
-    FILTER,
-    FROM_MEASUREMENT,
-    FROM_REFERENCE,
-    GAIN,
-    INERTIA,
-    KD,
-    KI,
-    KP,
-    KR,
-    SAMPLE_TIME,
-    SOURCE,
-    TORQUE_LIMIT,
+from stickslip.jit import kernel
+from stickslip.simulate._case import FILTER, FROM_MEASUREMENT, FROM_REFERENCE, INERTIA, SAMPLE_TIME, SOURCE
+from stickslip.simulate._fixed_loop import (
+    FILTER_RATE,
+    FILTERED,
+    FRICTION,
+    HEAD,
+    HELP,
+    HOLDING,
+    INTEGRAL,
+    LEAVING,
+    LINEAR,
+    MOTOR,
+    POSITION,
+    POSITION_D,
+    SIDE,
+    VELOCITY,
+    VELOCITY_D,
+    Loop,
+    copy,
+    helper_holds,
+    helper_jumps,
+    limited,
+    look_ahead,
+    low_pass,
+    plant_holds,
+    set_motor,
+    sign,
+    step_helper,
+    step_plant,
 )
 
-# ---- the state at one time: these entries, then the plant's state, then the compensator's -------------------------
-(
-    POSITION, VELOCITY, INTEGRAL, FILTERED, FILTER_RATE, POSITION_D, VELOCITY_D, LINEAR, HELP, MOTOR, FRICTION, SIDE,
-    LEAVING, HEAD,
-) = range(14)  # fmt: skip
-# SIDE is the direction of motion, or at rest the one from which the axis came; LEAVING the one in which it is
-# about to go (0: none); HELP includes the gain.
-
-STEP, HOLDING = 0, 6  # places in a Side's addresses
 GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
 VELOCITY_ROUNDING = 1e-14  # rad/s, relative above 1 rad/s
-NUDGE = 1e-11  # s, by which one-sided values of the reference lie inside the step
 FINE = 0.1  # of the sliding curve's velocity scale, by which the velocity near rest may change in a step
-APPROACH, LANDING, GROWTH = 0.9, 1e-3, 4.0  # of a step: how a steep compensator's zero is approached, and left
+APPROACH = 0.9  # of the time to the zero of a steep compensator's velocity, in which it is approached
+LANDING, GROWTH = 1e-3, 4.0  # of a step: the first one after that zero, and the growth of those that follow
 
 
-class Loop(NamedTuple):
-    """What a step reads besides the state: the case, and scratch arrays."""
-
-    numbers: Any
-    plant: Any
-    plant_parameters: Any
-    helper: Any
-    helper_parameters: Any
-    profile: int
-    reference_parameters: Any
-    plant_states: int
-    damped: bool
-    steep: bool
-    fine: float
-    surroundings: Any
-    motion: Any
-    ahead: Any
-    middle: Any
-    base: Any
-
-
-@kernel()
-def copy(source: Any, target: Any) -> None:
-    """Copy a state."""
-    for i in range(source.size):
-        target[i] = source[i]
-
-
-@kernel()
-def sign(x: float) -> float:
-    """+1, -1, or 0."""
-    if x > 0.0:
-        return 1.0
-    if x < 0.0:
-        return -1.0
-    return 0.0
-
-
-# ---- torques ------------------------------------------------------------------------------------------------------
-
-
-@kernel()
-def step_plant(loop: Loop, z: Any, v0: float, v1: float, h: float) -> float:
-    """Advance the plant's law inside the state `z`; returns its torque, N·m."""
-    loop.surroundings[0] = z[POSITION]
-    return call_step(
-        loop.plant[STEP], v0, v1, h, pointer(z, HEAD), pointer(loop.plant_parameters, 0), pointer(loop.surroundings, 0)
-    )
-
-
-@kernel()
-def step_helper(loop: Loop, z: Any, v0: float, v1: float, h: float) -> float:
-    """Advance the compensator's law inside the state `z`; returns gain times torque, N·m."""
-    loop.surroundings[0] = z[POSITION]
-    return loop.numbers[GAIN] * call_step(
-        loop.helper[STEP], v0, v1, h, pointer(z, HEAD + loop.plant_states), pointer(loop.helper_parameters, 0),
-        pointer(loop.surroundings, 0),
-    )  # fmt: skip
-
-
-@kernel()
-def helper_jumps(loop: Loop) -> bool:
-    """Whether the compensating torque jumps where the axis passes through rest."""
-    n = loop.numbers
-    return n[SOURCE] == FROM_MEASUREMENT and n[FILTER] == 0.0 and n[SAMPLE_TIME] == 0.0 and loop.helper[HOLDING] != 0
-
-
-@kernel()
-def plant_holds(loop: Loop, z: Any, side: float) -> float:
-    """Friction torque of a law that jumps at zero, at rest on one side of it, N·m."""
-    return side * call_holding(
-        loop.plant[HOLDING], side, pointer(z, HEAD), pointer(loop.plant_parameters, 0), pointer(loop.surroundings, 0)
-    )
-
-
-@kernel()
-def helper_holds(loop: Loop, z: Any, side: float) -> float:
-    """Compensating torque of a law that jumps at zero, at rest on one side of it, N·m."""
-    return loop.numbers[GAIN] * side * call_holding(
-        loop.helper[HOLDING], side, pointer(z, HEAD + loop.plant_states), pointer(loop.helper_parameters, 0),
-        pointer(loop.surroundings, 0),
-    )  # fmt: skip
-
-
-@kernel()
-def linear_torque(n: Any, z: Any) -> float:
-    """Torque of the linear controller, N·m; thesis eqs. 3.4, 3.5 and 3.11."""
-    error = z[POSITION_D] - z[POSITION]
-    return n[KP] * error + n[KR] * z[VELOCITY_D] - n[KD] * z[VELOCITY] + n[KI] * z[INTEGRAL]
-
-
-@kernel()
-def limited(n: Any, torque: float) -> float:
-    """The torque within the motor's limit, N·m."""
-    return min(max(torque, -n[TORQUE_LIMIT]), n[TORQUE_LIMIT])
-
-
-@kernel()
-def set_motor(loop: Loop, z: Any) -> None:
-    """Motor torque of a controller that acts in continuous time; a sampled one holds its output."""
-    if loop.numbers[SAMPLE_TIME] == 0.0:
-        z[LINEAR] = linear_torque(loop.numbers, z)
-        z[MOTOR] = limited(loop.numbers, z[LINEAR] + z[HELP])
-
-
-@kernel()
-def low_pass(n: Any, a: Any, b: Any, v0: float, v1: float, h: float, w: float) -> None:
-    """Second-order Butterworth y'' = f² (v - y) - sqrt(2) f y', from state a to b; w is the weight of the end."""
-    f = n[FILTER]
-    slope = f * f * (v0 - a[FILTERED]) - math.sqrt(2.0) * f * a[FILTER_RATE]
-    y = a[FILTERED] + h * (1.0 - w) * a[FILTER_RATE]
-    rate = a[FILTER_RATE] + h * (1.0 - w) * slope
-    wh = w * h
-    b[FILTER_RATE] = (rate + wh * f * f * (v1 - y)) / (1.0 + wh * f * (math.sqrt(2.0) + wh * f))
-    b[FILTERED] = y + wh * b[FILTER_RATE]
-
-
-@kernel()
-def look_ahead(loop: Loop, a: Any, t: float, h: float) -> None:
-    """Write into `loop.ahead` what depends on time alone at t + h: reference and feedforward, from state a."""
-    n, ahead, motion = loop.numbers, loop.ahead, loop.motion
-    copy(a, ahead)
-    at = pointer(motion, 0)
-    parameters = pointer(loop.reference_parameters, 0)
-    call_profile(loop.profile, t + min(NUDGE, 0.5 * h), parameters, at)
-    v0 = motion[1]
-    call_profile(loop.profile, t + h - min(NUDGE, 0.5 * h), parameters, at)
-    v1 = motion[1]
-    call_profile(loop.profile, t + h, parameters, at)
-    ahead[POSITION_D] = motion[0]
-    ahead[VELOCITY_D] = v1
-    if n[SOURCE] == FROM_REFERENCE and n[SAMPLE_TIME] == 0.0:
-        if n[FILTER] > 0.0:
-            low_pass(n, a, ahead, v0, v1, h, 0.5)
-            v0, v1 = a[FILTERED], ahead[FILTERED]
-        ahead[HELP] = step_helper(loop, ahead, v0, v1, h)
-
-
-@kernel()
-def restart(loop: Loop, z: Any, t: float) -> None:
-    """Torques of the state at t, seen from just after it: at the begin, and where the reference has a kink."""
-    n, motion = loop.numbers, loop.motion
-    call_profile(loop.profile, t + NUDGE, pointer(loop.reference_parameters, 0), pointer(motion, 0))
-    z[POSITION_D], z[VELOCITY_D] = motion[0] - NUDGE * motion[1], motion[1]
-    if n[SAMPLE_TIME] == 0.0 and n[SOURCE] != 0.0:
-        v = z[VELOCITY_D] if n[SOURCE] == FROM_REFERENCE else z[VELOCITY]
-        if n[FILTER] > 0.0:
-            v = z[FILTERED]
-        if n[SOURCE] == FROM_REFERENCE or z[VELOCITY] != 0.0:
-            z[HELP] = step_helper(loop, z, v, v, 0.0)
-    set_motor(loop, z)
-
-
-# ---- one implicit stage -------------------------------------------------------------------------------------------
+# ---- one implicit stage -----------------------------------------------------------------------------------
 
 
 @kernel()
@@ -258,7 +112,7 @@ def solve(loop: Loop, a: Any, b: Any, h: float, side: float, w: float) -> bool:
     """Find the end velocity of a stage from a, and complete b; False if there is none.
 
     Of several solutions the first one is taken in the direction in which the net torque at the present
-    velocity drives: the others lie beyond a repelling one (negative slope of the torque against the velocity).
+    velocity drives: the others lie beyond a repelling one, where the torque falls steeply with the velocity.
     """
     inertia, v = loop.numbers[INERTIA], a[VELOCITY]
     known = inertia * v + h * (1.0 - w) * (a[MOTOR] - a[FRICTION])
@@ -296,7 +150,7 @@ def solve(loop: Loop, a: Any, b: Any, h: float, side: float, w: float) -> bool:
     return False
 
 
-# ---- one step -----------------------------------------------------------------------------------------------------
+# ---- one step ---------------------------------------------------------------------------------------------
 
 
 @kernel()
@@ -412,7 +266,7 @@ def near_rest(loop: Loop, v0: float, v1: float) -> float:
 
 @kernel()
 def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, bool]:
-    """A step of the trapezoid, cut where the velocity passes through zero; time taken (< 0: no solution), cut."""
+    """A step of the trapezoid, cut at a reversal; returns the time taken (< 0: no solution) and whether."""
     side = sign(a[VELOCITY]) if a[VELOCITY] != 0.0 else a[LEAVING]
     jumping = side if loop.plant[HOLDING] != 0 or helper_jumps(loop) else 0.0
     look_ahead(loop, a, t, h)
@@ -460,7 +314,9 @@ def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, 
 
 @kernel()
 def advance(loop: Loop, a: Any, b: Any, t: float, h: float, cap: float) -> tuple[float, bool]:
-    """One step from a to b, at most h long (in motion at most cap); time taken (< 0: no solution), ended by an event.
+    """One step from a to b, at most h long, in motion at most `cap`.
+
+    Returns the time taken (< 0: no solution) and whether an event ended the step.
     """
     if loop.damped:
         return (h, False) if damped_step(loop, a, b, t, h) else (-1.0, False)

@@ -1,11 +1,11 @@
 """Fixed-step integrator: for any law, through its ``step`` alone; the one that runs sampled controllers.
 
-Second order and A-stable (`stickslip.simulate._fixed_step`): the implicit trapezoid with steps cut at
-reversals, break-away and every kink of the reference. Where a step does not resolve the contact at rest, that is
-where ``dt`` times the slope of its torque against the velocity exceeds `RESOLVED` inertias (a spring k:
-omega dt > 2 with omega = sqrt(k / J)), the whole run uses an L-stable method of the same order instead, since the
-trapezoid would let a stuck contact ring without damping. That method does not cut its steps: what it does not
-resolve, it damps.
+Second order and A-stable (`stickslip.simulate._fixed_step`): the implicit trapezoid, with steps cut at
+reversals, break-away and every kink of the reference, and short near rest, where s(v) varies. Where a step
+does not resolve the contact at rest, that is where ``dt`` times the slope of its torque against the velocity
+exceeds `RESOLVED` inertias (a spring k: omega dt > 2 with omega = sqrt(k / J)), the whole run uses an
+L-stable method of the same order instead, since the trapezoid would let a stuck contact ring without damping.
+That method does not cut its steps: what it does not resolve, it damps.
 """
 
 from __future__ import annotations
@@ -43,13 +43,10 @@ from stickslip.simulate._case import (
     Outcome,
     Side,
 )
-from stickslip.simulate._fixed_sampled import COMPENSATION, HELD, MEMORY, sample
-from stickslip.simulate._fixed_step import (
+from stickslip.simulate._fixed_loop import (
     FRICTION,
-    GROWTH,
     HEAD,
     HELP,
-    LANDING,
     MOTOR,
     NUDGE,
     POSITION,
@@ -57,13 +54,20 @@ from stickslip.simulate._fixed_step import (
     STEP,
     VELOCITY,
     Loop,
-    advance,
     copy,
     restart,
-    sign,
     step_plant,
 )
-from stickslip.simulate._meter import MAX_WINDOW, TURN_COUNT, close_standstill, meter, new_meter, settle_band_of
+from stickslip.simulate._fixed_sampled import COMPENSATION, HELD, MEMORY, sample
+from stickslip.simulate._fixed_step import GROWTH, LANDING, advance
+from stickslip.simulate._meter import (
+    MAX_WINDOW,
+    TURN_COUNT,
+    close_standstill,
+    meter,
+    new_meter,
+    settle_band_of,
+)
 from stickslip.spec import Surroundings
 
 __all__ = ["can_run", "run"]
@@ -91,8 +95,8 @@ def run(case: Case, dt: float) -> Outcome:
     -------
     Outcome
         One row per entry of ``case.grid`` (values interpolated inside steps; from the right where a sampled
-        controller's torque jumps), and one per reversal, standstill and break-away. A run that ends early says
-        so in ``code`` and keeps its rows.
+        controller's torque jumps), and one per reversal, standstill and break-away. A run that ends early
+        says so in ``code`` and keeps its rows.
 
     Raises
     ------
@@ -160,7 +164,7 @@ def contact_slope(side: Side, dt: float) -> float:
 
 
 def velocity_scale(case: Case) -> float:
-    """The smallest velocity scale of the laws that see the axis's velocity, rad/s; infinite where none has one."""
+    """The smallest velocity scale of the laws that see the axis's velocity, rad/s; infinite without."""
     n = case.numbers
     scales = [n[PLANT_SCALE]]
     if n[SOURCE] == FROM_MEASUREMENT and n[SAMPLE_TIME] == 0.0:
@@ -187,12 +191,20 @@ def stops_of(case: Case) -> Any:
     return merged
 
 
-# ---- the loop over time -------------------------------------------------------------------------------------------
+# ---- the loop over time -----------------------------------------------------------------------------------
 
 
 @kernel()
 def integrate(
-    loop: Loop, a: Any, memory: Any, stops: Any, grid: Any, dt: float, accumulator: Any, turns: Any, counts: Any
+    loop: Loop,
+    a: Any,
+    memory: Any,
+    stops: Any,
+    grid: Any,
+    dt: float,
+    accumulator: Any,
+    turns: Any,
+    counts: Any,
 ) -> tuple[Any, int, float]:
     """Run from 0 to the last stop; returns rows, code and the time reached."""
     n = loop.numbers
@@ -207,7 +219,7 @@ def integrate(
         if n[SAMPLE_TIME] > 0.0 and (segment == 0 or stops[segment - 1, 1] > 0.0):
             act(loop, a, memory)
         begin, stop = t, stops[segment, 0]
-        pieces = max(1, int(math.ceil((stop - begin) / dt * (1.0 - 1e-12))))
+        pieces = max(1, math.ceil((stop - begin) / dt * (1.0 - 1e-12)))
         for piece in range(pieces):
             goal = stop if piece == pieces - 1 else begin + (stop - begin) * (piece + 1) / pieces
             while goal - t > 1e-12 * dt:
@@ -265,7 +277,7 @@ def verdict(n: Any, b: Any, taken: float) -> int:
     return NO_STEP if taken < 0.0 else DONE
 
 
-# ---- inside a step ------------------------------------------------------------------------------------------------
+# ---- inside a step ----------------------------------------------------------------------------------------
 
 
 @kernel()
@@ -281,9 +293,18 @@ def position_inside(a: Any, b: Any, h: float, x: float) -> float:
 
 @kernel()
 def write(
-    loop: Loop, a: Any, b: Any, t: float, x: float, h: float, time: float, event: float, rows: Any, written: int
+    loop: Loop,
+    a: Any,
+    b: Any,
+    t: float,
+    x: float,
+    h: float,
+    time: float,
+    event: float,
+    rows: Any,
+    written: int,
 ) -> tuple[Any, int]:
-    """Add the row at the fraction x of the step [t, t + h]; returns the rows (grown where full) and their number."""
+    """Add a row at the fraction x of the step [t, t + h]; returns the rows (grown if full), their count."""
     if written == rows.shape[0]:
         grown = np.zeros((2 * written, rows.shape[1]))
         grown[:written] = rows
@@ -303,7 +324,16 @@ def write(
 
 @kernel()
 def record(
-    loop: Loop, a: Any, b: Any, t: float, h: float, event: bool, grid: Any, rows: Any, written: int, counts: Any
+    loop: Loop,
+    a: Any,
+    b: Any,
+    t: float,
+    h: float,
+    event: bool,
+    grid: Any,
+    rows: Any,
+    written: int,
+    counts: Any,
 ) -> tuple[Any, int]:
     """Write the rows of the output times inside [t, t + h), and of the event at its end."""
     while counts[ROWS] < grid.size and grid[counts[ROWS]] < t + h - 1e-12 * max(1.0, t):
@@ -321,7 +351,7 @@ def measure(loop: Loop, a: Any, b: Any, t: float, h: float, nodes: Any, accumula
     """Hand the step to the meter in windows of at most MAX_WINDOW, torques and velocity linear inside it."""
     if h <= 0.0:
         return
-    windows = int(math.ceil(h / MAX_WINDOW * (1.0 - 1e-9)))
+    windows = math.ceil(h / MAX_WINDOW * (1.0 - 1e-9))
     for window in range(windows):
         for i in range(5):
             x = (window + 0.25 * i) / windows
