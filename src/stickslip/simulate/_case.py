@@ -32,7 +32,7 @@ UNITS = {
 }  # fmt: skip
 
 # ---- how a kernel ended ------------------------------------------------------------------------------------------
-DONE, DIVERGED, NOT_FINITE, STORM, NO_STEP, ROWS_FULL = range(6)
+DONE, DIVERGED, NOT_FINITE, STORM, NO_STEP, ROWS_FULL, TOO_STIFF = range(7)
 
 # ---- entries of Case.numbers -------------------------------------------------------------------------------------
 (

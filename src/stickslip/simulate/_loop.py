@@ -234,7 +234,7 @@ def events(a: Any, w: Any, t: float, y: Any, k: Any, row: int, g: Any) -> float:
         # At exactly zero the side is still the remembered one.
         g[laws + KINK] = -w[SIGN] * v if v != 0.0 else -TINY
     if w[FILTERED_SIGN] != 0.0:
-        g[laws + FILTER_KINK] = -w[FILTERED_SIGN] * y[FILTER_1]
+        g[laws + FILTER_KINK] = -w[FILTERED_SIGN] * y[FILTER_1] if y[FILTER_1] != 0.0 else -TINY
     largest = -1e9
     for i in range(laws + EXTRA):
         if (i >= laws or a[MODES + i] != 0) and g[i] > largest:

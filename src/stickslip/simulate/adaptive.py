@@ -33,6 +33,7 @@ from stickslip.simulate._case import (
     STORM_EVENTS,
     STORM_TIME,
     TOLERANCE,
+    TOO_STIFF,
     VELOCITY_0,
     VELOCITY_LIMIT,
     Case,
@@ -63,6 +64,9 @@ EVENT_ROWS = 20_000
 SHORTEST = 1e-14
 LOCAL = 1e-3
 """Error allowed in one step over the tolerance of a run: thousands of steps add up, and events carry them on."""
+CREEP, STEEPEST = 1e-9, 1e6
+"""Velocity (rad/s) at which a law's slope is taken, and the relaxation rate (1/s) that explicit steps can follow."""
+MOST_STEPS = 50_000_000
 RESOLVED = 1.6
 """Step times the largest eigenvalue; explicit Runge-Kutta amplifies ringing beyond about 1.6."""
 # Stages of the pair; the scratch row after them serves events and output.
@@ -76,6 +80,14 @@ def can_run(case: Case) -> str:
             return f"law {side.model.law.name!r} gives no `rate`; use the fixed integrator"
     if case.numbers[SAMPLE_TIME] > 0.0:
         return "the controller is sampled; use the fixed integrator"
+    friction = case.axis.friction
+    if friction.law.steady is not None and friction.law.holding is None:
+        slope = abs(friction.law.steady(CREEP, friction.parameters)) / CREEP
+        if not friction.law.state_fields and slope / case.axis.inertia > STEEPEST:
+            return (
+                f"the friction's slope at rest, {slope:.3g} N·m·s/rad, slows the axis down at "
+                f"{slope / case.axis.inertia:.1g} /s; use the fixed integrator"
+            )
     return ""
 
 
@@ -447,6 +459,8 @@ def integrate(
                 h = max(min(h, step * grow, 1e-4, resolved), 1e-8)
             elif not final or step >= h:
                 h = min(step * grow, resolved)
+            if code == DONE and counts[0] + counts[1] > MOST_STEPS:
+                code = TOO_STIFF
             if code != DONE:
                 counts[3] = written
                 return code, t

@@ -41,6 +41,7 @@ REASONS: dict[int, tuple[type[SimulationError], str]] = {
     ),
     _case.NO_STEP: (StepFailure, "no step that meets the tolerance was found"),
     _case.ROWS_FULL: (StepFailure, "the record is full"),
+    _case.TOO_STIFF: (StepFailure, "the case is too stiff for explicit steps; use the fixed integrator"),
 }
 
 
