@@ -57,6 +57,8 @@ from stickslip.simulate._exact_step import (
 )
 
 NONE = -1.0
+NOISE = 1e-12
+"""Velocities this small (rad/s) may be rounding errors of one that creeps to zero: no reversal yet."""
 VELOCITY_WEIGHT = 10.0
 """N·m per rad/s: puts a reversal on the scale of a break-away."""
 
@@ -86,7 +88,7 @@ def trigger(
     """The largest event function at a state: not negative where a mode ends."""
     g = -1e9
     if loop[WATCHED] > 0.0:
-        g = -VELOCITY_WEIGHT * loop[SIGMA] * v
+        g = -VELOCITY_WEIGHT * (loop[SIGMA] * v + NOISE)
     for side in range(plan[SIDES]):
         if sides[side, STICKING] > 0.0:
             top = heaviest(plan, elements, side, theta, v)
@@ -129,7 +131,7 @@ def grazing(
     if a0 < 0.0 and a1 > 0.0 and sigma * v1 > 0.0 and sigma * v1 < -a0 * stretch[LENGTH]:
         x = x0 + (x1 - x0) * a0 / (a0 - a1)
         _, v = state_at(lin, stretch, x)
-        if sigma * v <= 0.0:
+        if sigma * v <= -NOISE:
             return x
     return NONE
 

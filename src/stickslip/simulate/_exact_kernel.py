@@ -82,6 +82,9 @@ from stickslip.simulate._exact_step import (
 from stickslip.simulate._meter import close_standstill
 
 STEPS, REJECTED, EVENTS, COUNTS = range(4)
+SAFETY = 0.02
+"""Share of the tolerance that one step may be wrong by."""
+FINEST = 2e-12  # rad
 LONGEST_STEP = 8e-3
 FIRST_STEP = 2.5e-4
 """Longest step after an event, s."""
@@ -111,7 +114,7 @@ def move(
     cache: Any, generation: int, counts: Any, level: int, longest: float, left: float,
 ) -> int:  # fmt: skip
     """Take one step of at most `left`, shortened until it is accurate; returns its level, or -1."""
-    tol = parameters[TOLERANCE]
+    tol = max(SAFETY * parameters[TOLERANCE], FINEST)
     while True:
         counts[STEPS] += 1
         h = math.ldexp(longest, -level)
@@ -236,7 +239,7 @@ def solve(
     stretch = np.zeros(STRETCH_SIZE)
     cache = np.zeros((DEEPEST + 1, 5))
     nodes = np.zeros((8, 5))
-    tol = parameters[TOLERANCE]
+    tol = max(SAFETY * parameters[TOLERANCE], FINEST)
     ki = parameters[KI]
     longest = min(LONGEST_STEP, parameters[MAX_STEP])
     after_event = max(0, int(math.ceil(math.log2(longest / FIRST_STEP))))

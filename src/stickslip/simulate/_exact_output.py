@@ -162,7 +162,7 @@ def window_of(lin: Linear, stretch: Any) -> float:
     speed = abs(stretch[FREE_VELOCITY]) + rate * abs(stretch[FREE_POSITION])
     if speed == 0.0:
         return MAX_WINDOW
-    y = min(1.0, 0.13 * (1e-2 / (speed + 1e-12)) ** (1.0 / 3.0))
+    y = max(0.06, min(1.0, 0.13 * (1e-2 / (speed + 1e-12)) ** (1.0 / 3.0)))
     return min(MAX_WINDOW, 2.0 * y / (abs(rate) + 1e-9))
 
 

@@ -57,11 +57,16 @@ from stickslip.simulate._exact_state import (
 # ---- entries of `stretch`: the motion over one accepted step -------------------------------------------------
 (
     LENGTH, C0, C1, C2, C3, FREE_POSITION, FREE_VELOCITY, POSITION_MID, VELOCITY_MID, POSITION_END, VELOCITY_END,
-    R_MID, R_END, DR_END, GOAL_MID, GOAL_END, RATE_END, INTEGRAL_END, AMPLITUDE, ERROR, ROUNDS, STRETCH_SIZE,
-) = range(22)  # fmt: skip
+    R_MID, R_END, DR_END, GOAL_MID, RATE_MID, GOAL_END, RATE_END, INTEGRAL_END, AMPLITUDE, ERROR, ROUNDS, STRETCH_SIZE,
+) = range(23)  # fmt: skip
 
 NOT_CONVERGED = 1e9
+SHORT = 2e-8  # s
+STEEPEST = 1e5
+"""Largest particular solution, rad: more would cost too many digits."""
 MOST_ROUNDS = 5
+BUMP = 8.0 / 15.0
+"""Mean of x²(1 - x)² over its value in the middle."""
 LASTING = 5e-3
 """How long an error of a slipping force lasts, s: no more than C/s lets it."""
 
@@ -69,9 +74,10 @@ LASTING = 5e-3
 @kernel(exact=False)
 def look_ahead(parameters: Any, plan: Any, cells: Any, loop: Any, stretch: Any, h: float) -> None:
     """Commanded torque and reference in the middle and at the end of the next h."""
-    r, _, goal, _ = command(parameters, plan, cells, loop, loop[TIME] + 0.5 * h)
+    r, _, goal, rate = command(parameters, plan, cells, loop, loop[TIME] + 0.5 * h)
     stretch[R_MID] = r
     stretch[GOAL_MID] = goal
+    stretch[RATE_MID] = rate
     r, dr, goal, rate = command(parameters, plan, cells, loop, loop[TIME] + h)
     stretch[R_END] = r
     stretch[DR_END] = dr
@@ -136,12 +142,12 @@ def slip_error(lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, s
 
 @kernel(exact=False)
 def loop_terms(
-    lin: Linear, parameters: Any, loop: Any, stretch: Any, impulse: float, h: float, theta_end: float, v_end: float
-) -> tuple[float, float, float, float]:  # fmt: skip
-    """Torque of the integral controller and of the added spring: cubic over the stretch.
+    lin: Linear, parameters: Any, loop: Any, stretch: Any, impulse: float, h: float, theta_mid: float, v_mid: float,
+    theta_end: float, v_end: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Torque of the integral controller and of the added spring: upper coefficients and misfit in the middle.
 
     The integral of the position follows from the equation of motion itself: K int x = int p - D dx - J dv.
-    Returns value, slope and the two upper coefficients.
     """
     gain = parameters[KI]
     added = loop[ADDED]
@@ -151,12 +157,16 @@ def loop_terms(
     wanted = h / 30.0 * (7.0 * (loop[GOAL] + stretch[GOAL_END]) + 16.0 * stretch[GOAL_MID])
     wanted += h * h / 60.0 * (loop[GOAL_RATE] - stretch[RATE_END])
     stretch[INTEGRAL_END] = loop[INTEGRAL] + wanted - travelled
+    e0 = loop[GOAL] - loop[POSITION]
+    e_mid = stretch[GOAL_MID] - theta_mid
+    slopes = loop[GOAL_RATE] - loop[VELOCITY] - stretch[RATE_MID] + v_mid
+    i_mid = loop[INTEGRAL] + 0.25 * h * (e0 + e_mid) + h * h / 48.0 * slopes
     y0 = gain * loop[INTEGRAL] + added * loop[POSITION]
-    d0 = gain * (loop[GOAL] - loop[POSITION]) + added * loop[VELOCITY]
+    d0 = gain * e0 + added * loop[VELOCITY]
     y1 = gain * stretch[INTEGRAL_END] + added * theta_end
     d1 = gain * (stretch[GOAL_END] - theta_end) + added * v_end
     u2, u3 = upper_terms(y0, d0, y1, d1, 1.0 / h)
-    return y0, d0, u2, u3
+    return u2, u3, gain * i_mid + added * theta_mid - (0.5 * (y0 + y1) + 0.125 * h * (d0 - d1))
 
 
 @kernel(exact=False)
@@ -166,10 +176,21 @@ def correct(
     """Move the axis over h; fills `stretch` and returns the error in position, rad (or NOT_CONVERGED)."""
     full = twice(half)
     inverse = 1.0 / h
-    r2, r3 = upper_terms(loop[R], loop[DR], stretch[R_END], stretch[DR_END], inverse)
+    r1 = loop[DR]
+    r2, r3 = upper_terms(loop[R], r1, stretch[R_END], stretch[DR_END], inverse)
+    misfit = stretch[R_MID] - 0.5 * (loop[R] + stretch[R_END]) - 0.125 * h * (r1 - stretch[DR_END])
+    # Over very short stretches the upper terms are rounding errors, or a kink that the particular solution
+    # blows up: there the forcing is a straight line.
+    lag = lin.damping / lin.stiffness
+    bent = 1.0
+    if h < SHORT or abs(r3 * lag * lag * lag) > STEEPEST * abs(lin.stiffness):
+        bent = 0.0
+        r1 = (stretch[R_END] - loop[R]) * inverse
+        r2 = 0.0
+        r3 = 0.0
     # First guess: slipping forces and integral go on along their tangents.
     p0 = loop[R] - loop[BASE]
-    p1 = loop[DR]
+    p1 = r1
     for side in range(plan[SIDES]):
         p0 -= sides[side, WEIGHT] * sides[side, S]
         p1 -= sides[side, WEIGHT] * sides[side, DS]
@@ -178,10 +199,11 @@ def correct(
         p1 += parameters[KI] * (loop[GOAL] - loop[POSITION]) + loop[ADDED] * loop[VELOCITY]
     p2 = r2
     p3 = r3
-    misfit = abs(
-        stretch[R_MID] - (0.5 * (loop[R] + stretch[R_END]) + 0.125 * h * (loop[DR] - stretch[DR_END]))
-    )
-    forcing_misfit = misfit
+    # The cubic is lifted by the mean of the bump that it leaves out, so that the impulse is right.
+    p0 += bent * BUMP * misfit
+    r0 = p0
+    forcing_misfit = abs(misfit)
+    misfit = forcing_misfit
     theta_end = loop[POSITION]
     v_end = loop[VELOCITY]
     error = 0.0
@@ -204,6 +226,7 @@ def correct(
                 error = NOT_CONVERGED
                 break
         impulse = h * (p0 + h * (0.5 * p1 + h * (p2 / 3.0 + h * 0.25 * p3)))
+        p0 = r0
         p2 = r2
         p3 = r3
         misfit = forcing_misfit
@@ -212,21 +235,26 @@ def correct(
                 u2, u3, m = slip_terms(
                     lin, parameters, plan, sides, loop, c, side, h, v_mid, theta_end, v_end
                 )
-                p2 -= sides[side, WEIGHT] * u2
-                p3 -= sides[side, WEIGHT] * u3
+                p2 -= bent * sides[side, WEIGHT] * u2
+                p3 -= bent * sides[side, WEIGHT] * u3
                 misfit += abs(sides[side, WEIGHT]) * m
         if parameters[KI] != 0.0 or loop[ADDED] != 0.0:
-            _, _, u2, u3 = loop_terms(lin, parameters, loop, stretch, impulse, h, theta_end, v_end)
-            p2 += u2
-            p3 += u3
+            u2, u3, m = loop_terms(lin, parameters, loop, stretch, impulse, h, theta_mid, v_mid, theta_end, v_end)
+            p0 += BUMP * m
+            p2 += bent * u2
+            p3 += bent * u3
+            misfit += abs(m)
         rounds += 1
     remember(stretch, c, h, free_position, free_velocity, theta_mid, v_mid, theta_end, v_end, rounds)
     if loop[NONLINEAR] > 0.0 and error == 0.0:
         # What a slipping force is wrong by stays for as long as it relaxes; the position follows through K.
         error = slip_error(lin, parameters, plan, sides, loop, stretch)
         error *= min(LASTING * LASTING / lin.inertia, 1.0 / abs(lin.stiffness))
-    # A torque wrong by m in the middle moves a free axis by about m h²/20J, a spring by less than m/2K.
-    return error + 0.5 * misfit * min(0.1 * h * h / lin.inertia, 1.0 / abs(lin.stiffness))
+    # A torque wrong by m in the middle moves a free axis by about m h²/20J, a spring by less than m/2K; of its
+    # impulse little is left.
+    k = abs(lin.stiffness)
+    moves = h * (0.05 * h / lin.inertia + 0.02 / math.sqrt(lin.inertia * k))
+    return error + misfit * min(moves, 0.5 / k)
 
 
 @kernel(exact=False)

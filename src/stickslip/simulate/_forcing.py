@@ -159,11 +159,16 @@ def tabulate(
 
 
 def kinks_of(cells: Array) -> list[float]:
-    """Times of kinks: the end of every run of cells that had to be very short."""
-    ends = cells[:, 0] + 1.0 / cells[:, 1]
-    short = 1.0 / cells[:, 1] < KINK
-    last = short & ~np.append(short[1:], False)
-    return [float(t) for t in ends[last][:-1]] if last.size and last[-1] else [float(t) for t in ends[last]]
+    """Both ends of the most bent cell in every run of cells that had to be very short: a kink lies inside."""
+    widths = 1.0 / cells[:, 1]
+    short = np.flatnonzero(widths < KINK)
+    runs = np.split(short, np.flatnonzero(np.diff(short) > 1) + 1)
+    kinks: list[float] = []
+    for run in runs:
+        if run.size:
+            i = run[np.argmax(np.abs(cells[run, 6]))]
+            kinks += [float(cells[i, 0]), float(cells[i, 0] + widths[i])]
+    return kinks
 
 
 _tables: OrderedDict[Any, tuple[Array, list[float]]] = OrderedDict()
