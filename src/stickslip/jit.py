@@ -6,6 +6,10 @@ are translated by `stickslip.subset` to a file named after its own content, comp
 signature each, and handed to kernels as addresses: a kernel is compiled once, whatever laws it runs.
 """
 
+# numba and llvmlite carry no types.
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportMissingTypeStubs=false
+# pyright: reportAttributeAccessIssue=false, reportUnknownLambdaType=false, reportUnknownArgumentType=false
+
 from __future__ import annotations
 
 import ast
@@ -65,7 +69,7 @@ def cache_folder() -> Path:
     """The folder for compiled code: STICKSLIP_CACHE, else the user's cache folder, else a temporary one."""
     package = Path(__file__).parent
     digest = hashlib.sha256(f"{numba.__version__} {sys.version} {platform.machine()}".encode())
-    for file in sorted([Path(__file__), *package.glob("simulate/*.py"), *package.glob("study/*.py")]):
+    for file in sorted([Path(__file__), *package.glob("simulate/*.py")]):
         digest.update(file.read_bytes())
     home = os.environ.get("STICKSLIP_CACHE") or os.path.join(
         os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "stickslip"
@@ -109,15 +113,19 @@ def kernel(*, exact: bool = True) -> Callable[[Any], Any]:
 # ---- calls through addresses ------------------------------------------------------------------------------
 
 
-@intrinsic
-def pointer(typingctx: Any, array: Any, offset: Any) -> Any:
-    """The address of ``array[offset]``, array contiguous."""
+def _pointer(typingctx: Any, array: Any, offset: Any) -> Any:
+    """The address of ``array[offset]``; the array is contiguous, or an address itself."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        if isinstance(array, types.CPointer):
+            return builder.gep(arguments[0], [arguments[1]])
         struct = context.make_array(signature.args[0])(context, builder, arguments[0])
         return builder.gep(struct.data, [arguments[1]])
 
     return ARRAY(array, types.intp), generate
+
+
+pointer: Any = intrinsic(_pointer)
 
 
 def _caller(name: str, count: int, returns: bool) -> Any:
@@ -138,13 +146,13 @@ def _caller(name: str, count: int, returns: bool) -> Any:
     return intrinsic(scope["call"])
 
 
-call_step = _caller("step", 6, True)
-call_rate = _caller("rate", 5, True)
-call_guards = _caller("guards", 5, False)
-call_switch = _caller("switch", 5, False)
-call_value = _caller("steady", 2, True)
-call_holding = _caller("holding", 4, True)
-call_profile = _caller("profile", 3, False)
+call_step: Any = _caller("step", 6, True)
+call_rate: Any = _caller("rate", 5, True)
+call_guards: Any = _caller("guards", 5, False)
+call_switch: Any = _caller("switch", 5, False)
+call_value: Any = _caller("steady", 2, True)
+call_holding: Any = _caller("holding", 4, True)
+call_profile: Any = _caller("profile", 3, False)
 
 
 # ---- laws and references ----------------------------------------------------------------------------------
@@ -204,7 +212,12 @@ def _compile(
         lines += ["@compile_inner", ast.unparse(function), ""]
     for entry in entries:
         arguments = ", ".join(a.arg for a in functions[f"_{entry}_"].args.args)
-        lines += [f"@compile_entry({entry!r})", f"def {entry}({arguments}):", f"    return _{entry}_({arguments})", ""]
+        lines += [
+            f"@compile_entry({entry!r})",
+            f"def {entry}({arguments}):",
+            f"    return _{entry}_({arguments})",
+            "",
+        ]
     text = "\n".join(lines)
     module = _loaded(f"{name.replace('-', '_')}_{hashlib.sha256(text.encode()).hexdigest()[:16]}", text)
     return {entry: int(getattr(module, entry).address) for entry in entries}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -54,22 +54,33 @@ class Model:
         ParameterError
             If the law has no such parameter, or the result is out of bounds.
         """
-        values = self.parameters._asdict()
+        values: dict[str, Any] = self.parameters._asdict()
         for name, factor in factors.items():
             if name not in values:
                 raise ParameterError(f"{self.law.name}: no parameter {name!r}; {suggestion(name, values)}")
-            value = values[name]
-            values[name] = tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
+            values[name] = _times(factor, values[name])
         return Model(self.law, **values)
 
     def as_dict(self) -> dict[str, Any]:
         """Law, choices and parameters as plain data."""
-        parameters = {k: list(v) if isinstance(v, tuple) else v for k, v in self.parameters._asdict().items()}
-        return {"law": self.law.name, **dict(self.law.chosen), **parameters}
+        return {"law": self.law.name, **dict(self.law.chosen), **_plain(self.parameters)}
 
     def __repr__(self) -> str:
         inside = ", ".join(f"{k}={v!r}" for k, v in self.parameters._asdict().items())
         return f"Model({self.law.name!r}, {inside})"
+
+
+def _times(factor: float, value: Any) -> Any:
+    """A parameter, or each of its values, multiplied."""
+    if isinstance(value, tuple):
+        return [factor * v for v in cast("tuple[float, ...]", value)]
+    return factor * value
+
+
+def _plain(parameters: Any) -> dict[str, Any]:
+    """Parameters as numbers and lists."""
+    values: dict[str, Any] = parameters._asdict()
+    return {k: list(cast("tuple[float, ...]", v)) if isinstance(v, tuple) else v for k, v in values.items()}
 
 
 def _default(law: Law, choice: str) -> str:
@@ -113,7 +124,8 @@ class Reference:
         """Position (rad), velocity (rad/s) and acceleration (rad/s²) at the times, shape (n, 3)."""
         from types import SimpleNamespace
 
-        out, rows = SimpleNamespace(position=0.0, velocity=0.0, acceleration=0.0), []
+        out = SimpleNamespace(position=0.0, velocity=0.0, acceleration=0.0)
+        rows: list[tuple[float, float, float]] = []
         for t in time:
             self.kind.profile(float(t), self.parameters, out)
             rows.append((out.position, out.velocity, out.acceleration))
@@ -121,8 +133,7 @@ class Reference:
 
     def as_dict(self) -> dict[str, Any]:
         """Kind and parameters as plain data."""
-        parameters = {k: list(v) if isinstance(v, tuple) else v for k, v in self.parameters._asdict().items()}
-        return {"kind": self.kind.name, **parameters}
+        return {"kind": self.kind.name, **_plain(self.parameters)}
 
     def __repr__(self) -> str:
         inside = ", ".join(f"{k}={v!r}" for k, v in self.parameters._asdict().items())

@@ -104,5 +104,7 @@ def _module_at(path: str) -> ModuleType:
     except InputError:
         raise
     except Exception as error:
-        raise LawError(f"{path} cannot be imported: {type(error).__name__}: {error}; mend the file") from error
+        raise LawError(
+            f"{path} cannot be imported: {type(error).__name__}: {error}; mend the file"
+        ) from error
     return module

@@ -28,13 +28,25 @@ from __future__ import annotations
 
 import math
 import types
+from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, cast, get_args, get_origin, get_type_hints
 
 from stickslip.errors import ParameterError, UnknownName, suggestion
 
-__all__ = ["Choice", "Described", "Elements", "Field", "Law", "Mode", "Option", "Par", "ReferenceKind", "Surroundings"]
+__all__ = [
+    "Choice",
+    "Described",
+    "Elements",
+    "Field",
+    "Law",
+    "Mode",
+    "Option",
+    "Par",
+    "ReferenceKind",
+    "Surroundings",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,13 +201,18 @@ class Described:
 
     def _checked(self, f: Field, value: Any) -> Any:
         if value is None:
-            raise ParameterError(f"{self.name}: parameter {f.name!r} ({f.par.meaning}, {f.par.unit}) is missing")
+            raise ParameterError(
+                f"{self.name}: parameter {f.name!r} ({f.par.meaning}, {f.par.unit}) is missing"
+            )
         if f.per_element:
             if isinstance(value, str) or not isinstance(value, Sequence):
-                raise ParameterError(f"{self.name}: {f.name} = {value!r} must be a list, one number per element")
+                raise ParameterError(
+                    f"{self.name}: {f.name} = {value!r} must be a list, one number per element"
+                )
             if not value:
                 raise ParameterError(f"{self.name}: {f.name} is empty; give at least one element")
-            return tuple(self._number(f, v, f"{f.name}[{i}]") for i, v in enumerate(value))
+            numbers = cast(Sequence[Any], value)
+            return tuple(self._number(f, v, f"{f.name}[{i}]") for i, v in enumerate(numbers))
         return self._number(f, value, f.name)
 
     def _number(self, f: Field, value: Any, label: str) -> float:
@@ -276,6 +293,8 @@ class Law(Described):
         ``Annotated[tuple[float, ...], Par(...)]`` fields. Fields of the chosen options are added to them.
     equation, source : str
         Its equation in LaTeX; thesis equation numbers and keys of ``references.bib``.
+    example : mapping
+        Parameters of a real contact, for pictures, documentation and the contract tests.
     odd, rate_independent : bool
         Declarations that the contract tests hold it to.
     passive : str
@@ -290,6 +309,7 @@ class Law(Described):
     title: str
     equation: str
     source: tuple[str, ...]
+    example: Mapping[str, Any]
     State: type | None = None
     rate: Callable[..., float] | None = None
     guards: Callable[..., None] | None = None
@@ -314,9 +334,9 @@ class Law(Described):
         own_names = {f.name for f in own}
         object.__setattr__(self, "fields", own + tuple(f for f in brought if f.name not in own_names))
         object.__setattr__(self, "state_fields", fields_of(self.State))
-        names = [f.name for f in self.fields]
-        joined: Any = NamedTuple(self.Params.__name__, [(n, Any) for n in names])  # type: ignore[misc]
-        object.__setattr__(self, "Parameters", joined)
+        object.__setattr__(
+            self, "Parameters", namedtuple(self.Params.__name__, [f.name for f in self.fields])
+        )
         for function in ("step", "rate", "guards", "switch", "steady", "holding", "check", "modes"):
             raw = getattr(self, function)
             if raw is not None:

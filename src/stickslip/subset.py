@@ -29,12 +29,22 @@ MATH = {
     "exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
     "floor", "ceil", "fabs", "copysign", "pi", "inf", "pow", "hypot",
 }  # fmt: skip
-STATEMENTS = (ast.Assign, ast.AugAssign, ast.AnnAssign, ast.If, ast.For, ast.Return, ast.Expr, ast.Pass, ast.Break)
+STATEMENTS = (
+    ast.Assign,
+    ast.AugAssign,
+    ast.AnnAssign,
+    ast.If,
+    ast.For,
+    ast.Return,
+    ast.Expr,
+    ast.Pass,
+    ast.Break,
+)
 EXPRESSIONS = (
     ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp, ast.Constant, ast.Name, ast.Attribute,
     ast.Subscript, ast.Call, ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.expr_context,
 )  # fmt: skip
-REMEDY = {
+REMEDY: dict[type[ast.AST], str] = {
     ast.While: "use `for i in range(n)` with a `break`",
     ast.ListComp: "use a `for` loop over the elements",
     ast.GeneratorExp: "use a `for` loop over the elements",
@@ -80,7 +90,9 @@ def law_layouts(law: Law) -> dict[str, Layout]:
     }
 
 
-def lower(entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout]) -> dict[str, ast.FunctionDef]:
+def lower(
+    entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout]
+) -> dict[str, ast.FunctionDef]:
     """Translate functions and everything they call into functions on flat arrays.
 
     Parameters
@@ -124,7 +136,7 @@ def _lower_one(
         _lower_one(callee, target, layouts, done, (*stack, name))
     arguments = ast.arguments([], [ast.arg(a.arg) for a in tree.args.args], None, [], [], None, [])
     done[name] = ast.fix_missing_locations(
-        ast.FunctionDef(name=name, args=arguments, body=body or [ast.Pass()], decorator_list=[], type_params=[])
+        ast.FunctionDef(name=name, args=arguments, body=body or [ast.Pass()], decorator_list=[])
     )
 
 
@@ -142,7 +154,9 @@ def _parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, _Place]:
         lines, first = inspect.getsourcelines(function)
     except (OSError, TypeError) as error:
         name = getattr(function, "__name__", str(function))
-        raise LawError(f"the source of {name!r} cannot be read; write the law in a file of its own") from error
+        raise LawError(
+            f"the source of {name!r} cannot be read; write the law in a file of its own"
+        ) from error
     tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
     where = _Place(inspect.getsourcefile(function) or "<unknown>", max(first, 1))
     if not isinstance(tree, ast.FunctionDef):
@@ -167,7 +181,9 @@ class _Translator(ast.NodeTransformer):
     def visit(self, node: ast.AST) -> Any:
         if not isinstance(node, (*STATEMENTS, *EXPRESSIONS)):
             kind = type(node).__name__
-            raise self.refuse(node, f"`{kind}`", REMEDY.get(type(node), "use arithmetic, if/else and for loops"))
+            raise self.refuse(
+                node, f"`{kind}`", REMEDY.get(type(node), "use arithmetic, if/else and for loops")
+            )
         return super().visit(node)
 
     def visit_Expr(self, node: ast.Expr) -> Any:
@@ -202,7 +218,9 @@ class _Translator(ast.NodeTransformer):
         value = self.scope.get(node.id)
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             return ast.copy_location(ast.Constant(float(value)), node)
-        raise self.refuse(node, f"the name {node.id!r}", "use an argument, a local name or a numeric constant")
+        raise self.refuse(
+            node, f"the name {node.id!r}", "use an argument, a local name or a numeric constant"
+        )
 
     def visit_Attribute(self, node: ast.Attribute) -> Any:
         owner = node.value
@@ -279,9 +297,13 @@ class _Translator(ast.NodeTransformer):
     def count(self, node: ast.AST) -> ast.expr:
         """The number of elements, which the parameters hold after their scalars."""
         if "p" not in self.arguments:
-            raise self.refuse(node, "a field per element without `p`", "pass the parameters `p` to this function")
+            raise self.refuse(
+                node, "a field per element without `p`", "pass the parameters `p` to this function"
+            )
         place = ast.Constant(len(self.layouts["p"].scalars))
-        return ast.Call(ast.Name("int", ast.Load()), [ast.Subscript(ast.Name("p", ast.Load()), place, ast.Load())], [])
+        return ast.Call(
+            ast.Name("int", ast.Load()), [ast.Subscript(ast.Name("p", ast.Load()), place, ast.Load())], []
+        )
 
     def length(self, node: ast.Call) -> ast.expr:
         of = node.args[0] if len(node.args) == 1 else None

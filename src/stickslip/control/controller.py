@@ -41,10 +41,14 @@ class Controller:
             if not math.isfinite(value) or value < 0.0:
                 raise ParameterError(f"controller: {name} = {value:g} must be at least 0")
         if math.isnan(self.torque_limit) or self.torque_limit <= 0.0:
-            raise ParameterError(f"controller: torque_limit = {self.torque_limit:g} N·m must be greater than 0")
+            raise ParameterError(
+                f"controller: torque_limit = {self.torque_limit:g} N·m must be greater than 0"
+            )
         if not math.isfinite(self.sample_time) or self.sample_time < 0.0:
             raise ParameterError(f"controller: sample_time = {self.sample_time:g} s must be at least 0")
         if not math.isfinite(self.encoder_counts) or self.encoder_counts < 0.0:
             raise ParameterError(f"controller: encoder_counts = {self.encoder_counts:g} must be at least 0")
         if self.encoder_counts > 0.0 and self.sample_time == 0.0:
-            raise ParameterError("controller: an encoder is read by samples; give a sample_time greater than 0")
+            raise ParameterError(
+                "controller: an encoder is read by samples; give a sample_time greater than 0"
+            )

@@ -21,8 +21,12 @@ class Gains(NamedTuple):
 
     kp: Annotated[float, Par("N·m/rad", "k_p", "proportional gain", lower=0.0)]
     ki: Annotated[float, Par("N·m/(rad·s)", "k_i", "integral gain", lower=0.0, default=0.0)] = 0.0
-    kd: Annotated[float, Par("N·m·s/rad", "k_d", "gain on the measured velocity", lower=0.0, default=0.0)] = 0.0
-    kr: Annotated[float, Par("N·m·s/rad", "k_r", "gain on the reference velocity", lower=0.0, default=0.0)] = 0.0
+    kd: Annotated[float, Par("N·m·s/rad", "k_d", "gain on the measured velocity", lower=0.0, default=0.0)] = (
+        0.0
+    )
+    kr: Annotated[
+        float, Par("N·m·s/rad", "k_r", "gain on the reference velocity", lower=0.0, default=0.0)
+    ] = 0.0
 
 
 def pr(kp: float, kd: float) -> Gains:

@@ -20,7 +20,9 @@ class Stribeck(NamedTuple):
     fs: Annotated[float, Par("N·m", "F_S", "static (break-away) torque", positive=True)]
     fc: Annotated[float, Par("N·m", "F_C", "Coulomb torque", positive=True)]
     vs: Annotated[float, Par("rad/s", "v_s", "Stribeck velocity", positive=True)]
-    delta_s: Annotated[float, Par("-", "delta_s", "Stribeck shape factor", positive=True, upper=20.0, default=2.0)]
+    delta_s: Annotated[
+        float, Par("-", "delta_s", "Stribeck shape factor", positive=True, upper=20.0, default=2.0)
+    ]
 
 
 def stribeck(v: float, p: Any) -> float:
@@ -38,4 +40,6 @@ def check_levels(p: Any) -> str:
     return ""
 
 
-CURVE = Choice("curve", replaces="sliding", options={"stribeck": Option(stribeck, Stribeck)}, default="stribeck")
+CURVE = Choice(
+    "curve", replaces="sliding", options={"stribeck": Option(stribeck, Stribeck)}, default="stribeck"
+)

@@ -23,5 +23,8 @@ def literal(direction: float, force: float) -> float:
 
 
 SLIP_RULE = Choice(
-    "slip_rule", replaces="load_of", options={"signed": Option(signed), "literal": Option(literal)}, default="signed"
+    "slip_rule",
+    replaces="load_of",
+    options={"signed": Option(signed), "literal": Option(literal)},
+    default="signed",
 )

@@ -17,7 +17,9 @@ class Params(NamedTuple):
     """Parameters of Coulomb with viscous friction, thesis Table 2."""
 
     fc: Annotated[float, Par("N·m", "F_C", "Coulomb torque", lower=0.0)]
-    sigma2: Annotated[float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)]
+    sigma2: Annotated[
+        float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)
+    ]
 
 
 def steady(v: float, p: Any) -> float:
@@ -57,6 +59,7 @@ LAW = Law(
     title="Coulomb with viscous friction",
     equation=r"F = F_C\,\mathrm{sign}(v) + \sigma_2 v",
     source=("thesis eq. 3.19", "armstrong1994"),
+    example={"fc": 0.285, "sigma2": 0.018},  # thesis Table 2
     rate=rate,
     steady=steady,
     holding=holding,

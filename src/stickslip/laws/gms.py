@@ -23,9 +23,13 @@ class Params(NamedTuple):
     """Parameters besides the sliding curve's, thesis Table 1."""
 
     k: Annotated[tuple[float, ...], Par("N·m/rad", "k_i", "stiffness of element i", positive=True)]
-    alpha: Annotated[tuple[float, ...], Par("-", "alpha_i", "share of element i in s(v)", positive=True, upper=1.0)]
+    alpha: Annotated[
+        tuple[float, ...], Par("-", "alpha_i", "share of element i in s(v)", positive=True, upper=1.0)
+    ]
     c: Annotated[float, Par("N·m/s", "C", "attraction parameter", positive=True)]
-    sigma2: Annotated[float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)]
+    sigma2: Annotated[
+        float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)
+    ]
 
 
 class State(NamedTuple):
@@ -119,14 +123,13 @@ def advance(v0: float, v1: float, dt: float, z: Any, p: Any) -> None:
                     start = s0 + (1.0 - part) * (s1 - s0)
         if part > 0.0:
             exponent = part * rate_of_slip
-            decay = math.exp(-exponent)
+            gain = -math.expm1(-exponent)
             if exponent > 1e-4:
-                lag = (1.0 - decay) / exponent
+                follow = 1.0 - gain / exponent
             else:
-                lag = 1.0 - 0.5 * exponent
-            goal0 = p.alpha[i] * z.mode[i] * start
-            goal1 = p.alpha[i] * z.mode[i] * s1
-            z.force[i] = goal1 + (z.force[i] - goal0) * decay - (goal1 - goal0) * lag
+                follow = 0.5 * exponent
+            goal = p.alpha[i] * z.mode[i]
+            z.force[i] = z.force[i] * (1.0 - gain) + goal * (start * gain + (s1 - start) * follow)
 
 
 def stick(z: Any, p: Any) -> None:
@@ -175,6 +178,15 @@ LAW = Law(
     equation=r"F = \sum_i F_i + \sigma_2 v,\quad \dot F_i = k_i v \text{ (stick)},\quad "
     r"\dot F_i = C\left(\alpha_i\,\mathrm{sign}(v) - \frac{F_i}{s(v)}\right) \text{ (slip)}",
     source=("thesis eqs. 2.16 to 2.19", "lampaert2003", "albender2005"),
+    example={  # thesis Table 1
+        "k": [1e4, 7e3, 5e3, 3e3],
+        "alpha": [0.25] * 4,
+        "c": 24.0,
+        "sigma2": 0.018,
+        "fs": 0.335,
+        "fc": 0.285,
+        "vs": 0.01,
+    },
     State=State,
     rate=rate,
     guards=guards,

@@ -21,7 +21,9 @@ class Params(NamedTuple):
 
     sigma0: Annotated[float, Par("N·m/rad", "sigma_0", "bristle stiffness", positive=True)]
     sigma1: Annotated[float, Par("N·m·s/rad", "sigma_1", "micro-viscous damping", lower=0.0, default=0.0)]
-    sigma2: Annotated[float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)]
+    sigma2: Annotated[
+        float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)
+    ]
 
 
 class State(NamedTuple):
@@ -58,12 +60,12 @@ def relax(v0: float, v1: float, dt: float, z: float, p: Any) -> float:
     if vm < 0.0:
         s0 = -s0
         s1 = -s1
-    decay = math.exp(-exponent)
+    gain = -math.expm1(-exponent)
     if exponent > 1e-4:
-        lag = (1.0 - decay) / exponent
+        follow = 1.0 - gain / exponent
     else:
-        lag = 1.0 - 0.5 * exponent
-    return (s1 + (z * p.sigma0 - s0) * decay - (s1 - s0) * lag) / p.sigma0
+        follow = 0.5 * exponent
+    return z * (1.0 - gain) + (s0 * gain + (s1 - s0) * follow) / p.sigma0
 
 
 def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
@@ -90,6 +92,14 @@ LAW = Law(
     title="LuGre",
     equation=r"\dot z = v - \sigma_0 \frac{|v|}{s(v)} z,\quad F = \sigma_0 z + \sigma_1 \dot z + \sigma_2 v",
     source=("thesis eqs. 2.8 to 2.10", "canudas1995", "barabanov2000"),
+    example={
+        "sigma0": 3.5e4,
+        "sigma1": 0.1,
+        "sigma2": 0.018,
+        "fs": 0.335,
+        "fc": 0.285,
+        "vs": 0.01,
+    },  # Table 4
     State=State,
     rate=rate,
     steady=steady,

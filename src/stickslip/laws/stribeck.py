@@ -19,7 +19,9 @@ class Params(NamedTuple):
     """Parameters besides the sliding curve's, thesis Table 3."""
 
     k: Annotated[float, Par("N·m·s/rad", "k", "steep slope through zero velocity", positive=True)]
-    sigma2: Annotated[float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)]
+    sigma2: Annotated[
+        float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)
+    ]
 
 
 def steady(v: float, p: Any) -> float:
@@ -50,6 +52,7 @@ LAW = Law(
     equation=r"F = \begin{cases} k v & |k v| \le |s(v)| \\ s(v) & \text{otherwise}\end{cases},\quad "
     r"s(v) = \mathrm{sign}(v)\left(F_C + (F_S - F_C)e^{-|v/v_s|^{\delta_s}}\right) + \sigma_2 v",
     source=("thesis eq. 3.20", "armstrong1994"),
+    example={"k": 3.5e4, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01},  # thesis Table 3
     rate=rate,
     steady=steady,
     check=check_levels,

@@ -15,7 +15,9 @@ class Params(NamedTuple):
     """Parameters of the ramp."""
 
     velocity: Annotated[float, Par("rad/s", "v", "velocity")]
-    end: Annotated[float, Par("s", "t_e", "time at which the ramp ends and holds", positive=True, default=1e9)]
+    end: Annotated[
+        float, Par("s", "t_e", "time at which the ramp ends and holds", positive=True, default=1e9)
+    ]
 
 
 def profile(t: float, p: Any, out: Any) -> None:
@@ -34,4 +36,6 @@ def breaks(p: Any, duration: float) -> Sequence[float]:
     return [p.end] if p.end < duration and math.isfinite(p.end) else []
 
 
-REFERENCE = ReferenceKind("ramp", Params, profile, breaks, title="Ramp", equation=r"\theta_d = v\,\min(t, t_e)")
+REFERENCE = ReferenceKind(
+    "ramp", Params, profile, breaks, title="Ramp", equation=r"\theta_d = v\,\min(t, t_e)"
+)

@@ -27,7 +27,9 @@ def ramp_time(p: Any) -> float:
 
 def jerk_time(p: Any) -> float:
     """Length of a segment of constant jerk, s: shortened where velocity or distance end it first."""
-    return min(p.acceleration / p.jerk, math.sqrt(p.velocity / p.jerk), (0.5 * p.distance / p.jerk) ** (1.0 / 3.0))
+    return min(
+        p.acceleration / p.jerk, math.sqrt(p.velocity / p.jerk), (0.5 * p.distance / p.jerk) ** (1.0 / 3.0)
+    )
 
 
 def acceleration_time(p: Any) -> float:
@@ -99,5 +101,6 @@ REFERENCE = ReferenceKind(
     profile,
     breaks,
     title="S-curve",
-    equation=r"|\dddot\theta_d| \le j_\mathrm{max},\ |\ddot\theta_d| \le a_\mathrm{max},\ |\dot\theta_d| \le v_\mathrm{max}",
+    equation=r"|\dddot\theta_d| \le j_\mathrm{max},\ |\ddot\theta_d| \le a_\mathrm{max},\ "
+    r"|\dot\theta_d| \le v_\mathrm{max}",
 )

@@ -16,8 +16,10 @@ class Params(NamedTuple):
 
     height: Annotated[float, Par("rad", "h", "height of one step")]
     dwell: Annotated[float, Par("s", "t_d", "time from step to step", positive=True)]
-    count: Annotated[float, Par("-", "n", "number of steps", lower=1.0)]
-    tau: Annotated[float, Par("s", "tau", "time constant of the filter; 0 for ideal steps", lower=0.0, default=0.0)]
+    steps: Annotated[float, Par("-", "n", "number of steps", lower=1.0)]
+    tau: Annotated[
+        float, Par("s", "tau", "time constant of the filter; 0 for ideal steps", lower=0.0, default=0.0)
+    ]
 
 
 def profile(t: float, p: Any, out: Any) -> None:
@@ -26,8 +28,8 @@ def profile(t: float, p: Any, out: Any) -> None:
     out.velocity = 0.0
     out.acceleration = 0.0
     begun = math.floor(t / p.dwell) + 1.0
-    if begun > p.count:
-        begun = p.count
+    if begun > p.steps:
+        begun = p.steps
     for i in range(int(begun)):
         since = t - i * p.dwell
         if p.tau > 0.0:
@@ -42,13 +44,13 @@ def profile(t: float, p: Any, out: Any) -> None:
 
 def breaks(p: Any, duration: float) -> Sequence[float]:
     """The begin of every step."""
-    return [i * p.dwell for i in range(1, int(p.count)) if i * p.dwell < duration]
+    return [i * p.dwell for i in range(1, int(p.steps)) if i * p.dwell < duration]
 
 
 def check(p: Any) -> str:
     """The number of steps is a whole one."""
-    if p.count != int(p.count):
-        return f"count = {p.count:g} must be a whole number"
+    if p.steps != int(p.steps):
+        return f"steps = {p.steps:g} must be a whole number"
     return ""
 
 

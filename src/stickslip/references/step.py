@@ -19,7 +19,9 @@ class Params(NamedTuple):
     """Parameters of the step."""
 
     amplitude: Annotated[float, Par("rad", "A", "height of the step")]
-    tau: Annotated[float, Par("s", "tau", "time constant of the filter; 0 for an ideal step", lower=0.0, default=0.0)]
+    tau: Annotated[
+        float, Par("s", "tau", "time constant of the filter; 0 for an ideal step", lower=0.0, default=0.0)
+    ]
 
 
 def profile(t: float, p: Any, out: Any) -> None:

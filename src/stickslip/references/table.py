@@ -83,7 +83,9 @@ def with_velocities(time: Sequence[float], position: Sequence[float]) -> tuple[f
     """Velocities at the points of a natural cubic spline through them (C2), rad/s."""
     t, x = np.asarray(time, float), np.asarray(position, float)
     if t.shape != x.shape or t.ndim != 1 or t.size < 2:
-        raise ParameterError(f"table: time has {t.size} values and position {x.size}; give as many of each, at least 2")
+        raise ParameterError(
+            f"table: time has {t.size} values and position {x.size}; give as many of each, at least 2"
+        )
     h = np.diff(t)
     if not np.all(np.isfinite(x)) or not np.all(np.isfinite(t)) or np.any(h <= 0.0):
         raise ParameterError("table: time must ascend and every number must be finite; mend the table")

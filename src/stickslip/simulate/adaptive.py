@@ -224,8 +224,8 @@ def dense(h: float, y: Any, k: Any, end: Any, x: float, out: Any) -> None:
 
 @kernel()
 def locate(
-    a: Any, w: Any, t: float, h: float, y: Any, k: Any, end: Any, error: Any, u: Any, g: Any, before: float, after: float,
-    precision: float,
+    a: Any, w: Any, t: float, h: float, y: Any, k: Any, end: Any, error: Any, u: Any, g: Any,
+    before: float, after: float, precision: float,
 ) -> float:  # fmt: skip
     """Shorten a step of length h to the first moment at which an event is due; returns its length.
 

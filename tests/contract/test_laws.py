@@ -1,0 +1,249 @@
+"""One suite over every registered law, and over a law added in one file.
+
+A law that passes simulates, compensates and compiles; the engines may rely on nothing else.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from stickslip import plugins
+from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.controller import Controller
+from stickslip.control.linear import place
+from stickslip.errors import ParameterError
+from stickslip.jit import compiled_law, flat
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model, Reference
+from stickslip.simulate.closed_loop import simulate
+from stickslip.spec import Law, Mode, Surroundings
+
+LAWS = [plugins.law(name) for name in plugins.law_names()]
+U = Surroundings()
+every_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+
+speeds = st.builds(
+    lambda m, e, s: s * m * 10.0**e, st.floats(1, 10), st.integers(-7, 0), st.sampled_from((-1.0, 1.0))
+)
+velocities = st.one_of(st.just(0.0), speeds)
+steps = st.floats(-7, 0).map(lambda e: 10.0**e)
+motions = st.lists(st.tuples(velocities, steps), min_size=1, max_size=30)
+
+
+def example(law: Law):
+    return law.parameters(dict(law.example))
+
+
+def drive(law, p, motion, z=None):
+    """Torques along a motion of (end velocity, time step) from rest."""
+    z = law.state(p) if z is None else z
+    v, out = 0.0, []
+    for end, dt in motion:
+        out.append(law.step(v, end, dt, z, p, U))
+        v = end
+    return out, z
+
+
+class Compiled:
+    """The compiled step, called as the kernels call it."""
+
+    def __init__(self, law: Law, p) -> None:
+        pointer = ctypes.POINTER(ctypes.c_double)
+        kind = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * 3, pointer, pointer, pointer)
+        self.function = kind(compiled_law(law).step)
+        self.p, self.u = flat(law.pack(p)), flat(list(U))
+        self.z = flat(law.pack_state(law.state(p)))
+
+    def __call__(self, v0, v1, dt):
+        address = [a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in (self.z, self.p, self.u)]
+        return self.function(v0, v1, dt, *address)
+
+
+@every_law
+def test_description_is_complete(law):
+    assert law.title
+    assert law.equation
+    assert law.source
+    names = [f.name for f in law.fields]
+    assert len(names) == len(set(names))
+    for f in (*law.fields, *law.state_fields):
+        assert f.par.unit, f.name
+        assert f.par.symbol, f.name
+        assert f.par.meaning, f.name
+    assert law.step.__doc__
+    assert (law.guards is None) == (law.switch is None)
+    assert any(isinstance(f.par, Mode) for f in law.state_fields) == (law.guards is not None)
+
+
+@every_law
+def test_parameters_out_of_bounds_are_refused(law):
+    good = dict(law.example)
+    for f in law.fields:
+        bad = [math.nan, math.inf]
+        if f.par.positive:
+            bad += [0.0, -1.0]
+        elif f.par.lower > -math.inf:
+            bad.append(f.par.lower - 1.0)
+        for value in bad:
+            wrong = [value] * len(good["k"]) if f.per_element else value
+            with pytest.raises(ParameterError, match=f.name):
+                law.parameters({**good, f.name: wrong})
+        if f.par.default is None:
+            with pytest.raises(ParameterError, match=f.name):
+                law.parameters({k: v for k, v in good.items() if k != f.name})
+    with pytest.raises(ParameterError, match="no parameter 'nonsense'"):
+        law.parameters({**good, "nonsense": 1.0})
+
+
+@every_law
+def test_compiled_equals_plain_python_bit_for_bit(law):
+    p = example(law)
+    compiled, z = Compiled(law, p), law.state(p)
+    rng = np.random.default_rng(7)
+    v = 0.0
+    for _ in range(5000):
+        end = rng.choice([0.0, 1.0, 1.0, 1.0, 1.0]) * rng.normal() * 10.0 ** rng.uniform(-8, 0)
+        dt = 10.0 ** rng.uniform(-7, 0)
+        assert law.step(v, end, dt, z, p, U) == compiled(v, end, dt)
+        v = end
+    assert law.pack_state(z) == list(compiled.z[: law.state_size(p)])
+
+
+@every_law
+@given(motion=motions)
+@settings(max_examples=150, deadline=None)
+def test_step_is_bounded_for_any_time_step(law, motion):
+    p = example(law)
+    torques, z = drive(law, p, motion)
+    # A contact never gives more than its largest level, besides what is proportional to the velocity.
+    level = max(getattr(p, name) for name in ("fs", "fc") if hasattr(p, name)) if hasattr(p, "fc") else 1.0
+    slope = sum(getattr(p, name, 0.0) for name in ("sigma1", "sigma2"))
+    for torque, (v, _) in zip(torques, motion):
+        assert math.isfinite(torque)
+        assert abs(torque) <= 1.0001 * level + 2.0 * slope * max(abs(v), max(abs(w) for w, _ in motion))
+    assert all(math.isfinite(x) for x in law.pack_state(z))
+
+
+@every_law
+@given(motion=motions)
+@settings(max_examples=100, deadline=None)
+def test_odd(law, motion):
+    if not law.odd:
+        pytest.skip("declared not odd")
+    p = example(law)
+    there, _ = drive(law, p, motion)
+    back, _ = drive(law, p, [(-v, dt) for v, dt in motion])
+    assert there == [-t for t in back]
+
+
+@every_law
+@given(v=speeds)
+@settings(max_examples=60, deadline=None)
+def test_steady_value_is_reached(law, v):
+    assume(abs(v) > 1e-5)
+    p, z = example(law), None
+    _, z = drive(law, p, [(v, 1e-9)])
+    for _ in range(400):
+        torque = law.step(v, v, 0.05 * 0.01 / min(abs(v), 0.01), z, p, U)
+    assert torque == pytest.approx(law.steady(v, p), rel=1e-9)
+
+
+@every_law
+@given(v=speeds, dt=steps)
+@settings(max_examples=100, deadline=None)
+def test_exact_at_constant_velocity(law, v, dt):
+    """Two half steps are one step while no element breaks away between them."""
+    p = example(law)
+    whole, halves = law.state(p), law.state(p)
+    for z in (whole, halves):
+        for _ in range(3):
+            law.step(v, v, 10.0, z, p, U)
+    one = law.step(v, v, dt, whole, p, U)
+    law.step(v, v, 0.5 * dt, halves, p, U)
+    two = law.step(v, v, 0.5 * dt, halves, p, U)
+    assert one == pytest.approx(two, rel=1e-9, abs=1e-12)
+
+
+@every_law
+def test_step_converges_to_rate(law):
+    """The law's step and its rate are the same law: fine steps follow an accurate solution of the rate."""
+    if law.rate is None or not law.state_fields:
+        pytest.skip("no state to integrate")
+    from stickslip.simulate.open_loop import respond
+
+    motion = Reference("harmonic", amplitude=2e-3, frequency=2.0)
+    times = np.linspace(0.0, 0.6, 61)
+    fine = respond(Model(law, **law.example), motion, times, method="rate", tolerance=1e-10)
+    errors = []
+    p = example(law)
+    for n in (2400, 9600):
+        z, dt, v = law.state(p), 0.6 / n, motion.sample([0.0])[0, 1]
+        grid = motion.sample(np.arange(n + 1) * dt)[:, 1]
+        torque = np.zeros(n + 1)
+        for i in range(n):
+            torque[i + 1] = law.step(float(v), float(grid[i + 1]), dt, z, p, U)
+            v = grid[i + 1]
+        errors.append(np.abs(torque[:: n // 60][1:] - fine["friction_torque"][1:]).max())
+    assert errors[1] < 2e-4
+    assert errors[1] < errors[0] / 6.0
+
+
+@every_law
+@given(
+    amplitude=st.floats(-5, -2).map(lambda e: 10.0**e),
+    frequency=st.floats(-1, 1.5).map(lambda e: 10.0**e),
+    drift=st.floats(-1, 1),
+)
+@settings(max_examples=40, deadline=None)
+def test_passive_from_rest(law, amplitude, frequency, drift):
+    """Work done on a contact that starts unloaded is never negative."""
+    p = example(law)
+    if law.passive == "never" or (law.is_passive is not None and not law.is_passive(p)):
+        pytest.skip("declared not passive with these parameters")
+    n, z, work, torque = 400, law.state(p), 0.0, 0.0
+    w = 2 * math.pi * frequency
+    dt = 3.0 / frequency / n
+    v = 0.0
+    for i in range(1, n + 1):
+        end = amplitude * w * (math.sin(w * i * dt) + drift * math.sin(0.37 * w * i * dt))
+        before, torque = torque, law.step(v, end, dt, z, p, U)
+        work += 0.25 * (before + torque) * (v + end) * dt
+        v = end
+        assert work >= -2e-3 * 0.335 * amplitude
+
+
+@every_law
+@pytest.mark.parametrize("helper", [Feedforward, Feedback])
+def test_compensates(law, helper):
+    """As a compensator it lowers the error of a plant with Coulomb friction and pre-sliding."""
+    reference = Reference("sine", amplitude=0.5, frequency=0.25)
+    axis = RigidAxis(3.8623e-4, Model("lugre", **plugins.law("lugre").example))
+    gains = place("PD", 3.8623e-4, 10.0, 0.85)
+    plain = simulate(axis, Controller(gains), reference, 4.0, tolerance=1e-7)
+    helped = simulate(
+        axis, Controller(gains, helper(Model(law, **law.example), gain=0.8)), reference, 4.0, tolerance=1e-7
+    )
+    assert helped.meta["metrics"]["position_rms_rad"] < 0.5 * plain.meta["metrics"]["position_rms_rad"]
+
+
+@every_law
+def test_is_a_plant(law):
+    axis = RigidAxis(3.8623e-4, Model(law, **law.example))
+    record = simulate(
+        axis,
+        Controller(place("PD", 3.8623e-4, 10.0, 0.85)),
+        Reference("sine", amplitude=0.5, frequency=0.25),
+        2.0,
+        tolerance=1e-7,
+    )
+    energy = record.meta["energy"]
+    assert energy["friction_loss"] > 0.0
+    # Friction of about 0.3 N·m over 1 rad.
+    assert energy["friction_loss"] == pytest.approx(0.3, rel=0.3)

@@ -1,0 +1,106 @@
+"""Every registered kind of reference: derivatives, breaks, limits; the compiled profile equals plain Python."""
+
+from __future__ import annotations
+
+import ctypes
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stickslip import plugins
+from stickslip.errors import ParameterError, UnknownName
+from stickslip.jit import compiled_profile, flat
+from stickslip.model import Reference
+from stickslip.subset import Layout
+
+EXAMPLES = {
+    "sine": Reference("sine", amplitude=0.01, frequency=0.4),
+    "harmonic": Reference("harmonic", amplitude=0.01, frequency=0.4, phase=-1.5, velocity=0.01),
+    "step": Reference("step", amplitude=0.01, tau=0.02),
+    "ramp": Reference("ramp", velocity=0.3, end=1.2),
+    "staircase": Reference("staircase", height=0.1, dwell=0.5, steps=4, tau=0.02),
+    "scurve": Reference("scurve", distance=1.0, velocity=0.5, acceleration=2.0, jerk=40.0),
+    "table": Reference.table([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 0.0, 0.5]),
+}
+
+
+def test_every_kind_has_an_example():
+    assert set(EXAMPLES) >= set(plugins.reference_names())
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_derivatives_are_consistent_between_breaks(name):
+    reference, duration, h = EXAMPLES[name], 3.0, 1e-6
+    edges = [0.0, *reference.breaks(duration), duration]
+    for start, end in pairwise(edges):
+        t = np.linspace(start + 1e-3 * (end - start), end - 1e-3 * (end - start), 11)
+        now, before, after = (reference.sample(t + d) for d in (0.0, -h, h))
+        velocity = (after[:, 0] - before[:, 0]) / (2 * h)
+        acceleration = (after[:, 1] - before[:, 1]) / (2 * h)
+        assert np.abs(velocity - now[:, 1]).max() <= 1e-6 * (1 + np.abs(now[:, 1]).max() * 1e2)
+        assert np.abs(acceleration - now[:, 2]).max() <= 1e-5 * (1 + np.abs(now[:, 2]).max() * 1e2)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_velocity_keeps_its_sign_between_breaks(name):
+    """Integrators rely on it: a feedforward's sign changes only at breaks."""
+    reference, duration = EXAMPLES[name], 3.0
+    edges = [0.0, *reference.breaks(duration), duration]
+    for start, end in pairwise(edges):
+        t = np.linspace(start, end, 102)[1:-1]
+        assert len(set(np.sign(reference.sample(t)[:, 1])) - {0.0}) <= 1
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_compiled_profile_equals_plain_python(name):
+    reference = EXAMPLES[name]
+    kind = reference.kind
+    address = compiled_profile(kind.name, kind.profile, Layout.of(kind.fields, counted=True))
+    pointer = ctypes.POINTER(ctypes.c_double)
+    call = ctypes.CFUNCTYPE(None, ctypes.c_double, pointer, pointer)(address)
+    p, out = flat(kind.pack(reference.parameters)), np.zeros(3)
+    for t in np.linspace(0.0, 4.0, 97):
+        call(t, p.ctypes.data_as(pointer), out.ctypes.data_as(pointer))
+        assert tuple(out) == tuple(reference.sample([t])[0])
+
+
+@given(
+    distance=st.floats(1e-4, 10),
+    velocity=st.floats(1e-2, 20),
+    acceleration=st.floats(1e-1, 200),
+    jerk=st.floats(1, 2e4),
+)
+@settings(max_examples=150, deadline=None)
+def test_scurve_keeps_its_limits_and_arrives(distance, velocity, acceleration, jerk):
+    reference = Reference(
+        "scurve", distance=distance, velocity=velocity, acceleration=acceleration, jerk=jerk
+    )
+    end = max(reference.breaks(1e6))
+    rows = reference.sample(np.linspace(0.0, end, 501))
+    assert rows[-1, 0] == pytest.approx(distance, rel=1e-9)
+    assert np.abs(rows[:, 1]).max() <= velocity * (1 + 1e-9)
+    assert np.abs(rows[:, 2]).max() <= acceleration * (1 + 1e-9)
+    assert np.all(np.diff(rows[:, 0]) >= -1e-12)
+    change = np.abs(np.diff(rows[:, 2])).max() / (end / 500)
+    assert change <= jerk * (1 + 1e-6)
+
+
+def test_table_passes_through_its_points():
+    t, x = [0.0, 0.5, 1.5, 2.0], [0.0, 1.0, -1.0, 0.25]
+    assert Reference.table(t, x).sample(t)[:, 0] == pytest.approx(x)
+
+
+def test_bad_references_are_refused():
+    with pytest.raises(UnknownName, match="did you mean 'sine'"):
+        Reference("sin", amplitude=1.0)
+    with pytest.raises(ParameterError, match="frequency = 0"):
+        Reference("sine", amplitude=1.0, frequency=0.0)
+    with pytest.raises(ParameterError, match=r"time\[1\]"):
+        Reference("table", time=[0.0, 0.0], position=[0.0, 1.0], velocity=[0.0, 0.0])
+    with pytest.raises(ParameterError, match="time must ascend"):
+        Reference.table([0.0, 1.0, 1.0], [0.0, 1.0, 2.0])
+    with pytest.raises(ParameterError, match="whole number"):
+        Reference("staircase", height=0.1, dwell=1.0, steps=2.5)

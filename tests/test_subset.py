@@ -1,0 +1,163 @@
+"""The translation of the scalar subset: what it refuses, and how it says so."""
+
+from __future__ import annotations
+
+import ast
+import math
+from typing import Annotated, NamedTuple
+
+import pytest
+
+from stickslip.errors import LawError
+from stickslip.spec import Field, Par
+from stickslip.subset import Layout, lower
+
+LAYOUTS = {"p": Layout(("a", "b"), ("k", "m"), counted=True), "z": Layout(("x",), ("f", "h"))}
+
+
+def scale(v, p):
+    return p.a * v
+
+
+def good(v, z, p):
+    """Docstrings go."""
+    total: float = 0.0
+    for i in range(len(p.k)):
+        if z.f[i] > 0.0 and v >= p.b:
+            total += p.k[i] * z.f[i]
+        else:
+            total -= p.m[i]
+    z.x = total
+    z.f[0] = -z.x
+    return scale(total, p) + math.exp(-abs(v))
+
+
+def test_fields_become_elements():
+    functions = lower({"good": good}, LAYOUTS)
+    assert list(functions) == ["_scale", "good"]
+    text = ast.unparse(functions["good"])
+    assert "Docstrings" not in text
+    assert "range(int(p[2]))" in text
+    assert "z[1 + i]" in text
+    assert "p[3 + i]" in text
+    assert "p[3 + (1 * int(p[2]) + i)]" in text
+    assert "_scale(total, p)" in text
+
+
+def test_translation_computes_the_same():
+    text = "\n".join(ast.unparse(f) for f in lower({"good": good}, LAYOUTS).values())
+    scope = {"math": math}
+    exec(text, scope)
+
+    class Bag:
+        def __init__(self, **values):
+            self.__dict__.update(values)
+
+    p, z = Bag(a=2.0, b=0.5, k=(1.0, 2.0), m=(3.0, 4.0)), Bag(x=0.0, f=[0.5, -1.0])
+    flat_p, flat_z = [2.0, 0.5, 2.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.5, -1.0]
+    assert good(0.7, z, p) == scope["good"](0.7, flat_z, flat_p)
+    assert flat_z == [z.x, *z.f]
+
+
+def uses_while(v, p):
+    while v > 1.0:
+        v = v / 2.0
+    return v
+
+
+def uses_comprehension(v, p):
+    return sum([k * v for k in p.k])
+
+
+def uses_unknown_field(v, p):
+    return p.aa * v
+
+
+def uses_whole_block(v, p):
+    return p.k * v
+
+
+def uses_tuple(v, p):
+    a, b = v, v
+    return a + b
+
+
+def uses_import(v, p):
+    return open("x")
+
+
+def uses_global_list(v, p):
+    return NAMES[0] * v
+
+
+def uses_keyword(v, p):
+    return scale(v=v, p=p)
+
+
+def uses_math_gamma(v, p):
+    return math.gamma(v)
+
+
+def uses_recursion(v, p):
+    return uses_recursion(v - 1.0, p)
+
+
+def uses_odd_loop(v, p):
+    for k in p.k:
+        v += k
+    return v
+
+
+def uses_string(v, p):
+    return f"{v}"
+
+
+def needs_parameters(z):
+    return z.h[0]
+
+
+NAMES = ["x"]
+
+
+@pytest.mark.parametrize(
+    ("function", "said", "remedy"),
+    [
+        (uses_while, "`While`", "for i in range"),
+        (uses_comprehension, "sum()", "choose from|did you mean|scale"),
+        (uses_unknown_field, "no field 'aa'", "did you mean 'a'|choose from a, b, k, m"),
+        (uses_whole_block, "p.k as a whole", r"p\.k\[i\]"),
+        (uses_tuple, "`Tuple`", "one name at a time"),
+        (uses_import, "open()", "choose from|did you mean"),
+        (uses_global_list, "index", r"z\.force\[i\]"),
+        (uses_keyword, "keyword", "by position"),
+        (uses_math_gamma, "math.gamma", "choose from|did you mean"),
+        (uses_recursion, "calls itself", "loop"),
+        (uses_odd_loop, "loop", "for i in range"),
+        (uses_string, "`JoinedStr`", "only computes"),
+        (needs_parameters, "without `p`", "pass the parameters"),
+    ],
+)
+def test_refusals_name_file_line_and_remedy(function, said, remedy):
+    with pytest.raises(LawError, match=remedy) as caught:
+        lower({"f": function}, LAYOUTS)
+    text = str(caught.value)
+    assert said in text
+    assert "test_subset.py, line " in text
+    assert "\n" not in text
+
+
+def test_source_that_cannot_be_read():
+    scope: dict = {}
+    exec("def f(v, p):\n    return v", scope)
+    with pytest.raises(LawError, match="in a file of its own"):
+        lower({"f": scope["f"]}, LAYOUTS)
+
+
+def test_layout_of_fields():
+    class Params(NamedTuple):
+        k: Annotated[tuple[float, ...], Par("N·m/rad", "k", "stiffness")]
+        c: Annotated[float, Par("N·m/s", "C", "attraction")]
+
+    del Params
+    fields = (Field("k", Par("-", "k", "k"), True), Field("c", Par("-", "c", "c"), False))
+    assert Layout.of(fields, counted=True) == Layout(("c",), ("k",), True)
