@@ -49,7 +49,14 @@ def cruise_time(p: Any) -> float:
 
 
 def rise(t: float, j: float, tj: float, ta: float, order: int) -> float:
-    """Position (order 0), velocity (1) or acceleration (2) while speeding up from rest at t = 0."""
+    """Position (order 0), velocity (1) or acceleration (2) while speeding up from rest at t = 0, and after."""
+    if t >= ta + tj:
+        # The cubics below cancel there, and lose digits the longer the cruise lasts.
+        if order == 0:
+            return j * tj * ta * (t - 0.5 * (ta + tj))
+        if order == 1:
+            return j * tj * ta
+        return 0.0
     out = 0.0
     for i in range(4):
         since = t - tj * (i % 2) - ta * (i // 2)
