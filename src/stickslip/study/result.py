@@ -66,12 +66,15 @@ class StudyResult:
         Inputs with SHA-256, versions, configuration, timings.
     config : mapping
         The study's TOML as read.
+    extras : sequence of Run
+        Runs of the study's comparisons, which the table leaves out.
     """
 
     folder: Path
     runs: Sequence[Run]
     manifest: Mapping[str, Any]
     config: Mapping[str, Any]
+    extras: Sequence[Run] = ()
 
     def __iter__(self) -> Iterator[Run]:
         return iter(self.runs)
@@ -83,7 +86,7 @@ class StudyResult:
         ------
         KeyError
         """
-        for run in self.runs:
+        for run in (*self.runs, *self.extras):
             if run.key == key:
                 return run
         raise KeyError(key)

@@ -1,0 +1,259 @@
+"""Reading the TOML files people write: values are asked for by name, checked, and what nobody asked for is refused.
+
+Every complaint is a `ConfigError` of one line that names the file, the key, its value and what is allowed.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self, cast
+
+from stickslip.errors import ConfigError, InputError
+
+__all__ = ["Document", "Table", "read_toml"]
+
+BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+RUN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,63}")
+
+
+@dataclass
+class Document:
+    """A TOML file and the files it refers to.
+
+    Attributes
+    ----------
+    name : str
+        How messages call it.
+    folder : Path
+        The folder to which the paths written in it are relative.
+    moved : mapping of str to Path
+        Where a path as written lies now, if not there (a study that is run again from its copies).
+    files : mapping of str to Path
+        Files referred to so far, by the path as written.
+    """
+
+    name: str
+    folder: Path
+    moved: Mapping[str, Path] = field(default_factory=dict[str, Path])
+    files: dict[str, Path] = field(default_factory=dict[str, Path])
+
+    def locate(self, written: str) -> Path:
+        """Where the file written as `written` lies; it is remembered as an input."""
+        self.files[written] = self.moved.get(written, self.folder / written)
+        return self.files[written]
+
+
+def read_toml(path: Path, name: str = "", moved: Mapping[str, Path] | None = None) -> Table:
+    """Read a TOML file.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read, or is not TOML; with line and column.
+    """
+    shown = name or str(path)
+    try:
+        values = tomllib.loads(path.read_bytes().decode())
+    except FileNotFoundError:
+        raise ConfigError(f"no file {shown}; check the path") from None
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{shown}: byte {error.start} is not UTF-8; save the file as UTF-8 text") from None
+    except OSError as error:
+        raise ConfigError(f"{shown} cannot be read: {error.strerror}; give the path of a TOML file") from None
+    except RecursionError:
+        raise ConfigError(f"{shown}: arrays or tables are nested too deeply; flatten them") from None
+    except ValueError as error:
+        raise ConfigError(f"{shown}: not TOML: {error}; mend the file there") from None
+    return Table(values, Document(shown, path.parent, moved or {}))
+
+
+class Table:
+    """One table of a TOML file.
+
+    A getter without ``default`` demands its key. Used as a context manager, it refuses at the end every key
+    that was not asked for.
+
+    Parameters
+    ----------
+    values : mapping
+        The table as parsed.
+    document : Document
+    path : tuple of str
+        The keys that lead to it.
+    """
+
+    def __init__(self, values: Mapping[str, Any], document: Document, path: tuple[str, ...] = ()) -> None:
+        self.values = values
+        self.document = document
+        self.path = path
+        self._known: dict[str, None] = {}
+
+    # ---- complaints ------------------------------------------------------------------------------------
+
+    def label(self, key: str = "") -> str:
+        """File and dotted key, as messages begin."""
+        keys = [k if BARE_KEY.fullmatch(k) else _show(k) for k in (*self.path, *([key] if key else []))]
+        return f"{self.document.name}: {'.'.join(keys)}" if keys else self.document.name
+
+    def error(self, key: str, complaint: str) -> ConfigError:
+        """The error that says ``file: path.key = value complaint``."""
+        return ConfigError(f"{self.label(key)} = {_show(self.values.get(key))} {complaint}")
+
+    @contextmanager
+    def blamed(self) -> Iterator[None]:
+        """Let an `InputError` raised inside name this table."""
+        try:
+            yield
+        except ConfigError:
+            raise
+        except InputError as error:
+            raise ConfigError(f"{self.label()}: {error}") from None
+
+    def close(self) -> None:
+        """Refuse the keys that were not asked for."""
+        for key in self.values:
+            if key not in self._known:
+                near = difflib.get_close_matches(key, self._known, n=1, cutoff=0.6)
+                remedy = f"did you mean {near[0]!r}?" if near else f"allowed are {', '.join(self._known) or 'none'}"
+                raise ConfigError(f"{self.label(key)}: unknown key; {remedy}")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self.close()
+
+    # ---- getters ---------------------------------------------------------------------------------------
+
+    def has(self, key: str) -> bool:
+        """Whether the key is there; it counts as asked for."""
+        self._known[key] = None
+        return key in self.values
+
+    def _get(self, key: str, what: str) -> Any:
+        if not self.has(key):
+            near = difflib.get_close_matches(key, [k for k in self.values if k not in self._known], n=1)
+            hint = f"did you misspell it as {near[0]!r}?" if near else f"give {what}"
+            raise ConfigError(f"{self.label(key)} is missing; {hint}")
+        return self.values[key]
+
+    def number(self, key: str, unit: str, default: float | None = None, lower: float = -math.inf) -> float:
+        """A finite number of at least `lower`."""
+        if default is not None and not self.has(key):
+            return default
+        value = self._number(key, self._get(key, f"a number in {unit}"), unit)
+        if value < lower:
+            raise self.error(key, f"must be at least {lower:g} {unit}")
+        return value
+
+    def positive(self, key: str, unit: str, default: float | None = None) -> float:
+        """A finite number greater than 0."""
+        value = self.number(key, unit, default)
+        if value <= 0.0:
+            raise self.error(key, f"must be greater than 0 {unit}")
+        return value
+
+    def _number(self, key: str, value: Any, unit: str) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise self.error(key, f"must be a number in {unit}")
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            raise self.error(key, f"must be a finite number in {unit}")
+        return number
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """A string."""
+        if default is not None and not self.has(key):
+            return default
+        value = self._get(key, "a string")
+        if not isinstance(value, str):
+            raise self.error(key, "must be a string in quotes")
+        return value
+
+    def choice(self, key: str, allowed: Iterable[str], default: str | None = None) -> str:
+        """One of the allowed strings."""
+        names = list(allowed)
+        if default is None and key not in self.values:
+            self._get(key, f"one of {', '.join(names)}")
+        return self._one_of(key, self.text(key, default), names)
+
+    def texts(self, key: str, allowed: Iterable[str]) -> list[str]:
+        """A list of at least one string, each allowed, none twice."""
+        names = list(allowed)
+        values = self._list(key, "a list of strings")
+        for i, value in enumerate(values):
+            if not isinstance(value, str):
+                raise self.error(f"{key}", f"must be a list of strings; entry {i} is {_show(value)}")
+            self._one_of(key, value, names)
+        if len(set(values)) < len(values):
+            raise self.error(key, "names one twice; name each once")
+        return values
+
+    def files(self, key: str) -> list[Path]:
+        """A list of paths, relative to the file; empty where the key is missing."""
+        if not self.has(key):
+            return []
+        values = self._list(key, "a list of paths")
+        if not all(isinstance(v, str) for v in values):
+            raise self.error(key, "must be a list of paths in quotes")
+        return [self.document.locate(v) for v in values]
+
+    def _list(self, key: str, what: str) -> list[Any]:
+        values = self._get(key, what)
+        if not isinstance(values, list):
+            raise self.error(key, f"must be {what}")
+        if not values:
+            raise self.error(key, "is empty; give at least one entry")
+        return cast("list[Any]", values)
+
+    def _one_of(self, key: str, value: str, names: list[str]) -> str:
+        if value not in names:
+            near = difflib.get_close_matches(value, names, n=1, cutoff=0.6)
+            remedy = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(names)}"
+            raise self.error(key, f"is not known; {remedy}")
+        return value
+
+    def table(self, key: str) -> Table:
+        """The table under the key."""
+        value = self._get(key, f"a table [{'.'.join((*self.path, key))}]")
+        if not isinstance(value, dict):
+            raise self.error(key, f"must be a table [{'.'.join((*self.path, key))}]")
+        return Table(cast("dict[str, Any]", value), self.document, (*self.path, key))
+
+    def tables(self, key: str) -> dict[str, Table]:
+        """The named tables under the key; empty where it is missing. Names become names of files."""
+        if not self.has(key):
+            return {}
+        family = self.table(key)
+        for name in family.values:
+            if not RUN_NAME.fullmatch(name):
+                raise ConfigError(f"{family.label(name)}: names are letters, digits and -_.+ (at most 64)")
+        return {name: family.table(name) for name in family.values}
+
+    def rest(self) -> dict[str, Any]:
+        """Everything not asked for yet: numbers, lists of numbers and strings."""
+        return {key: self._plain(key, self._get(key, "")) for key in self.values if key not in self._known}
+
+    def _plain(self, key: str, value: Any) -> Any:
+        if isinstance(value, str):
+            return value
+        if isinstance(value, list):
+            return [self._number(key, v, "SI units") for v in cast("list[Any]", value)]
+        return self._number(key, value, "SI units")
+
+
+def _show(value: Any) -> str:
+    """A value as a message shows it: in one line, not too long."""
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,210 @@
+"""The files of a study's folder: records, metrics.csv, metrics.parquet, manifest.json and the copies of its inputs."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import shutil
+import zipfile
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.record import Record
+from stickslip.study.plan import PlannedRun, Study
+from stickslip.study.provenance import engine_hash, file_hash, versions
+from stickslip.study.result import Run
+
+__all__ = [
+    "KEYS",
+    "find_run",
+    "keep_record",
+    "metric_names",
+    "prepared_folder",
+    "read_manifest",
+    "write_manifest",
+    "write_metrics",
+]
+
+KEYS = ("slip_rule", "reference", "friction", "controller")
+
+
+def prepared_folder(folder: Path) -> Path:
+    """Make the folder and try to write into it, before anything is computed.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".stickslip"
+        probe.write_text("")
+        probe.unlink()
+    except OSError as error:
+        raise unwritable(folder, error) from None
+    return folder
+
+
+def unwritable(path: Path, error: OSError) -> InputError:
+    """The error that says that a path cannot be written, and why."""
+    return InputError(f"cannot write {path} ({error.strerror or error}); choose another place with --out")
+
+
+# ---- records -----------------------------------------------------------------------------------------------
+
+
+def record_path(folder: Path, planned: PlannedRun) -> Path:
+    """Where the record of a run lies."""
+    return folder / "records" / f"{planned.key}.npz"
+
+
+def keep_record(folder: Path, planned: PlannedRun, record: Record) -> Path:
+    """Write the record of a run. Returns its path."""
+    path = record_path(folder, planned)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return record.save(path)
+    except OSError as error:
+        raise unwritable(path, error) from None
+
+
+def find_run(folder: Path, planned: PlannedRun) -> Run | None:
+    """The run as an earlier call finished it, or None."""
+    path = record_path(folder, planned)
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            meta: dict[str, Any] = json.loads(str(data["__header__"]))["meta"]
+        about: dict[str, Any] = meta["study"]
+        if about["fingerprint"] != planned.fingerprint:
+            return None
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+        return None  # Missing, cut off or written by something else: it is run again.
+    return Run(
+        planned.slip_rule, planned.reference, planned.friction, planned.controller,
+        meta.get("metrics", {}), path, about["failure"], about["seconds"],
+    )  # fmt: skip
+
+
+# ---- tables -----------------------------------------------------------------------------------------------
+
+
+def metric_names(runs: Sequence[Run]) -> list[str]:
+    """Every metric that a run has, in the order of the first that has it."""
+    return list(dict.fromkeys(name for run in runs for name in run.metrics))
+
+
+def write_metrics(folder: Path, runs: Sequence[Run]) -> None:
+    """Write metrics.csv (exact decimals; empty where there is no number) and metrics.parquet, one row a run."""
+    names = metric_names(runs)
+    rows = [[getattr(run, key) for key in KEYS] + [_cell(run.metrics.get(n)) for n in names] for run in runs]
+    draft = folder / "metrics.csv.part"
+    try:
+        with draft.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows([[*KEYS, *names], *rows])
+        os.replace(draft, folder / "metrics.csv")
+        _write_parquet(folder, runs, names)
+    except OSError as error:
+        raise unwritable(folder, error) from None
+
+
+def _cell(value: float | None) -> str:
+    return "" if value is None or math.isnan(value) else repr(float(value))
+
+
+def _write_parquet(folder: Path, runs: Sequence[Run], names: Sequence[str]) -> None:
+    import pyarrow
+    from pyarrow import parquet
+
+    columns: dict[str, Any] = {key: pyarrow.array([getattr(run, key) for run in runs], pyarrow.string()) for key in KEYS}
+    for name in names:
+        values = [run.metrics.get(name, math.nan) for run in runs]
+        columns[name] = pyarrow.array(values, pyarrow.float64(), from_pandas=True)
+    draft = folder / "metrics.parquet.part"
+    parquet.write_table(pyarrow.table(columns), draft)
+    os.replace(draft, folder / "metrics.parquet")
+
+
+# ---- the manifest -----------------------------------------------------------------------------------------------
+
+
+def write_manifest(
+    folder: Path,
+    study: Study,
+    only: Sequence[str] | None,
+    planned: Sequence[PlannedRun],
+    results: Mapping[str, Run],
+    timings: Mapping[str, float],
+) -> dict[str, Any]:
+    """Write manifest.json and copy the study's inputs beside it, so that `stickslip rerun` needs nothing else."""
+    try:
+        inputs = _copy_inputs(folder, study)
+        manifest: dict[str, Any] = {
+            "study": study.name,
+            "title": study.title,
+            "written": datetime.now(UTC).isoformat(timespec="seconds"),
+            "versions": versions(),
+            "engine_sha256": engine_hash(),
+            "inputs": inputs,
+            "only": list(only or ()),
+            "configuration": study.config,
+            "timings": dict(timings),
+            "runs": [_entry(folder, p, results[p.key]) for p in planned],
+        }
+        draft = folder / "manifest.json.part"
+        draft.write_text(json.dumps(manifest, indent=1, default=str), encoding="utf-8")
+        os.replace(draft, folder / "manifest.json")
+    except OSError as error:
+        raise unwritable(folder, error) from None
+    return manifest
+
+
+def _entry(folder: Path, planned: PlannedRun, run: Run) -> dict[str, Any]:
+    return {
+        "run": run.key,
+        "fingerprint": planned.fingerprint,
+        "record": run.path.relative_to(folder).as_posix(),
+        "cpu_s": run.seconds,
+        "failure": run.failure,
+        "metrics": {k: None if math.isnan(v) else v for k, v in run.metrics.items()},
+    }
+
+
+def _copy_inputs(folder: Path, study: Study) -> list[dict[str, str]]:
+    """Copy the study and its files to inputs/; name, path as written and SHA-256 of each."""
+    target = folder / "inputs"
+    target.mkdir(exist_ok=True)
+    inputs: list[dict[str, str]] = []
+    for i, (written, path) in enumerate([(study.source.name, study.source), *study.files.items()]):
+        copy = target / (path.name if i == 0 else f"{i}-{path.name}")
+        if copy.resolve() != path.resolve():
+            shutil.copyfile(path, copy)
+        inputs.append({"written": written, "copy": copy.relative_to(folder).as_posix(), "sha256": file_hash(copy)})
+    return inputs
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Read the manifest of a study's folder.
+
+    Raises
+    ------
+    InputError
+        If there is none, or an input's copy is not what it was.
+    """
+    path = folder / "manifest.json"
+    try:
+        manifest: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        for entry in manifest["inputs"]:
+            if file_hash(folder / entry["copy"]) != entry["sha256"]:
+                raise InputError(f"{folder / entry['copy']} was changed since; restore it, or run the study anew")
+    except OSError as error:
+        raise InputError(f"no study in {folder} ({path.name}: {error.strerror}); give a folder that `stickslip study` wrote") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} is not a study's manifest ({error!r}); run the study anew") from None
+    return manifest

@@ -1,0 +1,295 @@
+"""From a study's TOML file to the runs it asks for."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from stickslip.config import Table, read_toml
+from stickslip.control.controller import Controller
+from stickslip.errors import ConfigError, InputError, UnknownName
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model, Reference
+from stickslip.simulate.closed_loop import prepare
+from stickslip.study import build
+from stickslip.study.build import Numerics, Placement
+from stickslip.study.provenance import engine_hash, source_hash
+
+__all__ = ["SLIP_RULES", "PlannedRun", "Response", "Study", "load", "load_run", "select"]
+
+SLIP_RULES = ("signed", "literal")
+BUILT_IN = ("thesis",)
+FAMILIES = ("slip_rule", "reference", "friction", "controller")
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One closed loop to be run, with the names by which the study calls its parts."""
+
+    slip_rule: str
+    reference: str
+    friction: str
+    controller: str
+    axis: RigidAxis
+    control: Controller
+    motion: Reference
+    duration: float
+    numerics: Numerics
+
+    @property
+    def key(self) -> str:
+        """`slip_rule/reference/friction/controller`."""
+        return f"{self.slip_rule}/{self.reference}/{self.friction}/{self.controller}"
+
+    @functools.cached_property
+    def fingerprint(self) -> str:
+        """A hash of everything that determines the run's numbers."""
+        helper = self.control.compensator
+        content = {
+            "slip_rule": self.slip_rule,
+            "inertia": self.axis.inertia,
+            "friction": self.axis.friction.as_dict(),
+            "gains": self.control.gains._asdict(),
+            "compensator": helper and [helper.name, helper.gain, helper.filter_hz, helper.model.as_dict()],
+            "control": [self.control.torque_limit, self.control.sample_time, self.control.encoder_counts],
+            "reference": self.motion.as_dict(),
+            "duration": self.duration,
+            "numerics": asdict(self.numerics),
+            "laws": [source_hash(m.law.Params.__module__) for m in (self.axis.friction, helper and helper.model) if m],
+            "engine": engine_hash(),
+        }
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+    def check(self) -> None:
+        """Find what is wrong with the run without running it; compiles its laws.
+
+        Raises
+        ------
+        InputError
+        """
+        n = self.numerics
+        try:
+            prepare(self.axis, self.control, self.motion, self.duration, tolerance=n.tolerance,
+                    slip_rule=self.slip_rule, output=n.output)  # fmt: skip
+        except InputError as error:
+            raise ConfigError(f"run {self.key}: {error}") from None
+
+
+@dataclass(frozen=True)
+class Response:
+    """Friction over velocity in open loop: laws that answer to the velocity of a reference."""
+
+    name: str
+    title: str
+    figure: str
+    motion: Reference
+    duration: float
+    models: Mapping[str, Model]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study as its file describes it.
+
+    Attributes
+    ----------
+    runs : sequence of PlannedRun
+        In order: slip rule, reference, friction, controller.
+    extras : sequence of PlannedRun
+        What the comparisons add to them.
+    responses : sequence of Response
+    config : mapping
+        The TOML as read.
+    source : Path
+        The TOML file.
+    files : mapping of str to Path
+        Files it refers to (laws, tables), by the path as written.
+    """
+
+    name: str
+    title: str
+    runs: Sequence[PlannedRun]
+    extras: Sequence[PlannedRun]
+    responses: Sequence[Response]
+    config: Mapping[str, Any]
+    source: Path
+    files: Mapping[str, Path]
+
+
+def load(study: str | Path, moved: Mapping[str, Path] | None = None) -> Study:
+    """Read a study: the path of a TOML file, or the name of one that ships with the package ("thesis").
+
+    Raises
+    ------
+    ConfigError
+        One line that names the key, its value and what is allowed.
+    """
+    name = str(study)
+    if name in BUILT_IN:
+        table = read_toml(Path(__file__).with_name(f"{name}.toml"), f"{name}.toml", moved)
+        return _study(name, Path(__file__).with_name(f"{name}.toml"), table)
+    path = Path(study)
+    if path.suffix != ".toml" and not path.exists():
+        raise ConfigError(f"unknown study {name!r}; give the path of a TOML file, or one of {', '.join(BUILT_IN)}")
+    return _study(path.stem, path, read_toml(path, moved=moved))
+
+
+def _study(name: str, path: Path, table: Table) -> Study:
+    with table:
+        title = table.text("title", name)
+        rules = table.texts("slip_rules", SLIP_RULES) if table.has("slip_rules") else ["signed"]
+        parts = _Parts.read(table)
+        runs = parts.runs(rules, parts.motions, parts.frictions, parts.controllers)
+        extras = [run for t in table.tables("comparisons").values() for run in _comparison(t, parts, rules[0])]
+        taken = {run.key for run in runs}
+        extras = list({run.key: run for run in extras if run.key not in taken}.values())
+        responses = [_response(n, t, parts) for n, t in table.tables("responses").items()]
+    return Study(name, title, runs, extras, responses, table.values, path, dict(table.document.files))
+
+
+def load_run(path: Path) -> PlannedRun:
+    """Read one run from a TOML file: [axis], [friction], [reference], [controller], perhaps [laws.*].
+
+    Raises
+    ------
+    ConfigError
+    """
+    with read_toml(path) as table:
+        numerics = build.numerics(table, Numerics())
+        rule = table.choice("slip_rule", SLIP_RULES, "signed")
+        files = build.law_files(table)
+        laws = build.models(table.tables("laws"), files)
+        with table.table("friction") as t:
+            axis = build.axis(table.table("axis"), build.model(t, files))
+        with table.table("reference") as t:
+            motion = _Motion.read(t)
+        with table.table("controller") as t:
+            numerics = build.numerics(t, numerics)
+            control = build.controller(t, axis.inertia, motion.placement, laws)
+    return PlannedRun(
+        rule, motion.reference.kind.name, axis.friction.law.name, "controller",
+        axis, control, motion.reference, motion.duration, numerics,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Motion:
+    reference: Reference
+    duration: float
+    placement: Placement | None
+
+    @staticmethod
+    def read(table: Table) -> _Motion:
+        with table:
+            duration, poles = table.positive("duration", "s"), build.placement(table)
+            return _Motion(build.reference(table), duration, poles)
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """What a study names: machine, frictions, references, laws and controllers."""
+
+    axis: Table
+    laws_from_files: Mapping[str, Any]
+    numerics: Numerics
+    motions: Mapping[str, _Motion]
+    frictions: Mapping[str, RigidAxis]
+    laws: Mapping[str, Model]
+    controllers: Mapping[str, Table]
+
+    @staticmethod
+    def read(table: Table) -> _Parts:
+        numerics = build.numerics(table, Numerics())
+        files = build.law_files(table)
+        for family in ("friction", "references", "controllers"):
+            if not table.tables(family):
+                raise ConfigError(f"{table.label(family)} is missing; give at least one [{family}.NAME]")
+        axis = table.table("axis")
+        frictions = build.models(table.tables("friction"), files)
+        return _Parts(
+            axis,
+            files,
+            numerics,
+            {name: _Motion.read(t) for name, t in table.tables("references").items()},
+            {name: build.axis(axis, friction) for name, friction in frictions.items()},
+            build.models(table.tables("laws"), files),
+            table.tables("controllers"),
+        )
+
+    def runs(
+        self, rules: Iterable[str], motions: Iterable[str], frictions: Iterable[str], controllers: Iterable[str]
+    ) -> list[PlannedRun]:
+        """Every one of each with every one of the others."""
+        made: dict[tuple[str, str], tuple[Controller, Numerics]] = {}
+        inertia = next(iter(self.frictions.values())).inertia
+        for c in controllers:
+            for m in motions:
+                with self.controllers[c] as table:
+                    numerics = build.numerics(table, self.numerics)
+                    made[c, m] = build.controller(table, inertia, self.motions[m].placement, self.laws), numerics
+        return [
+            PlannedRun(rule, m, f, c, self.frictions[f], made[c, m][0], self.motions[m].reference,
+                       self.motions[m].duration, made[c, m][1])
+            for rule in rules for m in motions for f in frictions for c in controllers
+        ]  # fmt: skip
+
+
+def _comparison(table: Table, parts: _Parts, rule: str) -> list[PlannedRun]:
+    with table:
+        table.text("title", "")
+        table.has("figures")
+        own = build.models(table.tables("friction"), parts.laws_from_files)
+        axes = {name: build.axis(parts.axis, friction) for name, friction in own.items()}
+        wider = replace(
+            parts,
+            frictions={**parts.frictions, **axes},
+            controllers={**parts.controllers, **table.tables("controller")},
+        )
+        return wider.runs(
+            [rule],
+            table.texts("references", wider.motions),
+            table.texts("frictions", wider.frictions),
+            table.texts("controllers", wider.controllers),
+        )
+
+
+def _response(name: str, table: Table, parts: _Parts) -> Response:
+    with table:
+        frictions = table.texts("frictions", parts.frictions) if table.has("frictions") else []
+        laws = table.texts("laws", parts.laws) if table.has("laws") else []
+        motion = parts.motions[table.choice("reference", parts.motions)]
+        models = {f: parts.frictions[f].friction for f in frictions} | {n: parts.laws[n] for n in laws}
+        return Response(name, table.text("title", name), table.text("figure", ""),
+                        motion.reference, motion.duration, models)  # fmt: skip
+
+
+def select(runs: Sequence[PlannedRun], parts: Sequence[str], all_runs: Sequence[PlannedRun] = ()) -> list[PlannedRun]:
+    """The runs whose names contain the parts: one of those given for a family, of every family given.
+
+    ``["low", "step", "PD"]`` selects the controller PD along the references low and step.
+
+    Parameters
+    ----------
+    runs : sequence of PlannedRun
+    parts : sequence of str
+        Names of slip rules, references, frictions and controllers.
+    all_runs : sequence of PlannedRun
+        Where the names are looked up, if not in `runs`.
+
+    Raises
+    ------
+    UnknownName
+    """
+    names = {family: dict.fromkeys(getattr(run, family) for run in all_runs or runs) for family in FAMILIES}
+    wanted: dict[str, set[str]] = {}
+    for part in parts:
+        family = next((f for f in FAMILIES if part in names[f]), None)
+        if family is None:
+            raise UnknownName("part of a run's name", part, [n for known in names.values() for n in known])
+        wanted.setdefault(family, set()).add(part)
+    return [run for run in runs if all(getattr(run, f) in chosen for f, chosen in wanted.items())]

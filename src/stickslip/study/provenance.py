@@ -1,0 +1,49 @@
+"""What numbers come from: hashes of sources and inputs, versions."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.metadata
+import platform
+import sys
+from pathlib import Path
+
+import stickslip
+
+__all__ = ["engine_hash", "file_hash", "source_hash", "versions"]
+
+WITHOUT_PHYSICS = ("cli", "report", "study")
+"""Folders of the package that cannot change a run's numbers."""
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@functools.cache
+def engine_hash() -> str:
+    """A hash of everything in the package that a run's numbers depend on, and of what compiles it."""
+    package = Path(stickslip.__file__).parent
+    digest = hashlib.sha256(repr(versions()).encode())
+    for file in sorted(package.rglob("*.py")):
+        inside = file.relative_to(package)
+        if inside.parts[0] not in WITHOUT_PHYSICS:
+            digest.update(inside.as_posix().encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
+@functools.cache
+def source_hash(module: str) -> str:
+    """SHA-256 of the file of an imported module (a law's file, say); empty where it has none."""
+    path = getattr(sys.modules.get(module), "__file__", None)
+    return file_hash(Path(path)) if path else ""
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """Versions of all that takes part in the numbers, and the processor's kind."""
+    found = {"stickslip": stickslip.__version__, "python": platform.python_version()}
+    found.update({name: importlib.metadata.version(name) for name in ("numpy", "numba", "llvmlite")})
+    return found | {"machine": platform.machine(), "system": platform.system()}

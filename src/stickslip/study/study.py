@@ -1,0 +1,157 @@
+"""Running a study: every run once, found again by its fingerprint, kept when the next one fails."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from stickslip.errors import ConfigError, InputError, SimulationError
+from stickslip.record import Record
+from stickslip.simulate.closed_loop import simulate
+from stickslip.study import files
+from stickslip.study.plan import PlannedRun, Study, load, load_run, select
+from stickslip.study.result import Run, StudyResult
+
+__all__ = ["PlannedRun", "Study", "execute", "load", "load_run", "run", "select"]
+
+Progress = Callable[[int, int], None]
+"""Called with the number of runs finished and the number of all."""
+
+
+@dataclass(frozen=True)
+class Executed:
+    """A run that has been simulated: its record, why it ended early (or nothing), its CPU time in s."""
+
+    record: Record
+    failure: str
+    seconds: float
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Metrics by name; empty if the run ended early."""
+        return dict(self.record.meta.get("metrics", {}))
+
+
+def execute(planned: PlannedRun) -> Executed:
+    """Simulate one run; one that ends early gives the record of what was computed.
+
+    Raises
+    ------
+    InputError
+        If the integrator that was named cannot run it.
+    """
+    n = planned.numerics
+    start, failure = time.thread_time(), ""
+    try:
+        record = simulate(
+            planned.axis, planned.control, planned.motion, planned.duration, integrator=n.integrator,
+            tolerance=n.tolerance, time_step=n.time_step, slip_rule=planned.slip_rule, output=n.output,
+        )  # fmt: skip
+    except SimulationError as error:
+        if error.record is None:
+            raise
+        record, failure = error.record, str(error)
+    except ConfigError:
+        raise
+    except InputError as error:
+        raise ConfigError(f"run {planned.key}: {error}") from None
+    return Executed(record, failure, time.thread_time() - start)
+
+
+def run(
+    study: Study,
+    out: str | Path,
+    only: Sequence[str] | None = None,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> StudyResult:
+    """Run a study, or find its runs finished, and write metrics.csv, metrics.parquet, records/, manifest.json.
+
+    A run is finished once its record lies in the folder with the fingerprint of the run; a second call does
+    the rest.
+
+    Parameters
+    ----------
+    study : Study
+    out : path
+        The folder to write to; made if missing.
+    only : sequence of str, optional
+        Parts of the names of the runs wanted (`stickslip.study.plan.select`).
+    jobs : int
+        Threads; the kernels release the interpreter's lock.
+    progress : callable, optional
+        ``progress(finished, all)``, called after every run.
+
+    Raises
+    ------
+    InputError
+        If a part of a name is unknown, a run cannot be run, or the folder cannot be written.
+    """
+    if jobs < 1:
+        raise InputError(f"jobs = {jobs} must be at least 1")
+    everything = [*study.runs, *study.extras]
+    grid = select(study.runs, only or (), everything)
+    extras = select(study.extras, only or (), everything)
+    folder = files.prepared_folder(Path(out))
+    clock, cpu = time.perf_counter(), time.process_time()
+    results: dict[str, Run] = {}
+    wanted = [*grid, *extras]
+    for done, finished in enumerate(_finished(wanted, folder, jobs), 1):
+        results[finished.key] = finished
+        if progress:
+            progress(done, len(wanted))
+    runs = [results[p.key] for p in grid]
+    more = [results[p.key] for p in extras]
+    files.write_metrics(folder, runs)
+    timings = {"wall_s": time.perf_counter() - clock, "cpu_s": time.process_time() - cpu, "jobs": jobs}
+    manifest = files.write_manifest(folder, study, only, wanted, results, timings)
+    return StudyResult(folder, runs, manifest, study.config, more)
+
+
+def _finished(planned: Sequence[PlannedRun], folder: Path, jobs: int) -> Iterator[Run]:
+    """The runs as they are found or get finished."""
+    missing: list[PlannedRun] = []
+    for p in planned:
+        found = files.find_run(folder, p)
+        if found:
+            yield found
+        else:
+            missing.append(p)
+    if jobs == 1:
+        for p in missing:
+            yield _run_and_keep(p, folder)
+    else:
+        yield from _in_threads(missing, folder, jobs)
+
+
+def _in_threads(planned: Sequence[PlannedRun], folder: Path, jobs: int) -> Iterator[Run]:
+    for p in planned:
+        p.check()  # Laws are compiled here, one after another: the compiler runs one thread at a time anyway.
+    pool = ThreadPoolExecutor(jobs)
+    try:
+        futures: list[Future[Run]] = [pool.submit(_run_and_keep, p, folder) for p in planned]
+        for future in as_completed(futures):
+            yield future.result()
+    finally:
+        # Runs under way are finished and kept; the others are left for the next call.
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _run_and_keep(planned: PlannedRun, folder: Path) -> Run:
+    executed = execute(planned)
+    about: dict[str, Any] = {
+        "run": planned.key,
+        "fingerprint": planned.fingerprint,
+        "seconds": executed.seconds,
+        "failure": executed.failure,
+    }
+    record = replace(executed.record, meta={**executed.record.meta, "study": about})
+    path = files.keep_record(folder, planned, record)
+    return Run(
+        planned.slip_rule, planned.reference, planned.friction, planned.controller,
+        executed.metrics, path, executed.failure, executed.seconds,
+    )  # fmt: skip
