@@ -55,6 +55,7 @@ class Loop(NamedTuple):
     ahead: Any
     middle: Any
     base: Any
+    nodes: Any
 
 
 @kernel()

@@ -238,6 +238,7 @@ def rest_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> float:
         copy(a, b)
         leave(loop, b, side)
         return 0.0
+    x = high
     for i in range(60):
         x = guess(low, f_low, high, f_high, i)
         rest_for(loop, a, b, t, x)

@@ -74,7 +74,9 @@ __all__ = ["can_run", "run"]
 
 RESOLVED = 2.0
 """dt * slope / J up to which the trapezoid runs; omega dt = 2 after `contact_slope` of a spring."""
-STEPS, ROWS, EVENTS = range(3)
+STEPS, OUTPUTS, EVENTS, ROWS = range(4)  # of the counts
+NOW, CAP = range(2)  # of the clock
+JUMP = 1e-9  # N·m, from which a change of torque at one time is a jump
 
 
 def can_run(case: Case) -> str:
@@ -94,9 +96,9 @@ def run(case: Case, dt: float) -> Outcome:
     Returns
     -------
     Outcome
-        One row per entry of ``case.grid`` (values interpolated inside steps; from the right where a sampled
-        controller's torque jumps), and one per reversal, standstill and break-away. A run that ends early
-        says so in ``code`` and keeps its rows.
+        One row per entry of ``case.grid`` (torques interpolated inside steps; from the right where a sampled
+        controller's torque jumps), and rows per reversal, standstill, break-away and jump of the torque. A run
+        that ends early says so in ``code`` and keeps its rows.
 
     Raises
     ------
@@ -114,7 +116,7 @@ def run(case: Case, dt: float) -> Outcome:
     memory = np.concatenate([np.zeros(MEMORY), case.compensator.state])
     accumulator = new_meter(float(n[DURATION]), settle_band_of(case.reference, float(n[DURATION])))
     turns = np.zeros((4096, 2))
-    counts = np.zeros(3, dtype=np.int64)
+    counts = np.zeros(4, dtype=np.int64)
     grid = np.ascontiguousarray(case.grid, dtype=np.float64)
     stops = stops_of(case)
     rows, code, time = integrate(loop, start, memory, stops, grid, dt, accumulator, turns, counts)
@@ -147,6 +149,7 @@ def loop_of(case: Case, dt: float) -> Loop:
         np.zeros(size),
         np.zeros(size),
         np.zeros(size),
+        np.zeros((8, 5)),
     )
 
 
@@ -207,53 +210,81 @@ def integrate(
     counts: Any,
 ) -> tuple[Any, int, float]:
     """Run from 0 to the last stop; returns rows, code and the time reached."""
-    n = loop.numbers
     b = a.copy()
-    nodes = np.zeros((8, 5))
     rows = np.zeros((grid.size + 256, len(COLUMNS)))
     storm = np.full(STORM_EVENTS, -1.0)
-    t, cap, code, written = 0.0, dt, DONE, 0
+    clock = np.array([0.0, dt])
+    sampled = loop.numbers[SAMPLE_TIME] > 0.0
     a[FRICTION] = step_plant(loop, a, a[VELOCITY], a[VELOCITY], 0.0)
+    code = DONE
     for segment in range(stops.shape[0]):
-        restart(loop, a, t)
-        if n[SAMPLE_TIME] > 0.0 and (segment == 0 or stops[segment - 1, 1] > 0.0):
+        begin, stop = clock[NOW], stops[segment, 0]
+        copy(a, b)
+        restart(loop, a, begin)
+        if sampled and (segment == 0 or stops[segment - 1, 1] > 0.0):
             act(loop, a, memory)
-        begin, stop = t, stops[segment, 0]
+        elif segment > 0:
+            rows = record_jump(loop, b, a, begin, rows, counts)
         pieces = max(1, math.ceil((stop - begin) / dt * (1.0 - 1e-12)))
         for piece in range(pieces):
             goal = stop if piece == pieces - 1 else begin + (stop - begin) * (piece + 1) / pieces
-            while goal - t > 1e-12 * dt:
-                if loop.steep:
-                    cap = LANDING * dt if a[VELOCITY] == 0.0 else min(GROWTH * cap, dt)
-                taken, event = advance(loop, a, b, t, goal - t, cap)
-                code = verdict(n, b, taken)
-                if code != DONE:
-                    break
-                if goal - t - taken < 1e-12 * dt:
-                    taken = goal - t
-                rows, written = record(loop, a, b, t, taken, event, grid, rows, written, counts)
-                if n[METERED] != 0.0:
-                    measure(loop, a, b, t, taken, nodes, accumulator, turns)
-                copy(b, a)
-                t += taken
-                counts[STEPS] += 1
-                if event:
-                    counts[EVENTS] += 1
-                    last = counts[EVENTS] % STORM_EVENTS
-                    if storm[last] >= 0.0 and t - storm[last] < STORM_TIME:
-                        code = STORM
-                        break
-                    storm[last] = t
+            rows, code = reach(loop, a, b, goal, dt, clock, grid, rows, storm, accumulator, turns, counts)
             if code != DONE:
                 break
-            t = goal
         if code != DONE:
             break
-    if code == DONE and counts[ROWS] < grid.size:
-        rows, written = write(loop, a, a, t, 1.0, 0.0, t, 0.0, rows, written)
-    if n[METERED] != 0.0:
-        close_standstill(accumulator, t)
-    return rows[:written].copy(), code, t
+    if code == DONE and counts[OUTPUTS] < grid.size:
+        rows = write(loop, a, a, clock[NOW], 1.0, 0.0, clock[NOW], 0.0, rows, counts)
+    if loop.numbers[METERED] != 0.0:
+        close_standstill(accumulator, clock[NOW])
+    return rows[: counts[ROWS]].copy(), code, clock[NOW]
+
+
+@kernel()
+def reach(
+    loop: Loop,
+    a: Any,
+    b: Any,
+    goal: float,
+    dt: float,
+    clock: Any,
+    grid: Any,
+    rows: Any,
+    storm: Any,
+    accumulator: Any,
+    turns: Any,
+    counts: Any,
+) -> tuple[Any, int]:
+    """Step from the clock's time to `goal`, once or, where events cut the step, more often; rows and code.
+
+    ``clock`` holds the time and the longest next step; ``storm`` the times of the last events.
+    """
+    while goal - clock[NOW] > 1e-12 * dt:
+        t = clock[NOW]
+        if loop.steep:
+            clock[CAP] = LANDING * dt if a[VELOCITY] == 0.0 else min(GROWTH * clock[CAP], dt)
+        before = a.copy() if a[VELOCITY] == 0.0 else a
+        taken, event = advance(loop, a, b, t, goal - t, clock[CAP])
+        code = verdict(loop.numbers, b, taken)
+        if code != DONE:
+            return rows, code
+        if goal - t - taken < 1e-12 * dt:
+            taken = goal - t
+        rows = record_jump(loop, before, a, t, rows, counts)
+        rows = record(loop, a, b, t, taken, event, grid, rows, counts)
+        if loop.numbers[METERED] != 0.0:
+            measure(loop, a, b, t, taken, accumulator, turns)
+        copy(b, a)
+        clock[NOW] = t + taken
+        counts[STEPS] += 1
+        if event:
+            counts[EVENTS] += 1
+            last = counts[EVENTS] % STORM_EVENTS
+            if storm[last] >= 0.0 and clock[NOW] - storm[last] < STORM_TIME:
+                return rows, STORM
+            storm[last] = clock[NOW]
+    clock[NOW] = goal
+    return rows, DONE
 
 
 @kernel()
@@ -302,15 +333,15 @@ def write(
     time: float,
     event: float,
     rows: Any,
-    written: int,
-) -> tuple[Any, int]:
-    """Add a row at the fraction x of the step [t, t + h]; returns the rows (grown if full), their count."""
-    if written == rows.shape[0]:
-        grown = np.zeros((2 * written, rows.shape[1]))
-        grown[:written] = rows
+    counts: Any,
+) -> Any:
+    """Add the row at the fraction x of the step [t, t + h]; returns the rows, grown where they were full."""
+    if counts[ROWS] == rows.shape[0]:
+        grown = np.zeros((2 * rows.shape[0], rows.shape[1]))
+        grown[: rows.shape[0]] = rows
         rows = grown
     call_profile(loop.profile, time, pointer(loop.reference_parameters, 0), pointer(loop.motion, 0))
-    row = rows[written]
+    row = rows[counts[ROWS]]
     row[0] = time
     row[1], row[2] = loop.motion[0], loop.motion[1]
     row[3] = position_inside(a, b, h, x)
@@ -319,38 +350,46 @@ def write(
     row[6] = a[FRICTION] + x * (b[FRICTION] - a[FRICTION])
     row[7] = a[HELP] + x * (b[HELP] - a[HELP])
     row[8] = event
-    return rows, written + 1
+    counts[ROWS] += 1
+    return rows
 
 
 @kernel()
 def record(
-    loop: Loop,
-    a: Any,
-    b: Any,
-    t: float,
-    h: float,
-    event: bool,
-    grid: Any,
-    rows: Any,
-    written: int,
-    counts: Any,
-) -> tuple[Any, int]:
-    """Write the rows of the output times inside [t, t + h), and of the event at its end."""
-    while counts[ROWS] < grid.size and grid[counts[ROWS]] < t + h - 1e-12 * max(1.0, t):
-        time = grid[counts[ROWS]]
+    loop: Loop, a: Any, b: Any, t: float, h: float, event: bool, grid: Any, rows: Any, counts: Any
+) -> Any:
+    """Write the rows of the output times inside [t, t + h), and of the event at its end; returns the rows."""
+    while counts[OUTPUTS] < grid.size and grid[counts[OUTPUTS]] < t + h - 1e-12 * max(1.0, t):
+        time = grid[counts[OUTPUTS]]
         x = min(max((time - t) / h, 0.0), 1.0)
-        rows, written = write(loop, a, b, t, x, h, time, 0.0, rows, written)
-        counts[ROWS] += 1
+        rows = write(loop, a, b, t, x, h, time, 0.0, rows, counts)
+        counts[OUTPUTS] += 1
     if event:
-        rows, written = write(loop, a, b, t, 1.0, h, t + h, 1.0, rows, written)
-    return rows, written
+        rows = write(loop, b, b, t, 1.0, 0.0, t + h, 1.0, rows, counts)
+    return rows
 
 
 @kernel()
-def measure(loop: Loop, a: Any, b: Any, t: float, h: float, nodes: Any, accumulator: Any, turns: Any) -> None:
+def record_jump(loop: Loop, before: Any, after: Any, t: float, rows: Any, counts: Any) -> Any:
+    """Write the rows before and after a jump of a torque at t, if there is one; returns the rows.
+
+    The steps of a sampled controller's output are no events.
+    """
+    jump = abs(after[MOTOR] - before[MOTOR]) > JUMP or abs(after[FRICTION] - before[FRICTION]) > JUMP
+    if jump and t > 0.0 and loop.numbers[SAMPLE_TIME] == 0.0:
+        last = rows[counts[ROWS] - 1]
+        if counts[ROWS] == 0 or last[0] != t or last[8] == 0.0:
+            rows = write(loop, before, before, t, 0.0, 0.0, t, 1.0, rows, counts)
+        rows = write(loop, after, after, t, 0.0, 0.0, t, 1.0, rows, counts)
+    return rows
+
+
+@kernel()
+def measure(loop: Loop, a: Any, b: Any, t: float, h: float, accumulator: Any, turns: Any) -> None:
     """Hand the step to the meter in windows of at most MAX_WINDOW, torques and velocity linear inside it."""
     if h <= 0.0:
         return
+    nodes = loop.nodes
     windows = math.ceil(h / MAX_WINDOW * (1.0 - 1e-9))
     for window in range(windows):
         for i in range(5):

@@ -63,9 +63,7 @@ def respond(
     StepFailure
         If no step meets the tolerance; the error holds the record until then.
     """
-    time = np.ascontiguousarray(times, dtype=np.float64)
-    if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(np.diff(time) < 0.0) or np.any(time < 0.0):
-        raise InputError("times must be one ascending list of finite seconds, none before 0")
+    time = checked(times)
     if not 1e-14 <= tolerance < 1.0:
         raise InputError(f"tolerance = {tolerance:g} must lie between 1e-14 (rounding) and 1")
     if method not in METHODS:
@@ -93,6 +91,14 @@ def respond(
             record,
         )
     return record
+
+
+def checked(times: Sequence[float] | Array) -> Array:
+    """The times as an array; refuses what does not ascend from 0 on."""
+    time = np.ascontiguousarray(times, dtype=np.float64)
+    if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(np.diff(time) < 0.0) or np.any(time < 0.0):
+        raise InputError("times must be one ascending list of finite seconds, none before 0")
+    return time
 
 
 def evaluated(model: Model, motion: Array) -> Array:
