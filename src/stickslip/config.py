@@ -9,7 +9,7 @@ import difflib
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -107,7 +107,7 @@ class Table:
         return ConfigError(f"{self.label(key)} = {_show(self.values.get(key))} {complaint}")
 
     @contextmanager
-    def blamed(self) -> Iterator[None]:
+    def blamed(self) -> Generator[None]:
         """Let an `InputError` raised inside name this table."""
         try:
             yield
@@ -121,7 +121,11 @@ class Table:
         for key in self.values:
             if key not in self._known:
                 near = difflib.get_close_matches(key, self._known, n=1, cutoff=0.6)
-                remedy = f"did you mean {near[0]!r}?" if near else f"allowed are {', '.join(self._known) or 'none'}"
+                remedy = (
+                    f"did you mean {near[0]!r}?"
+                    if near
+                    else f"allowed are {', '.join(self._known) or 'none'}"
+                )
                 raise ConfigError(f"{self.label(key)}: unknown key; {remedy}")
 
     def __enter__(self) -> Self:

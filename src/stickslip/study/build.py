@@ -21,7 +21,17 @@ from stickslip.model import Model, Reference
 from stickslip.simulate.closed_loop import INTEGRATORS
 from stickslip.spec import Law
 
-__all__ = ["Numerics", "Placement", "axis", "controller", "law_files", "models", "numerics", "placement", "reference"]
+__all__ = [
+    "Numerics",
+    "Placement",
+    "axis",
+    "controller",
+    "law_files",
+    "models",
+    "numerics",
+    "placement",
+    "reference",
+]
 
 COMPENSATORS: dict[str, type[Compensator]] = {c.name: c for c in (Feedforward, Feedback)}
 
@@ -69,9 +79,13 @@ def law_files(table: Table) -> dict[str, Law]:
         with table.blamed():
             law = plugins.law(str(path)) if path.suffix == ".py" else None
             if law is None:
-                raise ConfigError(f"{table.label('plugins')}: {path.name} is no law's file; its name ends in .py")
+                raise ConfigError(
+                    f"{table.label('plugins')}: {path.name} is no law's file; its name ends in .py"
+                )
             if law.name in found or law.name in plugins.law_names():
-                raise ConfigError(f"{table.label('plugins')}: {path.name} defines {law.name!r}, a name taken already")
+                raise ConfigError(
+                    f"{table.label('plugins')}: {path.name} defines {law.name!r}, a name taken already"
+                )
         found[law.name] = law
     return found
 
@@ -92,7 +106,11 @@ def models(tables: Mapping[str, Table], laws: Mapping[str, Law]) -> dict[str, Mo
 
 
 def _resolve(
-    name: str, tables: Mapping[str, Table], laws: Mapping[str, Law], done: dict[str, Model], chain: tuple[str, ...]
+    name: str,
+    tables: Mapping[str, Table],
+    laws: Mapping[str, Law],
+    done: dict[str, Model],
+    chain: tuple[str, ...],
 ) -> Model:
     if name not in done:
         with tables[name] as table:
@@ -100,7 +118,9 @@ def _resolve(
             if table.has("like"):
                 like = table.choice("like", [n for n in tables if n != name])
                 if like in chain:
-                    raise table.error("like", f"closes a circle ({' -> '.join((*chain, name, like))}); give a law")
+                    raise table.error(
+                        "like", f"closes a circle ({' -> '.join((*chain, name, like))}); give a law"
+                    )
                 base = _resolve(like, tables, laws, done, (*chain, name))
             done[name] = model(table, laws, base)
     return done[name]
@@ -119,7 +139,7 @@ def model(table: Table, laws: Mapping[str, Law], base: Model | None = None) -> M
         choices = {k: v for k, v in given.items() if k in options and isinstance(v, str)}
         if "slip_rule" in choices:
             raise table.error("slip_rule", "belongs to the whole run; give it at the top of the file")
-        values = base.parameters._asdict() if base else {}
+        values: dict[str, Any] = base.parameters._asdict() if base else {}
         values.update({k: v for k, v in given.items() if k not in choices})
         found = Model(law, choices, **values)
         return found.scaled(**scale) if scale else found
@@ -150,7 +170,11 @@ def reference(table: Table) -> Reference:
         if kind == "table" and table.has("file"):
             return Reference.table(*_points(table, table.text("file")))
         given = table.rest()
-        if kind == "table" and {"time", "position"} == set(given) and all(isinstance(v, list) for v in given.values()):
+        if (
+            kind == "table"
+            and {"time", "position"} == set(given)
+            and all(isinstance(v, list) for v in given.values())
+        ):
             return Reference.table(given["time"], given["position"])
         return Reference(kind, **given)
 
@@ -160,7 +184,9 @@ def _points(table: Table, written: str) -> list[list[float]]:
     path = table.document.locate(written)
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = [(i, row) for i, row in enumerate(csv.reader(file), 1) if row and not row[0].startswith("#")]
+            rows = [
+                (i, row) for i, row in enumerate(csv.reader(file), 1) if row and not row[0].startswith("#")
+            ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise table.error("file", f"cannot be read ({reason}); give a CSV file") from None
@@ -200,7 +226,9 @@ def placement(table: Table) -> Placement | None:
         return Placement(poles.positive("bandwidth_hz", "Hz"), poles.positive("damping", "-"))
 
 
-def controller(table: Table, inertia: float, default: Placement | None, laws: Mapping[str, Model]) -> Controller:
+def controller(
+    table: Table, inertia: float, default: Placement | None, laws: Mapping[str, Model]
+) -> Controller:
     """Read a controller.
 
     Parameters
@@ -238,7 +266,9 @@ def _gains(table: Table, inertia: float, default: Placement | None) -> Gains:
     kind = table.choice("linear", LINEAR)
     poles = own or default
     if poles is None:
-        raise ConfigError(f"{table.label('placement')} is missing; give {{bandwidth_hz = ..., damping = ...}}")
+        raise ConfigError(
+            f"{table.label('placement')} is missing; give {{bandwidth_hz = ..., damping = ...}}"
+        )
     return place(kind, inertia, poles.bandwidth, poles.damping)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib
 import json
 import math
 import os
@@ -119,10 +120,11 @@ def _cell(value: float | None) -> str:
 
 
 def _write_parquet(folder: Path, runs: Sequence[Run], names: Sequence[str]) -> None:
-    import pyarrow
-    from pyarrow import parquet
-
-    columns: dict[str, Any] = {key: pyarrow.array([getattr(run, key) for run in runs], pyarrow.string()) for key in KEYS}
+    pyarrow: Any = importlib.import_module("pyarrow")  # Any: it has no types.
+    parquet: Any = importlib.import_module("pyarrow.parquet")
+    columns: dict[str, Any] = {
+        key: pyarrow.array([getattr(run, key) for run in runs], pyarrow.string()) for key in KEYS
+    }
     for name in names:
         values = [run.metrics.get(name, math.nan) for run in runs]
         columns[name] = pyarrow.array(values, pyarrow.float64(), from_pandas=True)
@@ -185,7 +187,9 @@ def _copy_inputs(folder: Path, study: Study) -> list[dict[str, str]]:
         copy = target / (path.name if i == 0 else f"{i}-{path.name}")
         if copy.resolve() != path.resolve():
             shutil.copyfile(path, copy)
-        inputs.append({"written": written, "copy": copy.relative_to(folder).as_posix(), "sha256": file_hash(copy)})
+        inputs.append(
+            {"written": written, "copy": copy.relative_to(folder).as_posix(), "sha256": file_hash(copy)}
+        )
     return inputs
 
 
@@ -202,9 +206,13 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         manifest: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         for entry in manifest["inputs"]:
             if file_hash(folder / entry["copy"]) != entry["sha256"]:
-                raise InputError(f"{folder / entry['copy']} was changed since; restore it, or run the study anew")
+                raise InputError(
+                    f"{folder / entry['copy']} was changed since; restore it, or run the study anew"
+                )
     except OSError as error:
-        raise InputError(f"no study in {folder} ({path.name}: {error.strerror}); give a folder that `stickslip study` wrote") from None
+        raise InputError(
+            f"no study in {folder} ({path.name}: {error.strerror}); give a folder that `stickslip study` wrote"
+        ) from None
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path} is not a study's manifest ({error!r}); run the study anew") from None
     return manifest

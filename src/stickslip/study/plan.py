@@ -60,7 +60,11 @@ class PlannedRun:
             "reference": self.motion.as_dict(),
             "duration": self.duration,
             "numerics": asdict(self.numerics),
-            "laws": [source_hash(m.law.Params.__module__) for m in (self.axis.friction, helper and helper.model) if m],
+            "laws": [
+                source_hash(m.law.Params.__module__)
+                for m in (self.axis.friction, helper and helper.model)
+                if m
+            ],
             "engine": engine_hash(),
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
@@ -135,7 +139,9 @@ def load(study: str | Path, moved: Mapping[str, Path] | None = None) -> Study:
         return _study(name, Path(__file__).with_name(f"{name}.toml"), table)
     path = Path(study)
     if path.suffix != ".toml" and not path.exists():
-        raise ConfigError(f"unknown study {name!r}; give the path of a TOML file, or one of {', '.join(BUILT_IN)}")
+        raise ConfigError(
+            f"unknown study {name!r}; give the path of a TOML file, or one of {', '.join(BUILT_IN)}"
+        )
     return _study(path.stem, path, read_toml(path, moved=moved))
 
 
@@ -145,7 +151,9 @@ def _study(name: str, path: Path, table: Table) -> Study:
         rules = table.texts("slip_rules", SLIP_RULES) if table.has("slip_rules") else ["signed"]
         parts = _Parts.read(table)
         runs = parts.runs(rules, parts.motions, parts.frictions, parts.controllers)
-        extras = [run for t in table.tables("comparisons").values() for run in _comparison(t, parts, rules[0])]
+        extras = [
+            run for t in table.tables("comparisons").values() for run in _comparison(t, parts, rules[0])
+        ]
         taken = {run.key for run in runs}
         extras = list({run.key: run for run in extras if run.key not in taken}.values())
         responses = [_response(n, t, parts) for n, t in table.tables("responses").items()]
@@ -222,7 +230,11 @@ class _Parts:
         )
 
     def runs(
-        self, rules: Iterable[str], motions: Iterable[str], frictions: Iterable[str], controllers: Iterable[str]
+        self,
+        rules: Iterable[str],
+        motions: Iterable[str],
+        frictions: Iterable[str],
+        controllers: Iterable[str],
     ) -> list[PlannedRun]:
         """Every one of each with every one of the others."""
         made: dict[tuple[str, str], tuple[Controller, Numerics]] = {}
@@ -231,7 +243,10 @@ class _Parts:
             for m in motions:
                 with self.controllers[c] as table:
                     numerics = build.numerics(table, self.numerics)
-                    made[c, m] = build.controller(table, inertia, self.motions[m].placement, self.laws), numerics
+                    made[c, m] = (
+                        build.controller(table, inertia, self.motions[m].placement, self.laws),
+                        numerics,
+                    )
         return [
             PlannedRun(rule, m, f, c, self.frictions[f], made[c, m][0], self.motions[m].reference,
                        self.motions[m].duration, made[c, m][1])
@@ -268,7 +283,9 @@ def _response(name: str, table: Table, parts: _Parts) -> Response:
                         motion.reference, motion.duration, models)  # fmt: skip
 
 
-def select(runs: Sequence[PlannedRun], parts: Sequence[str], all_runs: Sequence[PlannedRun] = ()) -> list[PlannedRun]:
+def select(
+    runs: Sequence[PlannedRun], parts: Sequence[str], all_runs: Sequence[PlannedRun] = ()
+) -> list[PlannedRun]:
     """The runs whose names contain the parts: one of those given for a family, of every family given.
 
     ``["low", "step", "PD"]`` selects the controller PD along the references low and step.

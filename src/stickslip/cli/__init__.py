@@ -1,0 +1,86 @@
+"""The command line: one file a verb. `VERBS` names them; nothing heavy is imported until a verb runs.
+
+A verb's file has SUMMARY, ``arguments(parser)`` and ``run(args) -> int``. Exit codes: 0 done, 1 a simulation
+ended early or a check failed, 2 bad input (one line on stderr), 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from stickslip.errors import InputError, StickslipError
+
+__all__ = ["VERBS", "main"]
+
+VERBS = ("study", "simulate", "laws", "law", "rerun", "version")
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that complains in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise instead of printing the usage."""
+        raise InputError(f"{message}; see `{self.prog} --help`")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line. Returns the exit code."""
+    _tolerate_any_terminal()
+    try:
+        return _dispatch(list(sys.argv[1:] if argv is None else argv))
+    except InputError as error:
+        return _complain(error, 2)
+    except StickslipError as error:
+        return _complain(error, 1)
+    except KeyboardInterrupt as stop:
+        return _complain(f"interrupted; {stop}" if stop.args else "interrupted", 130)
+    except BrokenPipeError:
+        # The reader (`| head`) has gone; Python would complain once more when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+
+
+def _dispatch(argv: list[str]) -> int:
+    # Only the verb that is called is imported; all of them where help or a complaint lists them.
+    names = argv[:1] if argv and argv[0] in VERBS else VERBS
+    parser = Parser(prog="stickslip", description="Friction of a servo axis: simulated and compensated.")
+    parser.add_argument("--version", action="store_true", help="print the version and exit")
+    verbs = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs")
+    for name in names:
+        module = importlib.import_module(f"stickslip.cli.{name}")
+        sub = verbs.add_parser(name, help=module.SUMMARY, description=module.__doc__,
+                               formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+        module.arguments(sub)
+        sub.set_defaults(run=module.run)
+    try:
+        args: Any = parser.parse_args(argv)
+    except SystemExit as leaving:  # --help
+        return int(leaving.code or 0)
+    if args.version:
+        from stickslip import __version__
+
+        print(__version__)
+        return 0
+    if args.verb is None:
+        raise InputError(f"no verb; choose from {', '.join(VERBS)}; see `stickslip --help`")
+    code: int = args.run(args)
+    sys.stdout.flush()
+    return code
+
+
+def _complain(what: object, code: int) -> int:
+    """Print one line on stderr, whatever the message holds."""
+    print("stickslip: " + " ".join(str(what).split()), file=sys.stderr)
+    return code
+
+
+def _tolerate_any_terminal() -> None:
+    """Let units like N·m pass a terminal that has no such letters."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]

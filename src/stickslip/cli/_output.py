@@ -1,0 +1,137 @@
+"""What the verbs print: tables, JSON, progress."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from stickslip.study.result import Run, StudyResult
+
+COLUMNS = (("position_rms_rad", 1e3, "RMS"), ("position_peak_rad", 1e3, "peak"))
+"""Metrics of the table on the terminal, with their factor to mrad."""
+
+
+@contextmanager
+def progress_bar(title: str) -> Generator[Callable[[int, int], None]]:
+    """A bar with the time left on stderr, where that is a terminal; gives ``progress(finished, all)``."""
+    from tqdm import tqdm
+
+    with tqdm(desc=title, unit="run", file=sys.stderr, disable=None, leave=False) as bar:
+
+        def progress(finished: int, total: int) -> None:
+            bar.total = total
+            bar.update(finished - bar.n)
+
+        yield progress
+
+
+def print_json(data: Any) -> None:
+    """Print data as JSON that any reader takes: NaN becomes null."""
+    print(json.dumps(_plain(data), indent=1, allow_nan=False, ensure_ascii=False))
+
+
+def _plain(data: Any) -> Any:
+    if isinstance(data, float):
+        return data if math.isfinite(data) else None
+    if isinstance(data, Mapping):
+        return {str(k): _plain(v) for k, v in data.items()}  # type: ignore[reportUnknownVariableType]
+    if isinstance(data, (list, tuple)):
+        return [_plain(v) for v in data]  # type: ignore[reportUnknownVariableType]
+    return data
+
+
+def print_metrics(metrics: Mapping[str, float]) -> None:
+    """One line a metric; nothing where there is no number."""
+    for name, value in metrics.items():
+        print(f"{name:<44}{'' if math.isnan(value) else f'{value:.6g}':>14}")
+
+
+def result_as_data(result: StudyResult, report: Path | None) -> dict[str, Any]:
+    """A study's result as plain data."""
+    return {
+        "folder": str(result.folder),
+        "report": str(report) if report else None,
+        "timings": result.manifest["timings"],
+        "runs": [_run_as_data(run) for run in result.runs],
+        "extras": [_run_as_data(run) for run in result.extras],
+    }
+
+
+def _run_as_data(run: Run) -> dict[str, Any]:
+    return {
+        "slip_rule": run.slip_rule,
+        "reference": run.reference,
+        "friction": run.friction,
+        "controller": run.controller,
+        "metrics": dict(run.metrics),
+        "record": str(run.path),
+        "failure": run.failure,
+        "seconds": run.seconds,
+    }
+
+
+def print_study(result: StudyResult, report: Path | None) -> None:
+    """A block for each slip rule and reference: controllers over frictions, the best of each marked."""
+    for rule in _each(result.runs, "slip_rule"):
+        for reference in _each(result.runs, "reference"):
+            runs = [r for r in result.runs if (r.slip_rule, r.reference) == (rule, reference)]
+            if runs:
+                _print_block(f"{rule} / {reference}", runs)
+    print(
+        f"position error in mrad, RMS and peak; * is the best of its column. {len(result.runs)} runs, ",
+        end="",
+    )
+    print(f"{result.manifest['timings']['wall_s']:.1f} s")
+    for path in (result.folder / "metrics.csv", result.folder / "manifest.json", report):
+        if path:
+            print(path)
+
+
+def _each(runs: Sequence[Run], part: str) -> list[str]:
+    return list(dict.fromkeys(getattr(run, part) for run in runs))
+
+
+def _print_block(title: str, runs: Sequence[Run]) -> None:
+    frictions = _each(runs, "friction")
+    cells = {
+        (r.controller, r.friction, metric): r.metrics.get(metric, math.nan)
+        for r in runs
+        for metric, *_ in COLUMNS
+    }
+    best = {
+        (friction, metric): min(
+            (v for (_, f, m), v in cells.items() if (f, m) == (friction, metric)), key=_or_inf
+        )
+        for friction in frictions
+        for metric, *_ in COLUMNS
+    }
+    name_width = max(14, *(len(r.controller) for r in runs))
+    width = 10 * len(COLUMNS)
+    print(f"{title:<{name_width}}" + "".join(f"{friction:>{width}}" for friction in frictions))
+    print(" " * name_width + "".join(f"{label:>10}" for _ in frictions for *_, label in COLUMNS))
+    for controller in _each(runs, "controller"):
+        line = f"{controller:<{name_width}}"
+        for friction in frictions:
+            for metric, factor, _ in COLUMNS:
+                value = cells.get((controller, friction, metric), math.nan)
+                mark = "*" if value == best[friction, metric] else " "
+                line += f"{f'{value * factor:.4g}' if math.isfinite(value) else '-':>9}{mark}"
+        print(line.rstrip())
+    print()
+
+
+def _or_inf(value: float) -> float:
+    return math.inf if math.isnan(value) else value
+
+
+def report_failures(failed: Sequence[tuple[str, str, Path]]) -> int:
+    """Say on stderr which runs ended early, one line each. Returns the exit code."""
+    for key, why, path in failed:
+        print(f"stickslip: {key}: {why}; its record until then is {path}", file=sys.stderr)
+    return 1 if failed else 0

@@ -1,0 +1,59 @@
+"""Simulate one closed loop from a TOML file with [axis], [friction], [reference] and [controller].
+
+[axis]
+inertia = 3.8623e-4            # kg·m²
+[friction]                     # `stickslip law lugre` explains the parameters
+law = "lugre"
+sigma0 = 3.5e4
+sigma1 = 0.1
+sigma2 = 0.018
+fs = 0.335
+fc = 0.285
+vs = 0.01
+[reference]
+kind = "sine"
+amplitude = 0.01               # rad
+frequency = 0.4                # Hz
+duration = 5.0                 # s
+[controller]
+linear = "PD"
+placement = {bandwidth_hz = 36.0, damping = 1.0}
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+SUMMARY = "simulate one closed loop from a TOML file"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """File and output."""
+    parser.add_argument("file", type=Path, metavar="FILE.toml")
+    parser.add_argument("--out", type=Path, metavar="FILE.npz", help="the record (default: FILE.npz here)")
+    parser.add_argument(
+        "--json", action="store_true", help="print the record's meta (metrics, energy, ...) as JSON"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the record and print the metrics."""
+    from stickslip.cli import _output
+    from stickslip.study.files import prepared_folder, unwritable
+    from stickslip.study.study import execute, load_run
+
+    planned = load_run(args.file)
+    out: Path = args.out or Path(f"{args.file.stem}.npz")
+    prepared_folder(out.parent)
+    executed = execute(planned)
+    try:
+        executed.record.save(out)
+    except OSError as error:
+        raise unwritable(out, error) from None
+    if args.json:
+        _output.print_json({**executed.record.meta, "record": str(out), "failure": executed.failure})
+    else:
+        _output.print_metrics(executed.metrics)
+        print(f"record: {out} ({len(executed.record)} rows)")
+    return _output.report_failures([(planned.key, executed.failure, out)] if executed.failure else [])

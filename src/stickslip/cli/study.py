@@ -1,0 +1,70 @@
+"""Run a study: controllers compared over references and frictions.
+
+    stickslip study thesis           the thesis's simulation study, which ships with the package
+    stickslip study my.toml          your own; begin with a copy of thesis.toml (`stickslip study thesis --print`)
+
+Writes DIR/metrics.csv, metrics.parquet, records/, manifest.json and report.html. Finished runs are kept: after an
+interruption the same command goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from stickslip.study.result import StudyResult
+
+SUMMARY = "run a study: controllers compared over references and frictions"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Study, output, selection."""
+    parser.add_argument("study", metavar="STUDY", help="thesis, or the path of a TOML file")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: study-STUDY)")
+    parser.add_argument(
+        "--only", metavar="PARTS", help="run only what has these in its name: low,step or FF-lugre,signed"
+    )
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at a time (default 1)")
+    parser.add_argument("--json", action="store_true", help="print the results as JSON instead of a table")
+    parser.add_argument("--no-report", action="store_true", help="leave figures and report.html out")
+    parser.add_argument("--print", action="store_true", help="print the study's TOML and run nothing")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run, print the table, write the report."""
+    from stickslip.cli import _output
+    from stickslip.errors import InputError
+    from stickslip.study import study as studies
+
+    study = studies.load(args.study)
+    if args.print:
+        print(study.source.read_text(encoding="utf-8"), end="")
+        return 0
+    out: Path = args.out or Path(f"study-{study.name}")
+    only = None if args.only is None else [part.strip() for part in args.only.split(",")]
+    if only is not None and not all(only):
+        raise InputError(f"--only {args.only!r} has an empty part; give names like low,step")
+    try:
+        with _output.progress_bar(study.name) as progress:
+            result = studies.run(study, out, only, args.jobs, progress)
+        report = None if args.no_report else _report(result)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            f"finished runs are kept in {out}; run the same command again to go on"
+        ) from None
+    if args.json:
+        _output.print_json(_output.result_as_data(result, report))
+    else:
+        _output.print_study(result, report)
+    failed = [r for r in (*result.runs, *result.extras) if r.failure]
+    return _output.report_failures([(r.key, r.failure, r.path) for r in failed])
+
+
+def _report(result: StudyResult) -> Path | None:
+    """Render the result; None until the report is there."""
+    from stickslip import report
+
+    write = getattr(report, "write", None)
+    return write(result) if write else None

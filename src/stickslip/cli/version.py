@@ -1,0 +1,20 @@
+"""Print the versions of stickslip and of what its numbers come from."""
+
+from __future__ import annotations
+
+import argparse
+
+SUMMARY = "print the versions of stickslip and of what its numbers come from"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """None."""
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print one line a package."""
+    from stickslip.study.provenance import versions
+
+    for name, version in versions().items():
+        print(f"{name} {version}")
+    return 0

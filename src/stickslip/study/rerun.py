@@ -1,0 +1,89 @@
+"""Running a finished study again from its manifest: the numbers must be the same."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from stickslip.errors import InputError
+from stickslip.study.files import read_manifest
+from stickslip.study.plan import load, select
+from stickslip.study.provenance import versions
+from stickslip.study.study import Progress, execute
+
+__all__ = ["Comparison", "rerun"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What running again found.
+
+    Attributes
+    ----------
+    runs, metrics : int
+        How many were compared.
+    differences : sequence of str
+        One line for each metric that differs.
+    largest : float
+        The largest difference over the metric's former value.
+    notes : sequence of str
+        Versions that differ from the manifest's.
+    """
+
+    runs: int
+    metrics: int
+    differences: Sequence[str]
+    largest: float
+    notes: Sequence[str]
+
+
+def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comparison:
+    """Simulate every run of a study's manifest anew, from the copies of its inputs, and compare the metrics.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no study, or its inputs were changed.
+    """
+    if jobs < 1:
+        raise InputError(f"jobs = {jobs} must be at least 1")
+    manifest = read_manifest(folder)
+    source, *others = manifest["inputs"]
+    moved = {entry["written"]: (folder / entry["copy"]).resolve() for entry in others}
+    study = load(folder / source["copy"], moved)
+    everything = [*study.runs, *study.extras]
+    planned = select(everything, manifest["only"])
+    before = {entry["run"]: entry for entry in manifest["runs"]}
+    if missing := sorted(before.keys() ^ {p.key for p in planned}):
+        raise InputError(
+            f"{folder}: the manifest and its inputs differ in run {missing[0]}; run the study anew"
+        )
+    for p in planned:
+        p.check()
+    differences: list[str] = []
+    count, largest = 0, 0.0
+    with ThreadPoolExecutor(jobs) as pool:
+        for done, (p, executed) in enumerate(zip(planned, pool.map(execute, planned)), 1):
+            old = {k: math.nan if v is None else v for k, v in before[p.key]["metrics"].items()}
+            count += len(old)
+            if executed.failure != before[p.key]["failure"]:
+                differences.append(
+                    f"{p.key}: {executed.failure or 'finished'}, was {before[p.key]['failure'] or 'finished'}"
+                )
+            for name in old.keys() | executed.metrics.keys():
+                a, b = old.get(name, math.nan), executed.metrics.get(name, math.nan)
+                if a != b and not (math.isnan(a) and math.isnan(b)):
+                    differences.append(f"{p.key} {name}: {b!r}, was {a!r}")
+                    largest = max(largest, abs(b - a) / abs(a) if a and not math.isnan(b - a) else math.inf)
+            if progress:
+                progress(done, len(planned))
+    now, then = versions(), manifest["versions"]
+    notes = [
+        f"{name} {now.get(name)}, was {then.get(name)}"
+        for name in {**then, **now}
+        if now.get(name) != then.get(name)
+    ]
+    return Comparison(len(planned), count, differences, largest, notes)
