@@ -16,6 +16,8 @@ from stickslip.simulate._exact_flow import Linear, acceleration
 from stickslip.simulate._exact_state import (
     ATTRACTION,
     BREAKAWAY,
+    ELEMENT_SIZE,
+    ELEMENTS,
     EXPONENT,
     FORCE,
     HELD,
@@ -32,6 +34,7 @@ from stickslip.simulate._exact_state import (
     S_START,
     SCALE,
     SHARE,
+    SIDE_SIZE,
     SIDES,
     SIGMA,
     SLIPPING,
@@ -64,7 +67,7 @@ VELOCITY_WEIGHT = 10.0
 
 
 @kernel(exact=False)
-def load_of(literal: int, direction: float, force: float) -> float:
+def load_of(literal: bool, direction: float, force: float) -> float:
     """The load that the slip rule compares (`stickslip.laws._stick`)."""
     return abs(force) if literal else direction * force
 
@@ -75,9 +78,9 @@ def heaviest(plan: Any, elements: Any, side: int, theta: float, v: float) -> flo
     direction = 1.0 if v >= 0.0 else -1.0
     top = -1e300
     for i in range(first_of(plan, side), first_of(plan, side + 1)):
-        if elements[i, SLIPS] == 0.0:
-            force = elements[i, OFFSET] + elements[i, STIFFNESS] * theta
-            top = max(top, load_of(plan[LITERAL], direction, force) * elements[i, PER_SHARE])
+        if elements[i * ELEMENT_SIZE + SLIPS] == 0.0:
+            force = elements[i * ELEMENT_SIZE + OFFSET] + elements[i * ELEMENT_SIZE + STIFFNESS] * theta
+            top = max(top, load_of(plan[LITERAL] > 0.0, direction, force) * elements[i * ELEMENT_SIZE + PER_SHARE])
     return top
 
 
@@ -89,11 +92,11 @@ def trigger(
     g = -1e9
     if loop[WATCHED] > 0.0:
         g = -VELOCITY_WEIGHT * (loop[SIGMA] * v + NOISE)
-    for side in range(plan[SIDES]):
-        if sides[side, STICKING] > 0.0:
+    for side in range(int(plan[SIDES])):
+        if sides[side * SIDE_SIZE + STICKING] > 0.0:
             top = heaviest(plan, elements, side, theta, v)
             # The curve is only asked for where its lowest level is in reach.
-            if top > sides[side, LOWEST]:
+            if top > sides[side * SIDE_SIZE + LOWEST]:
                 g = max(g, top - sliding(parameters, plan, sides, side, v))
     return g
 
@@ -109,13 +112,13 @@ def too_long(plan: Any, elements: Any, sides: Any, loop: Any, stretch: Any) -> b
     v2 = stretch[VELOCITY_END]
     jump = max(abs(v1 - v0), abs(v2 - v1))
     least = min(abs(v0), abs(v1), abs(v2))
-    for side in range(plan[SIDES]):
-        scale = sides[side, SCALE]
-        if sides[side, STICKING] > 0.0 and jump > 0.1 * scale and least < 3.0 * scale and scale > 0.0:
+    for side in range(int(plan[SIDES])):
+        scale = sides[side * SIDE_SIZE + SCALE]
+        if sides[side * SIDE_SIZE + STICKING] > 0.0 and jump > 0.1 * scale and least < 3.0 * scale and scale > 0.0:
             top = heaviest(plan, elements, side, stretch[POSITION_END], v2)
             top = max(top, heaviest(plan, elements, side, stretch[POSITION_MID], v1))
             top = max(top, heaviest(plan, elements, side, loop[POSITION], v0))
-            if top > sides[side, LOWEST]:
+            if top > sides[side * SIDE_SIZE + LOWEST]:
                 return True
     return False
 
@@ -201,31 +204,31 @@ def locate(
 def add_exponents(plan: Any, sides: Any, h: float, x: float) -> None:
     """Add the decay C int 1/s dt of slipping elements over the first x of a stretch of length h."""
     f = x / h
-    for side in range(plan[SIDES]):
-        attraction = sides[side, ATTRACTION]
-        if sides[side, SLIPPING] > 0.0 and attraction < math.inf:
-            q0 = sides[side, Q]
-            bend = 2.0 * (q0 + sides[side, Q_END]) - 4.0 * sides[side, Q_MID]
-            slope = sides[side, Q_END] - q0 - bend
-            sides[side, EXPONENT] += attraction * x * (q0 + f * (0.5 * slope + f * bend / 3.0))
+    for side in range(int(plan[SIDES])):
+        attraction = sides[side * SIDE_SIZE + ATTRACTION]
+        if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and attraction < math.inf:
+            q0 = sides[side * SIDE_SIZE + Q]
+            bend = 2.0 * (q0 + sides[side * SIDE_SIZE + Q_END]) - 4.0 * sides[side * SIDE_SIZE + Q_MID]
+            slope = sides[side * SIDE_SIZE + Q_END] - q0 - bend
+            sides[side * SIDE_SIZE + EXPONENT] += attraction * x * (q0 + f * (0.5 * slope + f * bend / 3.0))
 
 
 @kernel(exact=False)
 def settle_forces(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> None:
     """Write every element's force where the loop stands, before modes change."""
-    for side in range(plan[SIDES]):
-        decay = math.exp(-sides[side, EXPONENT])
-        moves = sides[side, ATTRACTION] < math.inf
+    for side in range(int(plan[SIDES])):
+        decay = math.exp(-sides[side * SIDE_SIZE + EXPONENT])
+        moves = sides[side * SIDE_SIZE + ATTRACTION] < math.inf
         s = 0.0 if moves else sliding(parameters, plan, sides, side, loop[VELOCITY])
         for i in range(first_of(plan, side), first_of(plan, side + 1)):
-            if elements[i, SLIPS] == 0.0:
-                elements[i, FORCE] = elements[i, OFFSET] + elements[i, STIFFNESS] * loop[POSITION]
+            if elements[i * ELEMENT_SIZE + SLIPS] == 0.0:
+                elements[i * ELEMENT_SIZE + FORCE] = elements[i * ELEMENT_SIZE + OFFSET] + elements[i * ELEMENT_SIZE + STIFFNESS] * loop[POSITION]
             elif moves:
-                part = elements[i, SHARE] / sides[side, SLIPPING]
-                gained = sides[side, S_NOW] - decay * sides[side, S_START]
-                elements[i, FORCE] = decay * elements[i, FORCE] + part * gained
+                part = elements[i * ELEMENT_SIZE + SHARE] / sides[side * SIDE_SIZE + SLIPPING]
+                gained = sides[side * SIDE_SIZE + S_NOW] - decay * sides[side * SIDE_SIZE + S_START]
+                elements[i * ELEMENT_SIZE + FORCE] = decay * elements[i * ELEMENT_SIZE + FORCE] + part * gained
             else:
-                elements[i, FORCE] = elements[i, SHARE] * loop[SIGMA] * s
+                elements[i * ELEMENT_SIZE + FORCE] = elements[i * ELEMENT_SIZE + SHARE] * loop[SIGMA] * s
 
 
 @kernel(exact=False)
@@ -234,20 +237,20 @@ def switch(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> 
     v = loop[VELOCITY]
     settle_forces(parameters, plan, elements, sides, loop)
     if loop[WATCHED] > 0.0 and loop[SIGMA] * v <= 1e-9 * abs(v):
-        for i in range(elements.shape[0]):
-            elements[i, SLIPS] = 0.0
+        for i in range(int(plan[ELEMENTS])):
+            elements[i * ELEMENT_SIZE + SLIPS] = 0.0
         if loop[SIGMA] * v > 0.0:
             loop[VELOCITY] = 0.0
         set_off(plan, elements, sides, parameters, loop)
         return
     direction = 1.0 if v >= 0.0 else -1.0
-    for side in range(plan[SIDES]):
-        if sides[side, STICKING] > 0.0:
+    for side in range(int(plan[SIDES])):
+        if sides[side * SIDE_SIZE + STICKING] > 0.0:
             s = sliding(parameters, plan, sides, side, v)
             for i in range(first_of(plan, side), first_of(plan, side + 1)):
-                load = load_of(plan[LITERAL], direction, elements[i, FORCE])
-                if elements[i, SLIPS] == 0.0 and load >= elements[i, SHARE] * s - 1e-15:
-                    elements[i, SLIPS] = 1.0
+                load = load_of(plan[LITERAL] > 0.0, direction, elements[i * ELEMENT_SIZE + FORCE])
+                if elements[i * ELEMENT_SIZE + SLIPS] == 0.0 and load >= elements[i * ELEMENT_SIZE + SHARE] * s - 1e-15:
+                    elements[i * ELEMENT_SIZE + SLIPS] = 1.0
                     loop[SIGMA] = direction
 
 
@@ -255,8 +258,8 @@ def switch(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> 
 def stiction(plan: Any, sides: Any) -> float:
     """Half the net interval of torque that rigid elements hold at rest, N·m; negative where they repel."""
     total = 0.0
-    for side in range(plan[SIDES]):
-        total += sides[side, WEIGHT] * sides[side, RIGID] * sides[side, BREAKAWAY]
+    for side in range(int(plan[SIDES])):
+        total += sides[side * SIDE_SIZE + WEIGHT] * sides[side * SIDE_SIZE + RIGID] * sides[side * SIDE_SIZE + BREAKAWAY]
     return total
 
 
@@ -264,9 +267,9 @@ def stiction(plan: Any, sides: Any) -> float:
 def applied(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> float:
     """Torque on the resting axis without its rigid elements, N·m."""
     torque = loop[R] + parameters[KI] * loop[INTEGRAL] - parameters[KP] * loop[POSITION]
-    for side in range(plan[SIDES]):
+    for side in range(int(plan[SIDES])):
         for i in range(first_of(plan, side), first_of(plan, side + 1)):
-            torque -= sides[side, WEIGHT] * elements[i, FORCE]
+            torque -= sides[side * SIDE_SIZE + WEIGHT] * elements[i * ELEMENT_SIZE + FORCE]
     return torque
 
 
@@ -277,7 +280,7 @@ def set_off(plan: Any, elements: Any, sides: Any, parameters: Any, loop: Any) ->
     Rigid friction in the plant holds what lies inside its interval, less the jump of a compensator that acts on
     sign(v). A compensator that jumps by more than the plant repels: the axis goes on through zero.
     """
-    rigid = sides[0, RIGID] > 0.0 or (plan[SIDES] > 1 and sides[1, RIGID] > 0.0)
+    rigid = sides[RIGID] > 0.0 or (plan[SIDES] > 1 and sides[SIDE_SIZE + RIGID] > 0.0)
     if not rigid:
         return
     interval = stiction(plan, sides)

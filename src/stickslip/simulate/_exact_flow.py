@@ -80,6 +80,12 @@ def particular(lin: Linear, p0: float, p1: float, p2: float, p3: float) -> Cubic
 
 
 @kernel(exact=False)
+def free_motion(m: Matrix, position: float, velocity: float) -> tuple[float, float]:
+    """Apply a flow."""
+    return m[0] * position + m[1] * velocity, m[2] * position + m[3] * velocity
+
+
+@kernel(exact=False)
 def moved(c: Cubic, m: Matrix, x: float, position: float, velocity: float) -> tuple[float, float]:
     """Position and velocity at x: the cubic, and the free motion that starts from (position, velocity)."""
     return (

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
-from stickslip.jit import kernel
+from stickslip.jit import kernel, pointer
 from stickslip.simulate._case import (
     DIVERGED,
     DONE,
@@ -30,25 +28,36 @@ from stickslip.simulate._exact_flow import Linear, Matrix, flow
 from stickslip.simulate._exact_output import measure, row_after, row_before, write_grid, write_rows
 from stickslip.simulate._exact_rest import rest
 from stickslip.simulate._exact_state import (
+    COUNTS,
     DR,
     DS,
     DS_END,
     EDGE,
     EDGE_HIGH,
     EDGE_LOW,
+    EVENTS,
     GOAL,
     GOAL_RATE,
+    GRID_ROWS,
+    GRID_WRITTEN,
     HELD,
     INTEGRAL,
     LOOP_SIZE,
     POSITION,
     Q_END,
+    REJECTED,
     S_END,
     S_NOW,
+    SIDE_SIZE,
     SIDES,
     SIGMA,
     SLIPPING,
+    SPACING,
+    STEPS,
+    STORM_COUNT,
+    STORM_SINCE,
     TIME,
+    UNSEEN,
     VARIES,
     VELOCITY,
     Q,
@@ -79,13 +88,11 @@ from stickslip.simulate._exact_step import (
     slip_force_at,
     state_at,
 )
-from stickslip.simulate._meter import close_standstill
 
-STEPS, REJECTED, EVENTS, COUNTS = range(4)
 SAFETY = 0.02
 """Share of the tolerance that one step may be wrong by."""
 FINEST = 2e-12  # rad
-LONGEST_STEP = 8e-3
+LONGEST_STEP = 16e-3
 FIRST_STEP = 2.5e-4
 """Longest step after an event, s."""
 DEEPEST = 24
@@ -94,36 +101,45 @@ QUARTER_PERIODS = 3.2
 """A visible ringing is not stepped over: radians of it in one step."""
 
 
+FLOW = 6
+"""Entries per level in the cache of flows: a matrix, the generation of modes it belongs to, and the step."""
+AT_LOOP = COUNTS
+AT_STRETCH = AT_LOOP + LOOP_SIZE
+AT_CACHE = AT_STRETCH + STRETCH_SIZE
+AT_SIDES = AT_CACHE + FLOW * (DEEPEST + 2)
+AT_ELEMENTS = AT_SIDES + 2 * SIDE_SIZE
+"""Places in `work`; the elements end it."""
+
+
 @kernel(exact=False)
-def flow_of_level(lin: Linear, cache: Any, generation: int, level: int, half: float) -> Matrix:
-    """The flow over half a step of a level, computed once for every set of modes."""
-    if cache[level, 4] != generation:
-        m = flow(lin, half)
-        cache[level, 0] = m[0]
-        cache[level, 1] = m[1]
-        cache[level, 2] = m[2]
-        cache[level, 3] = m[3]
-        cache[level, 4] = generation
-        return m
-    return cache[level, 0], cache[level, 1], cache[level, 2], cache[level, 3]
+def flow_of_level(lin: Linear, cache: Any, generation: int, level: int, x: float) -> Matrix:
+    """The flow over half a step x of a level, computed once for every set of modes."""
+    kept = pointer(cache, level * FLOW)
+    if kept[4] != generation:
+        m = flow(lin, x)
+        kept[0] = m[0]
+        kept[1] = m[1]
+        kept[2] = m[2]
+        kept[3] = m[3]
+        kept[4] = generation
+    return kept[0], kept[1], kept[2], kept[3]
 
 
 @kernel(exact=False)
 def move(
     lin: Linear, parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, loop: Any, stretch: Any,
-    cache: Any, generation: int, counts: Any, level: int, longest: float, left: float,
+    cache: Any, generation: int, count: Any, level: int, left: float, tol: float,
 ) -> int:  # fmt: skip
     """Take one step of at most `left`, shortened until it is accurate; returns its level, or -1."""
-    tol = max(SAFETY * parameters[TOLERANCE], FINEST)
     while True:
-        counts[STEPS] += 1
-        h = math.ldexp(longest, -level)
+        count[STEPS] += 1.0
+        h = cache[level * FLOW + 5]
         if h > left - 1e-9:
             h = left
             half = flow(lin, 0.5 * h)
         else:
             half = flow_of_level(lin, cache, generation, level, 0.5 * h)
-        look_ahead(parameters, plan, cells, loop, stretch, h)
+        look_ahead(parameters, plan, cells, loop, stretch, h, tol)
         error = correct(lin, parameters, plan, sides, loop, stretch, half, h, tol)
         stretch[ERROR] = error
         amplitude = free_amplitude(lin, stretch)
@@ -133,17 +149,17 @@ def move(
             return level
         if level >= DEEPEST:
             return -1 if error >= NOT_CONVERGED else level
-        counts[REJECTED] += 1
+        count[REJECTED] += 1.0
         level += 1
-        while level < DEEPEST and math.ldexp(longest, -level) >= h:
+        while level < DEEPEST and cache[level * FLOW + 5] >= h:
             level += 1
 
 
 @kernel(exact=False)
-def next_level(lin: Linear, stretch: Any, level: int, longest: float, tol: float) -> int:
+def next_level(lin: Linear, stretch: Any, cache: Any, level: int, tol: float) -> int:
     """A longer step after an accurate one that was not cut short."""
     h = stretch[LENGTH]
-    if level == 0 or h < 0.999 * math.ldexp(longest, -level):
+    if level == 0 or h < 0.999 * cache[level * FLOW + 5]:
         return level
     rings = stretch[AMPLITUDE] > 2.0 * tol and 2.0 * lin.frequency * h > QUARTER_PERIODS
     if stretch[ERROR] < 0.03 * tol and stretch[ROUNDS] <= 2 and not rings:
@@ -155,12 +171,12 @@ def next_level(lin: Linear, stretch: Any, level: int, longest: float, tol: float
 def finish_step(plan: Any, sides: Any, loop: Any, stretch: Any, t: float, ki: float) -> None:
     """Stand at the end of the stretch; modes stay."""
     add_exponents(plan, sides, stretch[LENGTH], stretch[LENGTH])
-    for side in range(plan[SIDES]):
-        if sides[side, SLIPPING] > 0.0 and sides[side, VARIES] > 0.0:
-            sides[side, S] = sides[side, S_END]
-            sides[side, S_NOW] = sides[side, S_END]
-            sides[side, DS] = sides[side, DS_END]
-            sides[side, Q] = sides[side, Q_END]
+    for side in range(int(plan[SIDES])):
+        if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and sides[side * SIDE_SIZE + VARIES] > 0.0:
+            sides[side * SIDE_SIZE + S] = sides[side * SIDE_SIZE + S_END]
+            sides[side * SIDE_SIZE + S_NOW] = sides[side * SIDE_SIZE + S_END]
+            sides[side * SIDE_SIZE + DS] = sides[side * SIDE_SIZE + DS_END]
+            sides[side * SIDE_SIZE + Q] = sides[side * SIDE_SIZE + Q_END]
     loop[TIME] = t
     loop[POSITION] = stretch[POSITION_END]
     loop[VELOCITY] = stretch[VELOCITY_END]
@@ -178,8 +194,8 @@ def finish_event(
 ) -> None:  # fmt: skip
     """Stand at the event x; modes are about to change."""
     add_exponents(plan, sides, stretch[LENGTH], x)
-    for side in range(plan[SIDES]):
-        sides[side, S_NOW] = slip_force_at(sides, stretch, side, x)
+    for side in range(int(plan[SIDES])):
+        sides[side * SIDE_SIZE + S_NOW] = slip_force_at(sides, stretch, side, x)
     loop[INTEGRAL] = integral_at(parameters, loop, stretch, x)
     loop[TIME] += x
     loop[POSITION] = theta
@@ -198,9 +214,8 @@ def stand(parameters: Any, plan: Any, cells: Any, loop: Any) -> None:
 
 
 @kernel(exact=False)
-def start(parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, breaks: Any) -> Any:
-    """Return the loop at t = 0."""
-    loop = np.zeros(LOOP_SIZE)
+def start(parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, loop: Any, breaks: Any) -> None:
+    """Stand at t = 0."""
     loop[EDGE_LOW] = EDGE
     loop[EDGE_HIGH] = breaks[0] - EDGE
     loop[POSITION] = parameters[POSITION_0]
@@ -210,7 +225,6 @@ def start(parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, bre
     stand(parameters, plan, cells, loop)
     if loop[VELOCITY] == 0.0:
         set_off(plan, elements, sides, parameters, loop)
-    return loop
 
 
 @kernel(exact=False)
@@ -226,32 +240,65 @@ def ended(parameters: Any, loop: Any) -> int:
 
 
 @kernel(exact=False)
-def solve(
-    parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, breaks: Any, grid: Any, spacing: float,
-    out: Any, rows: Any, metered: bool, acc: Any, turns: Any, counts: Any, written: Any, stiffness_floor: float,
-) -> tuple[int, float]:  # fmt: skip
-    """Run the loop; returns why it ended, and when.
+def pass_break(
+    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, now: float, following: float
+) -> bool:  # fmt: skip
+    """Stand on the other side of a break; returns whether the commanded torque jumps."""
+    before = loop[R]
+    loop[TIME] = now
+    loop[EDGE_LOW] = now + EDGE
+    loop[EDGE_HIGH] = following - EDGE
+    loop[UNSEEN] = 0.0
+    stand(parameters, plan, cells, loop)
+    begin_slopes(parameters, plan, sides, loop, lin)
+    return abs(loop[R] - before) > 1e-9
 
-    ``out`` (n, 2) receives position and velocity on the grid, ``rows`` every column and the events; either may
-    be empty. ``written`` is (rows, grid rows) written, ``counts`` steps, rejected steps and events.
+
+@kernel(exact=False)
+def storms(count: Any, loop: Any) -> bool:
+    """Whether more than STORM_EVENTS events came within STORM_TIME; looked at after so many events."""
+    if count[EVENTS] < loop[STORM_COUNT] + STORM_EVENTS:
+        return False
+    soon = loop[TIME] - loop[STORM_SINCE] < STORM_TIME
+    loop[STORM_COUNT] = count[EVENTS]
+    loop[STORM_SINCE] = loop[TIME]
+    return soon
+
+
+@kernel(exact=False)
+def solve(
+    parameter_array: Any, plan_array: Any, cell_array: Any, break_array: Any, grid_array: Any, work: Any, out_array: Any,
+    row_array: Any, acc: Any, turns: Any, nodes: Any, light: bool, full: bool, metered: bool,
+) -> int:  # fmt: skip
+    """Run the loop; returns why it ended.
+
+    ``work`` holds `count`, the loop's state (whose first entry is the time), and what `_exact_state` calls sides
+    and elements. Position and velocity on the grid go to ``out_array`` (n, 2) if `light`, all columns and the
+    events to ``row_array`` if `full`, metrics to ``acc`` and ``turns`` if `metered`.
     """
-    loop = start(parameters, plan, cells, elements, sides, breaks)
-    stretch = np.zeros(STRETCH_SIZE)
-    cache = np.zeros((DEEPEST + 1, 5))
-    nodes = np.zeros((8, 5))
+    parameters = pointer(parameter_array, 0)
+    plan = pointer(plan_array, 0)
+    cells = pointer(cell_array, 0)
+    breaks = pointer(break_array, 0)
+    grid = pointer(grid_array, 0)
+    out = pointer(out_array, 0)
+    rows = pointer(row_array, 0)
+    count = pointer(work, 0)
+    loop = pointer(work, AT_LOOP)
+    stretch = pointer(work, AT_STRETCH)
+    cache = pointer(work, AT_CACHE)
+    sides = pointer(work, AT_SIDES)
+    elements = pointer(work, AT_ELEMENTS)
     tol = max(SAFETY * parameters[TOLERANCE], FINEST)
-    ki = parameters[KI]
     longest = min(LONGEST_STEP, parameters[MAX_STEP])
     after_event = max(0, int(math.ceil(math.log2(longest / FIRST_STEP))))
     level = after_event
     generation = 1
-    storm_events = 0
-    storm_time = 0.0
-    code = DONE
     next_break = 0
-    full = rows.shape[0] > 0
-    light = out.shape[0] > 0
-    lin = arrange(parameters, plan, elements, sides, loop, stiffness_floor)
+    for i in range(DEEPEST + 1):
+        cache[i * FLOW + 5] = math.ldexp(longest, -i)
+    start(parameters, plan, cells, elements, sides, loop, breaks)
+    lin = arrange(parameters, plan, elements, sides, loop)
     while loop[TIME] < parameters[DURATION] - EDGE:
         left = breaks[next_break] - loop[TIME]
         held = loop[HELD] > 0.0
@@ -259,60 +306,49 @@ def solve(
             event = rest(parameters, plan, cells, elements, sides, loop, stretch, left)
         else:
             level = move(
-                lin, parameters, plan, cells, elements, sides, loop, stretch, cache, generation, counts, level,
-                longest, left,
+                lin, parameters, plan, cells, elements, sides, loop, stretch, cache, generation, count, level, left,
+                tol,
             )  # fmt: skip
             if level < 0:
-                code = NO_STEP
-                break
+                return NO_STEP
             event = find(lin, parameters, plan, elements, sides, loop, stretch, tol)
         happens = event >= 0.0
         h = event if happens else stretch[LENGTH]
-        if light:
-            written[1] = write_grid(lin, loop, stretch, grid, spacing, out, written[1], h)
+        if light and count[GRID_WRITTEN] < plan[GRID_ROWS]:
+            if grid[int(count[GRID_WRITTEN])] <= loop[TIME] + h + EDGE:
+                between = flow_of_level(lin, cache, generation, DEEPEST + 1, plan[SPACING])
+                write_grid(lin, between, plan, loop, stretch, grid, count, out, h, 0.1 * tol)
         if full:
-            write_rows(lin, parameters, plan, cells, sides, loop, stretch, grid, written, rows, h)
+            write_rows(lin, parameters, plan, cells, sides, loop, stretch, grid, count, rows, h)
         if metered:
             measure(lin, parameters, plan, cells, sides, loop, stretch, h, acc, turns, nodes)
-        reaches = h >= left - EDGE
         if happens:
-            counts[EVENTS] += 1
+            count[EVENTS] += 1.0
             theta, v = state_at(lin, stretch, h)
             if full:
-                row_before(parameters, plan, cells, sides, loop, stretch, grid, written, rows, h, theta, v)
+                row_before(parameters, plan, cells, sides, loop, stretch, count, rows, h, theta, v)
             finish_event(parameters, plan, cells, sides, loop, stretch, h, theta, v)
             switch(parameters, plan, elements, sides, loop)
             if held:
                 release(plan, elements, sides, parameters, loop)
-            lin = arrange(parameters, plan, elements, sides, loop, stiffness_floor)
+            lin = arrange(parameters, plan, elements, sides, loop)
             generation += 1
             level = max(level, after_event)
-            storm_events += 1
         else:
-            finish_step(plan, sides, loop, stretch, loop[TIME] + h, ki)
+            finish_step(plan, sides, loop, stretch, loop[TIME] + h, parameters[KI])
             if not held:
-                level = next_level(lin, stretch, level, longest, tol)
-        if reaches:
-            loop[TIME] = breaks[next_break]
-            loop[EDGE_LOW] = loop[TIME] + EDGE
-            next_break = min(next_break + 1, breaks.shape[0] - 1)
-            loop[EDGE_HIGH] = breaks[next_break] - EDGE
-            before = loop[R]
-            stand(parameters, plan, cells, loop)
-            begin_slopes(parameters, plan, sides, loop, lin)
-            if full and abs(loop[R] - before) > 1e-9:
-                row_after(parameters, plan, sides, loop, grid, written, rows)
-        if happens and full:
-            row_after(parameters, plan, sides, loop, grid, written, rows)
+                level = next_level(lin, stretch, cache, level, tol)
+        jumps = happens
+        if h >= left - EDGE:
+            following = min(next_break + 1, break_array.size - 1)
+            if pass_break(lin, parameters, plan, cells, sides, loop, breaks[next_break], breaks[following]):
+                jumps = True
+            next_break = following
+        if full and jumps:
+            row_after(parameters, plan, sides, loop, count, rows)
         code = ended(parameters, loop)
         if code != DONE:
-            break
-        if storm_events >= STORM_EVENTS:
-            if loop[TIME] - storm_time < STORM_TIME:
-                code = STORM
-                break
-            storm_events = 0
-            storm_time = loop[TIME]
-    if metered:
-        close_standstill(acc, loop[TIME])
-    return code, loop[TIME]
+            return code
+        if storms(count, loop):
+            return STORM
+    return DONE

@@ -5,14 +5,22 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stickslip.jit import kernel
-from stickslip.simulate._exact_flow import Linear, flow, moved
+from stickslip.jit import kernel, pointer
+from stickslip.simulate._case import COLUMNS
+from stickslip.simulate._exact_flow import Linear, Matrix, flow, free_motion, moved
 from stickslip.simulate._exact_state import (
+    EDGE,
     GOAL,
     GOAL_RATE,
+    GRID_ROWS,
+    GRID_WRITTEN,
     INTEGRAL,
     POSITION,
+    ROWS,
+    ROWS_WRITTEN,
+    SIDE_SIZE,
     SIDES,
+    SPACING,
     TIME,
     VELOCITY,
     R,
@@ -24,65 +32,69 @@ from stickslip.simulate._exact_step import (
     FREE_POSITION,
     FREE_VELOCITY,
     cubic_of,
+    free_amplitude,
     integral_at,
     slip_force_at,
     state_at,
 )
 from stickslip.simulate._meter import MAX_WINDOW, meter
 
+ROW_SIZE = len(COLUMNS)
 SHORTEST_WINDOW = 2e-8
 """Shorter stretches are left out of the metrics (s); the high-pass loses its digits there."""
 
 
 @kernel(exact=False)
 def write_grid(
-    lin: Linear, loop: Any, stretch: Any, grid: Any, spacing: float, out: Any, row: int, h: float
-) -> int:
-    """Write position and velocity at the grid's times inside the first h of the stretch; returns the next row.
+    lin: Linear, between: Matrix, plan: Any, loop: Any, stretch: Any, grid: Any, count: Any, out: Any, h: float,
+    visible: float,
+) -> None:  # fmt: skip
+    """Write position and velocity at the grid's times inside the first h of the stretch; the next one is inside.
 
-    On an even grid the free motion is carried from one time to the next by one and the same matrix.
+    On an even grid the free motion is carried from one time to the next by one matrix, ``between``. A free
+    motion that has died out (less than `visible` rad) is left out.
     """
-    n = grid.shape[0]
-    t = loop[TIME]
-    if row >= n or grid[row] > t + h + 1e-12:
-        return row
+    end = min(loop[TIME] + h + EDGE, grid[int(plan[GRID_ROWS]) - 1])
+    row = int(count[GRID_WRITTEN])
+    even = plan[SPACING] > 0.0
     c = cubic_of(stretch)
-    x = grid[row] - t
-    m = flow(lin, x)
-    p = m[0] * stretch[FREE_POSITION] + m[1] * stretch[FREE_VELOCITY]
-    q = m[2] * stretch[FREE_POSITION] + m[3] * stretch[FREE_VELOCITY]
-    if spacing > 0.0 and row + 1 < n and grid[row + 1] <= t + h + 1e-12:
-        m = flow(lin, spacing)
+    x = grid[row] - loop[TIME]
+    p = 0.0
+    q = 0.0
+    rings = lin.discriminant <= 0.0 or free_amplitude(lin, stretch) > visible
+    if rings:
+        p, q = free_motion(flow(lin, x), stretch[FREE_POSITION], stretch[FREE_VELOCITY])
     while True:
-        out[row, 0] = c[0] + x * (c[1] + x * (c[2] + x * c[3])) + p
-        out[row, 1] = c[1] + x * (2.0 * c[2] + x * 3.0 * c[3]) + q
+        out[2 * row] = c[0] + x * (c[1] + x * (c[2] + x * c[3])) + p
+        out[2 * row + 1] = c[1] + x * (2.0 * c[2] + x * 3.0 * c[3]) + q
         row += 1
-        if row >= n or grid[row] > t + h + 1e-12:
-            return row
-        x = grid[row] - t
-        if spacing > 0.0:
-            p, q = m[0] * p + m[1] * q, m[2] * p + m[3] * q
-        else:
-            m = flow(lin, x)
-            p = m[0] * stretch[FREE_POSITION] + m[1] * stretch[FREE_VELOCITY]
-            q = m[2] * stretch[FREE_POSITION] + m[3] * stretch[FREE_VELOCITY]
+        if row >= plan[GRID_ROWS] or grid[row] > end:
+            break
+        x = grid[row] - loop[TIME]
+        if even:
+            p, q = free_motion(between, p, q)
+        elif rings:
+            p, q = free_motion(flow(lin, x), stretch[FREE_POSITION], stretch[FREE_VELOCITY])
+    count[GRID_WRITTEN] = row
 
 
 @kernel(exact=False)
 def put_row(
-    rows: Any, row: int, t: float, goal: float, rate: float, theta: float, v: float, tm: float, tf: float, th: float,
+    rows: Any, count: Any, t: float, goal: float, rate: float, theta: float, v: float, tm: float, tf: float, th: float,
     event: float,
 ) -> None:  # fmt: skip
-    """Write one row, in the order of `_case.COLUMNS`."""
-    rows[row, 0] = t
-    rows[row, 1] = goal
-    rows[row, 2] = rate
-    rows[row, 3] = theta
-    rows[row, 4] = v
-    rows[row, 5] = tm
-    rows[row, 6] = tf
-    rows[row, 7] = th
-    rows[row, 8] = event
+    """Write the next row, in the order of `_case.COLUMNS`."""
+    row_at = pointer(rows, int(count[ROWS_WRITTEN]) * ROW_SIZE)
+    count[ROWS_WRITTEN] += 1.0
+    row_at[0] = t
+    row_at[1] = goal
+    row_at[2] = rate
+    row_at[3] = theta
+    row_at[4] = v
+    row_at[5] = tm
+    row_at[6] = tf
+    row_at[7] = th
+    row_at[8] = event
 
 
 @kernel(exact=False)
@@ -103,50 +115,52 @@ def write_rows(
     lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, stretch: Any, grid: Any, count: Any,
     rows: Any, h: float,
 ) -> None:  # fmt: skip
-    """Write rows at the grid's times inside the first h; ``count`` is (rows written, grid rows written)."""
-    while count[1] < grid.shape[0] and grid[count[1]] <= loop[TIME] + h + 1e-12:
-        x = grid[count[1]] - loop[TIME]
+    """Write rows at the grid's times inside the first h of the stretch."""
+    while count[GRID_WRITTEN] < plan[GRID_ROWS]:
+        t = grid[int(count[GRID_WRITTEN])]
+        x = t - loop[TIME]
+        if x > h + 1e-12:
+            return
         theta, v = state_at(lin, stretch, x)
         goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, loop, stretch, x, theta, v)
-        put_row(rows, count[0], grid[count[1]], goal, rate, theta, v, tm, tf, th, 0.0)
-        count[0] += 1
-        count[1] += 1
+        put_row(rows, count, t, goal, rate, theta, v, tm, tf, th, 0.0)
+        count[GRID_WRITTEN] += 1.0
 
 
 @kernel(exact=False)
-def room_for_event(grid: Any, count: Any, rows: Any) -> bool:
+def room_for_event(plan: Any, count: Any) -> bool:
     """Whether an event's rows still leave room for the rest of the grid."""
-    return count[0] + 2 + grid.shape[0] - count[1] <= rows.shape[0]
+    return count[ROWS_WRITTEN] + 2.0 + plan[GRID_ROWS] - count[GRID_WRITTEN] <= plan[ROWS]
 
 
 @kernel(exact=False)
 def row_before(
-    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, stretch: Any, grid: Any, count: Any, rows: Any,
-    x: float, theta: float, v: float,
+    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, stretch: Any, count: Any, rows: Any, x: float,
+    theta: float, v: float,
 ) -> None:  # fmt: skip
     """Write the row of an event at x, as the stretch ends there."""
-    if room_for_event(grid, count, rows):
+    if room_for_event(plan, count):
         goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, loop, stretch, x, theta, v)
-        put_row(rows, count[0], loop[TIME] + x, goal, rate, theta, v, tm, tf, th, 1.0)
-        count[0] += 1
+        put_row(rows, count, loop[TIME] + x, goal, rate, theta, v, tm, tf, th, 1.0)
 
 
 @kernel(exact=False)
-def row_after(parameters: Any, plan: Any, sides: Any, loop: Any, grid: Any, count: Any, rows: Any) -> None:
+def row_after(parameters: Any, plan: Any, sides: Any, loop: Any, count: Any, rows: Any) -> None:
     """Write the row after an event if a torque has jumped."""
-    if not room_for_event(grid, count, rows) or count[0] == 0:
+    last = int(count[ROWS_WRITTEN]) - 1
+    if last < 0 or not room_for_event(plan, count):
         return
-    s1 = sides[1, S] if plan[SIDES] > 1 else 0.0
+    s1 = sides[SIDE_SIZE + S] if plan[SIDES] > 1 else 0.0
+    goal = loop[GOAL]
+    rate = loop[GOAL_RATE]
+    theta = loop[POSITION]
+    v = loop[VELOCITY]
     tm, tf, th = torques(
-        parameters, plan, sides, loop, loop[R], loop[GOAL], loop[GOAL_RATE], loop[INTEGRAL], loop[POSITION],
-        loop[VELOCITY], sides[0, S], s1,
+        parameters, plan, sides, loop, loop[R], goal, rate, loop[INTEGRAL], theta, v, sides[S], s1
     )  # fmt: skip
-    last = count[0] - 1
-    if abs(tm - rows[last, 5]) + abs(tf - rows[last, 6]) + abs(th - rows[last, 7]) > 1e-6:
-        put_row(
-            rows, count[0], loop[TIME], loop[GOAL], loop[GOAL_RATE], loop[POSITION], loop[VELOCITY], tm, tf, th, 1.0
-        )  # fmt: skip
-        count[0] += 1
+    before = pointer(rows, last * ROW_SIZE)
+    if abs(tm - before[5]) + abs(tf - before[6]) + abs(th - before[7]) > 1e-6:
+        put_row(rows, count, loop[TIME], goal, rate, theta, v, tm, tf, th, 1.0)
 
 
 @kernel(exact=False)
@@ -186,7 +200,7 @@ def measure(
             nodes[j, 0] = nodes[j, 4]
         for k in range(1, 5):
             x = (w + 0.25 * k) * width
-            p, q = m[0] * p + m[1] * q, m[2] * p + m[3] * q
+            p, q = free_motion(m, p, q)
             theta, v = moved(c, (1.0, 0.0, 0.0, 1.0), x, p, q)
             fill(parameters, plan, cells, sides, loop, stretch, x, theta, v, nodes, k)
         meter(

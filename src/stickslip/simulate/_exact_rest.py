@@ -20,7 +20,7 @@ def rest(
     """Stay at rest for at most `left` s; fills `stretch`, returns when the axis breaks away or NONE."""
     h = min(left, LONGEST_REST)
     theta = loop[POSITION]
-    look_ahead(parameters, plan, cells, loop, stretch, h)
+    look_ahead(parameters, plan, cells, loop, stretch, h, 0.0)
     remember(stretch, (theta, 0.0, 0.0, 0.0), h, 0.0, 0.0, theta, 0.0, theta, 0.0, 0)
     wanted = h / 30.0 * (7.0 * (loop[GOAL] + stretch[GOAL_END]) + 16.0 * stretch[GOAL_MID])
     wanted += h * h / 60.0 * (loop[GOAL_RATE] - stretch[RATE_END])

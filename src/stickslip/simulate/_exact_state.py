@@ -1,7 +1,8 @@
 """What the exact integrator remembers: elements, slipping forces, and the state of the loop.
 
 Flat arrays with named columns. A *side* is a law in the loop: 0 the plant's friction, 1 the law of a feedback
-compensator (weighted by minus its gain). The slipping elements of a side share one curve s(v), so that their sum
+compensator (weighted by minus its gain). All of them are handed on as addresses, which costs kernels nothing
+(arrays are counted references). The slipping elements of a side share one curve s(v), so that their sum
 S alone is integrated, dS/dt = C (A sigma - S/s(v)) with A the sum of their shares; each element's force follows
 from the decay exp(-integral of C/s) when a mode changes. Where C is infinite, S = A sigma s(v).
 """
@@ -12,8 +13,9 @@ import math
 from typing import Any
 
 from stickslip.jit import call_profile, call_value, kernel, pointer
-from stickslip.simulate._case import GAIN, INERTIA, KD, KI, KP, KR, NUMBERS
+from stickslip.simulate._case import GAIN, INERTIA, KD, KI, KP, KR
 from stickslip.simulate._exact_flow import Linear, linear
+from stickslip.simulate._forcing import CELL_SIZE
 
 # ---- columns of `elements` (those of finite stiffness) -------------------------------------------------------
 STIFFNESS, SHARE, PER_SHARE, FORCE, OFFSET, SLIPS, ELEMENT_SIZE = range(7)
@@ -27,27 +29,20 @@ STIFFNESS, SHARE, PER_SHARE, FORCE, OFFSET, SLIPS, ELEMENT_SIZE = range(7)
 # ---- entries of `loop`: the state, and the reference where it stands -----------------------------------------
 (
     TIME, POSITION, VELOCITY, SIGMA, HELD, INTEGRAL, ADDED, WATCHED, NONLINEAR, BASE,
-    R, DR, GOAL, GOAL_RATE, EDGE_LOW, EDGE_HIGH, CELL, PROFILE_OUT,
-) = range(18)  # fmt: skip
+    R, DR, GOAL, GOAL_RATE, EDGE_LOW, EDGE_HIGH, CELL, UNSEEN, SEEN_LENGTH, STORM_COUNT, STORM_SINCE, PROFILE_OUT,
+) = range(22)  # fmt: skip
 LOOP_SIZE = PROFILE_OUT + 3
 
-# ---- entries of `plan` (integers): addresses, and where parameters begin -------------------------------------
+# ---- entries of `plan`: addresses (exact as floats), offsets and sizes ---------------------------------------
 (
-    CURVE_0,
-    PARAMETERS_0,
-    CURVE_1,
-    PARAMETERS_1,
-    PROFILE,
-    PROFILE_PARAMETERS,
-    LITERAL,
-    FIRST_1,
-    ELEMENTS,
-    SIDES,
-    PLAN_SIZE,
-) = range(11)
+    CURVE_0, PARAMETERS_0, CURVE_1, PARAMETERS_1, PROFILE, PROFILE_PARAMETERS, LITERAL, FIRST_1, ELEMENTS, SIDES,
+    CELLS, GRID_ROWS, ROWS, SPACING, STIFFNESS_FLOOR, PLAN_SIZE,
+) = range(16)  # fmt: skip
 """``parameters`` begins with Case.numbers; elements of side 1 begin at FIRST_1."""
 
-assert NUMBERS > 0  # Case.numbers lie at the front of `parameters`
+# ---- entries of `count` --------------------------------------------------------------------------------------
+STEPS, REJECTED, EVENTS, ROWS_WRITTEN, GRID_WRITTEN, COUNTS = range(6)
+
 EDGE = 1e-12
 """One-sided limits at a break are taken this far from it, s."""
 
@@ -55,10 +50,10 @@ EDGE = 1e-12
 @kernel(exact=False)
 def sliding(parameters: Any, plan: Any, sides: Any, side: int, v: float) -> float:
     """The sliding curve of a side, N·m."""
-    address = plan[CURVE_0 + 2 * side]
+    address = int(plan[CURVE_0 + 2 * side])
     if address == 0:
-        return sides[side, BREAKAWAY]
-    return call_value(address, v, pointer(parameters, plan[PARAMETERS_0 + 2 * side]))
+        return sides[side * SIDE_SIZE + BREAKAWAY]
+    return call_value(address, v, pointer(parameters, int(plan[PARAMETERS_0 + 2 * side])))
 
 
 @kernel(exact=False)
@@ -68,35 +63,31 @@ def command(parameters: Any, plan: Any, cells: Any, loop: Any, t: float) -> tupl
     kp theta_d + kr theta_d' + gain T_hat(t); ``cells`` hold the feedforward torque (`_forcing`).
     """
     t = min(max(t, loop[EDGE_LOW]), loop[EDGE_HIGH])
-    call_profile(plan[PROFILE], t, pointer(parameters, plan[PROFILE_PARAMETERS]), pointer(loop, PROFILE_OUT))
+    profile_parameters = pointer(parameters, int(plan[PROFILE_PARAMETERS]))
+    call_profile(int(plan[PROFILE]), t, profile_parameters, pointer(loop, PROFILE_OUT))
     goal = loop[PROFILE_OUT]
     rate = loop[PROFILE_OUT + 1]
     r = parameters[KP] * goal + parameters[KR] * rate
     dr = parameters[KP] * rate + parameters[KR] * loop[PROFILE_OUT + 2]
-    last = cells.shape[0] - 1
+    last = int(plan[CELLS]) - 1
     if last >= 0:
         i = int(loop[CELL])
-        while i < last and t >= cells[i + 1, 0]:
+        while i < last and t >= cells[(i + 1) * CELL_SIZE]:
             i += 1
-        while i > 0 and t < cells[i, 0]:
+        while i > 0 and t < cells[i * CELL_SIZE]:
             i -= 1
         loop[CELL] = i
-        x = (t - cells[i, 0]) * cells[i, 1]
-        r += parameters[GAIN] * (
-            cells[i, 2] + x * (cells[i, 3] + x * (cells[i, 4] + x * (cells[i, 5] + x * cells[i, 6])))
-        )
-        dr += (
-            parameters[GAIN]
-            * cells[i, 1]
-            * (cells[i, 3] + x * (2.0 * cells[i, 4] + x * (3.0 * cells[i, 5] + x * 4.0 * cells[i, 6])))
-        )
+        cell = pointer(cells, i * CELL_SIZE)
+        x = (t - cell[0]) * cell[1]
+        r += parameters[GAIN] * (cell[2] + x * (cell[3] + x * (cell[4] + x * (cell[5] + x * cell[6]))))
+        slope = cell[3] + x * (2.0 * cell[4] + x * (3.0 * cell[5] + x * 4.0 * cell[6]))
+        dr += parameters[GAIN] * cell[1] * slope
     return r, dr, goal, rate
 
 
 @kernel(exact=False)
 def arrange(
-    parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, stiffness_floor: float
-) -> Linear:
+    parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> Linear:
     """Set the loop up for the modes as they are: springs, slipping sums, flow.
 
     Where the stiffness nearly vanishes, a spring is added (and taken off again by the corrector), so that the
@@ -109,22 +100,22 @@ def arrange(
     loop[BASE] = 0.0
     slips = False
     loop[NONLINEAR] = 1.0 if parameters[KI] != 0.0 else 0.0
-    for side in range(plan[SIDES]):
-        w = sides[side, WEIGHT]
-        damping += w * sides[side, VISCOUS]
+    for side in range(int(plan[SIDES])):
+        w = sides[side * SIDE_SIZE + WEIGHT]
+        damping += w * sides[side * SIDE_SIZE + VISCOUS]
         gather(plan, elements, sides, side, theta)
-        sides[side, SLIPPING] += sides[side, RIGID] * abs(loop[SIGMA])
-        total += w * sides[side, SPRING]
-        loop[BASE] += w * sides[side, SPRING_OFFSET]
-        if sides[side, SLIPPING] > 0.0:
+        sides[side * SIDE_SIZE + SLIPPING] += sides[side * SIDE_SIZE + RIGID] * abs(loop[SIGMA])
+        total += w * sides[side * SIDE_SIZE + SPRING]
+        loop[BASE] += w * sides[side * SIDE_SIZE + SPRING_OFFSET]
+        if sides[side * SIDE_SIZE + SLIPPING] > 0.0:
             slips = True
             begin_slip(parameters, plan, sides, loop, side, v)
-            if sides[side, VARIES] > 0.0:
+            if sides[side * SIDE_SIZE + VARIES] > 0.0:
                 loop[NONLINEAR] = 1.0
     loop[WATCHED] = 1.0 if slips else 0.0
     loop[ADDED] = 0.0
-    if abs(total) < stiffness_floor:
-        loop[ADDED] = 2.0 * stiffness_floor
+    if abs(total) < plan[STIFFNESS_FLOOR]:
+        loop[ADDED] = 2.0 * plan[STIFFNESS_FLOOR]
         loop[NONLINEAR] = 1.0
     lin = linear(parameters[INERTIA], damping, total + loop[ADDED])
     begin_slopes(parameters, plan, sides, loop, lin)
@@ -134,7 +125,9 @@ def arrange(
 @kernel(exact=False)
 def first_of(plan: Any, side: int) -> int:
     """Index of the first element of a side; that of side 2 ends side 1."""
-    return 0 if side == 0 else (plan[FIRST_1] if side == 1 else plan[ELEMENTS])
+    if side == 0:
+        return 0
+    return int(plan[FIRST_1]) if side == 1 else int(plan[ELEMENTS])
 
 
 @kernel(exact=False)
@@ -146,36 +139,36 @@ def gather(plan: Any, elements: Any, sides: Any, side: int, theta: float) -> Non
     force = 0.0
     sticking = 0.0
     for i in range(first_of(plan, side), first_of(plan, side + 1)):
-        if elements[i, SLIPS] > 0.0:
-            share += elements[i, SHARE]
-            force += elements[i, FORCE]
+        if elements[i * ELEMENT_SIZE + SLIPS] > 0.0:
+            share += elements[i * ELEMENT_SIZE + SHARE]
+            force += elements[i * ELEMENT_SIZE + FORCE]
         else:
             sticking += 1.0
-            elements[i, OFFSET] = elements[i, FORCE] - elements[i, STIFFNESS] * theta
-            spring += elements[i, STIFFNESS]
-            offset += elements[i, OFFSET]
-    sides[side, SPRING] = spring
-    sides[side, SPRING_OFFSET] = offset
-    sides[side, STICKING] = sticking
-    sides[side, SLIPPING] = share
-    sides[side, S] = force
-    sides[side, S_START] = force
-    sides[side, S_NOW] = force
-    sides[side, EXPONENT] = 0.0
-    sides[side, DS] = 0.0
+            elements[i * ELEMENT_SIZE + OFFSET] = elements[i * ELEMENT_SIZE + FORCE] - elements[i * ELEMENT_SIZE + STIFFNESS] * theta
+            spring += elements[i * ELEMENT_SIZE + STIFFNESS]
+            offset += elements[i * ELEMENT_SIZE + OFFSET]
+    sides[side * SIDE_SIZE + SPRING] = spring
+    sides[side * SIDE_SIZE + SPRING_OFFSET] = offset
+    sides[side * SIDE_SIZE + STICKING] = sticking
+    sides[side * SIDE_SIZE + SLIPPING] = share
+    sides[side * SIDE_SIZE + S] = force
+    sides[side * SIDE_SIZE + S_START] = force
+    sides[side * SIDE_SIZE + S_NOW] = force
+    sides[side * SIDE_SIZE + EXPONENT] = 0.0
+    sides[side * SIDE_SIZE + DS] = 0.0
 
 
 @kernel(exact=False)
 def begin_slip(parameters: Any, plan: Any, sides: Any, loop: Any, side: int, v: float) -> None:
     """Curve and slope of a side's slipping force at the start of a stretch."""
     s = sliding(parameters, plan, sides, side, v)
-    attraction = sides[side, ATTRACTION]
+    attraction = sides[side * SIDE_SIZE + ATTRACTION]
     if attraction < math.inf:
-        sides[side, Q] = 1.0 / s
-        sides[side, DS] = attraction * (sides[side, SLIPPING] * loop[SIGMA] - sides[side, S] / s)
+        sides[side * SIDE_SIZE + Q] = 1.0 / s
+        sides[side * SIDE_SIZE + DS] = attraction * (sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA] - sides[side * SIDE_SIZE + S] / s)
     else:
-        sides[side, S] = sides[side, SLIPPING] * loop[SIGMA] * s
-        sides[side, S_NOW] = sides[side, S]
+        sides[side * SIDE_SIZE + S] = sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA] * s
+        sides[side * SIDE_SIZE + S_NOW] = sides[side * SIDE_SIZE + S]
 
 
 @kernel(exact=False)
@@ -183,18 +176,18 @@ def begin_slopes(parameters: Any, plan: Any, sides: Any, loop: Any, lin: Linear)
     """Slopes of the forces that follow the curve at once, from the acceleration."""
     pull = loop[R] + parameters[KI] * loop[INTEGRAL] - loop[BASE]
     pull -= (lin.stiffness - loop[ADDED]) * loop[POSITION] + lin.damping * loop[VELOCITY]
-    for side in range(plan[SIDES]):
-        pull -= sides[side, WEIGHT] * sides[side, S]
-    for side in range(plan[SIDES]):
-        if sides[side, ATTRACTION] == math.inf and sides[side, SLIPPING] > 0.0 and sides[side, VARIES] > 0.0:
+    for side in range(int(plan[SIDES])):
+        pull -= sides[side * SIDE_SIZE + WEIGHT] * sides[side * SIDE_SIZE + S]
+    for side in range(int(plan[SIDES])):
+        if sides[side * SIDE_SIZE + ATTRACTION] == math.inf and sides[side * SIDE_SIZE + SLIPPING] > 0.0 and sides[side * SIDE_SIZE + VARIES] > 0.0:
             slope = curve_slope(parameters, plan, sides, side, loop[VELOCITY])
-            sides[side, DS] = sides[side, SLIPPING] * loop[SIGMA] * slope * pull / lin.inertia
+            sides[side * SIDE_SIZE + DS] = sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA] * slope * pull / lin.inertia
 
 
 @kernel(exact=False)
 def curve_slope(parameters: Any, plan: Any, sides: Any, side: int, v: float) -> float:
     """ds/dv by a central difference, one-sided at rest."""
-    d = 1e-4 * sides[side, SCALE]
+    d = 1e-4 * sides[side * SIDE_SIZE + SCALE]
     low = v - d if abs(v) >= d else v
     high = v + d if v >= 0.0 or abs(v) >= d else v
     if low == v:
@@ -212,11 +205,11 @@ def torques(
     """Motor, friction and compensating torque, N·m."""
     helped = r - parameters[KP] * goal - parameters[KR] * rate
     if plan[SIDES] > 1:
-        model = sides[1, SPRING] * theta + sides[1, SPRING_OFFSET] + s_helper + sides[1, VISCOUS] * v
-        helped -= sides[1, WEIGHT] * model
+        model = sides[SIDE_SIZE + SPRING] * theta + sides[SIDE_SIZE + SPRING_OFFSET] + s_helper + sides[SIDE_SIZE + VISCOUS] * v
+        helped -= sides[SIDE_SIZE + WEIGHT] * model
     motor = parameters[KP] * (goal - theta) + parameters[KR] * rate - parameters[KD] * v
     motor += parameters[KI] * integral + helped
     if loop[HELD] > 0.0:
         return motor, motor, helped
-    friction = sides[0, SPRING] * theta + sides[0, SPRING_OFFSET] + s_plant + sides[0, VISCOUS] * v
+    friction = sides[SPRING] * theta + sides[SPRING_OFFSET] + s_plant + sides[VISCOUS] * v
     return motor, friction, helped

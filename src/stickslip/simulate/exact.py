@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -27,22 +26,24 @@ from stickslip.simulate._case import (
     GAIN,
     KD,
     METERED,
-    NUMBERS,
     SOURCE,
     Array,
     Case,
     Outcome,
     Side,
 )
-from stickslip.simulate._exact_kernel import LONGEST_STEP, solve
+from stickslip.simulate._exact_kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, LONGEST_STEP, solve
 from stickslip.simulate._forcing import NO_CELLS, feedforward
-from stickslip.simulate._meter import SIZE, new_meter
+from stickslip.simulate._meter import SIZE, close_standstill, new_meter
 from stickslip.spec import Elements
 
 __all__ = ["Prepared", "can_run", "prepare", "run"]
 
 EVENT_ROWS = 20_000
 TURNS = 20_000
+NOTHING: Array = np.zeros((0, 2))
+NOTHING_1: Array = np.zeros(1)
+NODES: Array = np.zeros((8, 5))
 
 
 def elements_of(side: Side) -> Elements | None:
@@ -93,21 +94,18 @@ class Prepared:
 
     Attributes
     ----------
-    plan : array of int64
-        Addresses and offsets, by the names of `_exact_state`.
-    parameters, elements, sides, cells, breaks : arrays
-        What the kernel reads; elements and sides are its starting values.
+    parameters, plan, cells, breaks : arrays
+        What the kernel reads: `_exact_state` names the entries.
+    work : array
+        What the kernel works on, as it begins.
     """
 
     case: Case
-    plan: np.ndarray[Any, np.dtype[np.int64]]
     parameters: Array
-    elements: Array
-    sides: Array
+    plan: Array
     cells: Array
     breaks: Array
-    spacing: float
-    stiffness_floor: float
+    work: Array
 
     def run(self) -> tuple[Array, int, float]:
         """Run without metrics; returns position (rad) and velocity (rad/s) on the grid, why and when it ended.
@@ -120,29 +118,34 @@ class Prepared:
         time : float
         """
         out = np.empty((self.case.grid.size, 2))
-        code, time, written, _ = self._solve(
-            out, np.empty((0, len(COLUMNS))), False, np.zeros(1), np.zeros((0, 2))
-        )
-        return out[: written[1]], code, time
+        code, work = self._solve(out, NOTHING, NOTHING_1, NOTHING, light=True)
+        return out[: int(work[col.GRID_WRITTEN])], code, float(work[AT_LOOP])
 
     def record(self) -> Outcome:
         """Run with all rows, and the metrics if the case wants them."""
         metered = bool(self.case.numbers[METERED])
         acc = new_meter(float(self.case.breaks[-1]), 0.0) if metered else np.zeros(SIZE)
         turns = np.zeros((TURNS if metered else 0, 2))
-        rows = np.empty((self.case.grid.size + EVENT_ROWS, len(COLUMNS)))
-        code, time, written, counts = self._solve(np.empty((0, 2)), rows, metered, acc, turns)
-        named = {"steps": int(counts[0]), "rejected": int(counts[1]), "events": int(counts[2])}
-        return Outcome(rows[: written[0]].copy(), code, time, acc, turns, named)
+        rows = np.empty((int(self.plan[col.ROWS]), len(COLUMNS)))
+        code, work = self._solve(NOTHING, rows, acc, turns, full=True, metered=metered)
+        time = float(work[AT_LOOP])
+        if metered:
+            close_standstill(acc, time)
+        named = {
+            "steps": int(work[col.STEPS]), "rejected": int(work[col.REJECTED]), "events": int(work[col.EVENTS]),
+        }  # fmt: skip
+        return Outcome(rows[: int(work[col.ROWS_WRITTEN])].copy(), code, time, acc, turns, named)
 
-    def _solve(self, out: Array, rows: Array, metered: bool, acc: Array, turns: Array) -> Any:
-        counts = np.zeros(3, np.int64)
-        written = np.zeros(2, np.int64)
-        code, time = solve(
-            self.parameters, self.plan, self.cells, self.elements.copy(), self.sides.copy(), self.breaks,
-            self.case.grid, self.spacing, out, rows, metered, acc, turns, counts, written, self.stiffness_floor,
+    def _solve(
+        self, out: Array, rows: Array, acc: Array, turns: Array, *, light: bool = False, full: bool = False,
+        metered: bool = False,
+    ) -> tuple[int, Array]:  # fmt: skip
+        work = self.work.copy()
+        code = solve(
+            self.parameters, self.plan, self.cells, self.breaks, self.case.grid, work, out, rows, acc, turns, NODES.copy(),
+            light, full, metered,
         )  # fmt: skip
-        return int(code), float(time), written, counts
+        return int(code), work
 
 
 def prepare(case: Case) -> Prepared:
@@ -160,7 +163,7 @@ def prepare(case: Case) -> Prepared:
     members = [(case.plant, 1.0)]
     if feedback:
         members.append((case.compensator, -case.numbers[GAIN]))
-    plan = np.zeros(col.PLAN_SIZE, np.int64)
+    plan = np.zeros(col.PLAN_SIZE)
     blocks = [case.numbers]
     finite: list[list[float]] = []
     sides = np.zeros((len(members), col.SIDE_SIZE))
@@ -184,19 +187,16 @@ def prepare(case: Case) -> Prepared:
     law = case.plant.model.law if case.plant.model else None
     plan[col.LITERAL] = 1 if law and law.chosen.get("slip_rule", "signed") == "literal" else 0
     cells, kinks = feedforward(case) if case.numbers[SOURCE] == FROM_REFERENCE else (NO_CELLS, [])
+    plan[col.CELLS], plan[col.GRID_ROWS], plan[col.ROWS] = len(cells), case.grid.size, case.grid.size + EVENT_ROWS
+    plan[col.SPACING] = even_spacing(case.grid)
     damping = case.numbers[KD] + float(np.sum(sides[:, col.WEIGHT] * sides[:, col.VISCOUS]))
     inertia = case.axis.inertia
-    return Prepared(
-        case,
-        plan,
-        flat(np.concatenate(blocks)),
-        np.array(finite, dtype=np.float64).reshape(-1, col.ELEMENT_SIZE),
-        sides,
-        cells,
-        merged(case.breaks, kinks),
-        even_spacing(case.grid),
-        max(0.01 * damping * damping / inertia, 0.01 * inertia / LONGEST_STEP**2),
-    )
+    plan[col.STIFFNESS_FLOOR] = max(0.01 * damping * damping / inertia, 0.01 * inertia / LONGEST_STEP**2)
+    work = np.zeros(AT_ELEMENTS + col.ELEMENT_SIZE * len(finite))
+    work[AT_SIDES : AT_SIDES + sides.size] = sides.ravel()
+    work[AT_ELEMENTS:] = [x for element in finite for x in element]
+    breaks = merged(case.breaks, kinks)
+    return Prepared(case, flat(np.concatenate(blocks)), plan, flat(cells.ravel()), breaks, work)
 
 
 def fill_side(into: Array, side: Side, e: Elements, weight: float) -> None:
