@@ -26,8 +26,9 @@ MAX_WINDOW = 2e-3  # s
     DURATION, SETTLE_BAND, E2, E_MAX, EV2, TM2, TM_MAX, DF2, HP2, V_MAX, REVERSALS, SS_E, E_END,
     W2_E2, W2_E_MAX, W2_E_LOW, W2_E_HIGH, W2_EV2, W2_TM2, W2_HP2, W2_REVERSALS,
     LOW_PASS, SIDE, STILL_SINCE, STILL_COUNT, STILL_LONGEST, OUTSIDE_LAST, WORK, LOSS, COMPENSATION_WORK,
-    REFERENCE_SIDE, REFERENCE_REVERSALS, TURN_TIME, TURN_POSITION, TURN_COUNT, SIZE,
-) = range(36)  # fmt: skip
+    REFERENCE_SIDE, REFERENCE_REVERSALS, TURN_TIME, TURN_POSITION, TURN_COUNT,
+    LAST_VELOCITY, SIZE,
+) = range(37)  # fmt: skip
 
 
 def new_meter(duration: float, settle_band: float) -> Any:
@@ -185,6 +186,11 @@ def high_pass(acc: Any, h: float, v: Any, second: bool) -> None:
 @kernel(exact=False)
 def reversals(acc: Any, turns: Any, t: float, h: float, x: Any, v: Any, vd: Any, second: bool) -> None:
     """Count sign reversals of v and of the reference with a Schmitt trigger; keep the turning points."""
+    # Rounding may put a zero between the end of the last stretch and the start of this one.
+    if acc[LAST_VELOCITY] * v[0] < 0.0:
+        acc[TURN_TIME] = t
+        acc[TURN_POSITION] = x[0]
+    acc[LAST_VELOCITY] = v[4]
     for i in range(1, 5):
         # The last zero of v is the turning point, if the trigger then confirms a reversal.
         if v[i - 1] * v[i] <= 0.0 and v[i - 1] != v[i]:
