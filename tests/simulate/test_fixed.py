@@ -17,7 +17,7 @@ from stickslip.errors import ParameterError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulate import _meter as meter
-from stickslip.simulate import fixed
+from stickslip.simulate import adaptive, fixed
 from stickslip.simulate._case import DIVERGED, DONE, NOT_FINITE, lay_out
 from stickslip.simulate._fixed_sampled import MEMORY, low_passed, measured_position
 
@@ -96,6 +96,27 @@ def test_order_of_convergence(plant, helper, steps, duration):
     fine = on_grid(simulate(plant, steps[-1] / 16.0, **case))[:, 3]
     errors = [np.abs(on_grid(simulate(plant, dt, **case))[:, 3] - fine).max() for dt in steps]
     assert order(errors) >= 1.8, errors
+
+
+@pytest.mark.parametrize(
+    ("plant", "gains", "helper"),
+    [
+        (GMS, place("PID", J, 12.0, 1.0), None),
+        (COULOMB, PD, Feedback(Model("coulomb", fc=0.2))),
+        (GMS, PD, Feedback(LUGRE, filter_hz=10.0)),
+        (GMS, PD, Feedforward(GMS_3, filter_hz=10.0)),
+    ],
+)
+def test_tends_to_the_adaptive_integrator(plant, gains, helper):
+    grid = np.linspace(0.0, 0.5, 51)
+    controller = Controller(gains, helper)
+    case = lay_out(RigidAxis(J, plant), controller, LOW, 0.5, tolerance=1e-10, grid=grid, metered=False)
+    located = on_grid(adaptive.run(case))
+    # A kink may lie anywhere inside a step, so that single halvings scatter: the order over a factor of 16.
+    steps = (1e-4, 2.5e-5, 6.25e-6)
+    errors = [np.abs(on_grid(fixed.run(case, dt))[:, 3] - located[:, 3]).max() for dt in steps]
+    assert errors[0] < 1e-5
+    assert order(errors, factor=4.0) >= 1.8, errors
 
 
 def test_a_steep_law_keeps_second_order_while_it_slides():
