@@ -180,3 +180,15 @@ def test_divergence_says_when_and_keeps_the_record():
     assert 0.0 < caught.value.time < 1.0
     assert len(caught.value.record) > 1
     assert caught.value.record.time[-1] <= caught.value.time
+
+
+def test_ringing_against_the_torque_limit():
+    """A limit just above break-away is met again and again while the contact rings."""
+    axis, control, reference, _ = thesis_run("low/nominal/FF-lugre")
+    limited = Controller(control.gains, control.compensator, torque_limit=0.32)
+    record = simulate(axis, limited, reference, 5.0, integrator="adaptive")
+    assert np.abs(record["motor_torque"]).max() == 0.32
+    fixed = simulate(axis, limited, reference, 5.0, integrator="fixed", time_step=2e-5)
+    grid = np.linspace(0.0, 5.0, 501)
+    apart = np.interp(grid, record.time, record["position"]) - np.interp(grid, fixed.time, fixed["position"])
+    assert np.abs(apart).max() < 1e-5

@@ -201,12 +201,14 @@ def events(a: Any, w: Any, t: float, y: Any, k: Any, row: int, g: Any) -> float:
         rates(a, w, t, y, k, row)
         if is_held(a, w):
             g[laws + RELEASE] = abs(w[MOTOR_TORQUE]) - held_limit(a, w, y, np.sign(w[MOTOR_TORQUE]))
-        if w[SATURATED] == 0.0:
-            g[laws + LIMIT] = abs(w[DEMAND]) - w[TORQUE_LIMIT]
-        else:
-            g[laws + LIMIT] = w[TORQUE_LIMIT] - w[SATURATED] * w[DEMAND]
-        if w[TORQUE_LIMIT] == np.inf:
-            g[laws + LIMIT] = -1.0
+        # At exactly the limit the mode is still the remembered one.
+        beyond = (
+            abs(w[DEMAND]) - w[TORQUE_LIMIT]
+            if w[SATURATED] == 0.0
+            else w[TORQUE_LIMIT] - w[SATURATED] * w[DEMAND]
+        )
+        if w[TORQUE_LIMIT] < np.inf:
+            g[laws + LIMIT] = beyond if beyond != 0.0 else -TINY
     if a[PLANT + GUARDS] != 0:
         call_guards(
             a[PLANT + GUARDS],
