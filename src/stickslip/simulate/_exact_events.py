@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stickslip.jit import kernel
+from stickslip.jit import kernel, pointer
 from stickslip.simulate._case import KI, KP
 from stickslip.simulate._exact_flow import Linear, acceleration
 from stickslip.simulate._exact_state import (
@@ -23,9 +23,10 @@ from stickslip.simulate._exact_state import (
     HELD,
     INTEGRAL,
     LITERAL,
+    LOAD_AT_0,
+    LOAD_SLOPE,
     LOWEST,
     OFFSET,
-    PER_SHARE,
     POSITION,
     Q_END,
     Q_MID,
@@ -60,8 +61,12 @@ from stickslip.simulate._exact_step import (
 )
 
 NONE = -1.0
+NEAR = 1e-3
+"""N·m: a guess of how far the event function is below zero."""
 NOISE = 1e-12
 """Velocities this small (rad/s) may be rounding errors of one that creeps to zero: no reversal yet."""
+ROUNDING = 1e-10
+"""N·m by which a load may seem to miss the limit that it was located at."""
 VELOCITY_WEIGHT = 10.0
 """N·m per rad/s: puts a reversal on the scale of a break-away."""
 
@@ -73,14 +78,17 @@ def load_of(literal: bool, direction: float, force: float) -> float:
 
 
 @kernel(exact=False)
-def heaviest(plan: Any, elements: Any, side: int, theta: float, v: float) -> float:
+def heaviest(plan: Any, elements: Any, sides: Any, side: int, theta: float, v: float) -> float:
     """Largest load per share among a side's sticking elements, N·m."""
-    direction = 1.0 if v >= 0.0 else -1.0
     top = -1e300
-    for i in range(first_of(plan, side), first_of(plan, side + 1)):
-        if elements[i * ELEMENT_SIZE + SLIPS] == 0.0:
-            force = elements[i * ELEMENT_SIZE + OFFSET] + elements[i * ELEMENT_SIZE + STIFFNESS] * theta
-            top = max(top, load_of(plan[LITERAL] > 0.0, direction, force) * elements[i * ELEMENT_SIZE + PER_SHARE])
+    first = first_of(plan, side)
+    literal = plan[LITERAL] > 0.0
+    direction = 1.0 if v >= 0.0 else -1.0
+    for i in range(first, first + int(sides[side * SIDE_SIZE + STICKING])):
+        e = pointer(elements, i * ELEMENT_SIZE)
+        load = load_of(literal, direction, e[LOAD_AT_0] + e[LOAD_SLOPE] * theta)
+        if load > top:
+            top = load
     return top
 
 
@@ -94,33 +102,66 @@ def trigger(
         g = -VELOCITY_WEIGHT * (loop[SIGMA] * v + NOISE)
     for side in range(int(plan[SIDES])):
         if sides[side * SIDE_SIZE + STICKING] > 0.0:
-            top = heaviest(plan, elements, side, theta, v)
+            top = heaviest(plan, elements, sides, side, theta, v)
             # The curve is only asked for where its lowest level is in reach.
-            if top > sides[side * SIDE_SIZE + LOWEST]:
-                g = max(g, top - sliding(parameters, plan, sides, side, v))
+            limit = sides[side * SIDE_SIZE + LOWEST]
+            if top > limit:
+                limit = sliding(parameters, plan, sides, side, v)
+            g = max(g, top - limit)
     return g
 
 
 @kernel(exact=False)
-def too_long(plan: Any, elements: Any, sides: Any, loop: Any, stretch: Any) -> bool:
+def too_long(
+    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, stretch: Any
+) -> bool:
     """Whether the velocity changes too much for a sticking element that is near its limit.
 
-    Such a load can cross its limit up and down between the nodes, since s(v) varies over v_s.
+    Such a load can cross its limit up and down between the nodes, since s(v) varies over v_s. Not where the motion speeds up all along: there
+    load and event function rise with it.
     """
     v0 = loop[VELOCITY]
     v1 = stretch[VELOCITY_MID]
     v2 = stretch[VELOCITY_END]
     jump = max(abs(v1 - v0), abs(v2 - v1))
     least = min(abs(v0), abs(v1), abs(v2))
+    fastest = max(abs(v0), abs(v1), abs(v2)) + 1.0 * jump
     for side in range(int(plan[SIDES])):
         scale = sides[side * SIDE_SIZE + SCALE]
-        if sides[side * SIDE_SIZE + STICKING] > 0.0 and jump > 0.1 * scale and least < 3.0 * scale and scale > 0.0:
-            top = heaviest(plan, elements, side, stretch[POSITION_END], v2)
-            top = max(top, heaviest(plan, elements, side, stretch[POSITION_MID], v1))
-            top = max(top, heaviest(plan, elements, side, loop[POSITION], v0))
-            if top > sides[side * SIDE_SIZE + LOWEST]:
-                return True
+        if (
+            sides[side * SIDE_SIZE + STICKING] > 0.0
+            and jump > 0.1 * scale
+            and least < 3.0 * scale
+            and scale > 0.0
+        ):
+            top0 = heaviest(plan, elements, sides, side, loop[POSITION], v0)
+            top1 = heaviest(plan, elements, sides, side, stretch[POSITION_MID], v1)
+            top2 = heaviest(plan, elements, sides, side, stretch[POSITION_END], v2)
+            top = max(top0, top1, top2)
+            if top > sides[side * SIDE_SIZE + LOWEST] and not (
+                top0 <= top1 <= top2 and speeds_up(lin, loop, stretch)
+            ):
+                lowest = min(
+                    sliding(parameters, plan, sides, side, fastest),
+                    sliding(parameters, plan, sides, side, -fastest),
+                )
+                if top > lowest:
+                    return True
     return False
+
+
+@kernel(exact=False)
+def speeds_up(lin: Linear, loop: Any, stretch: Any) -> bool:
+    """Whether velocity and acceleration have one and the same sign at all nodes."""
+    c = cubic_of(stretch)
+    h = stretch[LENGTH]
+    v0 = loop[VELOCITY]
+    v1 = stretch[VELOCITY_MID]
+    v2 = stretch[VELOCITY_END]
+    a0 = acceleration(lin, c, 0.0, loop[POSITION], v0) * v2
+    a1 = acceleration(lin, c, 0.5 * h, stretch[POSITION_MID], v1) * v2
+    a2 = acceleration(lin, c, h, stretch[POSITION_END], v2) * v2
+    return v0 * v1 >= 0.0 and v1 * v2 > 0.0 and a0 > 0.0 and a1 > 0.0 and a2 > 0.0
 
 
 @kernel(exact=False)
@@ -148,6 +189,7 @@ def find(
     left = 0.0
     theta = loop[POSITION]
     v = loop[VELOCITY]
+    g_left = -NEAR
     for node in range(1, 3):
         right = 0.5 * node * stretch[LENGTH]
         theta_right = stretch[POSITION_MID] if node == 1 else stretch[POSITION_END]
@@ -156,10 +198,17 @@ def find(
             a = acceleration(lin, c, left, theta, v)
             dip = grazing(lin, loop, stretch, left, right, theta_right, v_right, a)
             if dip > 0.0:
-                return locate(lin, parameters, plan, elements, sides, loop, stretch, left, dip, tol)
+                theta, v = state_at(lin, stretch, dip)
+                g = trigger(parameters, plan, elements, sides, loop, theta, v)
+                return locate(
+                    lin, parameters, plan, elements, sides, loop, stretch, left, dip, g_left, g, tol
+                )
         g = trigger(parameters, plan, elements, sides, loop, theta_right, v_right)
         if g >= 0.0:
-            return locate(lin, parameters, plan, elements, sides, loop, stretch, left, right, tol)
+            if node == 1:
+                g_left = trigger(parameters, plan, elements, sides, loop, theta, v)
+            return locate(lin, parameters, plan, elements, sides, loop, stretch, left, right, g_left, g, tol)
+        g_left = g
         left = right
         theta = theta_right
         v = v_right
@@ -169,13 +218,11 @@ def find(
 @kernel(exact=False)
 def locate(
     lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, stretch: Any, low: float,
-    high: float, tol: float,
+    high: float, g_low: float, g_high: float, tol: float,
 ) -> float:  # fmt: skip
     """Root of `trigger` in [low, high], from its far side: regula falsi (Illinois), then bisection."""
-    theta, v = state_at(lin, stretch, low)
-    g_low = min(trigger(parameters, plan, elements, sides, loop, theta, v), -1e-15)
-    theta, v = state_at(lin, stretch, high)
-    g_high = max(trigger(parameters, plan, elements, sides, loop, theta, v), 1e-15)
+    g_low = min(g_low, -1e-15)
+    g_high = max(g_high, 1e-15)
     side = 0
     for turn in range(60):
         x = (low * g_high - high * g_low) / (g_high - g_low)
@@ -222,11 +269,16 @@ def settle_forces(parameters: Any, plan: Any, elements: Any, sides: Any, loop: A
         s = 0.0 if moves else sliding(parameters, plan, sides, side, loop[VELOCITY])
         for i in range(first_of(plan, side), first_of(plan, side + 1)):
             if elements[i * ELEMENT_SIZE + SLIPS] == 0.0:
-                elements[i * ELEMENT_SIZE + FORCE] = elements[i * ELEMENT_SIZE + OFFSET] + elements[i * ELEMENT_SIZE + STIFFNESS] * loop[POSITION]
+                elements[i * ELEMENT_SIZE + FORCE] = (
+                    elements[i * ELEMENT_SIZE + OFFSET]
+                    + elements[i * ELEMENT_SIZE + STIFFNESS] * loop[POSITION]
+                )
             elif moves:
                 part = elements[i * ELEMENT_SIZE + SHARE] / sides[side * SIDE_SIZE + SLIPPING]
                 gained = sides[side * SIDE_SIZE + S_NOW] - decay * sides[side * SIDE_SIZE + S_START]
-                elements[i * ELEMENT_SIZE + FORCE] = decay * elements[i * ELEMENT_SIZE + FORCE] + part * gained
+                elements[i * ELEMENT_SIZE + FORCE] = (
+                    decay * elements[i * ELEMENT_SIZE + FORCE] + part * gained
+                )
             else:
                 elements[i * ELEMENT_SIZE + FORCE] = elements[i * ELEMENT_SIZE + SHARE] * loop[SIGMA] * s
 
@@ -249,7 +301,10 @@ def switch(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> 
             s = sliding(parameters, plan, sides, side, v)
             for i in range(first_of(plan, side), first_of(plan, side + 1)):
                 load = load_of(plan[LITERAL] > 0.0, direction, elements[i * ELEMENT_SIZE + FORCE])
-                if elements[i * ELEMENT_SIZE + SLIPS] == 0.0 and load >= elements[i * ELEMENT_SIZE + SHARE] * s - 1e-15:
+                if (
+                    elements[i * ELEMENT_SIZE + SLIPS] == 0.0
+                    and load >= elements[i * ELEMENT_SIZE + SHARE] * s - ROUNDING
+                ):
                     elements[i * ELEMENT_SIZE + SLIPS] = 1.0
                     loop[SIGMA] = direction
 
@@ -259,7 +314,11 @@ def stiction(plan: Any, sides: Any) -> float:
     """Half the net interval of torque that rigid elements hold at rest, N·m; negative where they repel."""
     total = 0.0
     for side in range(int(plan[SIDES])):
-        total += sides[side * SIDE_SIZE + WEIGHT] * sides[side * SIDE_SIZE + RIGID] * sides[side * SIDE_SIZE + BREAKAWAY]
+        total += (
+            sides[side * SIDE_SIZE + WEIGHT]
+            * sides[side * SIDE_SIZE + RIGID]
+            * sides[side * SIDE_SIZE + BREAKAWAY]
+        )
     return total
 
 

@@ -145,7 +145,7 @@ def move(
         amplitude = free_amplitude(lin, stretch)
         stretch[AMPLITUDE] = amplitude
         rings = amplitude > 2.0 * tol and lin.frequency * h > QUARTER_PERIODS and h > 2e-6
-        if error <= tol and not rings and not too_long(plan, elements, sides, loop, stretch):
+        if error <= tol and not rings and not too_long(lin, parameters, plan, elements, sides, loop, stretch):
             return level
         if level >= DEEPEST:
             return -1 if error >= NOT_CONVERGED else level

@@ -18,7 +18,8 @@ from stickslip.simulate._exact_flow import Linear, linear
 from stickslip.simulate._forcing import CELL_SIZE
 
 # ---- columns of `elements` (those of finite stiffness) -------------------------------------------------------
-STIFFNESS, SHARE, PER_SHARE, FORCE, OFFSET, SLIPS, ELEMENT_SIZE = range(7)
+STIFFNESS, SHARE, FORCE, OFFSET, SLIPS, LOAD_AT_0, LOAD_SLOPE, ELEMENT_SIZE = range(8)
+"""The last two list the sticking elements of a side without gaps: force per share = LOAD_AT_0 + LOAD_SLOPE theta."""
 
 # ---- columns of `sides` --------------------------------------------------------------------------------------
 (
@@ -86,8 +87,7 @@ def command(parameters: Any, plan: Any, cells: Any, loop: Any, t: float) -> tupl
 
 
 @kernel(exact=False)
-def arrange(
-    parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> Linear:
+def arrange(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> Linear:
     """Set the loop up for the modes as they are: springs, slipping sums, flow.
 
     Where the stiffness nearly vanishes, a spring is added (and taken off again by the corrector), so that the
@@ -137,19 +137,24 @@ def gather(plan: Any, elements: Any, sides: Any, side: int, theta: float) -> Non
     offset = 0.0
     share = 0.0
     force = 0.0
-    sticking = 0.0
-    for i in range(first_of(plan, side), first_of(plan, side + 1)):
-        if elements[i * ELEMENT_SIZE + SLIPS] > 0.0:
-            share += elements[i * ELEMENT_SIZE + SHARE]
-            force += elements[i * ELEMENT_SIZE + FORCE]
+    first = first_of(plan, side)
+    stuck = first
+    for i in range(first, first_of(plan, side + 1)):
+        e = pointer(elements, i * ELEMENT_SIZE)
+        if e[SLIPS] > 0.0:
+            share += e[SHARE]
+            force += e[FORCE]
         else:
-            sticking += 1.0
-            elements[i * ELEMENT_SIZE + OFFSET] = elements[i * ELEMENT_SIZE + FORCE] - elements[i * ELEMENT_SIZE + STIFFNESS] * theta
-            spring += elements[i * ELEMENT_SIZE + STIFFNESS]
-            offset += elements[i * ELEMENT_SIZE + OFFSET]
+            e[OFFSET] = e[FORCE] - e[STIFFNESS] * theta
+            spring += e[STIFFNESS]
+            offset += e[OFFSET]
+            listed = pointer(elements, stuck * ELEMENT_SIZE)
+            listed[LOAD_AT_0] = e[OFFSET] / e[SHARE]
+            listed[LOAD_SLOPE] = e[STIFFNESS] / e[SHARE]
+            stuck += 1
     sides[side * SIDE_SIZE + SPRING] = spring
     sides[side * SIDE_SIZE + SPRING_OFFSET] = offset
-    sides[side * SIDE_SIZE + STICKING] = sticking
+    sides[side * SIDE_SIZE + STICKING] = stuck - first
     sides[side * SIDE_SIZE + SLIPPING] = share
     sides[side * SIDE_SIZE + S] = force
     sides[side * SIDE_SIZE + S_START] = force
@@ -165,7 +170,9 @@ def begin_slip(parameters: Any, plan: Any, sides: Any, loop: Any, side: int, v: 
     attraction = sides[side * SIDE_SIZE + ATTRACTION]
     if attraction < math.inf:
         sides[side * SIDE_SIZE + Q] = 1.0 / s
-        sides[side * SIDE_SIZE + DS] = attraction * (sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA] - sides[side * SIDE_SIZE + S] / s)
+        sides[side * SIDE_SIZE + DS] = attraction * (
+            sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA] - sides[side * SIDE_SIZE + S] / s
+        )
     else:
         sides[side * SIDE_SIZE + S] = sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA] * s
         sides[side * SIDE_SIZE + S_NOW] = sides[side * SIDE_SIZE + S]
@@ -179,9 +186,15 @@ def begin_slopes(parameters: Any, plan: Any, sides: Any, loop: Any, lin: Linear)
     for side in range(int(plan[SIDES])):
         pull -= sides[side * SIDE_SIZE + WEIGHT] * sides[side * SIDE_SIZE + S]
     for side in range(int(plan[SIDES])):
-        if sides[side * SIDE_SIZE + ATTRACTION] == math.inf and sides[side * SIDE_SIZE + SLIPPING] > 0.0 and sides[side * SIDE_SIZE + VARIES] > 0.0:
+        if (
+            sides[side * SIDE_SIZE + ATTRACTION] == math.inf
+            and sides[side * SIDE_SIZE + SLIPPING] > 0.0
+            and sides[side * SIDE_SIZE + VARIES] > 0.0
+        ):
             slope = curve_slope(parameters, plan, sides, side, loop[VELOCITY])
-            sides[side * SIDE_SIZE + DS] = sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA] * slope * pull / lin.inertia
+            sides[side * SIDE_SIZE + DS] = (
+                sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA] * slope * pull / lin.inertia
+            )
 
 
 @kernel(exact=False)
@@ -205,7 +218,12 @@ def torques(
     """Motor, friction and compensating torque, N·m."""
     helped = r - parameters[KP] * goal - parameters[KR] * rate
     if plan[SIDES] > 1:
-        model = sides[SIDE_SIZE + SPRING] * theta + sides[SIDE_SIZE + SPRING_OFFSET] + s_helper + sides[SIDE_SIZE + VISCOUS] * v
+        model = (
+            sides[SIDE_SIZE + SPRING] * theta
+            + sides[SIDE_SIZE + SPRING_OFFSET]
+            + s_helper
+            + sides[SIDE_SIZE + VISCOUS] * v
+        )
         helped -= sides[SIDE_SIZE + WEIGHT] * model
     motor = parameters[KP] * (goal - theta) + parameters[KR] * rate - parameters[KD] * v
     motor += parameters[KI] * integral + helped

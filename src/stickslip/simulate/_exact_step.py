@@ -152,7 +152,11 @@ def slip_error(lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, s
             force = slip_force_at(sides, stretch, side, 0.25 * h)
             slope = goal - attraction * force / sliding(parameters, plan, sides, side, v)
             middle = goal - attraction * sides[side * SIDE_SIZE + Q_MID] * sides[side * SIDE_SIZE + S_MID]
-            parabola = 0.375 * sides[side * SIDE_SIZE + DS] + 0.75 * middle - 0.125 * sides[side * SIDE_SIZE + DS_END]
+            parabola = (
+                0.375 * sides[side * SIDE_SIZE + DS]
+                + 0.75 * middle
+                - 0.125 * sides[side * SIDE_SIZE + DS_END]
+            )
             total += abs(sides[side * SIDE_SIZE + WEIGHT] * (slope - parabola))
     return 0.5 * h * total
 
@@ -256,7 +260,9 @@ def correct(
                 p3 -= bent * sides[side * SIDE_SIZE + WEIGHT] * u3
                 misfit += abs(sides[side * SIDE_SIZE + WEIGHT]) * m
         if parameters[KI] != 0.0 or loop[ADDED] != 0.0:
-            u2, u3, m = loop_terms(lin, parameters, loop, stretch, impulse, h, theta_mid, v_mid, theta_end, v_end)
+            u2, u3, m = loop_terms(
+                lin, parameters, loop, stretch, impulse, h, theta_mid, v_mid, theta_end, v_end
+            )
             p0 += BUMP * m
             p2 += bent * u2
             p3 += bent * u3
@@ -321,7 +327,12 @@ def slip_force_at(sides: Any, stretch: Any, side: int, x: float) -> float:
     if sides[side * SIDE_SIZE + VARIES] == 0.0 or sides[side * SIDE_SIZE + SLIPPING] == 0.0:
         return sides[side * SIDE_SIZE + S]
     return hermite(
-        sides[side * SIDE_SIZE + S], sides[side * SIDE_SIZE + DS], sides[side * SIDE_SIZE + S_END], sides[side * SIDE_SIZE + DS_END], stretch[LENGTH], x
+        sides[side * SIDE_SIZE + S],
+        sides[side * SIDE_SIZE + DS],
+        sides[side * SIDE_SIZE + S_END],
+        sides[side * SIDE_SIZE + DS_END],
+        stretch[LENGTH],
+        x,
     )
 
 

@@ -174,7 +174,7 @@ def prepare(case: Case) -> Prepared:
         plan[col.PARAMETERS_0 + 2 * i] = sum(b.size for b in blocks)
         blocks.append(side.parameters)
         finite += [
-            [k, a, 1.0 / a, 0.0, 0.0, 0.0]
+            [k, a] + [0.0] * (col.ELEMENT_SIZE - 2)
             for k, a in zip(e.stiffness, e.share, strict=True)
             if math.isfinite(k)
         ]
@@ -187,7 +187,11 @@ def prepare(case: Case) -> Prepared:
     law = case.plant.model.law if case.plant.model else None
     plan[col.LITERAL] = 1 if law and law.chosen.get("slip_rule", "signed") == "literal" else 0
     cells, kinks = feedforward(case) if case.numbers[SOURCE] == FROM_REFERENCE else (NO_CELLS, [])
-    plan[col.CELLS], plan[col.GRID_ROWS], plan[col.ROWS] = len(cells), case.grid.size, case.grid.size + EVENT_ROWS
+    plan[col.CELLS], plan[col.GRID_ROWS], plan[col.ROWS] = (
+        len(cells),
+        case.grid.size,
+        case.grid.size + EVENT_ROWS,
+    )
     plan[col.SPACING] = even_spacing(case.grid)
     damping = case.numbers[KD] + float(np.sum(sides[:, col.WEIGHT] * sides[:, col.VISCOUS]))
     inertia = case.axis.inertia
