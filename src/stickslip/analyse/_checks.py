@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from stickslip.analyse._evidence import QUANTITIES, Evidence, quantity
+from stickslip.analyse._evidence import QUANTITIES, Evidence
+from stickslip.analyse.wording import quantity
 
 __all__ = [
     "Check",

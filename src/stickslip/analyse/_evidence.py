@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip.record import Record
 
-__all__ = ["Evidence", "View", "quantity"]
+__all__ = ["QUANTITIES", "Evidence", "View"]
 
 STANDSTILL_SPEED, REFERENCE_MOVES, SHORTEST_STANDSTILL = 1e-3, 2e-3, 10e-3  # rad/s, rad/s, s; as the metrics'
 NEAR_ZERO, AWAY = 0.3, 0.5  # shares of the reference's peak velocity
@@ -163,13 +163,3 @@ QUANTITIES: dict[str, Quantity] = {
     "late high": Quantity("greatest error at steady state", "rad", lambda e, c: e.motion(c).high),
     "offset": _metric("steady_state_error_rad", "steady-state error", "rad"),
 }
-
-
-def quantity(value: float, unit: str) -> str:
-    """A value with three digits, in milli or micro units where that is easier to read."""
-    if not unit or unit == "/s":
-        return f"{value:.3g}{' ' + unit if unit else ''}"
-    for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ")):
-        if abs(value) * factor >= 0.1 or prefix == "µ":
-            return f"{value * factor:.3g} {prefix}{unit}" if abs(value) >= 1e-10 else f"0 {unit}"
-    raise AssertionError

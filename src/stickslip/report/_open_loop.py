@@ -1,0 +1,146 @@
+"""Figures of a study besides its grid: friction over velocity in open loop, and comparisons of controllers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.analyse.wording import quantity
+from stickslip.model import Model
+from stickslip.record import Record
+from stickslip.report._view import StudyView, is_thesis
+from stickslip.report.figures import COMMON, FRICTION_NAMES, Figure, describe, heading, named
+from stickslip.report.plots import Array, Curve, Panel, Style, draw, envelope, scaled, style_of
+from stickslip.simulate.open_loop import respond
+from stickslip.study.plan import Response, load
+from stickslip.study.result import StudyResult
+
+__all__ = ["comparison_figures", "response_figures"]
+
+NEAR_ZERO = 0.04  # rad/s, what the thesis shows where it compares laws
+GRID = 20_000  # instants of a response
+PLANT = {
+    "nominal": Style("#000000", "-", 2.2),
+    "plus10": Style("#D55E00", (0, (5, 1.5)), 1.2),
+    "minus10": Style("#0072B2", (0, (2, 1)), 1.2),
+}
+UNITS = {"position": "rad", "velocity": "rad/s"}
+WINDOWS = {"3.18": 1.0, "3.19": 0.5}  # periods of the reference that the thesis shows
+
+
+def responses(result: StudyResult) -> Sequence[Response]:
+    """The responses that the study's file asks for, read from the copies of its inputs."""
+    inputs = result.manifest.get("inputs", [])
+    if not inputs or not result.config.get("responses"):
+        return []
+    copies = {entry["written"]: result.folder / entry["copy"] for entry in inputs}
+    return load(result.folder / inputs[0]["copy"], copies).responses
+
+
+def response_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
+    """Friction over velocity of laws that follow the same motion (thesis figures 3.5, 3.10 to 3.14, 3.20).
+
+    The slip rules agree here: a prescribed motion does not reverse within the few milliseconds in which they
+    differ.
+    """
+    known: dict[str, tuple[Array, Array]] = {}
+    for response in responses(view.result):
+        stem = folder / COMMON / named(response.figure, f"response-{response.name}")
+        loops = {name: _loop(model, response, known) for name, model in response.models.items()}
+        near = is_thesis(view.result) and any(name not in view.frictions for name in loops)
+        curves = [_loop_curve(n, x, y, near, n in view.frictions, len(loops)) for n, (x, y) in loops.items()]
+        limits = (-NEAR_ZERO, NEAR_ZERO) if near else None
+        title = heading(response.figure, response.title)
+        message = _gap(loops, near)
+        draw(stem, title, message, [Panel(curves, "friction torque (N·m)", "velocity (rad/s)", limits)], 2.7)
+        caption = f"{response.title}, along {describe(response.motion.as_dict())}. {message}."
+        yield Figure(stem.name.removeprefix("figure-"), response.figure, title, caption, COMMON, stem)
+
+
+def _loop(model: Model, response: Response, known: dict[str, tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Velocity (rad/s) and torque (N·m) in the second half of the response, after the first loading."""
+    key = f"{model!r} {response.motion!r} {response.duration}"
+    if key not in known:
+        record = respond(
+            model, response.motion, np.linspace(0.0, response.duration, GRID + 1), tolerance=1e-8
+        )
+        late = record.time >= 0.5 * response.duration
+        known[key] = record["velocity"][late], record["friction_torque"][late]
+    return known[key]
+
+
+def _loop_curve(name: str, x: Array, y: Array, near: bool, plant: bool, count: int) -> Curve:
+    if near:
+        # Only the part that is shown, so that the file keeps its detail; gaps separate the passes.
+        outside = np.abs(x) > 1.3 * NEAR_ZERO
+        keep = ~(outside & np.roll(outside, 1))
+        x, y = np.where(outside, np.nan, x)[keep], y[keep]
+    else:
+        # Away from zero velocity a loop is smooth: keep what moved by a dot's width.
+        dots = np.cumsum(np.hypot(np.diff(x, prepend=x[0]) / np.ptp(x), np.diff(y, prepend=y[0]) / np.ptp(y)))
+        keep = np.append(np.diff(np.floor(dots * 800.0)) > 0, True)
+        x, y = x[keep], y[keep]
+    style = PLANT.get(name, PLANT["nominal"]) if plant else style_of(name)
+    label = f"{name} law" if not plant else "plant" if near else FRICTION_NAMES.get(name, name)
+    return Curve(x, y, label if count > 1 else "", replace(style, width=1.1) if near and not plant else style)
+
+
+def _gap(loops: dict[str, tuple[Array, Array]], near: bool) -> str:
+    """Largest difference from the first loop, over what is shown."""
+    (first, (x, torque)), *others = loops.items()
+    shown = np.abs(x) <= NEAR_ZERO if near else np.ones(x.size, np.bool_)
+    gaps = {name: float(np.max(np.abs(y - torque)[shown])) for name, (_, y) in others}
+    words = ", ".join(f"{name} {quantity(gap, 'N·m')}" for name, gap in gaps.items())
+    return (
+        f"Largest difference from {first}: {words}"
+        if words
+        else f"Peak torque {np.max(np.abs(torque)):.4g} N·m"
+    )
+
+
+def comparison_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
+    """Position and velocity errors of the controllers of every comparison (thesis figures 3.18, 3.19)."""
+    for name, table in view.result.config.get("comparisons", {}).items():
+        numbers = iter(table.get("figures", []))
+        for reference in table.get("references", []):
+            for friction in table.get("frictions", []):
+                number = str(next(numbers, ""))
+                cases = {c: f"{reference}/{friction}/{c}" for c in table.get("controllers", [])}
+                figure = _comparison(view, folder, name, number, cases, str(table.get("title", name)))
+                if figure:
+                    yield figure
+
+
+def _comparison(
+    view: StudyView, folder: Path, name: str, number: str, cases: dict[str, str], title: str
+) -> Figure | None:
+    rule = view.rules[0]
+    try:
+        records = {c: view.record(rule, case) for c, case in cases.items()}
+        rms = {c: view.metric(rule, case, "position_rms_rad") for c, case in cases.items()}
+    except KeyError:
+        return None  # A part of the study was run, or a run failed; the report lists those.
+    reference, friction, _ = next(iter(cases.values())).split("/")
+    period = 1.0 / view.result.config["references"][reference].get("frequency", np.inf)
+    end = period * WINDOWS[number] if number in WINDOWS and period else None
+    panels: list[Panel] = []
+    for word in ("position", "velocity"):
+        lines = {c: _error(r, word, end or np.inf) for c, r in records.items()}
+        factor, unit = scaled(max(float(np.max(np.abs(y))) for _, y in lines.values()), UNITS[word])
+        curves = [Curve(*envelope(x, factor * y), c, style_of(c)) for c, (x, y) in lines.items()]
+        panels.append(Panel(curves, f"{word} error ({unit})", "time (s)", (0.0, end) if end else None))
+    words = f"{' and '.join(cases)}, {'without friction' if friction == 'none' else friction + ' friction'}"
+    stem = folder / COMMON / named(number, f"{name}-{reference}-{friction}")
+    message = "RMS error: " + ", ".join(f"{c} {1e3 * v:.4g} mrad" for c, v in rms.items())
+    draw(stem, heading(number, words), message, panels, 1.6)
+    caption = f"{title}: tracking errors along {reference!r}, {words.partition(', ')[2]}. {message}."
+    return Figure(stem.name.removeprefix("figure-"), number, heading(number, words), caption, COMMON, stem)
+
+
+def _error(record: Record, word: str, end: float) -> tuple[Array, Array]:
+    """Time and error of position or velocity up to a time."""
+    shown = record.time <= end
+    return record.time[shown], (record[f"{word}_reference"] - record[word])[shown]

@@ -1,0 +1,125 @@
+"""The report's table of metrics: one for each reference and friction, the slip rules side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from stickslip.report._view import StudyView
+from stickslip.study.result import Run
+
+__all__ = ["Cell", "Column", "MetricsTable", "metrics_tables"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A metric as it is shown: its name, label, unit, and the factor into that unit.
+
+    `least` says that the smallest magnitude is the best; where it is False none is marked.
+    """
+
+    metric: str
+    label: str
+    unit: str
+    factor: float = 1.0
+    least: bool = True
+
+
+COLUMNS = (
+    Column("position_rms_rad", "RMS error", "mrad", 1e3),
+    Column("position_peak_rad", "peak error", "mrad", 1e3),
+    Column("steady_state_error_rad", "steady-state error", "mrad", 1e3),
+    Column("settling_s", "settling", "s"),
+    Column("velocity_rms_rad_s", "velocity error RMS", "mrad/s", 1e3),
+    Column("velocity_above_50Hz_rms_rad_s", "velocity above 50 Hz", "mrad/s RMS", 1e3),
+    Column("reversals_per_s", "reversals", "1/s", least=False),
+    Column("standstills", "stand-stills", "", least=False),
+    Column("longest_standstill_s", "longest standstill", "ms", 1e3, least=False),
+    Column("limit_cycle_amplitude_rad", "limit cycle", "mrad", 1e3, least=False),
+    Column("torque_rms_Nm", "torque RMS", "N·m", least=False),
+)
+PERIODIC, AT_REST = ("steady_state_error_rad", "settling_s"), ("standstills", "longest_standstill_s")
+"""Columns that say nothing along a motion without end, and along one that comes to rest."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Text of a table's cell, its CSS classes and how many columns it spans."""
+
+    text: str
+    classes: str = ""
+    span: int = 1
+
+
+@dataclass(frozen=True)
+class Row:
+    """A controller and its cells under every slip rule."""
+
+    controller: str
+    cells: Sequence[Cell]
+
+
+@dataclass(frozen=True)
+class MetricsTable:
+    """The runs of one reference and friction."""
+
+    title: str
+    rules: Sequence[str]
+    columns: Sequence[Column]
+    rows: Sequence[Row]
+
+
+def metrics_tables(view: StudyView) -> list[MetricsTable]:
+    """One table for each reference and friction that was run."""
+    tables: list[MetricsTable] = []
+    for reference in view.references:
+        idle = AT_REST if view.reference_kind(reference) == "step" else PERIODIC
+        for friction in view.frictions:
+            groups = {rule: view.group(rule, reference, friction) for rule in view.rules}
+            runs = [run for group in groups.values() for run in group]
+            columns = [c for c in COLUMNS if c.metric not in idle and any(_finite(r, c.metric) for r in runs)]
+            if not runs:
+                continue
+            names = [c for c in view.controllers if any(r.controller == c for r in runs)]
+            rows = [
+                Row(name, [cell for group in groups.values() for cell in _cells(name, group, columns)])
+                for name in names
+            ]
+            tables.append(
+                MetricsTable(f"Reference {reference}, friction {friction}", view.rules, columns, rows)
+            )
+    return tables
+
+
+def _finite(run: Run, metric: str) -> bool:
+    return math.isfinite(run.metrics.get(metric, math.nan))
+
+
+def _cells(controller: str, group: Sequence[Run], columns: Sequence[Column]) -> list[Cell]:
+    """The cells of a controller in a group of runs."""
+    run = next((r for r in group if r.controller == controller), None)
+    if run is None:
+        return [Cell("not run", "split soft", len(columns))]
+    if run.failure:
+        return [Cell(f"failed: {run.failure}", "split failed", len(columns))]
+    cells: list[Cell] = []
+    for i, column in enumerate(columns):
+        best = column.least and _finite(run, column.metric) and run is _best(group, column.metric)
+        classes = " ".join(word for word, there in (("split", i == 0), ("best", best)) if there)
+        cells.append(Cell(_text(run, column), classes))
+    return cells
+
+
+def _best(group: Sequence[Run], metric: str) -> Run | None:
+    finite = [r for r in group if not r.failure and _finite(r, metric)]
+    return min(finite, key=lambda r: abs(r.metrics[metric])) if finite else None
+
+
+def _text(run: Run, column: Column) -> str:
+    if not _finite(run, column.metric):
+        return "–"
+    value = column.factor * run.metrics[column.metric]
+    if abs(value) < 1e-7:
+        return "0"
+    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"

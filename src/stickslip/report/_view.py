@@ -1,0 +1,63 @@
+"""A study's runs as the report and the claims ask for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from stickslip.record import Record
+from stickslip.study.result import Run, StudyResult
+
+__all__ = ["StudyView", "is_thesis"]
+
+
+def is_thesis(result: StudyResult) -> bool:
+    """Whether it is the study that ships with the package, whose figures and statements have numbers."""
+    return result.manifest.get("study") == "thesis"
+
+
+class StudyView:
+    """Runs by key, names in the study's order, what the configuration says of a controller."""
+
+    def __init__(self, result: StudyResult) -> None:
+        self.result = result
+        self.runs: dict[str, Run] = {run.key: run for run in (*result.runs, *result.extras)}
+        self.rules = list(dict.fromkeys(run.slip_rule for run in result.runs))
+        self.references = list(dict.fromkeys(run.reference for run in result.runs))
+        self.frictions = list(dict.fromkeys(run.friction for run in result.runs))
+        self.controllers = list(dict.fromkeys(run.controller for run in result.runs))
+
+    def metric(self, rule: str, case: str, name: str) -> float:
+        """One metric of a run; KeyError where it is missing or failed."""
+        run = self.runs[f"{rule}/{case}"]
+        if run.failure or name not in run.metrics:
+            raise KeyError(f"{run.key} ({run.failure or 'no ' + name})")
+        return run.metrics[name]
+
+    def record(self, rule: str, case: str) -> Record:
+        """The record of a run; KeyError where it is missing or failed."""
+        run = self.runs[f"{rule}/{case}"]
+        if run.failure:
+            raise KeyError(f"{run.key} ({run.failure})")
+        return run.record()
+
+    def group(self, rule: str, reference: str, friction: str) -> list[Run]:
+        """The runs of one reference and friction, in the study's order."""
+        keys = (f"{rule}/{reference}/{friction}/{c}" for c in self.controllers)
+        return [self.runs[key] for key in keys if key in self.runs]
+
+    def compensation(self, controller: str) -> str:
+        """`feedforward`, `feedback`, or the empty string for a controller without compensator."""
+        return str(self._setting("controllers", controller).get("compensator", ""))
+
+    def reference_kind(self, reference: str) -> str:
+        """The kind of a reference, `sine`; the empty string where the configuration does not say."""
+        return str(self._setting("references", reference).get("kind", ""))
+
+    def _setting(self, family: str, name: str) -> Mapping[str, Any]:
+        return self.result.config.get(family, {}).get(name, {})
+
+    def kinds(self) -> Sequence[str]:
+        """The ways to compensate that the study has, feedforward first."""
+        found = {self.compensation(c) for c in self.controllers}
+        return [kind for kind in ("feedforward", "feedback") if kind in found]

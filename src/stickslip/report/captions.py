@@ -1,0 +1,90 @@
+"""What each case shows, in words made from its metrics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from stickslip.analyse.wording import quantity
+from stickslip.study.result import Run
+
+__all__ = ["case_caption", "case_message", "oscillates"]
+
+OSCILLATES = 20e-3  # rad/s RMS above 50 Hz; the statements' measure
+HUNTS = 2.0  # reversals/s while the reference is at rest
+
+
+def _get(run: Run, name: str) -> float:
+    return run.metrics.get(name, math.nan)
+
+
+def oscillates(run: Run, at_rest: bool) -> bool:
+    """Whether a run oscillates: at steady state where the reference comes to rest, else by its fast velocity."""
+    if at_rest:
+        return _get(run, "second_half_reversals_per_s") > HUNTS
+    return _get(run, "velocity_above_50Hz_rms_rad_s") > OSCILLATES
+
+
+def _figure_of_merit(at_rest: bool) -> tuple[str, str]:
+    return ("steady_state_error_rad", "steady-state error") if at_rest else ("position_rms_rad", "RMS error")
+
+
+def _ranked(runs: Sequence[Run], name: str) -> list[Run]:
+    return sorted((r for r in runs if math.isfinite(_get(r, name))), key=lambda r: abs(_get(r, name)))
+
+
+def case_message(runs: Sequence[Run], at_rest: bool, linear: Sequence[str]) -> str:
+    """One line: which compensator tracks best, beside the controllers without one."""
+    name, words = _figure_of_merit(at_rest)
+    ranked = _ranked(runs, name)
+    best = next((r for r in ranked if r.controller not in linear), ranked[0] if ranked else None)
+    if best is None:
+        return "no run was finished"
+    rest = [
+        f"{r.controller} {quantity(abs(_get(r, name)), 'rad')}"
+        for r in runs
+        if r.controller in linear and r != best
+    ]
+    return f"Least {words}: {best.controller} {quantity(abs(_get(best, name)), 'rad')}" + (
+        f" ({', '.join(rest)})" if rest else ""
+    )
+
+
+def case_caption(runs: Sequence[Run], at_rest: bool) -> str:
+    """Two or three sentences: the order by error, who oscillates, who stands still."""
+    name, words = _figure_of_merit(at_rest)
+    ranked = _ranked(runs, name)
+    sentences = [
+        f"By {'the size of the ' if at_rest else ''}{words}, best first: "
+        + ", ".join(f"{r.controller} {quantity(_get(r, name), 'rad')}" for r in ranked)
+        + "."
+    ]
+    moving = [r for r in ranked if oscillates(r, at_rest)]
+    if at_rest:
+        listed = ", ".join(
+            f"{r.controller} ({quantity(_get(r, 'second_half_reversals_per_s'), '/s')})" for r in moving
+        )
+        sentences.append(
+            f"At steady state {listed} go on moving (reversals)." if moving else "All come to rest."
+        )
+    else:
+        fast = "velocity_above_50Hz_rms_rad_s"
+        listed = ", ".join(f"{r.controller} {quantity(_get(r, fast), 'rad/s')}" for r in moving)
+        sentences.append(
+            f"Oscillating (RMS velocity above 50 Hz): {listed}." if moving else "None oscillates."
+        )
+        still = [r for r in ranked if _get(r, "standstills") > 0]
+        listed = ", ".join(f"{r.controller} {_get(r, 'standstills'):.0f}" for r in still)
+        sentences.append(
+            f"Standstills while the reference moves: {listed}." if still else "None stands still."
+        )
+    cycles = [r for r in ranked if math.isfinite(_get(r, "limit_cycle_period_s"))]
+    if cycles:
+        listed = ", ".join(
+            f"{r.controller} (amplitude {quantity(_get(r, 'limit_cycle_amplitude_rad'), 'rad')}, "
+            f"period {quantity(_get(r, 'limit_cycle_period_s'), 's')})"
+            for r in cycles
+        )
+        sentences.append(f"Limit cycle: {listed}.")
+    sentences += [f"{r.controller} failed: {r.failure}." for r in runs if r.failure]
+    return " ".join(sentences)

@@ -1,0 +1,161 @@
+"""The report of a study: one HTML file that needs nothing but itself."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from stickslip.analyse.claims import CLAIMS, Claim, Verdict, judge
+from stickslip.report._notes import notes
+from stickslip.report._tables import metrics_tables
+from stickslip.report._view import StudyView, is_thesis
+from stickslip.report.captions import case_message
+from stickslip.report.figures import COMMON, Figure
+
+__all__ = ["render"]
+
+MARKS = {True: ("yes", "holds"), False: ("no", "does not hold"), None: ("open", "not run")}
+
+
+def render(view: StudyView, figures: Sequence[Figure]) -> str:
+    """The report's HTML."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    verdicts = {rule: judge(view, rule) for rule in view.rules} if is_thesis(view.result) else {}
+    environment = Environment(
+        loader=PackageLoader("stickslip.report", "."), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True,
+    )  # fmt: skip
+    manifest = view.result.manifest
+    return environment.get_template("template.html").render(
+        title=manifest.get("title")
+        or view.result.config.get("title")
+        or f"Study {manifest.get('study', '')}".strip(),
+        ran=_ran(view),
+        tally=_tally(verdicts),
+        summary=_summary(view),
+        tables=metrics_tables(view),
+        rules=view.rules,
+        claims=[_claim(c, verdicts, figures) for c in CLAIMS] if verdicts else [],
+        parts=_parts(view, figures),
+        failed=[run for run in view.runs.values() if run.failure],
+        notes=notes(view),
+        manifest=json.dumps(_brief(manifest), indent=1, default=str, ensure_ascii=False),
+    )
+
+
+def _ran(view: StudyView) -> str:
+    """What was run, in a line."""
+    count = len(view.result.runs)
+    seconds = sum(run.seconds for run in view.result.runs)
+    words = [
+        f"{len(view.references)} references ({', '.join(view.references)})",
+        f"{len(view.frictions)} frictions ({', '.join(view.frictions)})",
+        f"{len(view.controllers)} controllers ({', '.join(view.controllers)})",
+        f"slip rules: {', '.join(view.rules)}",
+    ]
+    version = view.result.manifest.get("versions", {}).get("stickslip", "")
+    return f"{count} runs in {seconds:.1f} s of CPU: {'; '.join(words)}. stickslip {version}".strip()
+
+
+def _tally(verdicts: Mapping[str, Mapping[str, Verdict]]) -> list[dict[str, Any]]:
+    """How many statements hold under which rules."""
+    if not verdicts:
+        return []
+    counts: dict[str, int] = {}
+    for claim in CLAIMS:
+        found = {rule: verdict[claim.id].holds for rule, verdict in verdicts.items()}
+        held = [rule for rule, holds in found.items() if holds]
+        if any(holds is None for holds in found.values()):
+            words = "not judged: runs are missing"
+        elif len(held) == len(found):
+            words = "statements hold" + (" under both rules" if len(found) > 1 else "")
+        else:
+            words = f"hold only under the {held[0]} rule" if held else "hold under neither rule"
+        counts[words] = counts.get(words, 0) + 1
+    return [{"count": n, "words": words} for words, n in sorted(counts.items(), key=lambda item: -item[1])]
+
+
+def _summary(view: StudyView) -> list[str]:
+    """The best compensator of every reference and friction, rule by rule."""
+    lines: list[str] = []
+    linear = [c for c in view.controllers if not view.compensation(c)]
+    for rule in view.rules:
+        for reference in view.references:
+            for friction in view.frictions:
+                runs = [r for r in view.group(rule, reference, friction) if not r.failure]
+                if runs:
+                    message = case_message(runs, view.reference_kind(reference) == "step", linear)
+                    lines.append(f"{reference}, {friction}, {rule} rule. {message}.")
+    failed = sum(bool(run.failure) for run in view.result.runs)
+    return [*lines, f"{failed} runs failed." if failed else "No run failed."]
+
+
+def _claim(
+    claim: Claim, verdicts: Mapping[str, Mapping[str, Verdict]], figures: Sequence[Figure]
+) -> dict[str, Any]:
+    rows = [
+        dict(
+            zip(("mark", "word"), MARKS[v[claim.id].holds], strict=True),
+            rule=rule,
+            numbers=v[claim.id].numbers,
+        )
+        for rule, v in verdicts.items()
+    ]
+    everywhere = all(v[claim.id].holds for v in verdicts.values())
+    links = [
+        {"number": number, "anchor": next(f.id for f in figures if f.number == number)}
+        for number in claim.figures
+        if any(f.number == number for f in figures)
+    ]
+    return {
+        "id": claim.id, "text": claim.text, "section": claim.section, "verdicts": rows,
+        # Statements on all simulations would list every figure.
+        "links": links if len(claim.figures) <= 4 else [], "why": "" if everywhere else claim.why,
+    }  # fmt: skip
+
+
+def _parts(view: StudyView, figures: Sequence[Figure]) -> list[dict[str, Any]]:
+    """The figures in parts: those that no rule changes, then the results under each rule."""
+    parts: list[dict[str, Any]] = []
+    for rule in (COMMON, *view.rules):
+        chosen = [_embedded(f) for f in figures if f.rule == rule]
+        title = "References, laws and linear controllers" if rule == COMMON else f"Results, {rule} slip rule"
+        if chosen:
+            parts.append({"title": title, "figures": chosen})
+    return parts
+
+
+def _embedded(figure: Figure) -> dict[str, Any]:
+    """A figure for the template: the smaller of its two files, as a data URI, and its size in points."""
+    svg = figure.stem.with_name(figure.stem.name + ".svg")
+    png = figure.stem.with_name(figure.stem.name + ".png")
+    head = svg.read_text(encoding="utf-8")[:2000]
+    size = re.search(r'width="([\d.]+)pt" height="([\d.]+)pt"', head) or re.search(
+        r'viewBox="0 0 ([\d.]+) ([\d.]+)"', head
+    )
+    width, height = (float(x) for x in size.groups()) if size else (317.0, 317.0)
+    data, kind = _smaller(svg, png)
+    return {
+        "id": figure.id, "title": figure.title, "caption": figure.caption,
+        "source": f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}",
+        "width": round(width * 2), "height": round(height * 2),
+    }  # fmt: skip
+
+
+def _smaller(svg: Path, png: Path) -> tuple[bytes, str]:
+    """The SVG, unless dense oscillations make it larger than the PNG."""
+    vector, pixels = svg.read_bytes(), png.read_bytes()
+    return (vector, "image/svg+xml") if len(vector) <= 1.5 * len(pixels) else (pixels, "image/png")
+
+
+def _brief(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """The manifest without every run's metrics, which the tables show."""
+    brief = {k: v for k, v in manifest.items() if k not in ("runs", "configuration")}
+    if "runs" in manifest:
+        brief["runs"] = f"{len(manifest['runs'])}, listed in manifest.json"
+    return brief

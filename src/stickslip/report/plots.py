@@ -1,0 +1,221 @@
+"""How figures look, and how they are drawn and saved: small enough to embed, legible at half a page's width.
+
+matplotlib is imported inside the functions, so that importing this module costs nothing.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+__all__ = ["Curve", "Panel", "Style", "draw", "envelope", "scaled", "style_of"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+WIDTH = 4.4  # inches: printed at half a page's width, 8 points stay above 5
+DPI = 144
+RC: dict[str, Any] = {
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.5,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "legend.handlelength": 2.6,
+    "lines.solid_capstyle": "round",
+    "path.simplify": True,
+    "path.simplify_threshold": 0.3,
+    "svg.hashsalt": "stickslip",
+    "svg.fonttype": "path",
+}
+
+
+@dataclass(frozen=True)
+class Style:
+    """Colour (Okabe-Ito, safe for the colour-blind), dashes and width (points) of a line."""
+
+    colour: str
+    dashes: Any = "-"
+    width: float = 1.1
+
+
+REFERENCE = Style("#000000", (0, (1, 1.5)), 1.3)
+LAWS = {
+    "coulomb": Style("#E69F00", (0, (5, 1.5))),
+    "stribeck": Style("#56B4E9", (0, (3, 1, 1, 1))),
+    "lugre": Style("#009E73", (0, (7, 1.5, 1.5, 1.5))),
+    "gms": Style("#0072B2", "-", 1.5),
+}
+LINEAR = {
+    "PD": Style("#555555", (0, (1, 1)), 1.3),
+    "PID": Style("#CC79A7", (0, (2.5, 1))),
+    "PR": Style("#D55E00", "-"),
+}
+SPARE = (
+    Style("#D55E00", (0, (4, 1))), Style("#CC79A7", (0, (1.5, 0.8))), Style("#0072B2", (0, (6, 2))),
+    Style("#009E73", (0, (2, 2))), Style("#E69F00", (0, (1, 0.7))), Style("#56B4E9", (0, (8, 2))),
+    Style("#7f7f7f", (0, (3, 1, 1, 1, 1, 1))),
+)  # fmt: skip
+
+
+def style_of(name: str, others: Sequence[str] = ()) -> Style:
+    """The style of a controller or law by its name; one of the spare ones by its place among unknown names."""
+    law = name.rpartition("-")[2]
+    known = LINEAR.get(name) or LAWS.get(law)
+    if known:
+        return known
+    strangers = [n for n in others if n not in LINEAR and n.rpartition("-")[2] not in LAWS]
+    place = strangers.index(name) if name in strangers else 0
+    return SPARE[place % len(SPARE)]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One line: its points, shape (n,), label (empty for none in the legend) and style."""
+
+    x: Array
+    y: Array
+    label: str
+    style: Style
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes.
+
+    Attributes
+    ----------
+    curves : sequence of Curve
+    y_label, x_label : str
+        With the unit.
+    x_limits, y_limits : tuple of float or None
+        None fits the data.
+    note : str
+        A line above the axes.
+    """
+
+    curves: Sequence[Curve]
+    y_label: str
+    x_label: str = ""
+    x_limits: tuple[float, float] | None = None
+    y_limits: tuple[float, float] | None = None
+    note: str = ""
+
+
+def envelope(x: Array, y: Array, bins: int = 380) -> tuple[Array, Array]:
+    """The least and the greatest point of each of `bins` stretches of x (ascending), in their order.
+
+    What is left draws the same picture as all points where a stretch is no wider than a dot.
+    """
+    if x.size <= 2 * bins:
+        return x, y
+    group = np.minimum((bins * (x - x[0]) / (x[-1] - x[0])).astype(np.int64), bins - 1)
+    order = np.lexsort((y, group))
+    first = np.flatnonzero(np.diff(group[order], prepend=-1))
+    last = np.append(first[1:] - 1, x.size - 1)
+    keep = np.unique(np.concatenate([[0, x.size - 1], order[first], order[last]]))
+    return x[keep], y[keep]
+
+
+def scaled(largest: float, unit: str) -> tuple[float, str]:
+    """Factor and unit in which values up to `largest` read well: milli or micro below 0.1 and 1e-4."""
+    if not math.isfinite(largest) or largest >= 0.1 or largest == 0.0:
+        return 1.0, unit
+    return (1e3, f"m{unit}") if largest >= 1e-4 else (1e6, f"µ{unit}")
+
+
+def draw(path: Path, title: str, message: str, panels: Sequence[Panel], height: float = 2.0) -> None:
+    """Draw panels one above the other and save them as path.svg and path.png.
+
+    Parameters
+    ----------
+    path : Path
+        Without a suffix; its folder is made.
+    title, message : str
+        What it is; what it shows.
+    panels : sequence of Panel
+        Curves of the same label and style are named once, in one legend below.
+    height : float
+        Of one panel, inches.
+    """
+    import matplotlib
+
+    with matplotlib.rc_context(RC):
+        figure = _figure(title, message, panels, height)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # No date in the file: the same study gives the same bytes.
+        figure.savefig(path.with_name(path.name + ".svg"), format="svg", metadata={"Date": None})
+        figure.savefig(path.with_name(path.name + ".png"), format="png", dpi=DPI)
+
+
+def _figure(title: str, message: str, panels: Sequence[Panel], height: float) -> Any:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    named = dict.fromkeys(c.label for p in panels for c in p.curves if c.label)
+    columns = min(4, max(1, len(named)))
+    rows = math.ceil(len(named) / columns)
+    heading = textwrap.wrap(title, 62)
+    head = 0.37 + 0.13 * len(heading)
+    total = head + height * len(panels) + 0.26 + 0.17 * rows
+    figure = Figure(figsize=(WIDTH, total))
+    FigureCanvasAgg(figure)
+    figure.text(0.02, 1.0 - 0.07 / total, "\n".join(heading), va="top", fontsize=8.0, fontweight="bold")
+    figure.text(0.02, 1.0 - (head - 0.25) / total, message, va="top", fontsize=7.5, color="#444444")
+    axes: list[Any] = []
+    shared = len({p.x_label for p in panels if p.x_label}) == 1
+    for i, panel in enumerate(panels):
+        top = head + height * i
+        # Fixed margins: matplotlib's layout engines take longer than the drawing.
+        box = (0.14, 1.0 - (top + height - 0.14) / total, 0.83, (height - 0.2) / total)
+        axes.append(figure.add_axes(box, sharex=axes[0] if axes and shared else None))
+        _fill(axes[-1], panel, bare=shared and i < len(panels) - 1)
+    handles = {line.get_label(): line for a in axes for line in a.get_lines() if line.get_label()[0] != "_"}
+    if len(handles) > 1:
+        shown = [handles[name] for name in named]
+        figure.legend(
+            handles=shown, loc="lower center", ncols=columns, bbox_to_anchor=(0.53, 0.0), columnspacing=1.4,
+            borderaxespad=0.3,
+        )  # fmt: skip
+    return figure
+
+
+def _fill(axes: Any, panel: Panel, bare: bool) -> None:
+    for curve in panel.curves:
+        axes.plot(
+            curve.x, curve.y, color=curve.style.colour, linestyle=curve.style.dashes,
+            linewidth=curve.style.width, label=curve.label or "_nolegend_",
+        )  # fmt: skip
+    axes.set_ylabel(panel.y_label)
+    axes.yaxis.set_label_coords(-0.122, 0.5)
+    if panel.x_limits:
+        axes.set_xlim(*panel.x_limits)
+    if panel.y_limits:
+        axes.set_ylim(*panel.y_limits)
+    if panel.note:
+        axes.text(
+            1.0,
+            1.015,
+            panel.note,
+            transform=axes.transAxes,
+            ha="right",
+            va="bottom",
+            fontsize=6.3,
+            color="#444444",
+        )
+    if bare:
+        axes.tick_params(labelbottom=False)
+    else:
+        axes.set_xlabel(panel.x_label)
+        axes.xaxis.labelpad = 1.5
