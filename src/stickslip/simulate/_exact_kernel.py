@@ -266,9 +266,15 @@ def storms(count: Any, loop: Any) -> bool:
 
 
 @kernel(exact=False)
+def awaits(plan: Any, grid: Any, count: Any, t: float) -> bool:
+    """Whether a time of the grid lies before t."""
+    return count[GRID_WRITTEN] < plan[GRID_ROWS] and grid[int(count[GRID_WRITTEN])] <= t + EDGE
+
+
+@kernel(exact=False)
 def solve(
-    parameter_array: Any, plan_array: Any, cell_array: Any, break_array: Any, grid_array: Any, work: Any, out_array: Any,
-    row_array: Any, acc: Any, turns: Any, nodes: Any, light: bool, full: bool, metered: bool,
+    parameter_array: Any, plan_array: Any, cell_array: Any, break_array: Any, grid_array: Any, work: Any,
+    out_array: Any, row_array: Any, acc: Any, turns: Any, nodes: Any, light: bool, full: bool, metered: bool,
 ) -> int:  # fmt: skip
     """Run the loop; returns why it ended.
 
@@ -291,7 +297,7 @@ def solve(
     elements = pointer(work, AT_ELEMENTS)
     tol = max(SAFETY * parameters[TOLERANCE], FINEST)
     longest = min(LONGEST_STEP, parameters[MAX_STEP])
-    after_event = max(0, int(math.ceil(math.log2(longest / FIRST_STEP))))
+    after_event = max(0, math.ceil(math.log2(longest / FIRST_STEP)))
     level = after_event
     generation = 1
     next_break = 0
@@ -314,10 +320,9 @@ def solve(
             event = find(lin, parameters, plan, elements, sides, loop, stretch, tol)
         happens = event >= 0.0
         h = event if happens else stretch[LENGTH]
-        if light and count[GRID_WRITTEN] < plan[GRID_ROWS]:
-            if grid[int(count[GRID_WRITTEN])] <= loop[TIME] + h + EDGE:
-                between = flow_of_level(lin, cache, generation, DEEPEST + 1, plan[SPACING])
-                write_grid(lin, between, plan, loop, stretch, grid, count, out, h, 0.1 * tol)
+        if light and awaits(plan, grid, count, loop[TIME] + h):
+            between = flow_of_level(lin, cache, generation, DEEPEST + 1, plan[SPACING])
+            write_grid(lin, between, plan, loop, stretch, grid, count, out, h, 0.1 * tol)
         if full:
             write_rows(lin, parameters, plan, cells, sides, loop, stretch, grid, count, rows, h)
         if metered:

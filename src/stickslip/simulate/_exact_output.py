@@ -176,7 +176,7 @@ def window_of(lin: Linear, stretch: Any) -> float:
     speed = abs(stretch[FREE_VELOCITY]) + rate * abs(stretch[FREE_POSITION])
     if speed == 0.0:
         return MAX_WINDOW
-    y = max(0.06, min(1.0, 0.13 * (1e-2 / (speed + 1e-12)) ** (1.0 / 3.0)))
+    y = max(0.03, min(1.0, 0.1 * (1e-2 / (speed + 1e-12)) ** (1.0 / 3.0)))
     return min(MAX_WINDOW, 2.0 * y / (abs(rate) + 1e-9))
 
 
@@ -188,7 +188,7 @@ def measure(
     """Hand the first h of the stretch to the meter, in windows of five nodes."""
     if h < SHORTEST_WINDOW:
         return
-    windows = int(math.ceil(h / window_of(lin, stretch) * (1.0 - 1e-9)))
+    windows = math.ceil(h / window_of(lin, stretch) * (1.0 - 1e-9))
     width = h / windows
     c = cubic_of(stretch)
     m = flow(lin, 0.25 * width)

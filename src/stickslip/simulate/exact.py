@@ -21,6 +21,7 @@ from stickslip.jit import flat
 from stickslip.simulate import _exact_state as col
 from stickslip.simulate._case import (
     COLUMNS,
+    DURATION,
     FROM_MEASUREMENT,
     FROM_REFERENCE,
     GAIN,
@@ -34,7 +35,7 @@ from stickslip.simulate._case import (
 )
 from stickslip.simulate._exact_kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, LONGEST_STEP, solve
 from stickslip.simulate._forcing import NO_CELLS, feedforward
-from stickslip.simulate._meter import SIZE, close_standstill, new_meter
+from stickslip.simulate._meter import SIZE, close_standstill, new_meter, settle_band_of
 from stickslip.spec import Elements
 
 __all__ = ["Prepared", "can_run", "prepare", "run"]
@@ -123,8 +124,10 @@ class Prepared:
 
     def record(self) -> Outcome:
         """Run with all rows, and the metrics if the case wants them."""
-        metered = bool(self.case.numbers[METERED])
-        acc = new_meter(float(self.case.breaks[-1]), 0.0) if metered else np.zeros(SIZE)
+        metered, duration = bool(self.case.numbers[METERED]), float(self.case.numbers[DURATION])
+        acc = (
+            new_meter(duration, settle_band_of(self.case.reference, duration)) if metered else np.zeros(SIZE)
+        )
         turns = np.zeros((TURNS if metered else 0, 2))
         rows = np.empty((int(self.plan[col.ROWS]), len(COLUMNS)))
         code, work = self._solve(NOTHING, rows, acc, turns, full=True, metered=metered)
@@ -142,8 +145,8 @@ class Prepared:
     ) -> tuple[int, Array]:  # fmt: skip
         work = self.work.copy()
         code = solve(
-            self.parameters, self.plan, self.cells, self.breaks, self.case.grid, work, out, rows, acc, turns, NODES.copy(),
-            light, full, metered,
+            self.parameters, self.plan, self.cells, self.breaks, self.case.grid, work, out, rows, acc, turns,
+            NODES.copy(), light, full, metered,
         )  # fmt: skip
         return int(code), work
 
