@@ -153,54 +153,48 @@ def tolerances(case: Case) -> Any:
     return np.array(out)
 
 
+# Dormand and Prince's coefficients: row s leads to stage s, at the fraction NODES[s] of the step; the last row is
+# the fifth-order solution (stage 6 is its rate), ERROR the difference to the fourth-order one.
+TABLEAU = np.array(
+    [
+        [0, 0, 0, 0, 0, 0],
+        [1 / 5, 0, 0, 0, 0, 0],
+        [3 / 40, 9 / 40, 0, 0, 0, 0],
+        [44 / 45, -56 / 15, 32 / 9, 0, 0, 0],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0],
+        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+)
+NODES = np.array([0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1, 1])
+ERROR = np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+
+
 @kernel()
 def stages(a: Any, w: Any, t: float, h: float, y: Any, k: Any, end: Any, error: Any, u: Any) -> None:
-    """One Dormand-Prince step from y; row 0 of k holds the rates at its start, row 6 receives those at its end."""
+    """One Dormand-Prince step from y; row 0 of k holds the rates at its start, row 6 receives those at its end.
+
+    ``u`` is left with the state of stage 5.
+    """
     n = y.shape[0]
+    for s in range(1, 7):
+        for j in range(n):
+            rise = 0.0
+            for m in range(s):
+                rise += TABLEAU[s, m] * k[m, j]
+            if s < 6:
+                u[j] = y[j] + h * rise
+            else:
+                end[j] = y[j] + h * rise
+        if s < 6:
+            rates(a, w, t + NODES[s] * h, u, k, s)
+        else:
+            rates(a, w, t + h, end, k, s)
     for j in range(n):
-        u[j] = y[j] + h * (0.2 * k[0, j])
-    rates(a, w, t + 0.2 * h, u, k, 1)
-    for j in range(n):
-        u[j] = y[j] + h * (3.0 / 40.0 * k[0, j] + 9.0 / 40.0 * k[1, j])
-    rates(a, w, t + 0.3 * h, u, k, 2)
-    for j in range(n):
-        u[j] = y[j] + h * (44.0 / 45.0 * k[0, j] - 56.0 / 15.0 * k[1, j] + 32.0 / 9.0 * k[2, j])
-    rates(a, w, t + 0.8 * h, u, k, 3)
-    for j in range(n):
-        u[j] = y[j] + h * (
-            19372.0 / 6561.0 * k[0, j]
-            - 25360.0 / 2187.0 * k[1, j]
-            + 64448.0 / 6561.0 * k[2, j]
-            - 212.0 / 729.0 * k[3, j]
-        )
-    rates(a, w, t + 8.0 / 9.0 * h, u, k, 4)
-    for j in range(n):
-        u[j] = y[j] + h * (
-            9017.0 / 3168.0 * k[0, j]
-            - 355.0 / 33.0 * k[1, j]
-            + 46732.0 / 5247.0 * k[2, j]
-            + 49.0 / 176.0 * k[3, j]
-            - 5103.0 / 18656.0 * k[4, j]
-        )
-    rates(a, w, t + h, u, k, 5)
-    for j in range(n):
-        end[j] = y[j] + h * (
-            35.0 / 384.0 * k[0, j]
-            + 500.0 / 1113.0 * k[2, j]
-            + 125.0 / 192.0 * k[3, j]
-            - 2187.0 / 6784.0 * k[4, j]
-            + 11.0 / 84.0 * k[5, j]
-        )
-    rates(a, w, t + h, end, k, 6)
-    for j in range(n):
-        error[j] = h * (
-            71.0 / 57600.0 * k[0, j]
-            - 71.0 / 16695.0 * k[2, j]
-            + 71.0 / 1920.0 * k[3, j]
-            - 17253.0 / 339200.0 * k[4, j]
-            + 22.0 / 525.0 * k[5, j]
-            - 1.0 / 40.0 * k[6, j]
-        )
+        off = 0.0
+        for m in range(STAGES):
+            off += ERROR[m] * k[m, j]
+        error[j] = h * off
 
 
 @kernel()
@@ -281,12 +275,7 @@ def measure(
 ) -> None:
     """Hand an accepted step to the meter, at five nodes of its dense output."""
     for i in range(5):
-        if i == 0:
-            u[:] = y
-        elif i == 4:
-            u[:] = end
-        else:
-            dense(h, y, k, end, 0.25 * i, u)
+        dense(h, y, k, end, 0.25 * i, u)
         rates(a, w, t + 0.25 * i * h, u, k, SCRATCH)
         nodes[0, i] = w[THETA_D] - u[POSITION]
         nodes[1, i] = w[OMEGA_D] - u[VELOCITY]
@@ -354,7 +343,7 @@ def stiffness_limit(h: float, k: Any, end: Any, u: Any, tolerance: Any) -> float
     """Longest next step that follows the fastest motion present instead of ringing at the border of stability.
 
     The last two stages belong to the same time: the difference of their rates over that of their states tells
-    the largest eigenvalue (Hairer and Wanner, Solving ODEs II, IV.2). ``u`` holds the state of stage 6.
+    the largest eigenvalue (Hairer and Wanner, Solving ODEs II, IV.2). ``u`` holds the state of stage 5.
     """
     above, below = 0.0, 0.0
     for j in range(u.shape[0]):
@@ -437,8 +426,10 @@ def integrate(
             if w[METERED] != 0.0:
                 measure(a, w, t, step, y, k, end, u, nodes, acc, turns)
             t = stop if final else t + step
-            y[:] = end
-            k[0, :] = k[6, :]
+            # Element by element: assigning slices would compile numpy's checks of shapes, seconds of it.
+            for j in range(n):
+                y[j] = end[j]
+                k[0, j] = k[6, j]
             code = broken(a, w, y)
             if code == DONE and event:
                 counts[2] += 1
