@@ -46,6 +46,8 @@ class Document:
 
     def locate(self, written: str) -> Path:
         """Where the file written as `written` lies; it is remembered as an input."""
+        if not written.isprintable() or not written.strip():
+            raise ConfigError(f"{self.name}: {written!r} is no path of a file; mend it")
         self.files[written] = self.moved.get(written, self.folder / written)
         return self.files[written]
 

@@ -29,7 +29,12 @@ def run(args: argparse.Namespace) -> int:
             f"{name} (default)" if name == choice.default else name for name in choice.options
         )
         print(f"{choice.name}: {options}")
-    print(f"passive: {law.passive}\nsource: {'; '.join(law.source)}")
+    print(f"passive: {law.passive}\nsource: {'; '.join(law.source)}\n\nas a study's file has it:")
+    print(f'  law = "{law.name}"')
+    for f in law.fields:
+        if f.name in law.example:
+            value = law.example[f.name]
+            print(f"  {f.name} = {list(value) if f.per_element else value}")
     return 0
 
 

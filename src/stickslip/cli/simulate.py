@@ -45,6 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
     planned = load_run(args.file)
     out: Path = args.out or Path(f"{args.file.stem}.npz")
+    planned.check()
     prepared_folder(out.parent)
     executed = execute(planned)
     try:

@@ -27,7 +27,7 @@ from stickslip.simulate import _case
 from stickslip.simulate._case import COLUMNS, UNITS, Case, Outcome, lay_out
 from stickslip.simulate._meter import metrics
 
-__all__ = ["INTEGRATORS", "prepare", "simulate"]
+__all__ = ["INTEGRATORS", "integrator_for", "prepare", "simulate"]
 
 INTEGRATORS = ("exact", "adaptive", "fixed")
 """In the order in which `integrator="auto"` tries them."""
@@ -101,7 +101,7 @@ def simulate(
         axis, controller, reference, duration,
         tolerance=tolerance, slip_rule=slip_rule, output=output, initial=initial, metered=metered,
     )  # fmt: skip
-    name, run = _integrator(integrator, case)
+    name, run = integrator_for(case, integrator)
     outcome: Outcome = run(case, time_step) if name == "fixed" else run(case)
     record = _record(case, outcome, {"integrator": name, "slip_rule": slip_rule})
     if outcome.code != _case.DONE:
@@ -154,8 +154,8 @@ def _grid(output: float | Sequence[float] | np.ndarray[Any, Any], duration: floa
     return times
 
 
-def _integrator(name: str, case: Case) -> tuple[str, Any]:
-    """The integrator of that name, or the first that can run the case."""
+def integrator_for(case: Case, name: str = "auto") -> tuple[str, Any]:
+    """Name and ``run`` of that integrator, or of the first that can run the case; `InputError` if it cannot."""
     if name != "auto":
         if name not in INTEGRATORS:
             raise UnknownName("integrator", name, (*INTEGRATORS, "auto"))

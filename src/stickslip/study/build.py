@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +15,11 @@ from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import LINEAR, Gains, place
-from stickslip.errors import ConfigError, InputError
+from stickslip.errors import ConfigError, InputError, suggestion
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulate.closed_loop import INTEGRATORS
-from stickslip.spec import Law
+from stickslip.spec import Described, Law
 
 __all__ = [
     "Numerics",
@@ -141,8 +141,20 @@ def model(table: Table, laws: Mapping[str, Law], base: Model | None = None) -> M
             raise table.error("slip_rule", "belongs to the whole run; give it at the top of the file")
         values: dict[str, Any] = base.parameters._asdict() if base else {}
         values.update({k: v for k, v in given.items() if k not in choices})
+        _refuse_unknown(table, values, law.having(**choices), options)
         found = Model(law, choices, **values)
         return found.scaled(**scale) if scale else found
+
+
+def _refuse_unknown(
+    table: Table, values: Mapping[str, Any], described: Described, others: Iterable[str] = ()
+) -> None:
+    """Refuse what is no parameter, before Python takes it for an argument of its own."""
+    names = [f.name for f in described.fields]
+    for key in values:
+        if key not in names:
+            remedy = suggestion(key, [*names, *others])
+            raise ConfigError(f"{table.label(key)}: {described.name} has no parameter {key!r}; {remedy}")
 
 
 def _law(table: Table, laws: Mapping[str, Law]) -> Law:
@@ -176,6 +188,7 @@ def reference(table: Table) -> Reference:
             and all(isinstance(v, list) for v in given.values())
         ):
             return Reference.table(given["time"], given["position"])
+        _refuse_unknown(table, given, plugins.reference_kind(kind), ["file"] if kind == "table" else [])
         return Reference(kind, **given)
 
 
@@ -187,7 +200,7 @@ def _points(table: Table, written: str) -> list[list[float]]:
             rows = [
                 (i, row) for i, row in enumerate(csv.reader(file), 1) if row and not row[0].startswith("#")
             ]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, ValueError, csv.Error) as error:  # ValueError: not UTF-8, or a NUL in the path
         reason = getattr(error, "strerror", None) or str(error)
         raise table.error("file", f"cannot be read ({reason}); give a CSV file") from None
     if rows and not _is_number(rows[0][1][0]):

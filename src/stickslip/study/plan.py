@@ -15,7 +15,7 @@ from stickslip.control.controller import Controller
 from stickslip.errors import ConfigError, InputError, UnknownName
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulate.closed_loop import prepare
+from stickslip.simulate.closed_loop import integrator_for, prepare
 from stickslip.study import build
 from stickslip.study.build import Numerics, Placement
 from stickslip.study.provenance import engine_hash, source_hash
@@ -78,8 +78,11 @@ class PlannedRun:
         """
         n = self.numerics
         try:
-            prepare(self.axis, self.control, self.motion, self.duration, tolerance=n.tolerance,
-                    slip_rule=self.slip_rule, output=n.output)  # fmt: skip
+            case = prepare(
+                self.axis, self.control, self.motion, self.duration,
+                tolerance=n.tolerance, slip_rule=self.slip_rule, output=n.output,
+            )  # fmt: skip
+            integrator_for(case, n.integrator)
         except InputError as error:
             raise ConfigError(f"run {self.key}: {error}") from None
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from stickslip.errors import ConfigError, InputError, SimulationError
+from stickslip.errors import InputError, SimulationError
 from stickslip.record import Record
 from stickslip.simulate.closed_loop import simulate
 from stickslip.study import files
@@ -37,13 +37,7 @@ class Executed:
 
 
 def execute(planned: PlannedRun) -> Executed:
-    """Simulate one run; one that ends early gives the record of what was computed.
-
-    Raises
-    ------
-    InputError
-        If the integrator that was named cannot run it.
-    """
+    """Simulate one run that `PlannedRun.check` passes; one that ends early gives what was computed until then."""
     n = planned.numerics
     start, failure = time.thread_time(), ""
     try:
@@ -55,10 +49,6 @@ def execute(planned: PlannedRun) -> Executed:
         if error.record is None:
             raise
         record, failure = error.record, str(error)
-    except ConfigError:
-        raise
-    except InputError as error:
-        raise ConfigError(f"run {planned.key}: {error}") from None
     return Executed(record, failure, time.thread_time() - start)
 
 
@@ -121,6 +111,8 @@ def _finished(planned: Sequence[PlannedRun], folder: Path, jobs: int) -> Iterato
             yield found
         else:
             missing.append(p)
+    for p in missing:
+        p.check()  # Before the first of them runs; laws are compiled here, one after another.
     if jobs == 1:
         for p in missing:
             yield _run_and_keep(p, folder)
@@ -129,8 +121,6 @@ def _finished(planned: Sequence[PlannedRun], folder: Path, jobs: int) -> Iterato
 
 
 def _in_threads(planned: Sequence[PlannedRun], folder: Path, jobs: int) -> Iterator[Run]:
-    for p in planned:
-        p.check()  # Laws are compiled here, one after another: the compiler runs one thread at a time anyway.
     pool = ThreadPoolExecutor(jobs)
     try:
         futures: list[Future[Run]] = [pool.submit(_run_and_keep, p, folder) for p in planned]

@@ -1,0 +1,302 @@
+"""A study: what it plans, what it writes, how it goes on after an interruption."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conftest import INERTIA, thesis_run
+from stickslip.errors import InputError
+from stickslip.model import Model
+from stickslip.record import Record
+from stickslip.study import study as studies
+from stickslip.study.files import KEYS
+from stickslip.study.plan import load, load_run, select
+from stickslip.study.rerun import rerun
+
+DATA = Path(__file__).parents[1] / "data"
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> studies.Study:
+    for name in ("small_study.toml", "motion.csv"):
+        shutil.copy(DATA / name, tmp_path)
+    return load(tmp_path / "small_study.toml")
+
+
+# ---- the thesis's study ------------------------------------------------------------------------------------------
+
+
+def test_the_thesis_is_180_runs_in_order() -> None:
+    thesis = load("thesis")
+    controllers = [
+        "PD",
+        "PID",
+        *(f"{way}-{law}" for way in ("FF", "FB") for law in ("coulomb", "stribeck", "lugre", "gms")),
+    ]
+    expected = [
+        f"{rule}/{reference}/{friction}/{controller}"
+        for rule in ("signed", "literal")
+        for reference in ("low", "high", "step")
+        for friction in ("nominal", "plus10", "minus10")
+        for controller in controllers
+    ]
+    assert [run.key for run in thesis.runs] == expected
+    assert [run.key for run in thesis.extras] == [
+        "signed/high/none/PR", "signed/high/none/PD", "signed/high/nominal/PR",
+    ]  # fmt: skip
+    assert [r.figure for r in thesis.responses] == ["3.5", "3.10", "3.11", "3.13", "3.14", "3.20"]
+
+
+def test_the_thesis_file_says_what_the_tables_say() -> None:
+    for run in load("thesis").runs:
+        axis, control, motion, duration = thesis_run(run.key.split("/", 1)[1])
+        assert run.axis.inertia == INERTIA
+        assert run.axis.friction.parameters == axis.friction.parameters
+        assert run.control.gains == control.gains
+        assert (run.duration, run.motion.parameters) == (duration, motion.parameters)
+        ours, theirs = run.control.compensator, control.compensator
+        assert type(ours) is type(theirs)
+        if ours and theirs:
+            assert ours.model.parameters == theirs.model.parameters
+            assert (ours.gain, ours.filter_hz) == (1.0, None)
+
+
+@pytest.mark.slow
+def test_the_thesis_runs(tmp_path: Path, study_reference: dict[tuple[str, str], dict[str, Any]]) -> None:
+    result = studies.run(load("thesis"), tmp_path, ["low", "step", "nominal"])
+    assert len(result.runs) == 2 * 2 * 10
+    assert not [run.key for run in result if run.failure]
+    for run in result:
+        value, room = study_reference[run.slip_rule, run.case]["metrics"]["rms_e"]
+        if study_reference[run.slip_rule, run.case]["cls"] == "W":
+            assert abs(run.metrics["position_rms_rad"] - value) <= room, run.key
+
+
+# ---- selection ---------------------------------------------------------------------------------------------------
+
+
+def test_selection_is_any_within_a_family_and_all_of_the_families() -> None:
+    runs = load("thesis").runs
+    assert {r.reference for r in select(runs, ["low", "step"])} == {"low", "step"}
+    assert len(select(runs, ["low", "step"])) == 120
+    assert [r.key for r in select(runs, ["FF-lugre", "low", "nominal", "signed"])] == [
+        "signed/low/nominal/FF-lugre"
+    ]
+    assert select(runs, []) == list(runs)
+    with pytest.raises(InputError, match="'minus10'"):
+        select(runs, ["minus1"])
+
+
+# ---- what a study writes ------------------------------------------------------------------------------------------
+
+
+def test_files_and_their_content(small: studies.Study, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    result = studies.run(small, out)
+    keys = [f"signed/{r}/{f}/{c}" for r in ("sine", "points") for f in ("nominal", "plus10")
+            for c in ("PD", "FF-lugre", "FF-coulomb")]  # fmt: skip
+    assert [run.key for run in result] == keys
+    with (out / "metrics.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[:4] == list(KEYS)
+    assert ["/".join(row[k] for k in KEYS) for row in rows] == keys
+    for row, run in zip(rows, result):
+        record = Record.load(out / "records" / f"{run.key}.npz")
+        assert record.meta["metrics"].keys() == run.metrics.keys()
+        for name, value in run.metrics.items():
+            assert row[name] == ("" if math.isnan(value) else repr(value))
+        assert run.record().time[-1] == pytest.approx(0.1)
+    assert rows[0]["limit_cycle_period_s"] == ""
+    manifest = json.loads((out / "manifest.json").read_text())
+    assert [entry["run"] for entry in manifest["runs"]] == keys + [run.key for run in result.extras]
+    assert {entry["written"] for entry in manifest["inputs"]} == {"small_study.toml", "motion.csv"}
+    assert all(len(entry["sha256"]) == 64 for entry in manifest["inputs"])
+    assert manifest["versions"].keys() >= {"stickslip", "python", "numpy", "numba"}
+    assert manifest["configuration"] == small.config
+    assert not list(out.rglob("*.part"))
+
+
+def test_parquet_holds_the_same_table(small: studies.Study, tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    result = studies.run(small, tmp_path / "out")
+    rows = parquet.read_table(tmp_path / "out" / "metrics.parquet").to_pylist()
+    for row, run in zip(rows, result, strict=True):
+        assert row["controller"] == run.controller
+        assert row["position_rms_rad"] == run.metrics["position_rms_rad"]
+        assert row["limit_cycle_period_s"] is None
+
+
+def test_threads_change_no_number(small: studies.Study, tmp_path: Path) -> None:
+    studies.run(small, tmp_path / "one", jobs=1)
+    studies.run(small, tmp_path / "two", jobs=2)
+    assert (tmp_path / "one" / "metrics.csv").read_bytes() == (tmp_path / "two" / "metrics.csv").read_bytes()
+
+
+# ---- going on -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_interrupted_study_goes_on(
+    small: studies.Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jobs: int
+) -> None:
+    whole = studies.run(small, tmp_path / "whole")
+
+    def interrupt(done: int, total: int) -> None:
+        if done == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        studies.run(small, tmp_path / "parts", jobs=jobs, progress=interrupt)
+    kept = len(list((tmp_path / "parts").rglob("*.npz")))
+    assert 5 <= kept < len(whole.runs) + len(whole.extras)
+
+    executed: list[str] = []
+    real = studies.execute
+
+    def counted(planned: studies.PlannedRun) -> Any:
+        executed.append(planned.key)
+        return real(planned)
+
+    monkeypatch.setattr(studies, "execute", counted)
+    studies.run(small, tmp_path / "parts", jobs=jobs)
+    assert len(executed) == len(whole.runs) + len(whole.extras) - kept
+    assert (tmp_path / "whole" / "metrics.csv").read_bytes() == (
+        tmp_path / "parts" / "metrics.csv"
+    ).read_bytes()
+    executed.clear()
+    studies.run(small, tmp_path / "parts")
+    assert executed == []
+
+
+def test_only_what_changed_runs_again(
+    small: studies.Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    studies.run(small, out)
+    (out / "records" / "signed" / "sine" / "nominal" / "PD.npz").write_bytes(b"cut off")
+    small.source.write_text(small.source.read_text().replace("gain = 0.9", "gain = 0.8"))
+    executed: list[str] = []
+    real = studies.execute
+    monkeypatch.setattr(studies, "execute", lambda p: executed.append(p.key) or real(p))
+    studies.run(load(small.source), out)
+    assert sorted(executed) == sorted(
+        ["signed/sine/nominal/PD"]
+        + [f"signed/{r}/{f}/FF-lugre" for r in ("sine", "points") for f in ("nominal", "plus10")]
+    )
+
+
+def test_fingerprints_tell_runs_apart() -> None:
+    thesis = load("thesis")
+    every = [run.fingerprint for run in (*thesis.runs, *thesis.extras)]
+    assert len(set(every)) == len(every)
+    assert every == [run.fingerprint for run in (*load("thesis").runs, *load("thesis").extras)]
+
+
+def test_rerun_is_identical_and_sees_a_change(small: studies.Study, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    studies.run(small, out, ["sine"])
+    small.source.unlink()  # The folder holds all that is needed.
+    (tmp_path / "motion.csv").unlink()
+    found = rerun(out, jobs=2)
+    assert (found.runs, found.differences, found.notes) == (6 + 3, [], [])
+    manifest = json.loads((out / "manifest.json").read_text())
+    manifest["runs"][0]["metrics"]["position_rms_rad"] *= 1.0 + 1e-12
+    (out / "manifest.json").write_text(json.dumps(manifest))
+    assert len(rerun(out).differences) == 1
+    (out / "inputs" / "small_study.toml").write_text("")
+    with pytest.raises(InputError, match="was changed"):
+        rerun(out)
+
+
+# ---- runs that end early -------------------------------------------------------------------------------------------
+
+
+def test_a_run_that_ends_early_is_kept_and_the_others_go_on(small: studies.Study, tmp_path: Path) -> None:
+    text = small.source.read_text()
+    # Far too large a gain against samples of 10 ms: the loop diverges.
+    wild = "[controllers.wild]\ngains = {kp = 500.0, kd = 50.0, kr = 50.0}\nsample_time = 1e-2\n\n[controllers.PD]"
+    small.source.write_text(
+        text.replace("[controllers.PD]", wild, 1).replace("duration = 0.1", "duration = 5.0", 1)
+    )
+    study = load(small.source)
+    result = studies.run(study, tmp_path / "out", ["wild", "PD", "sine", "nominal"])
+    failed = result.find("signed/sine/nominal/wild")
+    assert "ended at" in failed.failure
+    assert failed.metrics == {}
+    assert 0 < len(failed.record()) < len(result.find("signed/sine/nominal/PD").record())
+    assert result.find("signed/sine/nominal/PD").failure == ""
+    again = studies.run(study, tmp_path / "out", ["wild", "PD", "sine", "nominal"])
+    assert again.find("signed/sine/nominal/wild").failure == failed.failure
+    rows = (tmp_path / "out" / "metrics.csv").read_text().splitlines()
+    assert any(row.startswith("signed,sine,nominal,wild,,,") for row in rows)
+    assert rerun(tmp_path / "out").differences == []
+
+
+# ---- a user's own -------------------------------------------------------------------------------------------------
+
+LAW = '''
+"""Viscous friction with a level of its own."""
+from typing import Annotated, NamedTuple
+from stickslip.spec import Law, Par
+
+class Params(NamedTuple):
+    """Its parameters."""
+    level: Annotated[float, Par("N·m", "F_0", "level", lower=0.0)]
+    slope: Annotated[float, Par("N·m·s/rad", "b", "slope", lower=0.0, default=0.01)]
+
+def steady(v, p):
+    if v > 0.0:
+        return p.level + p.slope * v
+    if v < 0.0:
+        return p.slope * v - p.level
+    return 0.0
+
+def step(v0, v1, dt, z, p, u):
+    return steady(v1, p)
+
+def rate(v, z, p, u, dz):
+    return steady(v, p)
+
+LAW = Law(
+    "mine", Params, step, title="Mine", equation="F = F_0", source=("none",), example={"level": 0.2}, rate=rate,
+    steady=steady,
+)
+'''
+
+
+def test_a_law_from_a_file_serves_as_plant_and_compensator(small: studies.Study, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(LAW)
+    text = small.source.read_text()
+    text = text.replace("[axis]", 'plugins = ["mine.py"]\n\n[axis]', 1)
+    text += '\n[laws.mine]\nlaw = "mine"\nlevel = 0.2\n\n[controllers.FF-mine]\nlinear = "PD"\n'
+    text += 'compensator = "feedforward"\nlaw = "mine"\n\n[friction.own]\nlaw = "mine.py"\nlevel = 0.1\n'
+    small.source.write_text(text)
+    study = load(small.source)
+    result = studies.run(study, tmp_path / "out", ["FF-mine", "sine", "own", "nominal"])
+    assert [run.failure for run in result] == ["", ""]
+    (tmp_path / "mine.py").unlink()  # Its copy serves.
+    assert rerun(tmp_path / "out").differences == []
+
+
+def test_like_takes_values_over(small: studies.Study) -> None:
+    text = small.source.read_text() + '\n[friction.softer]\nlike = "plus10"\nk = [5.0e3, 2.5e3]\n'
+    small.source.write_text(text)
+    friction = {run.friction: run.axis.friction for run in load(small.source).runs}
+    assert friction["softer"].parameters.k == (5e3, 2.5e3)
+    assert friction["softer"].parameters.fs == friction["plus10"].parameters.fs
+    assert isinstance(friction["plus10"], Model)
+
+
+def test_one_run_from_a_file() -> None:
+    run = load_run(DATA / "one_run.toml")
+    run.check()
+    executed = studies.execute(run)
+    assert executed.failure == ""
+    assert executed.metrics["position_rms_rad"] > 0.0
