@@ -67,8 +67,8 @@ LOCAL = 1e-3
 CREEP, STEEPEST = 1e-9, 1e6
 """Velocity (rad/s) at which a law's slope is taken, and the relaxation rate (1/s) that explicit steps can follow."""
 MOST_STEPS = 50_000_000
-RESOLVED = 1.6
-"""Step times the largest eigenvalue; explicit Runge-Kutta amplifies ringing beyond about 1.6."""
+RINGING, DECAYING = 1.6, 2.8
+"""Step times the largest eigenvalue that explicit stages damp: imaginary ones to about 1.6, real ones to 3.3."""
 # Stages of the pair; the scratch row after them serves events and output.
 STAGES, SCRATCH = 7, 7
 
@@ -270,22 +270,30 @@ def emit(a: Any, w: Any, t: float, y: Any, k: Any, rows: Any, n: int, event: flo
 
 
 @kernel()
+def note(w: Any, y: Any, nodes: Any, i: int) -> None:
+    """Write the signals of the state whose rates were taken last into column i of the meter's nodes."""
+    nodes[0, i] = w[THETA_D] - y[POSITION]
+    nodes[1, i] = w[OMEGA_D] - y[VELOCITY]
+    nodes[2, i] = y[POSITION]
+    nodes[3, i] = y[VELOCITY]
+    nodes[4, i] = w[OMEGA_D]
+    nodes[5, i] = w[MOTOR_TORQUE]
+    nodes[6, i] = w[FRICTION_TORQUE]
+    nodes[7, i] = w[COMPENSATION_TORQUE]
+
+
+@kernel()
 def measure(
     a: Any, w: Any, t: float, h: float, y: Any, k: Any, end: Any, u: Any, nodes: Any, acc: Any, turns: Any
 ) -> None:
-    """Hand an accepted step to the meter, at five nodes of its dense output."""
-    for i in range(5):
+    """Hand an accepted step to the meter: its ends are noted, the nodes between come from the dense output."""
+    for i in range(1, 4):
         dense(h, y, k, end, 0.25 * i, u)
         rates(a, w, t + 0.25 * i * h, u, k, SCRATCH)
-        nodes[0, i] = w[THETA_D] - u[POSITION]
-        nodes[1, i] = w[OMEGA_D] - u[VELOCITY]
-        nodes[2, i] = u[POSITION]
-        nodes[3, i] = u[VELOCITY]
-        nodes[4, i] = w[OMEGA_D]
-        nodes[5, i] = w[MOTOR_TORQUE]
-        nodes[6, i] = w[FRICTION_TORQUE]
-        nodes[7, i] = w[COMPENSATION_TORQUE]
+        note(w, u, nodes, i)
     meter(acc, turns, t, h, nodes[0], nodes[1], nodes[2], nodes[3], nodes[4], nodes[5], nodes[6], nodes[7])
+    for j in range(8):
+        nodes[j, 0] = nodes[j, 4]
 
 
 @kernel()
@@ -339,17 +347,97 @@ def ratio(error: Any, tolerance: Any) -> float:
 
 
 @kernel()
-def stiffness_limit(h: float, k: Any, end: Any, u: Any, tolerance: Any) -> float:
+def stiffness_limit(k: Any, end: Any, u: Any, tolerance: Any) -> float:
     """Longest next step that follows the fastest motion present instead of ringing at the border of stability.
 
-    The last two stages belong to the same time: the difference of their rates over that of their states tells
-    the largest eigenvalue (Hairer and Wanner, Solving ODEs II, IV.2). ``u`` holds the state of stage 5.
+    The last two stages belong to the same time: the difference of their rates against that of their states tells
+    the largest eigenvalue and whether it decays or rings (Hairer and Wanner, Solving ODEs II, IV.2). ``u`` holds
+    the state of stage 5.
     """
-    above, below = 0.0, 0.0
+    above, below, along = 0.0, 0.0, 0.0
     for j in range(u.shape[0]):
-        above += ((k[6, j] - k[5, j]) / tolerance[j]) ** 2
-        below += ((end[j] - u[j]) / tolerance[j]) ** 2
-    return RESOLVED * math.sqrt(below / above) if above > 0.0 and below > 0.0 else math.inf
+        rate = (k[6, j] - k[5, j]) / tolerance[j]
+        state = (end[j] - u[j]) / tolerance[j]
+        above += rate * rate
+        below += state * state
+        along += rate * state
+    if above <= 0.0 or below <= 0.0:
+        return math.inf
+    size = math.sqrt(above / below)
+    decays = along < -0.95 * math.sqrt(above * below)
+    return (DECAYING if decays else RINGING) / size
+
+
+# ---- one step, and all of them ------------------------------------------------------------------------------
+# What a trial step leaves behind: its length, whether it ends the stretch, whether an event is due at its end, the
+# value of the event function there, the length of the next step, and whether it may be taken.
+STEP, FINAL, EVENT, VALUE, NEXT, TAKEN, TRIAL = range(7)
+
+
+@kernel()
+def attempt(
+    a: Any, w: Any, t: float, stop: float, y: Any, k: Any, end: Any, error: Any, u: Any, g: Any, tolerance: Any,
+    nodes: Any, trial: Any,
+) -> int:  # fmt: skip
+    """Try one step of length ``trial[NEXT]`` from t; where it is accepted it ends at the first event."""
+    h = trial[NEXT]
+    trial[FINAL] = t + h * (1.0 + 1e-9) >= stop
+    step = stop - t if trial[FINAL] else h
+    stages(a, w, t, step, y, k, end, error, u)
+    worst = ratio(error, tolerance)
+    shrink = small_enough(a, w, y, end)
+    trial[TAKEN] = 0.0
+    if not worst < np.inf and step <= SHORTEST:
+        return NOT_FINITE
+    if worst > 1.0 and step <= SHORTEST:
+        return NO_STEP
+    if (worst > 1.0 or shrink < 1.0) and step > SHORTEST:
+        trial[NEXT] = step * min(shrink, max(0.2, 0.9 * worst**-0.2) if worst > 1.0 else 1.0)
+        return DONE
+    trial[TAKEN] = 1.0
+    grow = min(5.0, 0.9 * worst**-0.2) if worst > 1e-4 else 5.0
+    resolved = stiffness_limit(k, end, u, tolerance)
+    note(w, end, nodes, 4)
+    before, now = trial[VALUE], events(a, w, t + step, end, k, SCRATCH, g)
+    # Far from any event at both ends, none lies between; an extreme of the velocity is looked at all the same.
+    near = now > -4.0 * abs(now - before) or k[0, VELOCITY] * k[6, VELOCITY] < 0.0
+    if now < 0.0 and near:
+        early = inside(a, w, t, step, y, k, end, u, g)
+        if early > 0.0 and step > SHORTEST:
+            step *= early
+            trial[FINAL] = 0.0
+            stages(a, w, t, step, y, k, end, error, u)
+            note(w, end, nodes, 4)
+            now = events(a, w, t + step, end, k, SCRATCH, g)
+    trial[EVENT] = now >= 0.0
+    if now >= 0.0:
+        trial[FINAL] = 0.0
+        before = events(a, w, t, y, k, SCRATCH, g)
+        precision = min(max(LOCAL * w[TOLERANCE], 4e-16 * t), 1e-10)
+        step = locate(a, w, t, step, y, k, end, error, u, g, before, now, precision)
+        note(w, end, nodes, 4)
+        trial[NEXT] = max(min(h, step * grow, 1e-4, resolved), 1e-8)
+    elif not trial[FINAL] or step >= h:
+        trial[NEXT] = min(step * grow, resolved)
+    trial[STEP] = step
+    trial[VALUE] = now
+    return DONE
+
+
+@kernel()
+def cross(
+    a: Any, w: Any, t: float, stop: float, y: Any, k: Any, g: Any, rows: Any, written: int, room: int
+) -> tuple[int, int]:
+    """Switch at an event, with a row before and after it; returns the number of rows and of switching rounds."""
+    if rows.shape[0] - written > room + 2:
+        written = emit(a, w, t, y, k, rows, written, 1.0)
+    events(a, w, t, y, k, SCRATCH, g)
+    switch(a, w, t, y, k, SCRATCH, g)
+    rounds = settle(a, w, t, y, k, g)
+    begin_side(a, w, t, 0.5 * (t + stop), y, k, SCRATCH)
+    if rows.shape[0] - written > room + 2:
+        written = emit(a, w, t, y, k, rows, written, 1.0)
+    return written, rounds
 
 
 @kernel()
@@ -370,14 +458,13 @@ def integrate(
     ``counts`` receives steps, rejected steps, events and rows.
     """
     n = y.shape[0]
-    k = np.zeros((STAGES + 1, n))
+    k, nodes, trial = np.zeros((STAGES + 1, n)), np.zeros((8, 5)), np.zeros(TRIAL)
     end, error, u = np.zeros(n), np.zeros(n), np.zeros(n)
     g = np.zeros(n - LAWS + EXTRA)
-    nodes = np.zeros((8, 5))
     longest = min(w[MAX_STEP], MAX_WINDOW)
-    t, h = 0.0, 1e-6
-    written, storm_start, storm_events = 0, 0.0, 0
-    out = 0
+    t, written, out, code = 0.0, 0, 0, DONE
+    storm_start, storm_events = 0.0, 0
+    trial[NEXT] = 1e-6
     for b in range(breaks.shape[0]):
         stop = breaks[b]
         begin_side(a, w, t, 0.5 * (t + stop), y, k, SCRATCH)
@@ -385,39 +472,20 @@ def integrate(
         if out < grid.shape[0] and grid[out] <= t:
             written = emit(a, w, t, y, k, rows, written, 0.0)
             out += 1
-        rates(a, w, t, y, k, 0)
-        h = min(h, 1e-4)
-        while t < stop:
-            h = min(h, longest)
-            final = t + h * (1.0 + 1e-9) >= stop
-            step = stop - t if final else h
-            stages(a, w, t, step, y, k, end, error, u)
-            worst = ratio(error, tolerance)
-            shrink = small_enough(a, w, y, end)
-            if (worst > 1.0 or shrink < 1.0) and step > SHORTEST:
-                h = step * min(shrink, max(0.2, 0.9 * worst**-0.2) if worst > 1.0 else 1.0)
+        fresh = True
+        trial[NEXT] = min(trial[NEXT], 1e-4)
+        while t < stop and code == DONE:
+            if fresh:
+                rates(a, w, t, y, k, 0)
+                note(w, y, nodes, 0)
+                trial[VALUE] = -np.inf
+                fresh = False
+            trial[NEXT] = min(trial[NEXT], longest)
+            code = attempt(a, w, t, stop, y, k, end, error, u, g, tolerance, nodes, trial)
+            if code != DONE or trial[TAKEN] == 0.0:
                 counts[1] += 1
                 continue
-            if not worst < np.inf or (worst > 1.0 and step <= SHORTEST):
-                counts[3] = written
-                return (NOT_FINITE if not worst < np.inf else NO_STEP), t
-            grow = min(5.0, 0.9 * worst**-0.2) if worst > 1e-4 else 5.0
-            resolved = stiffness_limit(step, k, end, u, tolerance)
-            now = events(a, w, t + step, end, k, SCRATCH, g)
-            event = now >= 0.0
-            if not event:
-                early = inside(a, w, t, step, y, k, end, u, g)
-                if early > 0.0 and step > SHORTEST:
-                    step *= early
-                    final = False
-                    stages(a, w, t, step, y, k, end, error, u)
-                    now = events(a, w, t + step, end, k, SCRATCH, g)
-                    event = now >= 0.0
-            if event:
-                final = False
-                before = events(a, w, t, y, k, SCRATCH, g)
-                precision = max(LOCAL * w[TOLERANCE], 4e-16 * t)
-                step = locate(a, w, t, step, y, k, end, error, u, g, before, now, min(precision, 1e-10))
+            step = trial[STEP]
             counts[0] += 1
             while out < grid.shape[0] and grid[out] <= t + step:
                 dense(step, y, k, end, min(1.0, (grid[out] - t) / step), u)
@@ -425,36 +493,25 @@ def integrate(
                 out += 1
             if w[METERED] != 0.0:
                 measure(a, w, t, step, y, k, end, u, nodes, acc, turns)
-            t = stop if final else t + step
+            t = stop if trial[FINAL] else t + step
             # Element by element: assigning slices would compile numpy's checks of shapes, seconds of it.
             for j in range(n):
                 y[j] = end[j]
                 k[0, j] = k[6, j]
             code = broken(a, w, y)
-            if code == DONE and event:
+            if code == DONE and trial[EVENT]:
                 counts[2] += 1
                 storm_events += 1
-                if rows.shape[0] - written > grid.shape[0] - out + 2:
-                    written = emit(a, w, t, y, k, rows, written, 1.0)
-                events(a, w, t, y, k, SCRATCH, g)
-                switch(a, w, t, y, k, SCRATCH, g)
-                rounds = settle(a, w, t, y, k, g)
-                begin_side(a, w, t, 0.5 * (t + stop), y, k, SCRATCH)
-                if rows.shape[0] - written > grid.shape[0] - out + 2:
-                    written = emit(a, w, t, y, k, rows, written, 1.0)
-                rates(a, w, t, y, k, 0)
+                written, rounds = cross(a, w, t, stop, y, k, g, rows, written, grid.shape[0] - out)
+                fresh = True
                 if t - storm_start > STORM_TIME:
                     storm_start, storm_events = t, 0
                 if storm_events > STORM_EVENTS or rounds == 9:
                     code = STORM
-                h = max(min(h, step * grow, 1e-4, resolved), 1e-8)
-            elif not final or step >= h:
-                h = min(step * grow, resolved)
             if code == DONE and counts[0] + counts[1] > MOST_STEPS:
                 code = TOO_STIFF
-            if code != DONE:
-                counts[3] = written
-                return code, t
+        if code != DONE:
+            break
     close_standstill(acc, t)
     counts[3] = written
-    return DONE, t
+    return code, t
