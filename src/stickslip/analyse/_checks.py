@@ -104,13 +104,19 @@ def within_cycle(names: Sequence[str], pid: str, inside: bool) -> Check:
     return check
 
 
+def _said_once(texts: Iterable[str]) -> list[str]:
+    """The texts without those whose numbers another one has as well."""
+    parts = {text: set(text.partition(": ")[2].split(", ")) for text in texts}
+    label = {text: text.partition(": ")[0] for text in parts}
+    return [a for a in parts if not any(label[a] == label[b] and parts[a] < parts[b] for b in parts)]
+
+
 def all_of(*checks: Check) -> Check:
     """All of the comparisons hold."""
 
     def check(evidence: Evidence) -> tuple[bool, str]:
         found = [one(evidence) for one in checks]
-        # A quantity of the same cases may be asked twice; say it once.
-        return all(holds for holds, _ in found), "; ".join(dict.fromkeys(text for _, text in found))
+        return all(holds for holds, _ in found), "; ".join(_said_once(text for _, text in found))
 
     return check
 

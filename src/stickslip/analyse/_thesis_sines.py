@@ -343,7 +343,7 @@ MINUS_HIGH = [
         "M-high-FB-order",
         "FB: GMS, LuGre, Coulomb, Stribeck",
         rises("rms", cases(M_HIGH, "FB", "gms lugre coulomb stribeck")),
-        "Coulomb is better than LuGre by 1 % under both rules.",
+        "Coulomb is better than LuGre by about 1 % under both rules.",
     ),
     _fb(
         "M-high-FBlugre-osc",

@@ -61,7 +61,7 @@ def _for_each_friction(letter: str) -> list[Claim]:
     """What the thesis says of the step under every friction."""
     group = f"step/{PLACES[letter][0]}"
     gms_smooth = (
-        "GMS underestimates the friction by 10 % here and chatters at microscopic amplitude (61 µrad)."
+        "GMS underestimates the friction here and chatters at microscopic amplitude (61 µrad peak to peak)."
     )
     return [
         _ff(
@@ -109,8 +109,8 @@ def _for_each_friction(letter: str) -> list[Claim]:
             f"{letter}-step-FB-gms<lugre",
             "FB: GMS better than LuGre",
             rises("rms", cases(group, "FB", "gms lugre")),
-            "" if letter == "N" else "Under the signed rule LuGre feedback oscillates less than GMS's offset is "
-            "large; the literal rule blows that oscillation up.",
+            "" if letter == "N" else "Under the signed rule the oscillation with LuGre is "
+            "smaller than the offset that GMS leaves; the literal rule makes it large.",
         ),
     ]  # fmt: skip
 
@@ -180,7 +180,7 @@ PLUS = [
         "P-step-FBdyn-outsidePID",
         "FB: steady-state errors of the dynamic models lie outside the PID limit cycle",
         within_cycle(cases(P, "FB", "lugre gms"), f"{P}/PID", inside=False),
-        "GMS feedback comes to rest inside the PID's limit cycle under both rules.",
+        "The offset that GMS feedback leaves is inside the PID's limit cycle under both rules.",
     ),
 ]  # fmt: skip
 

@@ -14,16 +14,23 @@ __all__ = ["Cell", "Column", "MetricsTable", "metrics_tables"]
 
 @dataclass(frozen=True)
 class Column:
-    """A metric as it is shown: its name, label, unit, and the factor into that unit.
+    """A metric as it is shown.
 
-    `least` says that the smallest magnitude is the best; where it is False none is marked.
+    Attributes
+    ----------
+    metric, label, unit : str
+    factor : float
+        From the metric's unit into `unit`.
+    best : str
+        "all": the least of all is the best; "following": the least of the runs that follow, since an axis that
+        stays behind is smooth for nothing; empty: none is marked.
     """
 
     metric: str
     label: str
     unit: str
     factor: float = 1.0
-    least: bool = True
+    best: str = "all"
 
 
 COLUMNS = (
@@ -32,12 +39,12 @@ COLUMNS = (
     Column("steady_state_error_rad", "steady-state error", "mrad", 1e3),
     Column("settling_s", "settling", "s"),
     Column("velocity_rms_rad_s", "velocity error RMS", "mrad/s", 1e3),
-    Column("velocity_above_50Hz_rms_rad_s", "velocity above 50 Hz", "mrad/s RMS", 1e3),
-    Column("reversals_per_s", "reversals", "1/s", least=False),
-    Column("standstills", "stand-stills", "", least=False),
-    Column("longest_standstill_s", "longest standstill", "ms", 1e3, least=False),
-    Column("limit_cycle_amplitude_rad", "limit cycle", "mrad", 1e3, least=False),
-    Column("torque_rms_Nm", "torque RMS", "N·m", least=False),
+    Column("velocity_above_50Hz_rms_rad_s", "velocity above 50 Hz", "mrad/s", 1e3, "following"),
+    Column("reversals_beyond_reference_per_s", "extra reversals", "1/s", 1.0, "following"),
+    Column("standstills", "stand-stills", "", 1.0, "following"),
+    Column("longest_standstill_s", "longest", "ms", 1e3, "following"),
+    Column("limit_cycle_amplitude_rad", "limit cycle", "mrad", 1e3, ""),
+    Column("torque_rms_Nm", "torque RMS", "N·m", 1.0, ""),
 )
 PERIODIC, AT_REST = ("steady_state_error_rad", "settling_s"), ("standstills", "longest_standstill_s")
 """Columns that say nothing along a motion without end, and along one that comes to rest."""
@@ -105,15 +112,24 @@ def _cells(controller: str, group: Sequence[Run], columns: Sequence[Column]) -> 
         return [Cell(f"failed: {run.failure}", "split failed", len(columns))]
     cells: list[Cell] = []
     for i, column in enumerate(columns):
-        best = column.least and _finite(run, column.metric) and run is _best(group, column.metric)
+        best = run in _best(group, column)
         classes = " ".join(word for word, there in (("split", i == 0), ("best", best)) if there)
         cells.append(Cell(_text(run, column), classes))
     return cells
 
 
-def _best(group: Sequence[Run], metric: str) -> Run | None:
-    finite = [r for r in group if not r.failure and _finite(r, metric)]
-    return min(finite, key=lambda r: abs(r.metrics[metric])) if finite else None
+def _best(group: Sequence[Run], column: Column) -> list[Run]:
+    """The runs with the least magnitude of a metric."""
+    worst = max((r.metrics.get("position_rms_rad", 0.0) for r in group), default=0.0)
+    runs = [
+        r
+        for r in group
+        if not r.failure
+        and _finite(r, column.metric)
+        and (column.best == "all" or (column.best and r.metrics["position_rms_rad"] <= 0.5 * worst))
+    ]
+    least = min((abs(r.metrics[column.metric]) for r in runs), default=math.nan)
+    return [r for r in runs if abs(r.metrics[column.metric]) == least]
 
 
 def _text(run: Run, column: Column) -> str:
@@ -122,4 +138,6 @@ def _text(run: Run, column: Column) -> str:
     value = column.factor * run.metrics[column.metric]
     if abs(value) < 1e-7:
         return "0"
+    if abs(value) < 1e-3:
+        return "<0.001"
     return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"

@@ -38,6 +38,7 @@ def render(view: StudyView, figures: Sequence[Figure]) -> str:
         ran=_ran(view),
         tally=_tally(verdicts),
         summary=_summary(view),
+        overview=_overview(view),
         tables=metrics_tables(view),
         rules=view.rules,
         claims=[_claim(c, verdicts, figures) for c in CLAIMS] if verdicts else [],
@@ -81,18 +82,38 @@ def _tally(verdicts: Mapping[str, Mapping[str, Verdict]]) -> list[dict[str, Any]
 
 
 def _summary(view: StudyView) -> list[str]:
-    """The best compensator of every reference and friction, rule by rule."""
+    """Which controllers are best how often, and what failed."""
     lines: list[str] = []
-    linear = [c for c in view.controllers if not view.compensation(c)]
     for rule in view.rules:
-        for reference in view.references:
-            for friction in view.frictions:
-                runs = [r for r in view.group(rule, reference, friction) if not r.failure]
-                if runs:
-                    message = case_message(runs, view.reference_kind(reference) == "step", linear)
-                    lines.append(f"{reference}, {friction}, {rule} rule. {message}.")
-    failed = sum(bool(run.failure) for run in view.result.runs)
-    return [*lines, f"{failed} runs failed." if failed else "No run failed."]
+        groups = [view.group(rule, r, f) for r in view.references for f in view.frictions]
+        wins: dict[str, int] = {}
+        for group in groups:
+            finished = [r for r in group if not r.failure and "position_rms_rad" in r.metrics]
+            if finished:
+                best = min(finished, key=lambda r: r.metrics["position_rms_rad"]).controller
+                wins[best] = wins.get(best, 0) + 1
+        listed = ", ".join(f"{name} {n}" for name, n in sorted(wins.items(), key=lambda item: -item[1]))
+        lines.append(
+            f"Least RMS position error of {sum(wins.values())} cases, {rule} rule: {listed or 'none'}."
+        )
+    failed = sum(bool(run.failure) for run in view.runs.values())
+    return [*lines, f"{failed} of {len(view.runs)} runs failed." if failed else "No run failed."]
+
+
+def _overview(view: StudyView) -> list[dict[str, Any]]:
+    """The best compensator of every reference and friction, rule by rule."""
+    linear = [c for c in view.controllers if not view.compensation(c)]
+    rows: list[dict[str, Any]] = []
+    for reference in view.references:
+        at_rest = view.reference_kind(reference) == "step"
+        for friction in view.frictions:
+            groups = [view.group(rule, reference, friction) for rule in view.rules]
+            if any(groups):
+                cells = [
+                    case_message([r for r in group if not r.failure], at_rest, linear) for group in groups
+                ]
+                rows.append({"case": f"{reference}, {friction}", "cells": cells})
+    return rows
 
 
 def _claim(

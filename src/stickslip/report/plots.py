@@ -5,6 +5,7 @@ matplotlib is imported inside the functions, so that importing this module costs
 
 from __future__ import annotations
 
+import importlib
 import math
 import textwrap
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WIDTH = 4.4  # inches: printed at half a page's width, 8 points stay above 5
 DPI = 144
+LEGEND = 80  # characters in a row of the legend, 9 of them an entry's line and gap
 RC: dict[str, Any] = {
     "font.size": 8.0,
     "axes.titlesize": 8.0,
@@ -149,9 +151,8 @@ def draw(path: Path, title: str, message: str, panels: Sequence[Panel], height: 
     height : float
         Of one panel, inches.
     """
-    import matplotlib
-
-    with matplotlib.rc_context(RC):
+    settings: Any = importlib.import_module("matplotlib").rc_context(RC)
+    with settings:
         figure = _figure(title, message, panels, height)
         path.parent.mkdir(parents=True, exist_ok=True)
         # No date in the file: the same study gives the same bytes.
@@ -164,12 +165,13 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
     from matplotlib.figure import Figure
 
     named = dict.fromkeys(c.label for p in panels for c in p.curves if c.label)
-    columns = min(4, max(1, len(named)))
+    longest = max((len(name) for name in named), default=0)
+    columns = max(1, min(4, len(named), LEGEND // (longest + 9)))
     rows = math.ceil(len(named) / columns)
     heading = textwrap.wrap(title, 62)
     head = 0.37 + 0.13 * len(heading)
     total = head + height * len(panels) + 0.26 + 0.17 * rows
-    figure = Figure(figsize=(WIDTH, total))
+    figure: Any = Figure(figsize=(WIDTH, total))
     FigureCanvasAgg(figure)
     figure.text(0.02, 1.0 - 0.07 / total, "\n".join(heading), va="top", fontsize=8.0, fontweight="bold")
     figure.text(0.02, 1.0 - (head - 0.25) / total, message, va="top", fontsize=7.5, color="#444444")
