@@ -117,7 +117,8 @@ def too_long(
 ) -> bool:
     """Whether the velocity changes too much for a sticking element that is near its limit.
 
-    Such a load can cross its limit up and down between the nodes, since s(v) varies over v_s. Not where the motion speeds up all along: there
+    Such a load can cross its limit up and down between the nodes, since s(v) varies over v_s. Not where the
+    motion speeds up all along: there
     load and event function rise with it.
     """
     v0 = loop[VELOCITY]
