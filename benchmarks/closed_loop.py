@@ -175,11 +175,17 @@ def guard(y: Any, p: Any, slips: Any, sigma: float) -> float:
     return g
 
 
+def direction(y: Positions) -> float:
+    """Sign of the velocity."""
+    return 1.0 if y[1] >= 0.0 else -1.0
+
+
 def scipy_run(name: str, tolerance: float, grid: Positions) -> Positions:
     """SciPy's BDF from event to event."""
     p = numbers(name)
     elements = 4 + (3 if name == "GMS feedback" else 0)
     size = 2 + elements + (1 if name == "LuGre feedforward" else 0)
+    shares = np.array([*PLANT.parameters.alpha, *GMS.parameters.alpha][:elements])
     slips, sigma, dy = np.zeros(elements, dtype=np.bool_), 1.0, np.zeros(size)
     atol = np.full(size, tolerance)
     atol[1] = 1e3 * tolerance
@@ -206,16 +212,14 @@ def scipy_run(name: str, tolerance: float, grid: Positions) -> Positions:
         if r.status != 1:
             break
         t, y = float(r.t_events[0][0]), r.y_events[0][0].copy()
-        if slips.any() and sigma * y[1] <= 1e-7:
+        # Whichever event function is largest there has ended its mode: a reversal, or an element's limit.
+        s = CURVE["fc"] + (CURVE["fs"] - CURVE["fc"]) * math.exp(-((y[1] / CURVE["vs"]) ** 2))
+        limits = np.where(slips, -math.inf, direction(y) * y[2 : 2 + elements] / shares - s)
+        if slips.any() and -10.0 * sigma * y[1] >= limits.max():
             slips[:], y[1] = False, 0.0
-            continue
-        sigma = 1.0 if y[1] >= 0.0 else -1.0
-        for i in range(elements):
-            alone = np.ones(elements, dtype=np.bool_)
-            alone[i] = slips[i]
-            # An element at its limit, judged without the reversal of those that slip.
-            if not slips[i] and max(guard(y, p, alone, sigma), -1e8) >= -1e-9:
-                slips[i] = True
+        else:
+            sigma = direction(y)
+            slips[np.argmax(limits)] = True
     return out
 
 
