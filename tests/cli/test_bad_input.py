@@ -215,6 +215,65 @@ def test_one_run(folder: Path, capsys: pytest.CaptureFixture[str], old: str, new
     assert not (folder / "run.npz").exists()
 
 
+def test_the_folder_of_another_study(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    argv = [
+        "study",
+        str(folder / "small_study.toml"),
+        "--out",
+        str(folder / "out"),
+        "--no-report",
+        "--only",
+        "PD",
+    ]
+    assert main(argv) == 0
+    capsys.readouterr()
+    before = (folder / "out" / "metrics.csv").read_bytes()
+    assert "small_study" in complaint(capsys, "study", "thesis", "--out", folder / "out")
+    assert (folder / "out" / "metrics.csv").read_bytes() == before
+
+
+@pytest.mark.parametrize("place", [".", "motion.csv/run.npz", "/proc/nowhere/run.npz"])
+def test_record_that_cannot_be_written(folder: Path, capsys: pytest.CaptureFixture[str], place: str) -> None:
+    assert "--out" in complaint(capsys, "simulate", folder / "one_run.toml", "--out", folder / place)
+
+
+LAW = """
+from typing import Annotated, NamedTuple
+from stickslip.spec import Law, Par
+
+class Params(NamedTuple):
+    level: Annotated[float, Par("N·m", "F_0", "level", lower=0.0)]
+
+def rate(v, z, p, u, dz):
+    BODY
+    return p.level * v
+
+def step(v0, v1, dt, z, p, u):
+    return p.level * v1
+
+LAW = Law("own", Params, step, title="Own", equation="F", source=("none",), example={"level": 0.2}, rate=rate)
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (LAW.replace("BODY", "while v > 1.0: v -= 1.0"), "While"),
+        (LAW.replace("BODY", "v = nowhere(v)"), "nowhere()"),
+        (LAW.replace("LAW = ", "OTHER = "), "defines no law"),
+        (LAW.replace('"own"', '"gms"'), "a name taken already"),
+        (LAW.replace("(NamedTuple)", "(NamedTuple"), "SyntaxError"),
+    ],
+    ids=["while", "unknown function", "no law", "name taken", "syntax"],
+)
+def test_law_files(folder: Path, capsys: pytest.CaptureFixture[str], text: str, named: str) -> None:
+    (folder / "own.py").write_text(text)
+    change(folder / "small_study.toml", "[axis]", 'plugins = ["own.py"]\n\n[axis]')
+    change(folder / "small_study.toml", "[axis]", '[friction.own]\nlaw = "own"\nlevel = 0.1\n\n[axis]')
+    assert named in complaint(capsys, "study", folder / "small_study.toml", "--out", folder / "out")
+    assert not (folder / "out" / "records").exists()
+
+
 def test_files_that_are_no_text(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "bytes.toml").write_bytes(b"\xff\xfe\x00")
     assert "UTF-8" in complaint(capsys, "study", folder / "bytes.toml")

@@ -139,6 +139,12 @@ def test_the_file_that_ships_can_be_copied_and_run(folder: Path, capsys: pytest.
     assert [r["controller"] for r in data["runs"]] == ["PD"]
 
 
+def test_a_study_ends_with_its_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = json_output(capsys, "study", "small_study.toml", "--json", "--only", "PD,sine")
+    assert data["report"] == str(Path("study-small_study") / "report.html")
+    assert "<html" in (folder / data["report"]).read_text()
+
+
 def test_rerun(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output(capsys, "study", "small_study.toml", "--no-report", "--only", "sine", "--out", "here")
     assert "all identical" in output(capsys, "rerun", "here")

@@ -40,11 +40,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the record and print the metrics."""
     from stickslip.cli import _output
+    from stickslip.errors import InputError
     from stickslip.study.files import prepared_folder, unwritable
     from stickslip.study.study import execute, load_run
 
     planned = load_run(args.file)
     out: Path = args.out or Path(f"{args.file.stem}.npz")
+    if out.is_dir():
+        raise InputError(f"--out {out} is a folder; give the name of a file")
     planned.check()
     prepared_folder(out.parent)
     executed = execute(planned)

@@ -11,10 +11,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from stickslip.study.result import StudyResult
 
 SUMMARY = "run a study: controllers compared over references and frictions"
 
@@ -36,6 +32,7 @@ def run(args: argparse.Namespace) -> int:
     """Run, print the table, write the report."""
     from stickslip.cli import _output
     from stickslip.errors import InputError
+    from stickslip.report import write
     from stickslip.study import study as studies
 
     study = studies.load(args.study)
@@ -49,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         with _output.progress_bar(study.name) as progress:
             result = studies.run(study, out, only, args.jobs, progress)
-        report = None if args.no_report else _report(result)
+        report = None if args.no_report else write(result)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
             f"finished runs are kept in {out}; run the same command again to go on"
@@ -60,11 +57,3 @@ def run(args: argparse.Namespace) -> int:
         _output.print_study(result, report)
     failed = [r for r in (*result.runs, *result.extras) if r.failure]
     return _output.report_failures([(r.key, r.failure, r.path) for r in failed])
-
-
-def _report(result: StudyResult) -> Path | None:
-    """Render the result; None until the report is there."""
-    from stickslip import report
-
-    write = getattr(report, "write", None)
-    return write(result) if write else None

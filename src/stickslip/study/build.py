@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -10,9 +11,8 @@ from typing import Any
 
 from stickslip import plugins
 from stickslip.config import Table
+from stickslip.control import compensators
 from stickslip.control.compensators._base import Compensator
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import LINEAR, Gains, place
 from stickslip.errors import ConfigError, InputError, suggestion
@@ -33,7 +33,8 @@ __all__ = [
     "reference",
 ]
 
-COMPENSATORS: dict[str, type[Compensator]] = {c.name: c for c in (Feedforward, Feedback)}
+for _name in compensators.COMPENSATORS:
+    importlib.import_module(f"{compensators.__name__}.{_name}")
 
 
 @dataclass(frozen=True)
@@ -286,12 +287,13 @@ def _gains(table: Table, inertia: float, default: Placement | None) -> Gains:
 
 
 def _compensator(table: Table, laws: Mapping[str, Model]) -> Compensator | None:
+    kinds = {kind.name: kind for kind in Compensator.__subclasses__()}
     if not table.has("compensator"):
         for key in ("law", "gain", "filter_hz"):
             if key in table.values:
-                table.choice("compensator", COMPENSATORS)
+                table.choice("compensator", kinds)
         return None
-    kind = COMPENSATORS[table.choice("compensator", COMPENSATORS)]
+    kind = kinds[table.choice("compensator", kinds)]
     law = laws[table.choice("law", laws)]
     gain = table.number("gain", "1", 1.0)
     return kind(law, gain, table.positive("filter_hz", "Hz") if table.has("filter_hz") else None)

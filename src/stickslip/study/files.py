@@ -24,6 +24,7 @@ from stickslip.study.result import Run
 
 __all__ = [
     "KEYS",
+    "claim_folder",
     "find_run",
     "keep_record",
     "metric_names",
@@ -56,6 +57,22 @@ def prepared_folder(folder: Path) -> Path:
 def unwritable(path: Path, error: OSError) -> InputError:
     """The error that says that a path cannot be written, and why."""
     return InputError(f"cannot write {path} ({error.strerror or error}); choose another place with --out")
+
+
+def claim_folder(folder: Path, study: Study) -> Path:
+    """Prepare the folder for a study, unless another one's results lie there.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        other = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["study"]
+    except (OSError, ValueError, KeyError, TypeError):
+        other = study.name
+    if other != study.name:
+        raise InputError(f"{folder} holds the study {other!r}; choose another place with --out, or delete it")
+    return prepared_folder(folder)
 
 
 # ---- records -----------------------------------------------------------------------------------------------

@@ -86,7 +86,7 @@ def run(
     everything = [*study.runs, *study.extras]
     grid = select(study.runs, only or (), everything)
     extras = select(study.extras, only or (), everything)
-    folder = files.prepared_folder(Path(out))
+    folder = files.claim_folder(Path(out), study)
     clock, cpu = time.perf_counter(), time.process_time()
     results: dict[str, Run] = {}
     wanted = [*grid, *extras]
