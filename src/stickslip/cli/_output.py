@@ -31,6 +31,12 @@ def progress_bar(title: str) -> Generator[Callable[[int, int], None]]:
         yield progress
 
 
+def say(what: str) -> None:
+    """Say on a terminal what goes on."""
+    if sys.stderr.isatty():
+        print(what, file=sys.stderr)
+
+
 def print_json(data: Any) -> None:
     """Print data as JSON that any reader takes: NaN becomes null."""
     print(json.dumps(_plain(data), indent=1, allow_nan=False, ensure_ascii=False))

@@ -46,6 +46,8 @@ def run(args: argparse.Namespace) -> int:
     try:
         with _output.progress_bar(study.name) as progress:
             result = studies.run(study, out, only, args.jobs, progress)
+        if not args.no_report:
+            _output.say("drawing figures ...")
         report = None if args.no_report else write(result)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(

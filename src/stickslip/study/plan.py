@@ -154,13 +154,25 @@ def _study(name: str, path: Path, table: Table) -> Study:
         rules = table.texts("slip_rules", SLIP_RULES) if table.has("slip_rules") else ["signed"]
         parts = _Parts.read(table)
         runs = parts.runs(rules, parts.motions, parts.frictions, parts.controllers)
-        extras = [
-            run for t in table.tables("comparisons").values() for run in _comparison(t, parts, rules[0])
-        ]
-        taken = {run.key for run in runs}
-        extras = list({run.key: run for run in extras if run.key not in taken}.values())
+        compared = [r for t in table.tables("comparisons").values() for r in _comparison(t, parts, rules[0])]
+        extras = _without_doubles(runs, compared, table.label("comparisons"))
         responses = [_response(n, t, parts) for n, t in table.tables("responses").items()]
     return Study(name, title, runs, extras, responses, table.values, path, dict(table.document.files))
+
+
+def _without_doubles(
+    runs: Sequence[PlannedRun], extras: Sequence[PlannedRun], label: str
+) -> list[PlannedRun]:
+    """The extras that are not planned already; one name must not mean two different runs."""
+    planned = {run.key: run for run in runs}
+    found: dict[str, PlannedRun] = {}
+    for run in extras:
+        same = planned.get(run.key) or found.setdefault(run.key, run)
+        if same.fingerprint != run.fingerprint:
+            raise ConfigError(
+                f"{label}: {run.key} means two different runs; give one of its parts another name"
+            )
+    return list(found.values())
 
 
 def load_run(path: Path) -> PlannedRun:
