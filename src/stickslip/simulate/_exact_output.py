@@ -44,6 +44,10 @@ SHORTEST_WINDOW = 2e-8
 """Shorter stretches are left out of the metrics (s); the high-pass loses its digits there."""
 
 
+UNSEEN = 1e-8
+"""Free motion slower than this (rad/s) adds nothing to a metric; the nodes need not follow it."""
+
+
 @kernel(exact=False)
 def write_grid(
     lin: Linear, between: Matrix, plan: Any, loop: Any, stretch: Any, grid: Any, count: Any, out: Any, h: float,
@@ -174,7 +178,7 @@ def window_of(lin: Linear, stretch: Any) -> float:
     else:
         rate = lin.decay + lin.frequency
     speed = abs(stretch[FREE_VELOCITY]) + rate * abs(stretch[FREE_POSITION])
-    if speed == 0.0:
+    if speed < UNSEEN:
         return MAX_WINDOW
     y = max(0.03, min(1.0, 0.1 * (1e-2 / (speed + 1e-12)) ** (1.0 / 3.0)))
     return min(MAX_WINDOW, 2.0 * y / (abs(rate) + 1e-9))
