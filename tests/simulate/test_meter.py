@@ -26,8 +26,8 @@ def measured(duration, x, v, xd=None, vd=None, tm=None, band=0.0, h=1e-3):
     xd, vd, tm = xd or zero, vd or zero, tm or zero
     for i in range(round(duration / h)):
         t = i * h + 0.25 * h * np.arange(5)
-        n = zero(t)
-        meter(acc, turns, i * h, h, xd(t) - x(t), vd(t) - v(t), x(t), v(t), vd(t), tm(t), tm(t), n)
+        nodes = np.array([xd(t) - x(t), vd(t) - v(t), x(t), v(t), vd(t), tm(t), tm(t), zero(t)])
+        meter(acc, turns, i * h, h, nodes)
     close_standstill(acc, duration)
     count = int(metrics(acc, turns[:0])["reversals_per_s"] * duration + 0.5)
     return metrics(acc, turns[:count]), turns[:count]
@@ -66,7 +66,9 @@ def test_high_pass_of_a_sine(frequency):
     t = np.linspace(0.0, duration, 4_000_001)
     # v - y for y(0) = 0: the steady response and a decay that makes it start at v(0).
     passed = ratio * np.cos(w * t + phase) + (1.0 - ratio * math.cos(phase)) * np.exp(-HIGH_PASS * t)
-    assert found["velocity_above_50Hz_rms_rad_s"] == pytest.approx(math.sqrt(np.trapezoid(passed**2, t) / duration), rel=1e-5)
+    assert found["velocity_above_50Hz_rms_rad_s"] == pytest.approx(
+        math.sqrt(np.trapezoid(passed**2, t) / duration), rel=1e-5
+    )
 
 
 def test_noise_below_the_trigger_is_no_reversal():

@@ -208,9 +208,7 @@ def measure(
             theta, v = moved(c, (1.0, 0.0, 0.0, 1.0), x, p, q)
             fill(parameters, plan, cells, sides, loop, stretch, x, theta, v, nodes, k)
         meter(
-            acc, turns, loop[TIME] + w * width, width, nodes[0], nodes[1], nodes[2], nodes[3], nodes[4], nodes[5],
-            nodes[6], nodes[7],
-        )  # fmt: skip
+            acc, turns, loop[TIME] + w * width, width, nodes)  # fmt: skip
 
 
 @kernel(exact=False)

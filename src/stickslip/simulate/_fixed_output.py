@@ -116,5 +116,4 @@ def measure(loop: Loop, a: Any, b: Any, t: float, h: float, accumulator: Any, tu
             nodes[7, i] = a[HELP] + x * (b[HELP] - a[HELP])
         meter(
             accumulator, turns, t + h * window / windows, h / windows,
-            nodes[0], nodes[1], nodes[2], nodes[3], nodes[4], nodes[5], nodes[6], nodes[7],
-        )  # fmt: skip
+            nodes)  # fmt: skip

@@ -42,21 +42,17 @@ def new_meter(duration: float, settle_band: float) -> Any:
     return acc
 
 
-@kernel(exact=False)
-def boole(y: Any, h: float) -> float:
-    """Integral over h of a signal at five nodes."""
-    return h / 90.0 * (7.0 * (y[0] + y[4]) + 32.0 * (y[1] + y[3]) + 12.0 * y[2])
+# ---- rows of the nodes: position error, velocity error, position, velocity, reference velocity, and the torques of
+# motor, friction and compensator
+ERROR, ERROR_RATE, AT, SPEED, WANTED, MOTOR, FRICTION, HELP, SIGNALS = range(9)
 
 
 @kernel(exact=False)
-def meter(
-    acc: Any, turns: Any, t: float, h: float, e: Any, ev: Any, x: Any, v: Any, vd: Any, tm: Any, tf: Any, th: Any
-) -> None:
+def meter(acc: Any, turns: Any, t: float, h: float, nodes: Any) -> None:
     """Add the stretch [t, t + h] to the accumulator.
 
-    Arrays of five nodes: position error, velocity error, position, velocity, reference velocity, motor torque,
-    friction torque, compensating torque. ``turns`` (n, 2) receives time and position of every reversal, as
-    long as it has room.
+    ``nodes`` has a row for each signal (see the names above) and five columns in time; ``turns`` (n, 2) receives
+    time and position of every reversal, as long as it has room.
     """
     second = t >= 0.5 * acc[DURATION] * (1.0 - 1e-12)
     e2 = 0.0
@@ -69,14 +65,14 @@ def meter(
     helped = 0.0
     for i in range(5):
         w = 7.0 if i == 0 or i == 4 else (12.0 if i == 2 else 32.0)
-        e2 += w * e[i] * e[i]
-        ev2 += w * ev[i] * ev[i]
-        tm2 += w * tm[i] * tm[i]
-        df2 += w * (tf[i] - th[i]) * (tf[i] - th[i])
-        mean += w * e[i]
-        work += w * tm[i] * v[i]
-        loss += w * tf[i] * v[i]
-        helped += w * th[i] * v[i]
+        e2 += w * nodes[ERROR, i] * nodes[ERROR, i]
+        ev2 += w * nodes[ERROR_RATE, i] * nodes[ERROR_RATE, i]
+        tm2 += w * nodes[MOTOR, i] * nodes[MOTOR, i]
+        df2 += w * (nodes[FRICTION, i] - nodes[HELP, i]) * (nodes[FRICTION, i] - nodes[HELP, i])
+        mean += w * nodes[ERROR, i]
+        work += w * nodes[MOTOR, i] * nodes[SPEED, i]
+        loss += w * nodes[FRICTION, i] * nodes[SPEED, i]
+        helped += w * nodes[HELP, i] * nodes[SPEED, i]
     scale = h / 90.0
     acc[E2] += scale * e2
     acc[EV2] += scale * ev2
@@ -87,13 +83,13 @@ def meter(
     acc[COMPENSATION_WORK] += scale * helped
     if t >= 0.8 * acc[DURATION] * (1.0 - 1e-12):
         acc[SS_E] += scale * mean
-    acc[E_END] = e[4]
-    low, high = extremes(e, ev, 0.25 * h)
+    acc[E_END] = nodes[ERROR, 4]
+    low, high = extremes(nodes, 0.25 * h)
     acc[E_MAX] = max(acc[E_MAX], -low, high)
-    acc[V_MAX] = max(acc[V_MAX], peak(v, acc[V_MAX]))
+    acc[V_MAX] = max(acc[V_MAX], peak(nodes, acc[V_MAX]))
     for i in range(5):
-        acc[TM_MAX] = max(acc[TM_MAX], abs(tm[i]))
-    high_pass(acc, h, v, second)
+        acc[TM_MAX] = max(acc[TM_MAX], abs(nodes[MOTOR, i]))
+    high_pass(acc, h, nodes, second)
     if second:
         acc[W2_E2] += scale * e2
         acc[W2_EV2] += scale * ev2
@@ -101,32 +97,33 @@ def meter(
         acc[W2_E_MAX] = max(acc[W2_E_MAX], -low, high)
         acc[W2_E_LOW] = min(acc[W2_E_LOW], low)
         acc[W2_E_HIGH] = max(acc[W2_E_HIGH], high)
-    reversals(acc, turns, t, h, x, v, vd, second)
-    standstill(acc, t, h, v, vd)
+    reversals(acc, turns, t, h, nodes, second)
+    standstill(acc, t, h, nodes)
     band = acc[SETTLE_BAND]
     if band > 0.0:
         for i in range(5):
-            if abs(e[i]) > band:
+            now = abs(nodes[ERROR, i])
+            if now > band:
                 acc[OUTSIDE_LAST] = t + 0.25 * h * i
-                if i < 4 and abs(e[i + 1]) <= band:
-                    acc[OUTSIDE_LAST] += 0.25 * h * (abs(e[i]) - band) / (abs(e[i]) - abs(e[i + 1]))
+                if i < 4 and abs(nodes[ERROR, i + 1]) <= band:
+                    acc[OUTSIDE_LAST] += 0.25 * h * (now - band) / (now - abs(nodes[ERROR, i + 1]))
 
 
 @kernel(exact=False)
-def extremes(e: Any, ev: Any, d: float) -> tuple[float, float]:
+def extremes(nodes: Any, d: float) -> tuple[float, float]:
     """Smallest and largest error over the nodes, spaced d apart, and between them where its slope changes sign."""
-    low = e[0]
-    high = e[0]
+    low = nodes[ERROR, 0]
+    high = nodes[ERROR, 0]
     for i in range(1, 5):
-        low = min(low, e[i])
-        high = max(high, e[i])
-        if ev[i - 1] * ev[i] < 0.0:
-            x = ev[i - 1] / (ev[i - 1] - ev[i])
+        low = min(low, nodes[ERROR, i])
+        high = max(high, nodes[ERROR, i])
+        if nodes[ERROR_RATE, i - 1] * nodes[ERROR_RATE, i] < 0.0:
+            x = nodes[ERROR_RATE, i - 1] / (nodes[ERROR_RATE, i - 1] - nodes[ERROR_RATE, i])
             y = 1.0 - x
             between = (
-                y * y * (1.0 + 2.0 * x) * e[i - 1]
-                + x * x * (3.0 - 2.0 * x) * e[i]
-                + x * y * d * (y * ev[i - 1] - x * ev[i])
+                y * y * (1.0 + 2.0 * x) * nodes[ERROR, i - 1]
+                + x * x * (3.0 - 2.0 * x) * nodes[ERROR, i]
+                + x * y * d * (y * nodes[ERROR_RATE, i - 1] - x * nodes[ERROR_RATE, i])
             )
             low = min(low, between)
             high = max(high, between)
@@ -134,23 +131,39 @@ def extremes(e: Any, ev: Any, d: float) -> tuple[float, float]:
 
 
 @kernel(exact=False)
-def peak(v: Any, so_far: float) -> float:
+def peak(nodes: Any, so_far: float) -> float:
     """Largest |v| of the quartic through the five nodes, where it may exceed the one so far; else 0.
 
     Sampled finely and refined by a parabola.
     """
-    if 1.3 * max(abs(v[0]), abs(v[1]), abs(v[2]), abs(v[3]), abs(v[4])) < so_far:
+    if (
+        1.3
+        * max(
+            abs(nodes[SPEED, 0]),
+            abs(nodes[SPEED, 1]),
+            abs(nodes[SPEED, 2]),
+            abs(nodes[SPEED, 3]),
+            abs(nodes[SPEED, 4]),
+        )
+        < so_far
+    ):
         return 0.0
-    d1 = v[1] - v[0]
-    d2 = v[2] - 2.0 * v[1] + v[0]
-    d3 = v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]
-    d4 = v[4] - 4.0 * v[3] + 6.0 * v[2] - 4.0 * v[1] + v[0]
+    d1 = nodes[SPEED, 1] - nodes[SPEED, 0]
+    d2 = nodes[SPEED, 2] - 2.0 * nodes[SPEED, 1] + nodes[SPEED, 0]
+    d3 = nodes[SPEED, 3] - 3.0 * nodes[SPEED, 2] + 3.0 * nodes[SPEED, 1] - nodes[SPEED, 0]
+    d4 = (
+        nodes[SPEED, 4]
+        - 4.0 * nodes[SPEED, 3]
+        + 6.0 * nodes[SPEED, 2]
+        - 4.0 * nodes[SPEED, 1]
+        + nodes[SPEED, 0]
+    )
     top = 0.0
     before, middle = 0.0, 0.0
     for i in range(33):
         x = i / 8.0
         rise = d3 + 0.25 * (x - 3.0) * d4
-        now = abs(v[0] + x * (d1 + 0.5 * (x - 1.0) * (d2 + (x - 2.0) / 3.0 * rise)))
+        now = abs(nodes[SPEED, 0] + x * (d1 + 0.5 * (x - 1.0) * (d2 + (x - 2.0) / 3.0 * rise)))
         bend = before - 2.0 * middle + now
         if i > 1 and middle >= before and middle >= now and bend < 0.0:
             top = max(top, middle - (now - before) * (now - before) / (8.0 * bend))
@@ -160,23 +173,31 @@ def peak(v: Any, so_far: float) -> float:
 
 
 @kernel(exact=False)
-def high_pass(acc: Any, h: float, v: Any, second: bool) -> None:
+def high_pass(acc: Any, h: float, nodes: Any, second: bool) -> None:
     """Advance the 50 Hz low-pass y' = w (v - y) and add the integral of (v - y)²."""
     half = math.exp(-0.125 * HIGH_PASS * h)
     weight = HIGH_PASS * h / 24.0
     y = acc[LOW_PASS]
-    total = 7.0 * (v[0] - y) * (v[0] - y)
+    total = 7.0 * (nodes[SPEED, 0] - y) * (nodes[SPEED, 0] - y)
     for i in range(4):
         # Simpson's rule on the convolution over a quarter; its middle value from the cubic through four nodes.
         if i == 0:
-            middle = (5.0 * v[0] + 15.0 * v[1] - 5.0 * v[2] + v[3]) / 16.0
+            middle = (
+                5.0 * nodes[SPEED, 0] + 15.0 * nodes[SPEED, 1] - 5.0 * nodes[SPEED, 2] + nodes[SPEED, 3]
+            ) / 16.0
         elif i == 3:
-            middle = (5.0 * v[4] + 15.0 * v[3] - 5.0 * v[2] + v[1]) / 16.0
+            middle = (
+                5.0 * nodes[SPEED, 4] + 15.0 * nodes[SPEED, 3] - 5.0 * nodes[SPEED, 2] + nodes[SPEED, 1]
+            ) / 16.0
         else:
-            middle = (9.0 * (v[i] + v[i + 1]) - v[i - 1] - v[i + 2]) / 16.0
-        y = half * half * y + weight * (half * half * v[i] + 4.0 * half * middle + v[i + 1])
+            middle = (
+                9.0 * (nodes[SPEED, i] + nodes[SPEED, i + 1]) - nodes[SPEED, i - 1] - nodes[SPEED, i + 2]
+            ) / 16.0
+        y = half * half * y + weight * (
+            half * half * nodes[SPEED, i] + 4.0 * half * middle + nodes[SPEED, i + 1]
+        )
         w = 7.0 if i == 3 else (12.0 if i == 1 else 32.0)
-        total += w * (v[i + 1] - y) * (v[i + 1] - y)
+        total += w * (nodes[SPEED, i + 1] - y) * (nodes[SPEED, i + 1] - y)
     acc[LOW_PASS] = y
     acc[HP2] += h / 90.0 * total
     if second:
@@ -184,23 +205,23 @@ def high_pass(acc: Any, h: float, v: Any, second: bool) -> None:
 
 
 @kernel(exact=False)
-def reversals(acc: Any, turns: Any, t: float, h: float, x: Any, v: Any, vd: Any, second: bool) -> None:
+def reversals(acc: Any, turns: Any, t: float, h: float, nodes: Any, second: bool) -> None:
     """Count sign reversals of v and of the reference with a Schmitt trigger; keep the turning points."""
     # Rounding may put a zero between the end of the last stretch and the start of this one.
-    if acc[LAST_VELOCITY] * v[0] < 0.0:
+    if acc[LAST_VELOCITY] * nodes[SPEED, 0] < 0.0:
         acc[TURN_TIME] = t
-        acc[TURN_POSITION] = x[0]
-    acc[LAST_VELOCITY] = v[4]
+        acc[TURN_POSITION] = nodes[AT, 0]
+    acc[LAST_VELOCITY] = nodes[SPEED, 4]
     for i in range(1, 5):
         # The last zero of v is the turning point, if the trigger then confirms a reversal.
-        if v[i - 1] * v[i] <= 0.0 and v[i - 1] != v[i]:
-            f = v[i - 1] / (v[i - 1] - v[i])
+        if nodes[SPEED, i - 1] * nodes[SPEED, i] <= 0.0 and nodes[SPEED, i - 1] != nodes[SPEED, i]:
+            f = nodes[SPEED, i - 1] / (nodes[SPEED, i - 1] - nodes[SPEED, i])
             acc[TURN_TIME] = t + 0.25 * h * (i - 1 + f)
-            acc[TURN_POSITION] = x[i - 1] + f * (x[i] - x[i - 1])
+            acc[TURN_POSITION] = nodes[AT, i - 1] + f * (nodes[AT, i] - nodes[AT, i - 1])
         side = 0.0
-        if v[i] > TRIGGER:
+        if nodes[SPEED, i] > TRIGGER:
             side = 1.0
-        elif v[i] < -TRIGGER:
+        elif nodes[SPEED, i] < -TRIGGER:
             side = -1.0
         if side != 0.0:
             if side * acc[SIDE] < 0.0:
@@ -213,18 +234,18 @@ def reversals(acc: Any, turns: Any, t: float, h: float, x: Any, v: Any, vd: Any,
                     turns[n, 1] = acc[TURN_POSITION]
                     acc[TURN_COUNT] += 1.0
             acc[SIDE] = side
-        if abs(vd[i]) > TRIGGER:
-            side = 1.0 if vd[i] > 0.0 else -1.0
+        if abs(nodes[WANTED, i]) > TRIGGER:
+            side = 1.0 if nodes[WANTED, i] > 0.0 else -1.0
             if side * acc[REFERENCE_SIDE] < 0.0:
                 acc[REFERENCE_REVERSALS] += 1.0
             acc[REFERENCE_SIDE] = side
 
 
 @kernel(exact=False)
-def standstill(acc: Any, t: float, h: float, v: Any, vd: Any) -> None:
+def standstill(acc: Any, t: float, h: float, nodes: Any) -> None:
     """Find standstills: |v| below the trigger for at least 10 ms while the reference moves."""
     for i in range(5):
-        still = abs(v[i]) < TRIGGER and abs(vd[i]) > MOVING
+        still = abs(nodes[SPEED, i]) < TRIGGER and abs(nodes[WANTED, i]) > MOVING
         now = t + 0.25 * h * i
         if still and acc[STILL_SINCE] < 0.0:
             acc[STILL_SINCE] = now

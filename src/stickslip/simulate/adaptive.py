@@ -291,7 +291,7 @@ def measure(
         dense(h, y, k, end, 0.25 * i, u)
         rates(a, w, t + 0.25 * i * h, u, k, SCRATCH)
         note(w, u, nodes, i)
-    meter(acc, turns, t, h, nodes[0], nodes[1], nodes[2], nodes[3], nodes[4], nodes[5], nodes[6], nodes[7])
+    meter(acc, turns, t, h, nodes)
     for j in range(8):
         nodes[j, 0] = nodes[j, 4]
 
