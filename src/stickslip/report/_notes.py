@@ -22,7 +22,8 @@ SLIP = Note(
     "Eq. 2.17 lets an element slip when |F_i| > α_i s(v). Read literally, an element may slip while its force "
     "pushes with the motion: after a fast reversal s(v) falls faster than |F_i|, and friction feeds energy in "
     "for about 12 ms. The signed rule, slip when sign(v) F_i ≥ α_i s(v), is passive. Both agree in open loop and "
-    "with PD and PID alone; they differ in feedback compensation by Coulomb, Stribeck and LuGre.",
+    "with PD, PID, and feedforward by LuGre and GMS; they differ most in feedback compensation by Coulomb, "
+    "Stribeck and LuGre.",
 )
 STEP = Note(
     "The step",
@@ -41,7 +42,8 @@ SIGN = Note(
 MISSING = Note(
     "Figures that are not here",
     "Figure 3.12 compares positions under a prescribed motor torque, which belongs to the identification of the "
-    "LuGre model and is not part of this study. Figures 3.1 to 3.4 and 3.6 to 3.9 are block diagrams.",
+    "LuGre model and is not part of this study; so do 3.7 and 3.8 (curve fitting). Figures 3.1 to 3.4, 3.6 and "
+    "3.9 are schematics and block diagrams.",
 )
 NUMERICS = Note(
     "Numerics",

@@ -56,7 +56,7 @@ def response_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
         title = heading(response.figure, response.title)
         message = _gap(loops, near)
         draw(stem, title, message, [Panel(curves, "friction torque (N·m)", "velocity (rad/s)", limits)], 2.7)
-        caption = f"{response.title}, along {describe(response.motion.as_dict())}. {message}."
+        caption = f"Along {describe(response.motion.as_dict())}. {message}."
         yield Figure(stem.name.removeprefix("figure-"), response.figure, title, caption, COMMON, stem)
 
 
@@ -85,7 +85,9 @@ def _loop_curve(name: str, x: Array, y: Array, near: bool, plant: bool, count: i
         x, y = x[keep], y[keep]
     style = PLANT.get(name, PLANT["nominal"]) if plant else style_of(name)
     label = f"{name} law" if not plant else "plant" if near else FRICTION_NAMES.get(name, name)
-    return Curve(x, y, label if count > 1 else "", replace(style, width=1.1) if near and not plant else style)
+    if count == 1 or (near and not plant):
+        style = replace(style, width=1.1)
+    return Curve(x, y, label if count > 1 else "", style)
 
 
 def _gap(loops: dict[str, tuple[Array, Array]], near: bool) -> str:

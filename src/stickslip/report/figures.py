@@ -228,7 +228,9 @@ def off_scale(sizes: dict[str, float], limit: float) -> str:
 def curve(x: Array, y: Array, style: plots.Style) -> Curve:
     """An unlabelled curve of its envelope; a dense oscillation is drawn thin and without dashes."""
     x, y = envelope(x, y)
-    turns = int(np.sum(np.diff(np.sign(np.diff(y))) != 0))
+    steps = np.diff(y)
+    steps = steps[np.abs(steps) > 0.02 * np.ptp(y)]  # A ripple within the line's width is none.
+    turns = int(np.sum(steps[1:] * steps[:-1] < 0.0))
     return Curve(x, y, "", replace(style, dashes="-", width=0.6) if turns > DENSE else style)
 
 

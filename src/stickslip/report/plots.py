@@ -168,7 +168,7 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
     longest = max((len(name) for name in named), default=0)
     columns = max(1, min(4, len(named), LEGEND // (longest + 9)))
     rows = math.ceil(len(named) / columns)
-    heading = textwrap.wrap(title, 62)
+    heading = textwrap.wrap(title, 64)
     head = 0.37 + 0.13 * len(heading)
     total = head + height * len(panels) + 0.26 + 0.17 * rows
     figure: Any = Figure(figsize=(WIDTH, total))
