@@ -102,7 +102,7 @@ class Motion:
             away=int(np.sum(speed > AWAY * peak)),
             off_zero=int(np.sum(speed >= NEAR_ZERO * peak)),
             longest=float(near.max()) if near.size else 0.0,
-            lag=float(np.trapezoid(error * np.sign(vd), t) / t[-1]),
+            lag=_mean(error * np.sign(vd), t),
             midway=math.sqrt(_mean(np.where(np.abs(vd) > AWAY * peak, (vd - v) ** 2, np.nan), t)),
             low=float(late.min()),
             high=float(late.max()),
