@@ -37,10 +37,11 @@ def test_fields_become_elements():
     assert list(functions) == ["_scale", "good"]
     text = ast.unparse(functions["good"])
     assert "Docstrings" not in text
-    assert "range(int(p[2]))" in text
+    assert text.count("int(p[2])") == 1
+    assert "range(elements_)" in text
     assert "z[1 + i]" in text
     assert "p[3 + i]" in text
-    assert "p[3 + (1 * int(p[2]) + i)]" in text
+    assert "p[3 + (1 * elements_ + i)]" in text
     assert "_scale(total, p)" in text
 
 

@@ -29,6 +29,7 @@ MATH = {
     "exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
     "floor", "ceil", "fabs", "copysign", "pi", "inf", "pow", "hypot",
 }  # fmt: skip
+COUNT = "elements_"
 STATEMENTS = (
     ast.Assign,
     ast.AugAssign,
@@ -132,6 +133,9 @@ def _lower_one(
         raise LawError(f"{where.at(tree)}: {function.__name__} calls itself; use a `for` loop instead")
     translator = _Translator(where, layouts, [a.arg for a in tree.args.args], function.__globals__)
     body = [s for s in (translator.visit(statement) for statement in tree.body) if s is not None]
+    if translator.counts:
+        # Once at the top: the compiler cannot know that writing to a state leaves the parameters alone.
+        body.insert(0, translator.counted())
     for callee, target in translator.calls.items():
         _lower_one(callee, target, layouts, done, (*stack, name))
     arguments = ast.arguments([], [ast.arg(a.arg) for a in tree.args.args], None, [], [], None, [])
@@ -172,6 +176,7 @@ class _Translator(ast.NodeTransformer):
     scope: dict[str, Any]
     calls: dict[str, Callable[..., Any]] = field(default_factory=dict[str, Callable[..., Any]])
     locals: set[str] = field(default_factory=set[str])
+    counts: bool = False
 
     def refuse(self, node: ast.AST, what: str, remedy: str) -> LawError:
         return LawError(f"{self.where.at(node)}: {what} is outside the scalar subset; {remedy}")
@@ -300,10 +305,14 @@ class _Translator(ast.NodeTransformer):
             raise self.refuse(
                 node, "a field per element without `p`", "pass the parameters `p` to this function"
             )
+        self.counts = True
+        return ast.Name(COUNT, ast.Load())
+
+    def counted(self) -> ast.stmt:
+        """The statement that reads the number of elements."""
         place = ast.Constant(len(self.layouts["p"].scalars))
-        return ast.Call(
-            ast.Name("int", ast.Load()), [ast.Subscript(ast.Name("p", ast.Load()), place, ast.Load())], []
-        )
+        read = ast.Subscript(ast.Name("p", ast.Load()), place, ast.Load())
+        return ast.Assign([ast.Name(COUNT, ast.Store())], ast.Call(ast.Name("int", ast.Load()), [read], []))
 
     def length(self, node: ast.Call) -> ast.expr:
         of = node.args[0] if len(node.args) == 1 else None

@@ -47,11 +47,11 @@ from stickslip.spec import Surroundings
 # The state vector; the laws' states follow.
 POSITION, VELOCITY, INTEGRAL, FILTER_1, FILTER_2, LAWS = range(6)
 # The workspace w: Case.numbers, then what is remembered, the reference, the torques (the demand is the motor
-# torque before its limit), the surroundings, and the parameters of plant, compensator and reference.
+# torque before its limit), the time for which the reference was taken, the surroundings, and the parameters of plant, compensator and reference.
 (
     MOTION, SIGN, FILTERED_SIGN, REFERENCE_SIGN, SATURATED, THETA_D, OMEGA_D, ALPHA_D, MOTOR_TORQUE,
-    FRICTION_TORQUE, COMPENSATION_TORQUE, DEMAND, SURROUNDINGS,
-) = range(NUMBERS, NUMBERS + 13)  # fmt: skip
+    FRICTION_TORQUE, COMPENSATION_TORQUE, DEMAND, REFERENCE_TIME, SURROUNDINGS,
+) = range(NUMBERS, NUMBERS + 14)  # fmt: skip
 PLANT_PARAMETERS = SURROUNDINGS + 3
 # The integers a: addresses of the profile and of each law's functions, sizes and places, then which state
 # entries are modes.
@@ -71,6 +71,7 @@ def arrays_of(case: Case) -> tuple[Any, Any]:
     sizes = [plant.state.size, plant.state.size + helper.state.size, place, place + helper.parameters.size]
     integers = [case.profile, *plant.addresses, *helper.addresses, *sizes, *plant.modes, *helper.modes]
     remembered = np.zeros(SURROUNDINGS - NUMBERS)
+    remembered[REFERENCE_TIME - NUMBERS] = math.nan
     workspace = np.concatenate(
         [
             case.numbers,
@@ -82,6 +83,14 @@ def arrays_of(case: Case) -> tuple[Any, Any]:
         ]
     )
     return np.array(integers, dtype=np.int64), workspace
+
+
+@kernel()
+def refer(a: Any, w: Any, t: float) -> None:
+    """Take the reference at t, unless it is the one at hand: stages and events often share a time."""
+    if t != w[REFERENCE_TIME]:
+        call_profile(a[PROFILE], t, pointer(w, a[PROFILE_PARAMETERS]), pointer(w, THETA_D))
+        w[REFERENCE_TIME] = t
 
 
 @kernel()
@@ -119,7 +128,7 @@ def rates(a: Any, w: Any, t: float, y: Any, k: Any, row: int) -> None:
     """Write the time derivative of y into row `row` of k, and the torques; thesis eqs. 3.1, 3.3, 3.11."""
     n = y.shape[0]
     compensator = LAWS + a[PLANT_SIZE]
-    call_profile(a[PROFILE], t, pointer(w, a[PROFILE_PARAMETERS]), pointer(w, THETA_D))
+    refer(a, w, t)
     w[SURROUNDINGS] = y[POSITION]
     v = y[VELOCITY]
     helped = 0.0
@@ -220,7 +229,7 @@ def events(a: Any, w: Any, t: float, y: Any, k: Any, row: int, g: Any) -> float:
         )
     if w[SOURCE] != NO_COMPENSATOR and a[COMPENSATOR + GUARDS] != 0:
         if w[SOURCE] == FROM_REFERENCE:
-            call_profile(a[PROFILE], t, pointer(w, a[PROFILE_PARAMETERS]), pointer(w, THETA_D))
+            refer(a, w, t)
         call_guards(
             a[COMPENSATOR + GUARDS],
             compensator_velocity(a, w, y),
@@ -262,7 +271,7 @@ def switch(a: Any, w: Any, t: float, y: Any, k: Any, row: int, g: Any) -> None:
         )
     if w[SOURCE] != NO_COMPENSATOR and a[COMPENSATOR + GUARDS] != 0:
         if w[SOURCE] == FROM_REFERENCE:
-            call_profile(a[PROFILE], t, pointer(w, a[PROFILE_PARAMETERS]), pointer(w, THETA_D))
+            refer(a, w, t)
         call_switch(
             a[COMPENSATOR + SWITCH],
             compensator_velocity(a, w, y),
@@ -309,7 +318,7 @@ def begin_side(a: Any, w: Any, t: float, soon: float, y: Any, k: Any, row: int) 
 
     At rest the direction is that of the applied torque just after t.
     """
-    call_profile(a[PROFILE], soon, pointer(w, a[PROFILE_PARAMETERS]), pointer(w, THETA_D))
+    refer(a, w, soon)
     w[REFERENCE_SIGN] = np.sign(w[OMEGA_D])
     if w[FILTER] > 0.0 and w[FILTERED_SIGN] == 0.0:
         ahead = w[OMEGA_D] if w[SOURCE] == FROM_REFERENCE else y[VELOCITY]
@@ -319,22 +328,38 @@ def begin_side(a: Any, w: Any, t: float, soon: float, y: Any, k: Any, row: int) 
             w[SIGN] = np.sign(y[VELOCITY])
             w[MOTION] = w[SIGN]
         elif not is_held(a, w):
-            call_profile(a[PROFILE], t + 1e-9, pointer(w, a[PROFILE_PARAMETERS]), pointer(w, THETA_D))
+            refer(a, w, t + 1e-9)
             # Only the reference pushes an axis at rest whose laws are at rest too.
             push = w[KP] * (w[THETA_D] - y[POSITION]) + w[KR] * w[OMEGA_D]
             w[SIGN] = np.sign(push)
 
 
 @kernel()
-def small_enough(a: Any, w: Any, before: Any, after: Any) -> float:
+def scale_near_rest(w: Any) -> float:
+    """Velocity over which a law in the loop changes much, rad/s; 0 for none."""
+    scale = w[PLANT_SCALE]
+    if w[SOURCE] == FROM_MEASUREMENT and w[COMPENSATOR_SCALE] > 0.0:
+        scale = min(scale, w[COMPENSATOR_SCALE]) if scale > 0.0 else w[COMPENSATOR_SCALE]
+    return scale
+
+
+@kernel()
+def calm_step(w: Any, y: Any, acceleration: float) -> float:
+    """Longest step that changes a velocity near rest by little of its scale, at the present acceleration."""
+    scale = scale_near_rest(w)
+    if scale > 0.0 and abs(y[VELOCITY]) < 3.0 * scale and acceleration != 0.0:
+        return 0.09 * scale / abs(acceleration)
+    return np.inf
+
+
+@kernel()
+def small_enough(w: Any, before: Any, after: Any) -> float:
     """Factor by which a step must shrink so that the velocity near rest changes by little of its scale.
 
     A sticking element's limit depends on s(v), which the error control does not see.
     """
     change = abs(after[VELOCITY] - before[VELOCITY])
-    scale = w[PLANT_SCALE]
-    if w[SOURCE] == FROM_MEASUREMENT and w[COMPENSATOR_SCALE] > 0.0:
-        scale = min(scale, w[COMPENSATOR_SCALE]) if scale > 0.0 else w[COMPENSATOR_SCALE]
+    scale = scale_near_rest(w)
     near = min(abs(after[VELOCITY]), abs(before[VELOCITY]))
     if scale > 0.0 and near < 3.0 * scale and change > 0.1 * scale:
         return 0.09 * scale / change

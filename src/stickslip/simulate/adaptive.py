@@ -51,12 +51,13 @@ from stickslip.simulate._loop import (
     VELOCITY,
     arrays_of,
     begin_side,
+    calm_step,
     events,
     rates,
     small_enough,
     switch,
 )
-from stickslip.simulate._meter import MAX_WINDOW, close_standstill, meter, new_meter
+from stickslip.simulate._meter import MAX_WINDOW, SIGNALS, close_standstill, meter, new_meter
 
 __all__ = ["can_run", "run"]
 
@@ -284,15 +285,24 @@ def note(w: Any, y: Any, nodes: Any, i: int) -> None:
 
 @kernel()
 def measure(
-    a: Any, w: Any, t: float, h: float, y: Any, k: Any, end: Any, u: Any, nodes: Any, acc: Any, turns: Any
-) -> None:
-    """Hand an accepted step to the meter: its ends are noted, the nodes between come from the dense output."""
+    a: Any, w: Any, t: float, h: float, y: Any, k: Any, end: Any, u: Any, nodes: Any, acc: Any, turns: Any,
+    smooth: bool,
+) -> None:  # fmt: skip
+    """Hand an accepted step to the meter: its ends are noted, the nodes between come from the dense output.
+
+    A smooth step, limited by stability alone, is short against every motion that it holds: parabolas do.
+    """
     for i in range(1, 4):
-        dense(h, y, k, end, 0.25 * i, u)
-        rates(a, w, t + 0.25 * i * h, u, k, SCRATCH)
-        note(w, u, nodes, i)
+        if i == 2 or not smooth:
+            dense(h, y, k, end, 0.25 * i, u)
+            rates(a, w, t + 0.25 * i * h, u, k, SCRATCH)
+            note(w, u, nodes, i)
+    if smooth:
+        for j in range(SIGNALS):
+            nodes[j, 1] = 0.125 * (3.0 * nodes[j, 0] + 6.0 * nodes[j, 2] - nodes[j, 4])
+            nodes[j, 3] = 0.125 * (3.0 * nodes[j, 4] + 6.0 * nodes[j, 2] - nodes[j, 0])
     meter(acc, turns, t, h, nodes)
-    for j in range(8):
+    for j in range(SIGNALS):
         nodes[j, 0] = nodes[j, 4]
 
 
@@ -370,8 +380,9 @@ def stiffness_limit(k: Any, end: Any, u: Any, tolerance: Any) -> float:
 
 # ---- one step, and all of them ------------------------------------------------------------------------------
 # What a trial step leaves behind: its length, whether it ends the stretch, whether an event is due at its end, the
-# value of the event function there, the length of the next step, and whether it may be taken.
-STEP, FINAL, EVENT, VALUE, NEXT, TAKEN, TRIAL = range(7)
+# value of the event function there, the length of the next step, whether it may be taken, and whether its error is so
+# far below the tolerance that stability alone limits it.
+STEP, FINAL, EVENT, VALUE, NEXT, TAKEN, SMOOTH, TRIAL = range(8)
 
 
 @kernel()
@@ -380,12 +391,12 @@ def attempt(
     nodes: Any, trial: Any,
 ) -> int:  # fmt: skip
     """Try one step of length ``trial[NEXT]`` from t; where it is accepted it ends at the first event."""
-    h = trial[NEXT]
+    h = min(trial[NEXT], calm_step(w, y, k[0, VELOCITY]))
     trial[FINAL] = t + h * (1.0 + 1e-9) >= stop
     step = stop - t if trial[FINAL] else h
     stages(a, w, t, step, y, k, end, error, u)
     worst = ratio(error, tolerance)
-    shrink = small_enough(a, w, y, end)
+    shrink = small_enough(w, y, end)
     trial[TAKEN] = 0.0
     if not worst < np.inf and step <= SHORTEST:
         return NOT_FINITE
@@ -395,6 +406,7 @@ def attempt(
         trial[NEXT] = step * min(shrink, max(0.2, 0.9 * worst**-0.2) if worst > 1.0 else 1.0)
         return DONE
     trial[TAKEN] = 1.0
+    trial[SMOOTH] = worst < 1e-3
     grow = min(5.0, 0.9 * worst**-0.2) if worst > 1e-4 else 5.0
     resolved = stiffness_limit(k, end, u, tolerance)
     note(w, end, nodes, 4)
@@ -458,7 +470,7 @@ def integrate(
     ``counts`` receives steps, rejected steps, events and rows.
     """
     n = y.shape[0]
-    k, nodes, trial = np.zeros((STAGES + 1, n)), np.zeros((8, 5)), np.zeros(TRIAL)
+    k, nodes, trial = np.zeros((STAGES + 1, n)), np.zeros((SIGNALS, 5)), np.zeros(TRIAL)
     end, error, u = np.zeros(n), np.zeros(n), np.zeros(n)
     g = np.zeros(n - LAWS + EXTRA)
     longest = min(w[MAX_STEP], MAX_WINDOW)
@@ -492,7 +504,7 @@ def integrate(
                 written = emit(a, w, grid[out], u, k, rows, written, 0.0)
                 out += 1
             if w[METERED] != 0.0:
-                measure(a, w, t, step, y, k, end, u, nodes, acc, turns)
+                measure(a, w, t, step, y, k, end, u, nodes, acc, turns, trial[SMOOTH] != 0.0)
             t = stop if trial[FINAL] else t + step
             # Element by element: assigning slices would compile numpy's checks of shapes, seconds of it.
             for j in range(n):
