@@ -83,7 +83,9 @@ def misses(expected: dict[str, Any], found: dict[str, float], names: Any = METRI
         inside = low <= ours <= high
         if "rev" in name:
             one = 1.0 / expected["T"] * (2.0 if name.startswith("w2") else 1.0)
-            fine = off <= max(1.001 * one, room) or (expected["cls"] != "W" and low - one <= ours <= high + one)
+            fine = off <= max(1.001 * one, room) or (
+                expected["cls"] != "W" and low - one <= ours <= high + one
+            )
         elif expected["cls"] == "W":
             fine = off <= room
         elif expected["cls"] == "S":

@@ -23,7 +23,9 @@ def blocks(text: str, kind: str) -> list[str]:
 def test_python_examples_run_in_order(tmp_path, capsys):
     """As one session, from top to bottom, in a folder of their own."""
     script = "\n".join(blocks(README, "python"))
-    out = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    out = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert out.returncode == 0, out.stderr
     assert float(out.stdout.split()[0]) == pytest.approx(0.00995, rel=1e-3)
     assert (tmp_path / "move.npz").exists()
@@ -52,7 +54,13 @@ def test_first_command_in_a_fresh_environment(tmp_path):
         os.symlink(ROOT / name, copy / name)
     environment = {**os.environ, "STICKSLIP_CACHE": str(tmp_path / "cache")}
     out = subprocess.run(
-        study.strip() + " --only step", shell=True, cwd=copy, env=environment, capture_output=True, text=True, check=False
+        study.strip() + " --only step",
+        shell=True,
+        cwd=copy,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert out.returncode == 0, out.stderr
     assert (copy / "study-thesis" / "report.html").exists()
@@ -67,10 +75,16 @@ def test_law_of_contributing_passes_the_contract(tmp_path):
     path.write_text(text)
     environment = {**os.environ, "STICKSLIP_LAWS": str(path)}
     python = [sys.executable, "-m"]
-    listing = subprocess.run([*python, "stickslip", "laws"], env=environment, capture_output=True, text=True, check=False)
+    listing = subprocess.run(
+        [*python, "stickslip", "laws"], env=environment, capture_output=True, text=True, check=False
+    )
     assert "dahl-example" in listing.stdout, listing.stderr
     shown = subprocess.run(
-        [*python, "stickslip", "law", "dahl-example"], env=environment, capture_output=True, text=True, check=False
+        [*python, "stickslip", "law", "dahl-example"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert "stiffness at rest" in shown.stdout, shown.stderr
     suite = subprocess.run(
