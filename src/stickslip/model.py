@@ -110,9 +110,7 @@ class Reference:
     ) -> Reference:
         """A reference through points (s, rad); velocities (rad/s) of a cubic spline where none are given."""
         if velocity is None:
-            from stickslip.references.table import with_velocities
-
-            velocity = with_velocities(time, position)
+            velocity = spline_velocities(time, position)
         return cls("table", **{k: [float(x) for x in v] for k, v in
                                (("time", time), ("position", position), ("velocity", velocity))})  # fmt: skip
 
@@ -138,3 +136,23 @@ class Reference:
     def __repr__(self) -> str:
         inside = ", ".join(f"{k}={v!r}" for k, v in self.parameters._asdict().items())
         return f"Reference({self.kind.name!r}, {inside})"
+
+
+def spline_velocities(time: Sequence[float], position: Sequence[float]) -> tuple[float, ...]:
+    """Velocities at the points of a natural cubic spline through them (C2), rad/s."""
+    t, x = np.asarray(time, float), np.asarray(position, float)
+    if t.shape != x.shape or t.ndim != 1 or t.size < 2:
+        raise ParameterError(
+            f"table: time has {t.size} values and position {x.size}; give as many of each, at least 2"
+        )
+    h = np.diff(t)
+    if not np.all(np.isfinite(x)) or not np.all(np.isfinite(t)) or np.any(h <= 0.0):
+        raise ParameterError("table: time must ascend and every number must be finite; mend the table")
+    slope = np.diff(x) / h
+    matrix, right = np.zeros((t.size, t.size)), np.zeros(t.size)
+    matrix[0, :2], right[0] = (2.0, 1.0), 3.0 * slope[0]
+    matrix[-1, -2:], right[-1] = (1.0, 2.0), 3.0 * slope[-1]
+    for i in range(1, t.size - 1):
+        matrix[i, i - 1 : i + 2] = (1.0 / h[i - 1], 2.0 / h[i - 1] + 2.0 / h[i], 1.0 / h[i])
+        right[i] = 3.0 * (slope[i - 1] / h[i - 1] + slope[i] / h[i])
+    return tuple(float(v) for v in np.linalg.solve(matrix, right))

@@ -334,9 +334,8 @@ class Law(Described):
         own_names = {f.name for f in own}
         object.__setattr__(self, "fields", own + tuple(f for f in brought if f.name not in own_names))
         object.__setattr__(self, "state_fields", fields_of(self.State))
-        object.__setattr__(
-            self, "Parameters", namedtuple(self.Params.__name__, [f.name for f in self.fields])
-        )
+        make: Any = namedtuple  # whose fields are not known to a type checker
+        object.__setattr__(self, "Parameters", make(self.Params.__name__, [f.name for f in self.fields]))
         for function in ("step", "rate", "guards", "switch", "steady", "holding", "check", "modes"):
             raw = getattr(self, function)
             if raw is not None:

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from conftest import CASES, INERTIA, METRICS, PARAMETERS, PLANT, misses, thesis_run
 
+from conftest import CASES, INERTIA, METRICS, PARAMETERS, PLANT, misses, thesis_run
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller

@@ -7,10 +7,9 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from stickslip.errors import ParameterError
 from stickslip.spec import Par, ReferenceKind
 
-__all__ = ["REFERENCE", "with_velocities"]
+__all__ = ["REFERENCE"]
 
 
 class Params(NamedTuple):
@@ -77,26 +76,6 @@ def check(p: Any) -> str:
         if p.time[i] <= p.time[i - 1]:
             return f"time[{i}] = {p.time[i]:g} s does not come after time[{i - 1}] = {p.time[i - 1]:g} s"
     return "" if len(p.time) > 1 else "a table needs at least two points"
-
-
-def with_velocities(time: Sequence[float], position: Sequence[float]) -> tuple[float, ...]:
-    """Velocities at the points of a natural cubic spline through them (C2), rad/s."""
-    t, x = np.asarray(time, float), np.asarray(position, float)
-    if t.shape != x.shape or t.ndim != 1 or t.size < 2:
-        raise ParameterError(
-            f"table: time has {t.size} values and position {x.size}; give as many of each, at least 2"
-        )
-    h = np.diff(t)
-    if not np.all(np.isfinite(x)) or not np.all(np.isfinite(t)) or np.any(h <= 0.0):
-        raise ParameterError("table: time must ascend and every number must be finite; mend the table")
-    slope = np.diff(x) / h
-    matrix, right = np.zeros((t.size, t.size)), np.zeros(t.size)
-    matrix[0, :2], right[0] = (2.0, 1.0), 3.0 * slope[0]
-    matrix[-1, -2:], right[-1] = (1.0, 2.0), 3.0 * slope[-1]
-    for i in range(1, t.size - 1):
-        matrix[i, i - 1 : i + 2] = (1.0 / h[i - 1], 2.0 / h[i - 1] + 2.0 / h[i], 1.0 / h[i])
-        right[i] = 3.0 * (slope[i - 1] / h[i - 1] + slope[i] / h[i])
-    return tuple(float(v) for v in np.linalg.solve(matrix, right))
 
 
 REFERENCE = ReferenceKind(

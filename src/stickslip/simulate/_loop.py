@@ -47,7 +47,8 @@ from stickslip.spec import Surroundings
 # The state vector; the laws' states follow.
 POSITION, VELOCITY, INTEGRAL, FILTER_1, FILTER_2, LAWS = range(6)
 # The workspace w: Case.numbers, then what is remembered, the reference, the torques (the demand is the motor
-# torque before its limit), the time for which the reference was taken, the surroundings, and the parameters of plant, compensator and reference.
+# torque before its limit), the time for which the reference was taken, the surroundings,
+# and the parameters of plant, compensator and reference.
 (
     MOTION, SIGN, FILTERED_SIGN, REFERENCE_SIGN, SATURATED, THETA_D, OMEGA_D, ALPHA_D, MOTOR_TORQUE,
     FRICTION_TORQUE, COMPENSATION_TORQUE, DEMAND, REFERENCE_TIME, SURROUNDINGS,
