@@ -88,7 +88,7 @@ def test_law_of_contributing_passes_the_contract(tmp_path):
     )
     assert "stiffness at rest" in shown.stdout, shown.stderr
     suite = subprocess.run(
-        [*python, "pytest", "-q", "-p", "no:cacheprovider", "tests/contract", "-k", "dahl"],
+        [*python, "pytest", "-p", "no:cacheprovider", "tests/contract", "-k", "dahl"],
         cwd=ROOT, env=environment, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert suite.returncode == 0, suite.stdout[-3000:]
