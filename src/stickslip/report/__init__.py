@@ -29,7 +29,7 @@ def write(result: StudyResult) -> Path:
     InputError
         If the folder cannot be written.
     """
-    from stickslip.report._open_loop import comparison_figures, response_figures
+    from stickslip.report._open_loop import comparison_figures, drive_figures, response_figures
     from stickslip.report._view import StudyView
     from stickslip.report.figures import reference_figures, result_figures
     from stickslip.report.html import render
@@ -40,7 +40,13 @@ def write(result: StudyResult) -> Path:
     try:
         figures = [
             figure
-            for make in (reference_figures, response_figures, comparison_figures, result_figures)
+            for make in (
+                reference_figures,
+                response_figures,
+                drive_figures,
+                comparison_figures,
+                result_figures,
+            )
             for figure in make(view, folder)
         ]
         draft = target.with_name("report.html.part")

@@ -41,9 +41,8 @@ SIGN = Note(
 )
 MISSING = Note(
     "Figures that are not here",
-    "Figure 3.12 compares positions under a prescribed motor torque, which belongs to the identification of the "
-    "LuGre model and is not part of this study; so do 3.7 and 3.8 (curve fitting). Figures 3.1 to 3.4, 3.6 and "
-    "3.9 are schematics and block diagrams.",
+    "Figures 3.7 and 3.8 (curve fitting) belong to the identification. Figures 3.1 to 3.4, 3.6 and 3.9 are "
+    "schematics and block diagrams.",
 )
 NUMERICS = Note(
     "Numerics",

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from stickslip.analyse.wording import quantity
-from stickslip.model import Model
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Gains
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model, Reference
 from stickslip.record import Record
 from stickslip.report._view import StudyView, is_thesis
 from stickslip.report.figures import COMMON, FRICTION_NAMES, Figure, describe, heading, named
 from stickslip.report.plots import Array, Curve, Panel, Style, draw, envelope, scaled, style_of
+from stickslip.simulate.closed_loop import simulate
 from stickslip.simulate.open_loop import respond
-from stickslip.study.plan import Response, load
+from stickslip.study.plan import Drive, Response, Study, load
 from stickslip.study.result import StudyResult
 
-__all__ = ["comparison_figures", "response_figures"]
+__all__ = ["comparison_figures", "drive_figures", "response_figures"]
 
 NEAR_ZERO = 0.04  # rad/s, what the thesis shows where it compares laws
 GRID = 20_000  # instants of a response
@@ -31,13 +35,13 @@ UNITS = {"position": "rad", "velocity": "rad/s"}
 WINDOWS = {"3.18": 1.0, "3.19": 0.5}  # periods of the reference that the thesis shows
 
 
-def responses(result: StudyResult) -> Sequence[Response]:
-    """The responses that the study's file asks for, read from the copies of its inputs."""
+def planned(result: StudyResult) -> Study | None:
+    """The study as its file describes it, read from the copies of its inputs."""
     inputs = result.manifest.get("inputs", [])
-    if not inputs or not result.config.get("responses"):
-        return []
+    if not inputs:
+        return None
     copies = {entry["written"]: result.folder / entry["copy"] for entry in inputs}
-    return load(result.folder / inputs[0]["copy"], copies).responses
+    return load(result.folder / inputs[0]["copy"], copies)
 
 
 def response_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
@@ -47,7 +51,8 @@ def response_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
     differ.
     """
     known: dict[str, tuple[Array, Array]] = {}
-    for response in responses(view.result):
+    study = planned(view.result) if view.result.config.get("responses") else None
+    for response in study.responses if study else ():
         stem = folder / COMMON / named(response.figure, f"response-{response.name}")
         loops = {name: _loop(model, response, known) for name, model in response.models.items()}
         near = is_thesis(view.result) and any(name not in view.frictions for name in loops)
@@ -100,6 +105,46 @@ def _gap(loops: dict[str, tuple[Array, Array]], near: bool) -> str:
         f"Largest difference from {first}: {words}"
         if words
         else f"Peak torque {np.max(np.abs(torque)):.4g} N·m"
+    )
+
+
+def drive_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
+    """Positions of axes under the same motor torque (thesis figure 3.12)."""
+    study = planned(view.result) if view.result.config.get("drives") else None
+    for drive in study.drives if study else ():
+        records = {name: _driven(axis, drive) for name, axis in drive.axes.items()}
+        factor, unit = scaled(max(float(np.ptp(r["position"])) for r in records.values()), "rad")
+        curves = [
+            Curve(
+                *envelope(r.time, factor * r["position"]),
+                "plant" if n in view.frictions else f"{n} law",
+                style,
+            )
+            for n, r in records.items()
+            for style in [PLANT["nominal"] if n in view.frictions else replace(style_of(n), dashes="--")]
+        ]
+        title = heading(drive.figure, drive.title)
+        peaks = ", ".join(f"{n} {1e3 * float(np.max(r['position'])):.4g} mrad" for n, r in records.items())
+        stem = folder / COMMON / named(drive.figure, f"drive-{drive.name}")
+        draw(
+            stem, title, f"Largest position: {peaks}", [Panel(curves, f"position ({unit})", "time (s)")], 2.7
+        )
+        caption = (
+            f"Open loop under {drive.amplitude:g} N·m at {drive.frequency:g} Hz. Largest position: {peaks}. Gross "
+            "sliding rules the record; the pre-sliding stiffness shows only near the turning points."
+        )
+        yield Figure(stem.name.removeprefix("figure-"), drive.figure, title, caption, COMMON, stem)
+
+
+def _driven(axis: RigidAxis, drive: Drive) -> Record:
+    """The axis under T_m = amplitude sin(2 pi f t): a controller that passes the reference's velocity on as torque."""
+    w = 2.0 * np.pi * drive.frequency
+    torque = Reference(
+        "harmonic", amplitude=drive.amplitude / w, frequency=drive.frequency, phase=-0.5 * np.pi
+    )
+    passing = Controller(Gains(kp=0.0, kr=1.0))
+    return simulate(
+        axis, passing, torque, drive.duration, integrator="adaptive", tolerance=1e-8, metered=False
     )
 
 

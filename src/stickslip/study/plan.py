@@ -20,7 +20,7 @@ from stickslip.study import build
 from stickslip.study.build import Numerics, Placement
 from stickslip.study.provenance import engine_hash, source_hash
 
-__all__ = ["SLIP_RULES", "PlannedRun", "Response", "Study", "load", "load_run", "select"]
+__all__ = ["SLIP_RULES", "Drive", "PlannedRun", "Response", "Study", "load", "load_run", "select"]
 
 SLIP_RULES = ("signed", "literal")
 BUILT_IN = ("thesis",)
@@ -100,6 +100,21 @@ class Response:
 
 
 @dataclass(frozen=True)
+class Drive:
+    """Positions in open loop: axes with different frictions under the same sinusoidal motor torque."""
+
+    name: str
+    title: str
+    figure: str
+    amplitude: float
+    """N·m"""
+    frequency: float
+    """Hz"""
+    duration: float
+    axes: Mapping[str, RigidAxis]
+
+
+@dataclass(frozen=True)
 class Study:
     """A study as its file describes it.
 
@@ -110,6 +125,7 @@ class Study:
     extras : sequence of PlannedRun
         What the comparisons add to them.
     responses : sequence of Response
+    drives : sequence of Drive
     config : mapping
         The TOML as read.
     source : Path
@@ -123,6 +139,7 @@ class Study:
     runs: Sequence[PlannedRun]
     extras: Sequence[PlannedRun]
     responses: Sequence[Response]
+    drives: Sequence[Drive]
     config: Mapping[str, Any]
     source: Path
     files: Mapping[str, Path]
@@ -157,7 +174,8 @@ def _study(name: str, path: Path, table: Table) -> Study:
         compared = [r for t in table.tables("comparisons").values() for r in _comparison(t, parts, rules[0])]
         extras = _without_doubles(runs, compared, table.label("comparisons"))
         responses = [_response(n, t, parts) for n, t in table.tables("responses").items()]
-    return Study(name, title, runs, extras, responses, table.values, path, dict(table.document.files))
+        drives = [_drive(n, t, parts) for n, t in table.tables("drives").items()]
+    return Study(name, title, runs, extras, responses, drives, table.values, path, dict(table.document.files))
 
 
 def _without_doubles(
@@ -296,6 +314,19 @@ def _response(name: str, table: Table, parts: _Parts) -> Response:
         models = {f: parts.frictions[f].friction for f in frictions} | {n: parts.laws[n] for n in laws}
         return Response(name, table.text("title", name), table.text("figure", ""),
                         motion.reference, motion.duration, models)  # fmt: skip
+
+
+def _drive(name: str, table: Table, parts: _Parts) -> Drive:
+    with table:
+        frictions = table.texts("frictions", parts.frictions) if table.has("frictions") else []
+        laws = table.texts("laws", parts.laws) if table.has("laws") else []
+        axes = {f: parts.frictions[f] for f in frictions}
+        inertia = next(iter(parts.frictions.values())).inertia
+        axes |= {n: RigidAxis(inertia, parts.laws[n]) for n in laws}
+        return Drive(
+            name, table.text("title", name), table.text("figure", ""), table.positive("amplitude", "N·m"),
+            table.positive("frequency", "Hz"), table.positive("duration", "s"), axes,
+        )  # fmt: skip
 
 
 def select(
