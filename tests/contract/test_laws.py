@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import ctypes
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+import stickslip
 from stickslip import plugins
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
@@ -80,6 +82,14 @@ def test_description_is_complete(law):
     assert law.step.__doc__
     assert (law.guards is None) == (law.switch is None)
     assert any(isinstance(f.par, Mode) for f in law.state_fields) == (law.guards is not None)
+
+
+@every_law
+def test_sources_are_in_the_bibliography(law):
+    """Every source of a law is a place in the thesis or a key of references.bib."""
+    bibliography = (Path(stickslip.__file__).parent / "references.bib").read_text()
+    for source in law.source:
+        assert source.startswith("thesis") or f"{{{source}," in bibliography, source
 
 
 @every_law
