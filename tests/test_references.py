@@ -93,6 +93,17 @@ def test_table_passes_through_its_points():
     assert Reference.table(t, x).sample(t)[:, 0] == pytest.approx(x)
 
 
+def test_table_without_velocities_does_not_overshoot():
+    """Dwells stay dwells, and the motion starts and ends at rest."""
+    t, x = [0.0, 0.5, 1.5, 2.0, 3.0, 3.5], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]
+    reference = Reference.table(t, x)
+    rows = reference.sample(np.linspace(0.0, 3.5, 701))
+    assert rows[:, 0].min() >= -1e-15
+    assert rows[:, 0].max() <= 1.0 + 1e-15
+    assert np.abs(rows[300:401, 0] - 1.0).max() < 1e-14
+    assert rows[0, 1] == rows[-1, 1] == 0.0
+
+
 def test_bad_references_are_refused():
     with pytest.raises(UnknownName, match="did you mean 'sine'"):
         Reference("sin", amplitude=1.0)

@@ -1,4 +1,4 @@
-"""stickslip finds the friction of a servo axis from its records, simulates it and compensates it.
+"""stickslip: friction of servo axes, simulated under control and compensated.
 
 The public names below are loaded when first used, so that importing the package costs nothing.
 """

@@ -108,9 +108,10 @@ class Reference:
     def table(
         cls, time: Sequence[float], position: Sequence[float], velocity: Sequence[float] | None = None
     ) -> Reference:
-        """A reference through points (s, rad); velocities (rad/s) of a cubic spline where none are given."""
+        """A reference through points (s, rad); where no velocities (rad/s) are given, of a
+        cubic that does not overshoot the points and starts and ends at rest."""
         if velocity is None:
-            velocity = spline_velocities(time, position)
+            velocity = monotone_velocities(time, position)
         return cls("table", **{k: [float(x) for x in v] for k, v in
                                (("time", time), ("position", position), ("velocity", velocity))})  # fmt: skip
 
@@ -138,8 +139,12 @@ class Reference:
         return f"Reference({self.kind.name!r}, {inside})"
 
 
-def spline_velocities(time: Sequence[float], position: Sequence[float]) -> tuple[float, ...]:
-    """Velocities at the points of a natural cubic spline through them (C2), rad/s."""
+def monotone_velocities(time: Sequence[float], position: Sequence[float]) -> tuple[float, ...]:
+    """Velocities at the points of a piecewise cubic that does not overshoot them, rad/s.
+
+    Fritsch and Butland's weighted harmonic mean of the slopes on both sides; 0 at a turning point, along a dwell
+    and at both ends, so that the motion starts and ends at rest.
+    """
     t, x = np.asarray(time, float), np.asarray(position, float)
     if t.shape != x.shape or t.ndim != 1 or t.size < 2:
         raise ParameterError(
@@ -149,10 +154,9 @@ def spline_velocities(time: Sequence[float], position: Sequence[float]) -> tuple
     if not np.all(np.isfinite(x)) or not np.all(np.isfinite(t)) or np.any(h <= 0.0):
         raise ParameterError("table: time must ascend and every number must be finite; mend the table")
     slope = np.diff(x) / h
-    matrix, right = np.zeros((t.size, t.size)), np.zeros(t.size)
-    matrix[0, :2], right[0] = (2.0, 1.0), 3.0 * slope[0]
-    matrix[-1, -2:], right[-1] = (1.0, 2.0), 3.0 * slope[-1]
-    for i in range(1, t.size - 1):
-        matrix[i, i - 1 : i + 2] = (1.0 / h[i - 1], 2.0 / h[i - 1] + 2.0 / h[i], 1.0 / h[i])
-        right[i] = 3.0 * (slope[i - 1] / h[i - 1] + slope[i] / h[i])
-    return tuple(float(v) for v in np.linalg.solve(matrix, right))
+    before, after = slope[:-1], slope[1:]
+    same = before * after > 0.0
+    w1, w2 = 2.0 * h[1:] + h[:-1], h[1:] + 2.0 * h[:-1]
+    inner = np.zeros(max(t.size - 2, 0))
+    inner[same] = (w1 + w2)[same] / (w1[same] / before[same] + w2[same] / after[same])
+    return (0.0, *(float(v) for v in inner), 0.0)

@@ -20,6 +20,7 @@ from typing import Any
 
 from stickslip.errors import InputError, LawError, UnknownName
 from stickslip.spec import Law, ReferenceKind
+from stickslip.subset import law_layouts, lower
 
 __all__ = ["law", "law_names", "reference_kind", "reference_names"]
 
@@ -87,6 +88,8 @@ def _law_in(path: str) -> Law:
     found = getattr(module, "LAW", None)
     if not isinstance(found, Law):
         raise LawError(f"{path} defines no law; end it with `LAW = Law(...)`")
+    functions = ("step", "rate", "guards", "switch", "steady", "holding")
+    lower({n: getattr(found, n) for n in functions if getattr(found, n)}, law_layouts(found))
     return found
 
 

@@ -91,9 +91,17 @@ class Record:
             raise InputError(f"{path} is not a record of this package ({error})") from None
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The channels as a data frame indexed by time (needs pandas: `pip install stickslip[pandas]`)."""
-        import pandas
+        """The channels as a data frame indexed by time.
 
+        Raises
+        ------
+        InputError
+            Without pandas, which `pip install 'stickslip[pandas]'` brings.
+        """
+        try:
+            import pandas
+        except ModuleNotFoundError:
+            raise InputError("to_pandas() needs pandas; run `pip install 'stickslip[pandas]'`") from None
         frame = pandas.DataFrame(dict(self.channels), index=pandas.Index(self.time, name="time"))
         frame.attrs.update(units=dict(self.units), meta=dict(self.meta))
         return frame

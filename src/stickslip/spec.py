@@ -7,7 +7,8 @@ Argument order, everywhere: velocity, time step, state ``z``, parameters ``p``, 
 
 =====================================  =============================================================
 ``step(v0, v1, dt, z, p, u)``          torque at the end of a step; advances ``z`` in place. The velocity
-                                       runs from ``v0`` to ``v1`` (linearly). Stable for any ``dt``
+                                       runs from ``v0`` to ``v1`` (linearly). Stable for any ``dt``; with
+                                       ``dt = 0`` the torque now, the state as it was
 ``rate(v, z, p, u, dz)``               torque now; writes the time derivative of every state but the modes
 ``guards(v, z, p, u, g)``              writes one value per mode; a mode is left when its value rises to zero
 ``switch(v, z, p, u, g)``              changes the modes whose value in ``g`` is not negative
@@ -298,7 +299,7 @@ class Law(Described):
     odd, rate_independent : bool
         Declarations that the contract tests hold it to.
     passive : str
-        "always", "never", or the condition under which it only dissipates; tested by `is_passive`.
+        "always", "never", or the condition under which it only dissipates, tested by `is_passive`; empty: not stated.
     velocity_scale : callable or None
         ``velocity_scale(p)``: a velocity over which the torque changes much; steps near rest stay below it.
     """
@@ -321,7 +322,7 @@ class Law(Described):
     velocity_scale: Callable[[Any], float] | None = None
     choices: tuple[Choice, ...] = ()
     odd: bool = True
-    passive: str = "always"
+    passive: str = ""
     is_passive: Callable[[Any], bool] | None = None
     rate_independent: bool = False
     chosen: Mapping[str, str] = field(default_factory=dict[str, str])
@@ -340,6 +341,7 @@ class Law(Described):
             raw = getattr(self, function)
             if raw is not None:
                 object.__setattr__(self, function, self._bound(raw))
+        self.parameters(dict(self.example))
 
     fields: tuple[Field, ...] = field(init=False)
     state_fields: tuple[Field, ...] = field(init=False)

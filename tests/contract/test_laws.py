@@ -142,6 +142,23 @@ def test_step_is_bounded_for_any_time_step(law, motion):
 
 
 @every_law
+@given(motion=motions, v=velocities)
+@settings(max_examples=60, deadline=None)
+def test_a_step_of_no_length_is_the_torque_now(law, motion, v):
+    """Engines take the first torque of a run so; nothing is divided by dt."""
+    p = example(law)
+    torques, z = drive(law, p, motion)
+    last = motion[-1][0]
+    before = law.pack_state(z)
+    assert law.step(last, last, 0.0, z, p, U) == pytest.approx(torques[-1], rel=1e-12, abs=1e-15)
+    fields = [f for f, mode in zip(before, law.mode_mask(p)) if not mode]
+    assert [f for f, mode in zip(law.pack_state(z), law.mode_mask(p)) if not mode] == pytest.approx(
+        fields, rel=1e-12
+    )
+    assert math.isfinite(law.step(v, v, 0.0, law.state(p), p, U))
+
+
+@every_law
 @given(motion=motions)
 @settings(max_examples=100, deadline=None)
 def test_odd(law, motion):
@@ -215,8 +232,8 @@ def test_step_converges_to_rate(law):
 def test_passive_from_rest(law, amplitude, frequency, drift):
     """Work done on a contact that starts unloaded is never negative."""
     p = example(law)
-    if law.passive == "never" or (law.is_passive is not None and not law.is_passive(p)):
-        pytest.skip("declared not passive with these parameters")
+    if law.passive in ("", "never") or (law.is_passive is not None and not law.is_passive(p)):
+        pytest.skip("not declared passive with these parameters")
     n, z, work, torque = 400, law.state(p), 0.0, 0.0
     w = 2 * math.pi * frequency
     dt = 3.0 / frequency / n

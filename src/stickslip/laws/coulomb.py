@@ -62,6 +62,7 @@ LAW = Law(
     example={"fc": 0.285, "sigma2": 0.018},  # thesis Table 2
     rate=rate,
     steady=steady,
+    passive="always",
     holding=holding,
     modes=modes,
     rate_independent=False,

@@ -55,6 +55,7 @@ LAW = Law(
     example={"k": 3.5e4, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01},  # thesis Table 3
     rate=rate,
     steady=steady,
+    passive="always",
     check=check_levels,
     velocity_scale=lambda p: p.vs,
     choices=(CURVE,),

@@ -20,6 +20,7 @@ TRIGGER = 1e-3  # rad/s, Schmitt trigger of the reversals, and standstill
 MOVING = 2e-3  # rad/s, the reference moves
 STANDSTILL = 10e-3  # s, shortest standstill that counts
 MAX_WINDOW = 2e-3  # s
+SETTLED_FOR = 0.1  # of the run, without leaving the band again
 
 # ---- layout of the accumulator --------------------------------------------------------------------------------
 (
@@ -295,10 +296,14 @@ def limit_cycle(turns: Any, duration: float) -> tuple[float, float]:
 
 
 def metrics(acc: Any, turns: Any) -> dict[str, float]:
-    """Read a finished accumulator: one number a metric, its unit in the name; NaN where there is none."""
+    """Read a finished accumulator: one number a metric, its unit in the name; NaN where there is none.
+
+    The definitions are in docs/metrics.md.
+    """
     duration = acc[DURATION]
     half = 0.5 * duration
-    settled = acc[SETTLE_BAND] > 0.0 and abs(acc[E_END]) <= acc[SETTLE_BAND]
+    # For good: a limit cycle that happens to end inside the band has not settled.
+    settled = acc[SETTLE_BAND] > 0.0 and acc[OUTSIDE_LAST] <= (1.0 - SETTLED_FOR) * duration
     amplitude, period = limit_cycle(turns, duration)
     return {
         "position_rms_rad": math.sqrt(acc[E2] / duration),
