@@ -94,17 +94,20 @@ def _cached(make: Callable[[], Any]) -> Any:
         config.CACHE_DIR = before
 
 
-def kernel(*, exact: bool = True) -> Callable[[Any], Any]:
+def kernel(*, exact: bool = True, inline: bool = False) -> Callable[[Any], Any]:
     """Compile a function of an engine; it releases the interpreter's lock and is cached.
 
     ``exact=False`` lets the compiler contract and reassociate by reciprocals (never for laws, whose compiled
-    form equals plain Python bit for bit).
+    form equals plain Python bit for bit). ``inline=True`` puts the machine code into every caller, which saves
+    functions of many arguments a tenth of a microsecond a call.
     """
     fast: Any = False if exact else {"contract", "arcp", "nsz"}
 
     def decorate(function: Any) -> Any:
         return _cached(
-            lambda: numba.njit(function, cache=True, nogil=True, fastmath=fast, error_model="numpy")
+            lambda: numba.njit(
+                function, cache=True, nogil=True, fastmath=fast, error_model="numpy", forceinline=inline
+            )
         )
 
     return decorate

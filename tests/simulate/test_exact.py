@@ -54,24 +54,14 @@ def column(outcome: Outcome, index: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("rule", ["signed", "literal"])
-@pytest.mark.parametrize("controller", ["PD", "PID", "FF-coulomb", "FF-stribeck", "FF-lugre", "FF-gms"])
+@pytest.mark.parametrize(
+    "controller", ["PD", "PID", "FF-coulomb", "FF-stribeck", "FF-lugre", "FF-gms", "FB-coulomb", "FB-gms"]
+)
 @pytest.mark.parametrize("motion", ["low", "high", "step"])
-def test_study_without_feedback_of_friction(motion, controller, rule, study_reference):
+def test_study_against_the_reference(motion, controller, rule, study_reference):
     for friction in ("nominal", "plus10", "minus10"):
         case = f"{motion}/{friction}/{controller}"
-        # Two runs ring at each reversal, where the high-passed velocity differs from the reference's by 5e-6.
-        names = [n for n in NAMES if not (motion == "high" and controller == "FF-stribeck" and n == "rms_hp")]
-        assert study_misses(case, rule, study_reference, names) == [], case
-
-
-@pytest.mark.parametrize("rule", ["signed", "literal"])
-@pytest.mark.parametrize("controller", ["FB-coulomb", "FB-gms"])
-@pytest.mark.parametrize("motion", ["low", "high", "step"])
-def test_study_with_feedback_of_friction(motion, controller, rule, study_reference):
-    for friction in ("nominal", "plus10", "minus10"):
-        case = f"{motion}/{friction}/{controller}"
-        names = [n for n in NAMES if case != "low/plus10/FB-gms" or n != "rev_per_s"]
-        assert study_misses(case, rule, study_reference, names) == [], case
+        assert study_misses(case, rule, study_reference, NAMES) == [], case
 
 
 def study_misses(case, rule, study_reference, names):

@@ -12,7 +12,7 @@ from typing import Any
 
 from stickslip.jit import kernel, pointer
 from stickslip.simulate._case import KI, KP
-from stickslip.simulate._exact_flow import Linear, acceleration
+from stickslip.simulate._exact_flow import UNMOVED, Linear, acceleration, flow, free_motion, moved
 from stickslip.simulate._exact_state import (
     ATTRACTION,
     BREAKAWAY,
@@ -53,8 +53,10 @@ from stickslip.simulate._exact_state import (
 from stickslip.simulate._exact_step import (
     LENGTH,
     POSITION_END,
+    POSITION_EVENT,
     POSITION_MID,
     VELOCITY_END,
+    VELOCITY_EVENT,
     VELOCITY_MID,
     cubic_of,
     state_at,
@@ -67,6 +69,10 @@ NOISE = 1e-12
 """Velocities this small (rad/s) may be rounding errors of one that creeps to zero: no reversal yet."""
 ROUNDING = 1e-10
 """N·m by which a load may seem to miss the limit that it was located at."""
+MOST_DIPS = 6
+LOOK, MOST_LOOKS, LOOKS_AT_TURN = 0.1, 16.0, 8
+"""Where an event may hide between two nodes, it is looked for at every such change of velocity, in parts of v_s,
+so often at most, and so often where the velocity turns."""
 VELOCITY_WEIGHT = 10.0
 """N·m per rad/s: puts a reversal on the scale of a break-away."""
 
@@ -77,7 +83,7 @@ def load_of(literal: bool, direction: float, force: float) -> float:
     return abs(force) if literal else direction * force
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def heaviest(plan: Any, elements: Any, sides: Any, side: int, theta: float, v: float) -> float:
     """Largest load per share among a side's sticking elements, N·m."""
     top = -1e300
@@ -92,7 +98,7 @@ def heaviest(plan: Any, elements: Any, sides: Any, side: int, theta: float, v: f
     return top
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def trigger(
     parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, theta: float, v: float
 ) -> float:
@@ -111,74 +117,100 @@ def trigger(
     return g
 
 
-@kernel(exact=False)
-def too_long(
-    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, stretch: Any
-) -> bool:
-    """Whether the velocity changes too much for a sticking element that is near its limit.
+@kernel(exact=False, inline=True)
+def looks(
+    parameters: Any, plan: Any, elements: Any, sides: Any, width: float, theta0: float, v0: float, a0: float,
+    theta1: float, v1: float, a1: float,
+) -> int:  # fmt: skip
+    """Number of parts of a stretch at whose ends events are looked for; the stretch's ends are given.
 
-    Such a load can cross its limit up and down between the nodes, since s(v) varies over v_s. Not where the
-    motion speeds up all along: there
-    load and event function rise with it.
+    The load of a sticking element near its limit can cross it up and down between two nodes, since s(v) varies
+    over v_s. Not where the motion speeds up all along: there the event function rises with the load.
     """
-    v0 = loop[VELOCITY]
-    v1 = stretch[VELOCITY_MID]
-    v2 = stretch[VELOCITY_END]
-    jump = max(abs(v1 - v0), abs(v2 - v1))
-    least = min(abs(v0), abs(v1), abs(v2))
-    fastest = max(abs(v0), abs(v1), abs(v2)) + 1.0 * jump
+    jump = abs(v1 - v0)
+    fastest = max(abs(v0), abs(v1)) + jump
+    rises = v0 * v1 >= 0.0 and a0 * v1 > 0.0 and a1 * v1 > 0.0
+    parts = 1
+    # Where the velocity turns, the load is largest between the ends, and no further than this.
+    peak = (
+        theta0 + 0.5 * (theta1 - theta0) + math.copysign(0.5 * abs(theta1 - theta0) + 0.25 * width * jump, v0)
+    )
     for side in range(int(plan[SIDES])):
-        scale = sides[side * SIDE_SIZE + SCALE]
         if (
-            sides[side * SIDE_SIZE + STICKING] > 0.0
-            and jump > 0.1 * scale
-            and least < 3.0 * scale
-            and scale > 0.0
+            v0 * v1 < 0.0
+            and sides[side * SIDE_SIZE + STICKING] > 0.0
+            and heaviest(plan, elements, sides, side, peak, v0) > sides[side * SIDE_SIZE + LOWEST]
         ):
-            top0 = heaviest(plan, elements, sides, side, loop[POSITION], v0)
-            top1 = heaviest(plan, elements, sides, side, stretch[POSITION_MID], v1)
-            top2 = heaviest(plan, elements, sides, side, stretch[POSITION_END], v2)
-            top = max(top0, top1, top2)
-            if top > sides[side * SIDE_SIZE + LOWEST] and not (
-                top0 <= top1 <= top2 and speeds_up(lin, loop, stretch)
-            ):
-                lowest = min(
-                    sliding(parameters, plan, sides, side, fastest),
-                    sliding(parameters, plan, sides, side, -fastest),
-                )
+            parts = LOOKS_AT_TURN
+        seen = LOOK * sides[side * SIDE_SIZE + SCALE]
+        if sides[side * SIDE_SIZE + STICKING] > 0.0 and jump > seen > 0.0:
+            top0 = heaviest(plan, elements, sides, side, theta0, v0)
+            top1 = heaviest(plan, elements, sides, side, theta1, v1)
+            top = max(top0, top1)
+            if top > sides[side * SIDE_SIZE + LOWEST] and not (rises and top0 <= top1):
+                lowest = sliding(parameters, plan, sides, side, fastest)
+                lowest = min(lowest, sliding(parameters, plan, sides, side, -fastest))
                 if top > lowest:
-                    return True
-    return False
+                    parts = max(parts, int(min(jump / seen, MOST_LOOKS)) + 1)
+    return parts
 
 
-@kernel(exact=False)
-def speeds_up(lin: Linear, loop: Any, stretch: Any) -> bool:
-    """Whether velocity and acceleration have one and the same sign at all nodes."""
-    c = cubic_of(stretch)
-    h = stretch[LENGTH]
-    v0 = loop[VELOCITY]
-    v1 = stretch[VELOCITY_MID]
-    v2 = stretch[VELOCITY_END]
-    a0 = acceleration(lin, c, 0.0, loop[POSITION], v0) * v2
-    a1 = acceleration(lin, c, 0.5 * h, stretch[POSITION_MID], v1) * v2
-    a2 = acceleration(lin, c, h, stretch[POSITION_END], v2) * v2
-    return v0 * v1 >= 0.0 and v1 * v2 > 0.0 and a0 > 0.0 and a1 > 0.0 and a2 > 0.0
-
-
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def grazing(
-    lin: Linear, loop: Any, stretch: Any, x0: float, x1: float, theta1: float, v1: float, a0: float
+    lin: Linear, loop: Any, stretch: Any, x0: float, x1: float, v1: float, a0: float, a1: float
 ) -> float:
-    """Time of the dip in [x0, x1] if the velocity is through zero there, else NONE; a0 is the acceleration at x0."""
+    """Time in [x0, x1] at which the velocity has dipped through zero, else NONE; a0, a1 are accelerations there."""
     sigma = loop[SIGMA]
-    a1 = sigma * acceleration(lin, cubic_of(stretch), x1, theta1, v1)
     a0 = sigma * a0
-    if a0 < 0.0 and a1 > 0.0 and sigma * v1 > 0.0 and sigma * v1 < -a0 * stretch[LENGTH]:
-        x = x0 + (x1 - x0) * a0 / (a0 - a1)
-        _, v = state_at(lin, stretch, x)
+    a1 = sigma * a1
+    if not (a0 < 0.0 and a1 > 0.0 and sigma * v1 > 0.0 and sigma * v1 < -a0 * stretch[LENGTH]):
+        return NONE
+    c = cubic_of(stretch)
+    for _ in range(MOST_DIPS):
+        x = x0 + (x1 - x0) * min(max(a0 / (a0 - a1), 0.1), 0.9)
+        theta, v = state_at(lin, stretch, x)
         if sigma * v <= -NOISE:
             return x
+        a = sigma * acceleration(lin, c, x, theta, v)
+        # The velocity falls no further than its tangent.
+        if a < 0.0:
+            a0 = a
+            x0 = x
+        else:
+            a1 = a
+            x1 = x
+        if sigma * v > max(-a0, a1) * (x1 - x0):
+            break
     return NONE
+
+
+@kernel(exact=False, inline=True)
+def between(
+    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, stretch: Any, left: float,
+    theta: float, v: float, g_left: float, width: float, parts: int, tol: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Look for an event at the ends of `parts` parts of [left, left + width], but for the last.
+
+    Returns its time or NONE, the last time looked at, and the event function there.
+    """
+    c = cubic_of(stretch)
+    step = width / parts
+    m = flow(lin, step)
+    p = theta - (c[0] + left * (c[1] + left * (c[2] + left * c[3])))
+    q = v - (c[1] + left * (2.0 * c[2] + left * 3.0 * c[3]))
+    for _ in range(1, parts):
+        p, q = free_motion(m, p, q)
+        x = left + step
+        theta, v = moved(c, UNMOVED, x, p, q)
+        g = trigger(parameters, plan, elements, sides, loop, theta, v)
+        if g >= 0.0:
+            event = locate(
+                lin, parameters, plan, elements, sides, loop, stretch, left, g_left, x, g, theta, v, tol
+            )
+            return event, left, g_left
+        left = x
+        g_left = g
+    return NONE, left, g_left
 
 
 @kernel(exact=False)
@@ -187,64 +219,95 @@ def find(
 ) -> float:  # fmt: skip
     """Time of the first event inside the stretch, or NONE."""
     c = cubic_of(stretch)
+    half = 0.5 * stretch[LENGTH]
     left = 0.0
     theta = loop[POSITION]
     v = loop[VELOCITY]
+    a = acceleration(lin, c, 0.0, theta, v)
     g_left = -NEAR
     for node in range(1, 3):
-        right = 0.5 * node * stretch[LENGTH]
+        right = half * node
         theta_right = stretch[POSITION_MID] if node == 1 else stretch[POSITION_END]
         v_right = stretch[VELOCITY_MID] if node == 1 else stretch[VELOCITY_END]
+        a_right = acceleration(lin, c, right, theta_right, v_right)
         if loop[WATCHED] > 0.0:
-            a = acceleration(lin, c, left, theta, v)
-            dip = grazing(lin, loop, stretch, left, right, theta_right, v_right, a)
+            dip = grazing(lin, loop, stretch, left, right, v_right, a, a_right)
             if dip > 0.0:
                 theta, v = state_at(lin, stretch, dip)
                 g = trigger(parameters, plan, elements, sides, loop, theta, v)
                 return locate(
-                    lin, parameters, plan, elements, sides, loop, stretch, left, dip, g_left, g, tol
+                    lin, parameters, plan, elements, sides, loop, stretch, left, g_left, dip, g, theta, v, tol
                 )
+        parts = looks(parameters, plan, elements, sides, half, theta, v, a, theta_right, v_right, a_right)
+        if parts > 1:
+            event, left, g_left = between(
+                lin,
+                parameters,
+                plan,
+                elements,
+                sides,
+                loop,
+                stretch,
+                left,
+                theta,
+                v,
+                g_left,
+                half,
+                parts,
+                tol,
+            )
+            if event >= 0.0:
+                return event
         g = trigger(parameters, plan, elements, sides, loop, theta_right, v_right)
         if g >= 0.0:
-            if node == 1:
+            if left == 0.0:
                 g_left = trigger(parameters, plan, elements, sides, loop, theta, v)
-            return locate(lin, parameters, plan, elements, sides, loop, stretch, left, right, g_left, g, tol)
-        g_left = g
-        left = right
-        theta = theta_right
-        v = v_right
+            return locate(
+                lin, parameters, plan, elements, sides, loop, stretch, left, g_left, right, g, theta_right,
+                v_right, tol,
+            )  # fmt: skip
+        left, theta, v, a, g_left = right, theta_right, v_right, a_right, g
     return NONE
 
 
 @kernel(exact=False)
 def locate(
     lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, stretch: Any, low: float,
-    high: float, g_low: float, g_high: float, tol: float,
+    g_low: float, high: float, g_high: float, theta: float, v: float, tol: float,
 ) -> float:  # fmt: skip
-    """Root of `trigger` in [low, high], from its far side: regula falsi (Illinois), then bisection."""
-    g_low = min(g_low, -1e-15)
-    g_high = max(g_high, 1e-15)
+    """Root of `trigger` in [low, high], from its far side: regula falsi (Anderson and Björck), then bisection.
+
+    The motion at `high` is (theta, v); that at the root is kept in `stretch`. Wanted is a value just beyond the
+    root, so that iterates from both sides are good.
+    """
+    wanted = 25.0 * tol
+    stretch[POSITION_EVENT] = theta
+    stretch[VELOCITY_EVENT] = v
+    low_miss = min(g_low, 0.0) - wanted
+    high_miss = g_high - wanted
     side = 0
-    for turn in range(60):
-        x = (low * g_high - high * g_low) / (g_high - g_low)
+    turn = 0
+    while high_miss > wanted and high - low > 1e-3 * tol:
+        x = (low * high_miss - high * low_miss) / (high_miss - low_miss)
         if turn > 10 or not low < x < high:
             x = 0.5 * (low + high)
         theta, v = state_at(lin, stretch, x)
-        g = trigger(parameters, plan, elements, sides, loop, theta, v)
-        if g >= 0.0:
-            high = x
-            g_high = g
+        miss = trigger(parameters, plan, elements, sides, loop, theta, v) - wanted
+        if miss >= -wanted:
             if side == 1:
-                g_low *= 0.5
+                low_miss *= 1.0 - miss / high_miss if miss < high_miss else 0.5
+            high = x
+            high_miss = miss
             side = 1
+            stretch[POSITION_EVENT] = theta
+            stretch[VELOCITY_EVENT] = v
         else:
-            low = x
-            g_low = g
             if side == -1:
-                g_high *= 0.5
+                high_miss *= 1.0 - miss / low_miss if miss > low_miss else 0.5
+            low = x
+            low_miss = miss
             side = -1
-        if high - low < 1e-3 * tol or 0.0 <= g < 50.0 * tol:
-            break
+        turn += 1
     return high
 
 

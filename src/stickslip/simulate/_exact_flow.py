@@ -14,6 +14,7 @@ from stickslip.jit import kernel
 
 Matrix = tuple[float, float, float, float]
 Cubic = tuple[float, float, float, float]
+UNMOVED: Matrix = (1.0, 0.0, 0.0, 1.0)
 
 
 class Linear(NamedTuple):
@@ -41,7 +42,7 @@ def linear(inertia: float, damping: float, stiffness: float) -> Linear:
     return Linear(inertia, damping, stiffness, decay, square, discriminant, math.sqrt(abs(discriminant)))
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def flow(lin: Linear, x: float) -> Matrix:
     """Matrix that takes (position, velocity) of the free system over the time x."""
     if lin.discriminant > 0.0:
@@ -85,7 +86,7 @@ def free_motion(m: Matrix, position: float, velocity: float) -> tuple[float, flo
     return m[0] * position + m[1] * velocity, m[2] * position + m[3] * velocity
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def moved(c: Cubic, m: Matrix, x: float, position: float, velocity: float) -> tuple[float, float]:
     """Position and velocity at x: the cubic, and the free motion that starts from (position, velocity)."""
     return (
@@ -117,7 +118,7 @@ def upper_terms(y0: float, d0: float, y1: float, d1: float, inverse: float) -> t
     return (3.0 * slope - 2.0 * d0 - d1) * inverse, (d0 + d1 - 2.0 * slope) * inverse * inverse
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def relaxed(
     attraction: float, goal: float, s0: float, d0: float, q_mid: float, q_end: float, h: float
 ) -> tuple[float, float, float]:

@@ -23,7 +23,7 @@ from stickslip.simulate._case import (
     VELOCITY_0,
     VELOCITY_LIMIT,
 )
-from stickslip.simulate._exact_events import add_exponents, find, release, set_off, switch, too_long
+from stickslip.simulate._exact_events import add_exponents, find, release, set_off, switch
 from stickslip.simulate._exact_flow import Linear, Matrix, flow
 from stickslip.simulate._exact_output import measure, row_after, row_before, write_grid, write_rows
 from stickslip.simulate._exact_rest import rest
@@ -52,7 +52,6 @@ from stickslip.simulate._exact_state import (
     SIDES,
     SIGMA,
     SLIPPING,
-    SPACING,
     STEPS,
     STORM_COUNT,
     STORM_SINCE,
@@ -76,23 +75,24 @@ from stickslip.simulate._exact_step import (
     LENGTH,
     NOT_CONVERGED,
     POSITION_END,
+    POSITION_EVENT,
     R_END,
     RATE_END,
     ROUNDS,
     STRETCH_SIZE,
     VELOCITY_END,
+    VELOCITY_EVENT,
     correct,
     free_amplitude,
     integral_at,
     look_ahead,
     slip_force_at,
-    state_at,
 )
 
-SAFETY = 0.02
+SAFETY = 0.005
 """Share of the tolerance that one step may be wrong by."""
 FINEST = 2e-12  # rad
-LONGEST_STEP = 16e-3
+LONGEST_STEP = 64e-3
 FIRST_STEP = 2.5e-4
 """Longest step after an event, s."""
 DEEPEST = 24
@@ -106,7 +106,7 @@ FLOW = 6
 AT_LOOP = COUNTS
 AT_STRETCH = AT_LOOP + LOOP_SIZE
 AT_CACHE = AT_STRETCH + STRETCH_SIZE
-AT_SIDES = AT_CACHE + FLOW * (DEEPEST + 2)
+AT_SIDES = AT_CACHE + FLOW * (DEEPEST + 1)
 AT_ELEMENTS = AT_SIDES + 2 * SIDE_SIZE
 """Places in `work`; the elements end it."""
 
@@ -145,7 +145,7 @@ def move(
         amplitude = free_amplitude(lin, stretch)
         stretch[AMPLITUDE] = amplitude
         rings = amplitude > 2.0 * tol and lin.frequency * h > QUARTER_PERIODS and h > 2e-6
-        if error <= tol and not rings and not too_long(lin, parameters, plan, elements, sides, loop, stretch):
+        if error <= tol and not rings:
             return level
         if level >= DEEPEST:
             return -1 if error >= NOT_CONVERGED else level
@@ -159,11 +159,16 @@ def move(
 def next_level(lin: Linear, stretch: Any, cache: Any, level: int, tol: float) -> int:
     """A longer step after an accurate one that was not cut short."""
     h = stretch[LENGTH]
-    if level == 0 or h < 0.999 * cache[level * FLOW + 5]:
+    if h < 0.999 * cache[level * FLOW + 5]:
         return level
-    rings = stretch[AMPLITUDE] > 2.0 * tol and 2.0 * lin.frequency * h > QUARTER_PERIODS
-    if stretch[ERROR] < 0.03 * tol and stretch[ROUNDS] <= 2 and not rings:
-        return level - 1
+    error = stretch[ERROR]
+    shortest = max(0, level - 3)
+    while level > shortest and error < 0.03 * tol and stretch[ROUNDS] <= 2:
+        h *= 2.0
+        if stretch[AMPLITUDE] > 2.0 * tol and lin.frequency * h > QUARTER_PERIODS:
+            break
+        error *= 32.0
+        level -= 1
     return level
 
 
@@ -321,15 +326,15 @@ def solve(
         happens = event >= 0.0
         h = event if happens else stretch[LENGTH]
         if light and awaits(plan, grid, count, loop[TIME] + h):
-            between = flow_of_level(lin, cache, generation, DEEPEST + 1, plan[SPACING])
-            write_grid(lin, between, plan, loop, stretch, grid, count, out, h, 0.1 * tol)
+            write_grid(lin, plan, loop, stretch, grid, count, out, h, 0.1 * tol)
         if full:
             write_rows(lin, parameters, plan, cells, sides, loop, stretch, grid, count, rows, h)
         if metered:
             measure(lin, parameters, plan, cells, sides, loop, stretch, h, acc, turns, nodes)
         if happens:
             count[EVENTS] += 1.0
-            theta, v = state_at(lin, stretch, h)
+            theta = stretch[POSITION_EVENT]
+            v = stretch[VELOCITY_EVENT]
             if full:
                 row_before(parameters, plan, cells, sides, loop, stretch, count, rows, h, theta, v)
             finish_event(parameters, plan, cells, sides, loop, stretch, h, theta, v)

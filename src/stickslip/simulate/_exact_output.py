@@ -7,7 +7,7 @@ from typing import Any
 
 from stickslip.jit import kernel, pointer
 from stickslip.simulate._case import COLUMNS
-from stickslip.simulate._exact_flow import Linear, Matrix, flow, free_motion, moved
+from stickslip.simulate._exact_flow import UNMOVED, Linear, flow, free_motion, moved
 from stickslip.simulate._exact_state import (
     EDGE,
     GOAL,
@@ -50,34 +50,37 @@ UNSEEN = 1e-8
 
 @kernel(exact=False)
 def write_grid(
-    lin: Linear, between: Matrix, plan: Any, loop: Any, stretch: Any, grid: Any, count: Any, out: Any, h: float,
-    visible: float,
+    lin: Linear, plan: Any, loop: Any, stretch: Any, grid: Any, count: Any, out: Any, h: float, visible: float
 ) -> None:  # fmt: skip
     """Write position and velocity at the grid's times inside the first h of the stretch; the next one is inside.
 
-    On an even grid the free motion is carried from one time to the next by one matrix, ``between``. A free
-    motion that has died out (less than `visible` rad) is left out.
+    On an even grid the free motion is carried from one time to the next by one matrix. A free motion that has
+    died out (less than `visible` rad) is left out.
     """
     end = min(loop[TIME] + h + EDGE, grid[int(plan[GRID_ROWS]) - 1])
     row = int(count[GRID_WRITTEN])
-    even = plan[SPACING] > 0.0
     c = cubic_of(stretch)
+    if lin.discriminant > 0.0 and free_amplitude(lin, stretch) <= visible:
+        while row < plan[GRID_ROWS] and grid[row] <= end:
+            x = grid[row] - loop[TIME]
+            out[2 * row] = c[0] + x * (c[1] + x * (c[2] + x * c[3]))
+            out[2 * row + 1] = c[1] + x * (2.0 * c[2] + x * 3.0 * c[3])
+            row += 1
+        count[GRID_WRITTEN] = row
+        return
     x = grid[row] - loop[TIME]
-    p = 0.0
-    q = 0.0
-    rings = lin.discriminant <= 0.0 or free_amplitude(lin, stretch) > visible
-    if rings:
-        p, q = free_motion(flow(lin, x), stretch[FREE_POSITION], stretch[FREE_VELOCITY])
+    p, q = free_motion(flow(lin, x), stretch[FREE_POSITION], stretch[FREE_VELOCITY])
+    even = plan[SPACING] > 0.0 and grid[row] + plan[SPACING] <= end
+    between = flow(lin, plan[SPACING]) if even else UNMOVED
     while True:
-        out[2 * row] = c[0] + x * (c[1] + x * (c[2] + x * c[3])) + p
-        out[2 * row + 1] = c[1] + x * (2.0 * c[2] + x * 3.0 * c[3]) + q
+        out[2 * row], out[2 * row + 1] = moved(c, UNMOVED, x, p, q)
         row += 1
         if row >= plan[GRID_ROWS] or grid[row] > end:
             break
         x = grid[row] - loop[TIME]
         if even:
             p, q = free_motion(between, p, q)
-        elif rings:
+        else:
             p, q = free_motion(flow(lin, x), stretch[FREE_POSITION], stretch[FREE_VELOCITY])
     count[GRID_WRITTEN] = row
 
@@ -174,7 +177,7 @@ def window_of(lin: Linear, stretch: Any) -> float:
     Boole's rule is wrong by about 2e-3 y^6 of the oscillating part for nodes y/2 of a radian apart.
     """
     if lin.discriminant > 0.0:
-        rate = lin.frequency
+        rate = max(lin.frequency, lin.decay)
     else:
         rate = lin.decay + lin.frequency
     speed = abs(stretch[FREE_VELOCITY]) + rate * abs(stretch[FREE_POSITION])
@@ -205,7 +208,7 @@ def measure(
         for k in range(1, 5):
             x = (w + 0.25 * k) * width
             p, q = free_motion(m, p, q)
-            theta, v = moved(c, (1.0, 0.0, 0.0, 1.0), x, p, q)
+            theta, v = moved(c, UNMOVED, x, p, q)
             fill(parameters, plan, cells, sides, loop, stretch, x, theta, v, nodes, k)
         meter(
             acc, turns, loop[TIME] + w * width, width, nodes)  # fmt: skip

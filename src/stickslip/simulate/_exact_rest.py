@@ -8,7 +8,16 @@ from stickslip.jit import kernel
 from stickslip.simulate._case import KI
 from stickslip.simulate._exact_events import NONE, applied, stiction
 from stickslip.simulate._exact_state import GOAL, GOAL_RATE, INTEGRAL, POSITION, TIME, R, command
-from stickslip.simulate._exact_step import GOAL_END, GOAL_MID, INTEGRAL_END, RATE_END, look_ahead, remember
+from stickslip.simulate._exact_step import (
+    GOAL_END,
+    GOAL_MID,
+    INTEGRAL_END,
+    POSITION_EVENT,
+    RATE_END,
+    VELOCITY_EVENT,
+    look_ahead,
+    remember,
+)
 
 LONGEST_REST = 2e-3
 
@@ -25,6 +34,8 @@ def rest(
     wanted = h / 30.0 * (7.0 * (loop[GOAL] + stretch[GOAL_END]) + 16.0 * stretch[GOAL_MID])
     wanted += h * h / 60.0 * (loop[GOAL_RATE] - stretch[RATE_END])
     stretch[INTEGRAL_END] = loop[INTEGRAL] + wanted - theta * h
+    stretch[POSITION_EVENT] = theta
+    stretch[VELOCITY_EVENT] = 0.0
     low = 0.0
     if excess(parameters, plan, cells, elements, sides, loop, 0.0) > 0.0:
         return 0.0

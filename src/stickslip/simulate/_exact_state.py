@@ -24,22 +24,27 @@ STIFFNESS, SHARE, FORCE, OFFSET, SLIPS, LOAD_AT_0, LOAD_SLOPE, ELEMENT_SIZE = ra
 # ---- columns of `sides` --------------------------------------------------------------------------------------
 (
     WEIGHT, ATTRACTION, BREAKAWAY, LOWEST, SCALE, VISCOUS, RIGID, SLIPPING, STICKING, SPRING, SPRING_OFFSET,
-    VARIES, S, DS, Q, S_START, EXPONENT, S_MID, S_END, DS_END, Q_MID, Q_END, S_NOW, SIDE_SIZE,
-) = range(24)  # fmt: skip
+    VARIES, S, DS, Q, S_START, EXPONENT, S_MID, S_END, DS_END, Q_MID, Q_END, S_NOW, LIFT, KEPT,
+) = range(25)  # fmt: skip
+
+SIDE_SIZE = KEPT + 4
+"""From KEPT on: two velocities with their values of the sliding curve."""
 
 # ---- entries of `loop`: the state, and the reference where it stands -----------------------------------------
 (
     TIME, POSITION, VELOCITY, SIGMA, HELD, INTEGRAL, ADDED, WATCHED, NONLINEAR, BASE,
-    R, DR, GOAL, GOAL_RATE, EDGE_LOW, EDGE_HIGH, CELL, UNSEEN, SEEN_LENGTH, STORM_COUNT, STORM_SINCE, PROFILE_OUT,
-) = range(22)  # fmt: skip
+    R, DR, GOAL, GOAL_RATE, EDGE_LOW, EDGE_HIGH, CELL, UNSEEN, SEEN_LENGTH, STORM_COUNT, STORM_SINCE, CALM,
+    PROFILE_OUT,
+) = range(23)  # fmt: skip
 LOOP_SIZE = PROFILE_OUT + 3
 
 # ---- entries of `plan`: addresses (exact as floats), offsets and sizes ---------------------------------------
 (
     CURVE_0, PARAMETERS_0, CURVE_1, PARAMETERS_1, PROFILE, PROFILE_PARAMETERS, LITERAL, FIRST_1, ELEMENTS, SIDES,
-    CELLS, GRID_ROWS, ROWS, SPACING, STIFFNESS_FLOOR, PLAN_SIZE,
-) = range(16)  # fmt: skip
-"""``parameters`` begins with Case.numbers; elements of side 1 begin at FIRST_1."""
+    CELLS, GRID_ROWS, ROWS, SPACING, STIFFNESS_FLOOR, SHARED,
+    PLAN_SIZE,
+) = range(17)  # fmt: skip
+"""``parameters`` begins with Case.numbers; elements of side 1 begin at FIRST_1; SHARED: both sides have one curve."""
 
 # ---- entries of `count` --------------------------------------------------------------------------------------
 STEPS, REJECTED, EVENTS, ROWS_WRITTEN, GRID_WRITTEN, COUNTS = range(6)
@@ -48,16 +53,26 @@ EDGE = 1e-12
 """One-sided limits at a break are taken this far from it, s."""
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def sliding(parameters: Any, plan: Any, sides: Any, side: int, v: float) -> float:
-    """The sliding curve of a side, N·m."""
-    address = int(plan[CURVE_0 + 2 * side])
+    """The sliding curve of a side, N·m; two values are kept, since middle and end are asked for again."""
+    own = 0 if plan[SHARED] > 0.0 else side
+    address = int(plan[CURVE_0 + 2 * own])
     if address == 0:
-        return sides[side * SIDE_SIZE + BREAKAWAY]
-    return call_value(address, v, pointer(parameters, int(plan[PARAMETERS_0 + 2 * side])))
+        return sides[own * SIDE_SIZE + BREAKAWAY]
+    kept = pointer(sides, own * SIDE_SIZE + KEPT)
+    if kept[0] == v:
+        return kept[1]
+    if kept[2] == v:
+        return kept[3]
+    kept[2] = kept[0]
+    kept[3] = kept[1]
+    kept[0] = v
+    kept[1] = call_value(address, v, pointer(parameters, int(plan[PARAMETERS_0 + 2 * own])))
+    return kept[1]
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def command(parameters: Any, plan: Any, cells: Any, loop: Any, t: float) -> tuple[float, float, float, float]:
     """Torque commanded by time alone, its slope, and the reference's position and velocity, at t.
 
@@ -99,6 +114,7 @@ def arrange(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) ->
     damping = parameters[KD]
     loop[BASE] = 0.0
     slips = False
+    sticks = False
     loop[NONLINEAR] = 1.0 if parameters[KI] != 0.0 else 0.0
     for side in range(int(plan[SIDES])):
         w = sides[side * SIDE_SIZE + WEIGHT]
@@ -107,12 +123,14 @@ def arrange(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) ->
         sides[side * SIDE_SIZE + SLIPPING] += sides[side * SIDE_SIZE + RIGID] * abs(loop[SIGMA])
         total += w * sides[side * SIDE_SIZE + SPRING]
         loop[BASE] += w * sides[side * SIDE_SIZE + SPRING_OFFSET]
+        sticks = sticks or sides[side * SIDE_SIZE + STICKING] > 0.0
         if sides[side * SIDE_SIZE + SLIPPING] > 0.0:
             slips = True
             begin_slip(parameters, plan, sides, loop, side, v)
             if sides[side * SIDE_SIZE + VARIES] > 0.0:
                 loop[NONLINEAR] = 1.0
     loop[WATCHED] = 1.0 if slips else 0.0
+    loop[CALM] = 1.0 if not sticks and total > 0.0 and damping > 0.0 and parameters[KI] == 0.0 else 0.0
     loop[ADDED] = 0.0
     if abs(total) < plan[STIFFNESS_FLOOR]:
         loop[ADDED] = 2.0 * plan[STIFFNESS_FLOOR]

@@ -28,6 +28,7 @@ from stickslip.simulate._exact_state import (
     ADDED,
     ATTRACTION,
     BASE,
+    CALM,
     CELLS,
     DR,
     DS,
@@ -35,12 +36,14 @@ from stickslip.simulate._exact_state import (
     GOAL,
     GOAL_RATE,
     INTEGRAL,
+    LIFT,
     NONLINEAR,
     POSITION,
     Q_END,
     Q_MID,
     S_END,
     S_MID,
+    SCALE,
     SEEN_LENGTH,
     SIDE_SIZE,
     SIDES,
@@ -61,10 +64,18 @@ from stickslip.simulate._exact_state import (
 # ---- entries of `stretch`: the motion over one accepted step -------------------------------------------------
 (
     LENGTH, C0, C1, C2, C3, FREE_POSITION, FREE_VELOCITY, POSITION_MID, VELOCITY_MID, POSITION_END, VELOCITY_END,
-    R_MID, R_END, DR_END, GOAL_MID, RATE_MID, GOAL_END, RATE_END, INTEGRAL_END, AMPLITUDE, ERROR, ROUNDS, STRETCH_SIZE,
-) = range(23)  # fmt: skip
+    R_MID, R_END, DR_END, GOAL_MID, RATE_MID, GOAL_END, RATE_END, INTEGRAL_END, AMPLITUDE, ERROR, ROUNDS,
+    POSITION_EVENT, VELOCITY_EVENT, STRETCH_SIZE,
+) = range(25)  # fmt: skip
 
 NOT_CONVERGED = 1e9
+UNCHANGED, FINEST_CHANGE, ROUNDING = 0.01, 1e-12, 4e-16
+"""The corrector ends at a change in position below the largest of: parts of the tolerance, 1e-12 rad, parts of the
+particular solution."""
+WIDEST = 1.0
+"""Change of velocity over half a stretch, in parts of v_s, above which s(v) is not resolved near v = 0."""
+CALM_SHARE = 0.2
+"""Where nothing sticks, the loop's own damping takes away what slipping forces are wrong by."""
 SHORT = 2e-8  # s
 STEEPEST = 1e5
 """Largest particular solution, rad: more would cost too many digits."""
@@ -76,7 +87,7 @@ LASTING = 5e-3
 """How long an error of a slipping force lasts, s: no more than C/s lets it."""
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def look_ahead(parameters: Any, plan: Any, cells: Any, loop: Any, stretch: Any, h: float, tol: float) -> None:
     """Commanded torque and reference in the middle and at the end of the next h.
 
@@ -102,7 +113,7 @@ def look_ahead(parameters: Any, plan: Any, cells: Any, loop: Any, stretch: Any, 
     loop[SEEN_LENGTH] = h
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def slip_terms(
     lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, c: Cubic, side: int, h: float, v_mid: float,
     theta_end: float, v_end: float,
@@ -133,7 +144,20 @@ def slip_terms(
     return u2, u3, abs(middle - (0.5 * (s0 + end) + 0.125 * h * (d0 - slope)))
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
+def hides_curve(plan: Any, sides: Any, v0: float, v1: float, v2: float) -> bool:
+    """Whether a slipping force would pass the bend of s(v) near rest unseen between start, middle and end."""
+    jump = max(abs(v1 - v0), abs(v2 - v1))
+    turns = v0 * v1 < 0.0 or v1 * v2 < 0.0
+    slowest = 0.0 if turns else min(abs(v0), abs(v1), abs(v2))
+    for side in range(int(plan[SIDES])):
+        scale = sides[side * SIDE_SIZE + SCALE]
+        if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and jump > WIDEST * scale > 0.0 and slowest < 3.0 * scale:
+            return True
+    return False
+
+
+@kernel(exact=False, inline=True)
 def slip_error(lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, stretch: Any) -> float:
     """Error of the relaxing slipping forces at the end of the stretch, N·m.
 
@@ -149,6 +173,7 @@ def slip_error(lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, s
         attraction = sides[side * SIDE_SIZE + ATTRACTION]
         if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and attraction < math.inf:
             goal = attraction * sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA]
+            sides[side * SIDE_SIZE + LIFT] = 0.0
             force = slip_force_at(sides, stretch, side, 0.25 * h)
             slope = goal - attraction * force / sliding(parameters, plan, sides, side, v)
             middle = goal - attraction * sides[side * SIDE_SIZE + Q_MID] * sides[side * SIDE_SIZE + S_MID]
@@ -157,8 +182,9 @@ def slip_error(lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, s
                 + 0.75 * middle
                 - 0.125 * sides[side * SIDE_SIZE + DS_END]
             )
+            sides[side * SIDE_SIZE + LIFT] = 16.0 / 3.0 * (slope - parabola) / (h * h * h)
             total += abs(sides[side * SIDE_SIZE + WEIGHT] * (slope - parabola))
-    return 0.5 * h * total
+    return h / 3.0 * total
 
 
 @kernel(exact=False)
@@ -190,44 +216,54 @@ def loop_terms(
     return u2, u3, gain * i_mid + added * theta_mid - (0.5 * (y0 + y1) + 0.125 * h * (d0 - d1))
 
 
-@kernel(exact=False)
-def correct(
-    lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, stretch: Any, half: Matrix, h: float, tol: float
-) -> float:  # fmt: skip
-    """Move the axis over h; fills `stretch` and returns the error in position, rad (or NOT_CONVERGED)."""
-    full = twice(half)
+@kernel(exact=False, inline=True)
+def commanded(lin: Linear, loop: Any, stretch: Any, h: float) -> tuple[float, float, float, float, float]:
+    """The commanded torque over the stretch: three coefficients, its misfit in the middle, 1 or 0 if straight.
+
+    Over very short stretches the upper terms are rounding errors, or a kink that the particular solution blows
+    up: there the forcing is a straight line.
+    """
     inverse = 1.0 / h
     r1 = loop[DR]
     r2, r3 = upper_terms(loop[R], r1, stretch[R_END], stretch[DR_END], inverse)
     misfit = stretch[R_MID] - 0.5 * (loop[R] + stretch[R_END]) - 0.125 * h * (r1 - stretch[DR_END])
-    # Over very short stretches the upper terms are rounding errors, or a kink that the particular solution
-    # blows up: there the forcing is a straight line.
     lag = lin.damping / lin.stiffness
-    bent = 1.0
     if h < SHORT or abs(r3 * lag * lag * lag) > STEEPEST * abs(lin.stiffness):
-        bent = 0.0
-        r1 = (stretch[R_END] - loop[R]) * inverse
-        r2 = 0.0
-        r3 = 0.0
-    # First guess: slipping forces and integral go on along their tangents.
-    p0 = loop[R] - loop[BASE]
-    p1 = r1
+        return (stretch[R_END] - loop[R]) * inverse, 0.0, 0.0, misfit, 0.0
+    return r1, r2, r3, misfit, 1.0
+
+
+@kernel(exact=False, inline=True)
+def tangents(parameters: Any, plan: Any, sides: Any, loop: Any) -> tuple[float, float]:
+    """Torque at the start without the command, and its slope: slipping forces, integral and added spring."""
+    p0 = -loop[BASE]
+    p1 = 0.0
     for side in range(int(plan[SIDES])):
         p0 -= sides[side * SIDE_SIZE + WEIGHT] * sides[side * SIDE_SIZE + S]
         p1 -= sides[side * SIDE_SIZE + WEIGHT] * sides[side * SIDE_SIZE + DS]
     if parameters[KI] != 0.0 or loop[ADDED] != 0.0:
         p0 += parameters[KI] * loop[INTEGRAL] + loop[ADDED] * loop[POSITION]
         p1 += parameters[KI] * (loop[GOAL] - loop[POSITION]) + loop[ADDED] * loop[VELOCITY]
+    return p0, p1
+
+
+@kernel(exact=False, inline=True)
+def correct(
+    lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, stretch: Any, half: Matrix, h: float, tol: float
+) -> float:  # fmt: skip
+    """Move the axis over h; fills `stretch` and returns the error in position, rad (or NOT_CONVERGED)."""
+    full = twice(half)
+    r1, r2, r3, command_misfit, bent = commanded(lin, loop, stretch, h)
+    p0, p1 = tangents(parameters, plan, sides, loop)
+    # The cubic is lifted by the mean of the bump that it leaves out, so that the impulse is right.
+    p0 += loop[R] + bent * BUMP * command_misfit
+    p1 += r1
     p2 = r2
     p3 = r3
-    # The cubic is lifted by the mean of the bump that it leaves out, so that the impulse is right.
-    p0 += bent * BUMP * misfit
-    r0 = p0
-    forcing_misfit = abs(misfit)
-    misfit = forcing_misfit
+    start = p0
+    misfit = abs(command_misfit)
     theta_end = loop[POSITION]
     v_end = loop[VELOCITY]
-    error = 0.0
     rounds = 0
     while True:
         c = particular(lin, p0, p1, p2, p3)
@@ -239,18 +275,20 @@ def correct(
         theta_end, v_end = moved(c, full, h, free_position, free_velocity)
         if loop[NONLINEAR] == 0.0:
             break
+        if rounds == 0 and hides_curve(plan, sides, loop[VELOCITY], v_mid, v_end):
+            return NOT_CONVERGED
         if rounds > 0:
             change = max(abs(theta_end - theta_before), 1e-3 * abs(v_end - v_before))
-            if change < 0.1 * tol:
+            # A particular solution that is huge leaves rounding errors behind.
+            if change < max(UNCHANGED * tol, FINEST_CHANGE, ROUNDING * abs(c[0])):
                 break
             if rounds == MOST_ROUNDS or not change < 1e300:
-                error = NOT_CONVERGED
-                break
+                return NOT_CONVERGED
         impulse = h * (p0 + h * (0.5 * p1 + h * (p2 / 3.0 + h * 0.25 * p3)))
-        p0 = r0
+        p0 = start
         p2 = r2
         p3 = r3
-        misfit = forcing_misfit
+        misfit = abs(command_misfit)
         for side in range(int(plan[SIDES])):
             if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and sides[side * SIDE_SIZE + VARIES] > 0.0:
                 u2, u3, m = slip_terms(
@@ -269,18 +307,29 @@ def correct(
             misfit += abs(m)
         rounds += 1
     remember(stretch, c, h, free_position, free_velocity, theta_mid, v_mid, theta_end, v_end, rounds)
-    if loop[NONLINEAR] > 0.0 and error == 0.0:
-        # What a slipping force is wrong by stays for as long as it relaxes; the position follows through K.
-        error = slip_error(lin, parameters, plan, sides, loop, stretch)
-        error *= min(LASTING * LASTING / lin.inertia, 1.0 / abs(lin.stiffness))
+    return error_of(lin, parameters, plan, sides, loop, stretch, misfit)
+
+
+@kernel(exact=False, inline=True)
+def error_of(
+    lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, stretch: Any, misfit: float
+) -> float:  # fmt: skip
+    """Error of the stretch in position, rad; the forcing is wrong by `misfit` in the middle."""
     # A torque wrong by m in the middle moves a free axis by about m h²/20J, a spring by less than m/2K; of its
     # impulse little is left.
+    h = stretch[LENGTH]
     k = abs(lin.stiffness)
-    moves = h * (0.05 * h / lin.inertia + 0.02 / math.sqrt(lin.inertia * k))
-    return error + misfit * min(moves, 0.5 / k)
+    moves = min(h * (0.05 * h / lin.inertia + 0.02 / math.sqrt(lin.inertia * k)), 0.5 / k)
+    error = misfit * moves
+    if loop[NONLINEAR] > 0.0:
+        bump = slip_error(lin, parameters, plan, sides, loop, stretch)
+        # What a slipping force is wrong by at the end stays for as long as it relaxes.
+        slip = bump * (moves + 0.5 * min(LASTING * LASTING / lin.inertia, 1.0 / k))
+        error += CALM_SHARE * slip if loop[CALM] > 0.0 else slip
+    return error
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def remember(
     stretch: Any, c: Cubic, h: float, free_position: float, free_velocity: float, theta_mid: float, v_mid: float,
     theta_end: float, v_end: float, rounds: int,
@@ -315,7 +364,7 @@ def cubic_of(stretch: Any) -> Cubic:
     return stretch[C0], stretch[C1], stretch[C2], stretch[C3]
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def state_at(lin: Linear, stretch: Any, x: float) -> tuple[float, float]:
     """Position and velocity at x inside the stretch, exact for its forcing."""
     return moved(cubic_of(stretch), flow(lin, x), x, stretch[FREE_POSITION], stretch[FREE_VELOCITY])
@@ -326,7 +375,8 @@ def slip_force_at(sides: Any, stretch: Any, side: int, x: float) -> float:
     """Slipping force of a side at x inside the stretch."""
     if sides[side * SIDE_SIZE + VARIES] == 0.0 or sides[side * SIDE_SIZE + SLIPPING] == 0.0:
         return sides[side * SIDE_SIZE + S]
-    return hermite(
+    y = x * (stretch[LENGTH] - x)
+    return sides[side * SIDE_SIZE + LIFT] * y * y + hermite(
         sides[side * SIDE_SIZE + S],
         sides[side * SIDE_SIZE + DS],
         sides[side * SIDE_SIZE + S_END],

@@ -36,7 +36,7 @@ from stickslip.simulate._case import (
 from stickslip.simulate._exact_kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, LONGEST_STEP, solve
 from stickslip.simulate._forcing import NO_CELLS, feedforward
 from stickslip.simulate._meter import SIZE, close_standstill, new_meter, settle_band_of
-from stickslip.spec import Elements
+from stickslip.spec import Elements, Option
 
 __all__ = ["Prepared", "can_run", "prepare", "run"]
 
@@ -184,6 +184,7 @@ def prepare(case: Case) -> Prepared:
         if i == 0:
             plan[col.FIRST_1] = len(finite)
         fill_side(sides[i], side, e, weight)
+    plan[col.SHARED] = 1.0 if feedback and share_curve(case.plant, case.compensator) else 0.0
     plan[col.ELEMENTS], plan[col.SIDES] = len(finite), len(members)
     plan[col.PROFILE], plan[col.PROFILE_PARAMETERS] = case.profile, sum(b.size for b in blocks)
     blocks.append(case.reference_parameters)
@@ -211,16 +212,33 @@ def fill_side(into: Array, side: Side, e: Elements, weight: float) -> None:
     into[col.WEIGHT], into[col.ATTRACTION], into[col.VISCOUS] = weight, e.attraction, e.viscous
     into[col.BREAKAWAY], into[col.SCALE] = e.breakaway, 0.0 if e.constant_curve else e.velocity_scale
     into[col.LOWEST] = lowest(side, e)
+    into[col.KEPT : col.KEPT + 4] = math.nan
     into[col.RIGID] = sum(a for k, a in zip(e.stiffness, e.share, strict=True) if math.isinf(k))
     into[col.VARIES] = 0.0 if e.constant_curve and math.isinf(e.attraction) else 1.0
+
+
+def curve_of(side: Side) -> Option:
+    """The sliding curve that a side's law has chosen."""
+    assert side.model is not None
+    law = side.model.law
+    return next(law.option(c) for c in law.choices if c.replaces == "sliding")
+
+
+def share_curve(one: Side, other: Side) -> bool:
+    """Whether both sides slide along the same curve with the same parameters."""
+    if not (one.pointers.sliding and other.pointers.sliding and one.model and other.model):
+        return False
+    curve = curve_of(one)
+    fields = getattr(curve.params, "_fields", ())
+    p, q = one.model.parameters, other.model.parameters
+    return curve is curve_of(other) and all(getattr(p, f) == getattr(q, f) for f in fields)
 
 
 def lowest(side: Side, e: Elements) -> float:
     """A level just below the sliding curve, below which no element breaks away."""
     if e.constant_curve or side.model is None:
         return 0.999 * e.breakaway
-    law, p = side.model.law, side.model.parameters
-    curve = next(law.option(c).function for c in law.choices if c.replaces == "sliding")
+    curve, p = curve_of(side).function, side.model.parameters
     speeds = e.velocity_scale * np.concatenate([np.linspace(0.0, 10.0, 21), np.geomspace(10.0, 1e4, 13)])
     return 0.99 * min(curve(sign * float(v), p) for v in speeds for sign in (1.0, -1.0))
 
