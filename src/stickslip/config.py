@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self, cast
 
-from stickslip.errors import ConfigError, InputError
+from stickslip.errors import ConfigError, InputError, suggestion
 
 __all__ = ["Document", "Table", "read_toml"]
 
@@ -122,12 +122,7 @@ class Table:
         """Refuse the keys that were not asked for."""
         for key in self.values:
             if key not in self._known:
-                near = difflib.get_close_matches(key, self._known, n=1, cutoff=0.6)
-                remedy = (
-                    f"did you mean {near[0]!r}?"
-                    if near
-                    else f"allowed are {', '.join(self._known) or 'none'}"
-                )
+                remedy = suggestion(key, self._known, f"allowed are {', '.join(self._known) or 'none'}")
                 raise ConfigError(f"{self.label(key)}: unknown key; {remedy}")
 
     def __enter__(self) -> Self:
@@ -152,30 +147,30 @@ class Table:
         return self.values[key]
 
     def number(self, key: str, unit: str, default: float | None = None, lower: float = -math.inf) -> float:
-        """A finite number of at least `lower`."""
+        """A finite number of at least `lower`; `unit` is empty where it has none."""
         if default is not None and not self.has(key):
             return default
-        value = self._number(key, self._get(key, f"a number in {unit}"), unit)
+        value = self._number(key, self._get(key, _number_in(unit)), unit)
         if value < lower:
-            raise self.error(key, f"must be at least {lower:g} {unit}")
+            raise self.error(key, f"must be at least {lower:g} {unit}".rstrip())
         return value
 
     def positive(self, key: str, unit: str, default: float | None = None) -> float:
         """A finite number greater than 0."""
         value = self.number(key, unit, default)
         if value <= 0.0:
-            raise self.error(key, f"must be greater than 0 {unit}")
+            raise self.error(key, f"must be greater than 0 {unit}".rstrip())
         return value
 
     def _number(self, key: str, value: Any, unit: str) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise self.error(key, f"must be a number in {unit}")
+            raise self.error(key, f"must be {_number_in(unit)}")
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise self.error(key, f"must be a finite number in {unit}")
+            raise self.error(key, f"must be {_number_in(unit, 'a finite number')}")
         return number
 
     def text(self, key: str, default: str | None = None) -> str:
@@ -187,21 +182,26 @@ class Table:
             raise self.error(key, "must be a string in quotes")
         return value
 
-    def choice(self, key: str, allowed: Iterable[str], default: str | None = None) -> str:
-        """One of the allowed strings."""
+    def choice(self, key: str, allowed: Iterable[str], default: str | None = None, family: str = "") -> str:
+        """One of the allowed strings; where the file defines them, `family` is the table it does so in."""
         names = list(allowed)
+        if default is None and not self.has(key) and not names:
+            thing = family.split(".")[-1].rstrip("s") or "one"
+            raise ConfigError(
+                f"{self.label(key)} is missing; define the {thing} in a table [{family}.NAME] and name it here"
+            )
         if default is None and key not in self.values:
             self._get(key, f"one of {', '.join(names)}")
-        return self._one_of(key, self.text(key, default), names)
+        return self._one_of(key, self.text(key, default), names, family)
 
-    def texts(self, key: str, allowed: Iterable[str]) -> list[str]:
-        """A list of at least one string, each allowed, none twice."""
+    def texts(self, key: str, allowed: Iterable[str], family: str = "") -> list[str]:
+        """A list of at least one string, each allowed, none twice; `family` as in `choice`."""
         names = list(allowed)
         values = self._list(key, "a list of strings")
         for i, value in enumerate(values):
             if not isinstance(value, str):
                 raise self.error(f"{key}", f"must be a list of strings; entry {i} is {_show(value)}")
-            self._one_of(key, value, names)
+            self._one_of(key, value, names, family)
         if len(set(values)) < len(values):
             raise self.error(key, "names one twice; name each once")
         return values
@@ -223,11 +223,11 @@ class Table:
             raise self.error(key, "is empty; give at least one entry")
         return cast("list[Any]", values)
 
-    def _one_of(self, key: str, value: str, names: list[str]) -> str:
+    def _one_of(self, key: str, value: str, names: list[str], family: str) -> str:
         if value not in names:
-            near = difflib.get_close_matches(value, names, n=1, cutoff=0.6)
-            remedy = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(names)}"
-            raise self.error(key, f"is not known; {remedy}")
+            define = f"define it in a table [{family}.{value if BARE_KEY.fullmatch(value) else 'NAME'}]"
+            either = f"choose from {', '.join(names)}, or {define}" if names else define
+            raise self.error(key, f"is not known; {suggestion(value, names, either if family else '')}")
         return value
 
     def table(self, key: str) -> Table:
@@ -257,6 +257,10 @@ class Table:
         if isinstance(value, list):
             return [self._number(key, v, "SI units") for v in cast("list[Any]", value)]
         return self._number(key, value, "SI units")
+
+
+def _number_in(unit: str, number: str = "a number") -> str:
+    return f"{number} in {unit}" if unit else number
 
 
 def _show(value: Any) -> str:

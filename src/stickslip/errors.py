@@ -93,10 +93,11 @@ class StepFailure(SimulationError):
     """No step that meets the tolerance was found."""
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
-    """Return the remedy for a misspelt `name`: the nearest known one, or all of them."""
+def suggestion(name: str, known: Iterable[str], otherwise: str = "") -> str:
+    """Return the remedy for a misspelt `name`: up to three near ones, or else `otherwise` or all of them."""
     names = list(known)
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    near = [repr(n) for n in difflib.get_close_matches(name, names, n=3, cutoff=0.6)]
     if near:
-        return f"did you mean {near[0]!r}?"
-    return f"choose from {', '.join(names)}" if names else "none is registered"
+        *others, last = near
+        return f"did you mean {', '.join(others)} or {last}?" if others else f"did you mean {last}?"
+    return otherwise or (f"choose from {', '.join(names)}" if names else "none is registered")

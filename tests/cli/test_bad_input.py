@@ -104,6 +104,12 @@ STUDY = [
         "means two different runs",
     ),
     ('reference = "sine"', 'reference = "cosine"', "responses.plant.reference"),
+    ("damping = 1.0", "damping = -1.0", "damping = -1.0 must be greater than 0\n"),
+    ("damping = 1.0", 'damping = "one"', "damping = 'one' must be a number\n"),
+    ("gain = 0.9", "gain = true", "gain = true must be a number\n"),
+    ('law = "lugre"\ngain', "gain", "law is missing; give one of lugre, coulomb"),
+    ('law = "lugre"\ngain', 'law = "dahl"\ngain', "choose from lugre, coulomb, or define it in a table [laws.dahl]"),
+    ("fs = 0.335", "f = 0.335", "did you mean 'fs' or 'fc'?"),
 ]  # fmt: skip
 
 
@@ -211,7 +217,16 @@ def test_output_that_cannot_be_written(folder: Path, capsys: pytest.CaptureFixtu
         ('slip_rule = "signed"', 'slip_rule = "unsigned"', "'signed'"),
         ("[controller]", "[controler]", "'controler'"),
         ("duration = 0.1", "duration = -1", "reference.duration = -1"),
-        ('linear = "PD"', 'linear = "PD"\ncompensator = "feedback"\nlaw = "lugre"', "controller.law"),
+        (
+            'linear = "PD"',
+            'linear = "PD"\ncompensator = "feedback"\nlaw = "lugre"',
+            "controller.law = 'lugre' is not known; define it in a table [laws.lugre]",
+        ),
+        (
+            'linear = "PD"',
+            'linear = "PD"\ncompensator = "feedback"',
+            "controller.law is missing; define the law in a table [laws.NAME] and name it here",
+        ),
         ('linear = "PD"', 'linear = "PD"\nintegrator = "exact"\nsample_time = 1e-3', "exact"),
         ('kind = "sine"', "kind = ", "line 18"),
     ],
@@ -268,7 +283,7 @@ LAW = Law("own", Params, step, title="Own", equation="F", source=("none",), exam
         (LAW.replace("BODY", "while v > 1.0: v -= 1.0"), "While"),
         (LAW.replace("BODY", "v = nowhere(v)"), "nowhere()"),
         (LAW.replace("LAW = ", "OTHER = "), "defines no law"),
-        (LAW.replace('"own"', '"gms"'), "a name taken already"),
+        (LAW.replace('"own"', '"gms"').replace("BODY", "v = v"), "a name taken already"),
         (LAW.replace("(NamedTuple)", "(NamedTuple"), "SyntaxError"),
     ],
     ids=["while", "unknown function", "no law", "name taken", "syntax"],

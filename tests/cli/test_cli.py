@@ -99,6 +99,12 @@ def test_laws_are_listed_and_explained(capsys: pytest.CaptureFixture[str]) -> No
             assert all(word in line for word in (f.par.symbol, f.par.unit, f.par.bounds, f.par.meaning))
 
 
+def test_a_law_from_a_file_is_named_by_its_path(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copy(Path(stickslip.__file__).parent / "laws" / "coulomb.py", folder / "my.py")
+    assert '\n  law = "my.py"\n' in output(capsys, "law", "my.py")
+    assert '\n  law = "coulomb"\n' in output(capsys, "law", "coulomb")
+
+
 # ---- study -----------------------------------------------------------------------------------------------------------
 
 
@@ -130,6 +136,18 @@ def test_a_study_as_json(folder: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert data["runs"][0]["metrics"]["limit_cycle_period_s"] is None
     assert Path(data["runs"][0]["record"]).exists()
     assert json_output(capsys, *argv)["runs"] == data["runs"]
+
+
+def test_a_selection_in_a_fuller_folder_shows_itself_and_keeps_the_rest(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output(capsys, "study", "small_study.toml", "--no-report")
+    text = output(capsys, "study", "small_study.toml", "--only", "PD,sine")
+    assert "FF-lugre" not in text
+    assert "2 of the 12 runs in metrics.csv" in text
+    assert "FF-lugre" in (folder / "study-small_study" / "report.html").read_text()
+    data = json_output(capsys, "study", "small_study.toml", "--no-report", "--json", "--only", "PD,sine")
+    assert [(r["reference"], r["controller"]) for r in data["runs"]] == [("sine", "PD")] * 2
 
 
 def test_the_file_that_ships_can_be_copied_and_run(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -206,6 +224,8 @@ def test_simulate_writes_a_record_and_prints_metrics(
     record = stickslip.Record.load(folder / "one_run.npz")
     for name in record.meta["metrics"]:
         assert name in text
+    assert all(len(line.split()) >= 2 for line in text.splitlines())
+    assert any(line.split() == ["limit_cycle_period_s", "none"] for line in text.splitlines())
     data = json_output(capsys, "simulate", "one_run.toml", "--json", "--out", "other.npz")
     assert data["record"] == "other.npz"
     assert data["metrics"]["position_rms_rad"] == record.meta["metrics"]["position_rms_rad"]

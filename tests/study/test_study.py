@@ -192,6 +192,33 @@ def test_only_what_changed_runs_again(
     )
 
 
+def test_a_selection_keeps_the_other_finished_runs(small: studies.Study, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    whole = studies.run(small, out)
+    table = (out / "metrics.csv").read_bytes()
+    again = studies.run(small, out, ["PD", "sine"])
+    assert [r.key for r in again] == [r.key for r in whole]
+    assert [r.key for r in again.extras] == [r.key for r in whole.extras]
+    assert (out / "metrics.csv").read_bytes() == table
+    assert [e["run"] for e in again.manifest["runs"]] == [e["run"] for e in whole.manifest["runs"]]
+    assert again.manifest["only"] == ["PD", "sine"]
+    assert rerun(out).differences == []
+    # A record that is no longer what the study asks for is not a result of it.
+    small.source.write_text(small.source.read_text().replace("gain = 0.9", "gain = 0.8"))
+    changed = studies.run(load(small.source), out, ["PD", "sine"])
+    assert [r.key for r in changed] == [r.key for r in whole if r.controller != "FF-lugre"]
+    assert len((out / "metrics.csv").read_text().splitlines()) == 1 + len(changed.runs)
+
+
+def test_selections_add_up_in_the_order_of_the_study(small: studies.Study, tmp_path: Path) -> None:
+    whole = studies.run(small, tmp_path / "whole")
+    for part in ("points", "sine"):
+        parts = studies.run(small, tmp_path / "parts", [part])
+    assert [r.key for r in parts] == [r.key for r in whole]
+    for name in ("metrics.csv", "metrics.parquet"):
+        assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
 def test_fingerprints_tell_runs_apart() -> None:
     thesis = load("thesis")
     every = [run.fingerprint for run in (*thesis.runs, *thesis.extras)]

@@ -53,9 +53,9 @@ def _plain(data: Any) -> Any:
 
 
 def print_metrics(metrics: Mapping[str, float]) -> None:
-    """One line a metric; nothing where there is no number."""
+    """One line a metric; "none" where there is no number."""
     for name, value in metrics.items():
-        print(f"{name:<44}{'' if math.isnan(value) else f'{value:.6g}':>14}")
+        print(f"{name:<44}{'none' if math.isnan(value) else f'{value:.6g}':>14}")
 
 
 def result_as_data(result: StudyResult, report: Path | None) -> dict[str, Any]:
@@ -82,18 +82,22 @@ def _run_as_data(run: Run) -> dict[str, Any]:
     }
 
 
-def print_study(result: StudyResult, report: Path | None) -> None:
-    """A block for each slip rule and reference: controllers over frictions, the best of each marked."""
+def print_study(result: StudyResult, report: Path | None, kept: int) -> None:
+    """A block for each slip rule and reference: controllers over frictions, the best of each marked.
+
+    `kept` is how many runs metrics.csv holds.
+    """
     for rule in _each(result.runs, "slip_rule"):
         for reference in _each(result.runs, "reference"):
             runs = [r for r in result.runs if (r.slip_rule, r.reference) == (rule, reference)]
             if runs:
                 _print_block(f"{rule} / {reference}", runs)
+    shown = len(result.runs)
+    count = f"{shown} runs" if shown == kept else f"{shown} of the {kept} runs in metrics.csv"
     print(
-        f"position error in mrad, RMS and peak; * is the best of its column. {len(result.runs)} runs, ",
-        end="",
+        f"position error in mrad, RMS and peak; * is the best of its column. {count}, "
+        f"{result.manifest['timings']['wall_s']:.1f} s"
     )
-    print(f"{result.manifest['timings']['wall_s']:.1f} s")
     for path in (result.folder / "metrics.csv", result.folder / "manifest.json", report):
         if path:
             print(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -30,7 +31,8 @@ def run(args: argparse.Namespace) -> int:
         )
         print(f"{choice.name}: {options}")
     print(f"passive: {law.passive}\nsource: {'; '.join(law.source)}\n\nas a study's file has it:")
-    print(f'  law = "{law.name}"')
+    written = args.name if args.name.endswith(".py") else law.name
+    print(f"  law = {json.dumps(written, ensure_ascii=False)}")
     for f in law.fields:
         if f.name in law.example:
             value = law.example[f.name]

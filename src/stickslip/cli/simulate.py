@@ -1,5 +1,7 @@
 """Simulate one closed loop from a TOML file with [axis], [friction], [reference] and [controller].
 
+A compensator computes its torque with a law from a table [laws.NAME], which the controller names.
+
 [axis]
 inertia = 3.8623e-4            # kg·m²
 [friction]                     # `stickslip law lugre` explains the parameters
@@ -18,6 +20,16 @@ duration = 5.0                 # s
 [controller]
 linear = "PD"
 placement = {bandwidth_hz = 36.0, damping = 1.0}
+compensator = "feedforward"    # or "feedback"; leave it and `law` out for the linear controller alone
+law = "lugre"                  # the NAME of a table [laws.NAME]
+[laws.lugre]                   # what the compensator believes friction to be
+law = "lugre"
+sigma0 = 3.5e4
+sigma1 = 0.1
+sigma2 = 0.018
+fs = 0.30
+fc = 0.25
+vs = 0.01
 """
 
 from __future__ import annotations

@@ -4,12 +4,13 @@
     stickslip study my.toml          your own; begin with a copy of thesis.toml (`stickslip study thesis --print`)
 
 Writes DIR/metrics.csv, metrics.parquet, records/, manifest.json and report.html. Finished runs are kept: after an
-interruption the same command goes on.
+interruption the same command goes on, and what --only leaves out stays in the tables and the report.
 """
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 SUMMARY = "run a study: controllers compared over references and frictions"
@@ -34,6 +35,7 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.errors import InputError
     from stickslip.report import write
     from stickslip.study import study as studies
+    from stickslip.study.plan import select
 
     study = studies.load(args.study)
     if args.print:
@@ -53,9 +55,16 @@ def run(args: argparse.Namespace) -> int:
         raise KeyboardInterrupt(
             f"finished runs are kept in {out}; run the same command again to go on"
         ) from None
+    # The folder may hold more of the study than was asked for; only that is shown.
+    names = [*study.runs, *study.extras]
+    shown = replace(
+        result,
+        runs=select(result.runs, only or (), names),
+        extras=select(result.extras, only or (), names),
+    )
     if args.json:
-        _output.print_json(_output.result_as_data(result, report))
+        _output.print_json(_output.result_as_data(shown, report))
     else:
-        _output.print_study(result, report)
-    failed = [r for r in (*result.runs, *result.extras) if r.failure]
+        _output.print_study(shown, report, len(result.runs))
+    failed = [r for r in (*shown.runs, *shown.extras) if r.failure]
     return _output.report_failures([(r.key, r.failure, r.path) for r in failed])

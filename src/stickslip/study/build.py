@@ -117,7 +117,9 @@ def _resolve(
         with tables[name] as table:
             base: Model | None = None
             if table.has("like"):
-                like = table.choice("like", [n for n in tables if n != name])
+                like = table.choice(
+                    "like", [n for n in tables if n != name], family=".".join(table.path[:-1])
+                )
                 if like in chain:
                     raise table.error(
                         "like", f"closes a circle ({' -> '.join((*chain, name, like))}); give a law"
@@ -132,7 +134,7 @@ def model(table: Table, laws: Mapping[str, Law], base: Model | None = None) -> M
     scale: dict[str, Any] = {}
     if table.has("scale"):
         with table.table("scale") as factors:
-            scale = {key: factors.number(key, "(a factor)") for key in factors.values}
+            scale = {key: factors.number(key, "") for key in factors.values}
     with table.blamed():
         law = base.law if base else _law(table, laws)
         options = {c.name for c in law.choices}
@@ -237,7 +239,7 @@ def placement(table: Table) -> Placement | None:
     if not table.has("placement"):
         return None
     with table.table("placement") as poles:
-        return Placement(poles.positive("bandwidth_hz", "Hz"), poles.positive("damping", "-"))
+        return Placement(poles.positive("bandwidth_hz", "Hz"), poles.positive("damping", ""))
 
 
 def controller(
@@ -294,6 +296,6 @@ def _compensator(table: Table, laws: Mapping[str, Model]) -> Compensator | None:
                 table.choice("compensator", kinds)
         return None
     kind = kinds[table.choice("compensator", kinds)]
-    law = laws[table.choice("law", laws)]
-    gain = table.number("gain", "1", 1.0)
+    law = laws[table.choice("law", laws, family="laws")]
+    gain = table.number("gain", "", 1.0)
     return kind(law, gain, table.positive("filter_hz", "Hz") if table.has("filter_hz") else None)

@@ -8,7 +8,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from stickslip.config import Table, read_toml
 from stickslip.control.controller import Controller
@@ -19,6 +19,7 @@ from stickslip.simulate.closed_loop import integrator_for, prepare
 from stickslip.study import build
 from stickslip.study.build import Numerics, Placement
 from stickslip.study.provenance import engine_hash, source_hash
+from stickslip.study.result import Run
 
 __all__ = ["SLIP_RULES", "Drive", "PlannedRun", "Response", "Study", "load", "load_run", "select"]
 
@@ -309,7 +310,7 @@ def _comparison(table: Table, parts: _Parts, rule: str) -> list[PlannedRun]:
 def _response(name: str, table: Table, parts: _Parts) -> Response:
     with table:
         frictions = table.texts("frictions", parts.frictions) if table.has("frictions") else []
-        laws = table.texts("laws", parts.laws) if table.has("laws") else []
+        laws = table.texts("laws", parts.laws, "laws") if table.has("laws") else []
         motion = parts.motions[table.choice("reference", parts.motions)]
         models = {f: parts.frictions[f].friction for f in frictions} | {n: parts.laws[n] for n in laws}
         return Response(name, table.text("title", name), table.text("figure", ""),
@@ -319,7 +320,7 @@ def _response(name: str, table: Table, parts: _Parts) -> Response:
 def _drive(name: str, table: Table, parts: _Parts) -> Drive:
     with table:
         frictions = table.texts("frictions", parts.frictions) if table.has("frictions") else []
-        laws = table.texts("laws", parts.laws) if table.has("laws") else []
+        laws = table.texts("laws", parts.laws, "laws") if table.has("laws") else []
         axes = {f: parts.frictions[f] for f in frictions}
         inertia = next(iter(parts.frictions.values())).inertia
         axes |= {n: RigidAxis(inertia, parts.laws[n]) for n in laws}
@@ -329,16 +330,19 @@ def _drive(name: str, table: Table, parts: _Parts) -> Drive:
         )  # fmt: skip
 
 
+PlannedOrDone = TypeVar("PlannedOrDone", PlannedRun, Run)
+
+
 def select(
-    runs: Sequence[PlannedRun], parts: Sequence[str], all_runs: Sequence[PlannedRun] = ()
-) -> list[PlannedRun]:
+    runs: Sequence[PlannedOrDone], parts: Sequence[str], all_runs: Sequence[PlannedRun] = ()
+) -> list[PlannedOrDone]:
     """The runs whose names contain the parts: one of those given for a family, of every family given.
 
     ``["low", "step", "PD"]`` selects the controller PD along the references low and step.
 
     Parameters
     ----------
-    runs : sequence of PlannedRun
+    runs : sequence of PlannedRun or of Run
     parts : sequence of str
         Names of slip rules, references, frictions and controllers.
     all_runs : sequence of PlannedRun

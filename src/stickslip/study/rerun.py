@@ -10,7 +10,7 @@ from pathlib import Path
 
 from stickslip.errors import InputError
 from stickslip.study.files import read_manifest
-from stickslip.study.plan import load, select
+from stickslip.study.plan import load
 from stickslip.study.provenance import versions
 from stickslip.study.study import Progress, execute
 
@@ -55,9 +55,9 @@ def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comp
     moved = {entry["written"]: (folder / entry["copy"]).resolve() for entry in others}
     study = load(folder / source["copy"], moved)
     everything = [*study.runs, *study.extras]
-    planned = select(everything, manifest["only"])
     before = {entry["run"]: entry for entry in manifest["runs"]}
-    if missing := sorted(before.keys() ^ {p.key for p in planned}):
+    planned = [p for p in everything if p.key in before]
+    if missing := sorted(before.keys() - {p.key for p in planned}):
         raise InputError(
             f"{folder}: the manifest and its inputs differ in run {missing[0]}; run the study anew"
         )

@@ -62,7 +62,8 @@ def run(
     """Run a study, or find its runs finished, and write metrics.csv, metrics.parquet, records/, manifest.json.
 
     A run is finished once its record lies in the folder with the fingerprint of the run; a second call does
-    the rest.
+    the rest. Tables, manifest and result hold every finished run of the study, those that earlier calls left in
+    the folder besides those that `only` asks for.
 
     Parameters
     ----------
@@ -84,21 +85,23 @@ def run(
     if jobs < 1:
         raise InputError(f"jobs = {jobs} must be at least 1")
     everything = [*study.runs, *study.extras]
-    grid = select(study.runs, only or (), everything)
-    extras = select(study.extras, only or (), everything)
+    wanted = select(everything, only or ())
     folder = files.claim_folder(Path(out), study)
     clock, cpu = time.perf_counter(), time.process_time()
     results: dict[str, Run] = {}
-    wanted = [*grid, *extras]
     for done, finished in enumerate(_finished(wanted, folder, jobs), 1):
         results[finished.key] = finished
         if progress:
             progress(done, len(wanted))
-    runs = [results[p.key] for p in grid]
-    more = [results[p.key] for p in extras]
+    for p in everything:
+        if p.key not in results and (found := files.find_run(folder, p)):
+            results[p.key] = found
+    runs = [results[p.key] for p in study.runs if p.key in results]
+    more = [results[p.key] for p in study.extras if p.key in results]
     files.write_metrics(folder, runs)
     timings = {"wall_s": time.perf_counter() - clock, "cpu_s": time.process_time() - cpu, "jobs": jobs}
-    manifest = files.write_manifest(folder, study, only, wanted, results, timings)
+    kept = [p for p in everything if p.key in results]
+    manifest = files.write_manifest(folder, study, only, kept, results, timings)
     return StudyResult(folder, runs, manifest, study.config, more)
 
 
