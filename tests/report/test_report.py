@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 from stickslip import report
-from stickslip.report._tables import metrics_tables
+from stickslip.report._tables import MetricsTable, metrics_tables
 from stickslip.report._view import StudyView
+from stickslip.report.captions import case_caption, case_message
+from stickslip.report.figures import drawn_style, off_scale
 from stickslip.report.plots import envelope, scaled, style_of
-from stickslip.study.result import StudyResult
+from stickslip.study.result import Run, StudyResult
 from stickslip.study.study import load, run
 
 STUDY = """
@@ -61,6 +63,8 @@ def test_report_of_a_users_study(result: StudyResult) -> None:
         assert (result.folder / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     assert page.count("<figure ") == 2
     assert "No run failed" in page
+    assert "<th>least error, signed rule</th>" in page
+    assert "fewer than five even periods in the last 40 % of the run, or none" in page
 
 
 def test_nothing_is_loaded_from_elsewhere(result: StudyResult) -> None:
@@ -90,6 +94,79 @@ def test_the_best_of_a_column_is_marked(result: StudyResult) -> None:
     errors = [r.metrics["position_rms_rad"] for r in result.runs]
     marked = ["best" in row.cells[column].classes for row in table.rows]
     assert marked == [e == min(errors) for e in errors]
+
+
+def runs(metric: str, **values: float) -> list[Run]:
+    """Runs of controllers with one metric each."""
+    return [Run("signed", "r", "f", name, {metric: v}, Path("no.npz")) for name, v in values.items()]
+
+
+LINEAR = ("PD", "PID")
+
+
+def test_the_message_names_the_best_of_all_and_the_best_compensator() -> None:
+    errors = {"PD": 9.95e-3, "PID": 0.338e-3, "helped": 0.866e-3, "worse": 2e-3}
+    assert case_message(runs("position_rms_rad", **errors), False, LINEAR) == (
+        "Least RMS error: PID 0.338 mrad; best compensator helped 0.866 mrad; PD 9.95 mrad"
+    )
+    assert case_message(runs("position_rms_rad", **{**errors, "helped": 1e-4}), False, LINEAR) == (
+        "Least RMS error: helped 0.1 mrad; PD 9.95 mrad, PID 0.338 mrad"
+    )
+    assert case_message(runs("position_rms_rad", PD=2e-3, PID=1e-3), False, LINEAR) == (
+        "Least RMS error: PID 1 mrad; PD 2 mrad"
+    )
+    assert (
+        case_message(runs("position_rms_rad", helped=1e-3), False, LINEAR) == "Least RMS error: helped 1 mrad"
+    )
+    failed = [replace(r, failure="it broke") for r in runs("position_rms_rad", PD=1e-3)]
+    assert case_message(failed, False, LINEAR) == "no run was finished"
+
+
+def at_rest(**values: tuple[float, float, float, float]) -> list[Run]:
+    """Runs by RMS error of the second half, mean error, reversals and settling."""
+    names = (
+        "second_half_position_rms_rad",
+        "steady_state_error_rad",
+        "second_half_reversals_per_s",
+        "settling_s",
+    )
+    return [
+        Run("signed", "slow", "dry", n, {**dict(zip(names, v)), "position_rms_rad": 1e-3}, Path("no.npz"))
+        for n, v in values.items()
+    ]
+
+
+def test_at_rest_a_limit_cycle_around_the_target_is_not_the_best(result: StudyResult) -> None:
+    found = at_rest(bare=(4e-4, 4e-4, 0.0, 0.5), helped=(4e-3, 1e-9, 50.0, 0.1))
+    assert case_message(found, True, ["bare"]) == (
+        "Least RMS error in the second half: bare 0.4 mrad; best compensator helped 4 mrad"
+    )
+    assert case_caption(found, True).startswith("By RMS error in the second half, best first: bare 0.4 mrad")
+    step = {"references": {"slow": {"kind": "step"}}}
+    (table,) = metrics_tables(StudyView(replace(result, runs=found, config={**result.config, **step})))
+    assert marked(table, "second_half_position_rms_rad") == [True, False]
+    assert marked(table, "steady_state_error_rad") == [False, False]
+    assert marked(table, "settling_s") == [True, False]
+
+
+def marked(table: MetricsTable, metric: str) -> list[bool]:
+    """Which rows are marked best in a metric's column."""
+    column = [c.metric for c in table.columns].index(metric)
+    return ["best" in row.cells[column].classes for row in table.rows]
+
+
+def test_the_note_says_over_what_an_error_is_off_the_scale() -> None:
+    sizes = {"a": 1e-3, "b": 7.63e-3}
+    assert off_scale(sizes, 2e-3, False) == "off scale: b 7.63 mrad"
+    assert off_scale(sizes, 2e-3, True) == "off scale in the second half: b 7.63 mrad"
+    assert off_scale(sizes, 1.0, True) == ""
+
+
+def test_a_dense_line_is_drawn_and_named_without_dashes() -> None:
+    x = np.linspace(0.0, 1.0, 2001)
+    style = style_of("FB-coulomb")
+    assert drawn_style(style, (x, np.sin(6.0 * x))) == style
+    assert drawn_style(style, (x, np.sin(6.0 * x)), (x, np.sin(400.0 * x))).dashes == "-"
 
 
 def test_figures_are_the_same_bytes_again(result: StudyResult) -> None:

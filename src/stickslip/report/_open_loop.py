@@ -59,7 +59,8 @@ def response_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
         curves = [_loop_curve(n, x, y, near, n in view.frictions, len(loops)) for n, (x, y) in loops.items()]
         limits = (-NEAR_ZERO, NEAR_ZERO) if near else None
         title = heading(response.figure, response.title)
-        message = _gap(loops, near)
+        plant = near and next(iter(loops)) in view.frictions
+        message = _gap(loops, near, "the plant" if plant else next(iter(loops)))
         draw(stem, title, message, [Panel(curves, "friction torque (N·m)", "velocity (rad/s)", limits)], 2.7)
         caption = f"Along {describe(response.motion.as_dict())}. {message}."
         yield Figure(stem.name.removeprefix("figure-"), response.figure, title, caption, COMMON, stem)
@@ -95,9 +96,9 @@ def _loop_curve(name: str, x: Array, y: Array, near: bool, plant: bool, count: i
     return Curve(x, y, label if count > 1 else "", style)
 
 
-def _gap(loops: dict[str, tuple[Array, Array]], near: bool) -> str:
-    """Largest difference from the first loop, over what is shown."""
-    (first, (x, torque)), *others = loops.items()
+def _gap(loops: dict[str, tuple[Array, Array]], near: bool, first: str) -> str:
+    """Largest difference from the loop named first, over what is shown."""
+    (_, (x, torque)), *others = loops.items()
     shown = np.abs(x) <= NEAR_ZERO if near else np.ones(x.size, np.bool_)
     gaps = {name: float(np.max(np.abs(y - torque)[shown])) for name, (_, y) in others}
     words = ", ".join(f"{name} {quantity(gap, 'N·m')}" for name, gap in gaps.items())
@@ -114,21 +115,19 @@ def drive_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
     for drive in study.drives if study else ():
         records = {name: _driven(axis, drive) for name, axis in drive.axes.items()}
         factor, unit = scaled(max(float(np.ptp(r["position"])) for r in records.values()), "rad")
+        labels = {n: "plant" if n in view.frictions else f"{n} law" for n in records}
         curves = [
-            Curve(
-                *envelope(r.time, factor * r["position"]),
-                "plant" if n in view.frictions else f"{n} law",
-                style,
-            )
+            Curve(*envelope(r.time, factor * r["position"]), labels[n], style)
             for n, r in records.items()
             for style in [PLANT["nominal"] if n in view.frictions else replace(style_of(n), dashes="--")]
         ]
         title = heading(drive.figure, drive.title)
-        peaks = ", ".join(f"{n} {1e3 * float(np.max(r['position'])):.4g} mrad" for n, r in records.items())
-        stem = folder / COMMON / named(drive.figure, f"drive-{drive.name}")
-        draw(
-            stem, title, f"Largest position: {peaks}", [Panel(curves, f"position ({unit})", "time (s)")], 2.7
+        peaks = ", ".join(
+            f"{labels[n]} {1e3 * float(np.max(r['position'])):.4g} mrad" for n, r in records.items()
         )
+        stem = folder / COMMON / named(drive.figure, f"drive-{drive.name}")
+        panel = Panel(curves, f"position ({unit})", "time (s)", (0.0, drive.duration))
+        draw(stem, title, f"Largest position: {peaks}", [panel], 2.7)
         caption = (
             f"Open loop under {drive.amplitude:g} N·m at {drive.frequency:g} Hz. Largest position: {peaks}. Gross "
             "sliding rules the record; the pre-sliding stiffness shows only near the turning points."
@@ -173,12 +172,13 @@ def _comparison(
     reference, friction, _ = next(iter(cases.values())).split("/")
     period = 1.0 / view.result.config["references"][reference].get("frequency", np.inf)
     end = period * WINDOWS[number] if number in WINDOWS and period else None
+    last = max(float(r.time[-1]) for r in records.values())
     panels: list[Panel] = []
     for word in ("position", "velocity"):
         lines = {c: _error(r, word, end or np.inf) for c, r in records.items()}
         factor, unit = scaled(max(float(np.max(np.abs(y))) for _, y in lines.values()), UNITS[word])
         curves = [Curve(*envelope(x, factor * y), c, style_of(c)) for c, (x, y) in lines.items()]
-        panels.append(Panel(curves, f"{word} error ({unit})", "time (s)", (0.0, end) if end else None))
+        panels.append(Panel(curves, f"{word} error ({unit})", "time (s)", (0.0, end or last)))
     words = f"{' and '.join(cases)}, {'without friction' if friction == 'none' else friction + ' friction'}"
     stem = folder / COMMON / named(number, f"{name}-{reference}-{friction}")
     message = "RMS error: " + ", ".join(f"{c} {1e3 * v:.4g} mrad" for c, v in rms.items())

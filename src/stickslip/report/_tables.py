@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from stickslip.report._view import StudyView
+from stickslip.report.captions import HUNTS
 from stickslip.study.result import Run
 
 __all__ = ["Cell", "Column", "MetricsTable", "metrics_tables"]
@@ -23,7 +24,8 @@ class Column:
         From the metric's unit into `unit`.
     best : str
         "all": the least of all is the best; "following": the least of the runs that follow, since an axis that
-        stays behind is smooth for nothing; empty: none is marked.
+        stays behind is smooth for nothing; "resting": the least of the runs that do not go on moving at steady
+        state; empty: none is marked.
     """
 
     metric: str
@@ -36,8 +38,10 @@ class Column:
 COLUMNS = (
     Column("position_rms_rad", "RMS error", "mrad", 1e3),
     Column("position_peak_rad", "peak error", "mrad", 1e3),
-    Column("steady_state_error_rad", "steady-state error", "mrad", 1e3),
-    Column("settling_s", "settling", "s"),
+    Column("second_half_position_rms_rad", "RMS error, second half", "mrad", 1e3),
+    # A mean: a limit cycle around the target has none.
+    Column("steady_state_error_rad", "steady-state error (mean)", "mrad", 1e3, ""),
+    Column("settling_s", "settling", "s", 1.0, "resting"),
     Column("velocity_rms_rad_s", "velocity error RMS", "mrad/s", 1e3),
     Column("velocity_above_50Hz_rms_rad_s", "velocity above 50 Hz", "mrad/s", 1e3, "following"),
     Column("reversals_beyond_reference_per_s", "extra reversals", "1/s", 1.0, "following"),
@@ -46,7 +50,8 @@ COLUMNS = (
     Column("limit_cycle_amplitude_rad", "limit cycle", "mrad", 1e3, ""),
     Column("torque_rms_Nm", "torque RMS", "N·m", 1.0, ""),
 )
-PERIODIC, AT_REST = ("steady_state_error_rad", "settling_s"), ("standstills", "longest_standstill_s")
+PERIODIC = ("second_half_position_rms_rad", "steady_state_error_rad", "settling_s")
+AT_REST = ("standstills", "longest_standstill_s")
 """Columns that say nothing along a motion without end, and along one that comes to rest."""
 
 
@@ -121,15 +126,18 @@ def _cells(controller: str, group: Sequence[Run], columns: Sequence[Column]) -> 
 def _best(group: Sequence[Run], column: Column) -> list[Run]:
     """The runs with the least magnitude of a metric."""
     worst = max((r.metrics.get("position_rms_rad", 0.0) for r in group), default=0.0)
-    runs = [
-        r
-        for r in group
-        if not r.failure
-        and _finite(r, column.metric)
-        and (column.best == "all" or (column.best and r.metrics["position_rms_rad"] <= 0.5 * worst))
-    ]
+    runs = [r for r in group if not r.failure and _finite(r, column.metric) and _eligible(r, column, worst)]
     least = min((abs(r.metrics[column.metric]) for r in runs), default=math.nan)
     return [r for r in runs if abs(r.metrics[column.metric]) == least]
+
+
+def _eligible(run: Run, column: Column, worst: float) -> bool:
+    """Whether a run may be a column's best; `worst` is the group's largest RMS error (rad)."""
+    if column.best == "following":
+        return run.metrics["position_rms_rad"] <= 0.5 * worst
+    if column.best == "resting":
+        return run.metrics.get("second_half_reversals_per_s", 0.0) <= HUNTS
+    return column.best == "all"
 
 
 def _text(run: Run, column: Column) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from stickslip.analyse.wording import quantity
 from stickslip.study.result import Run
 
-__all__ = ["case_caption", "case_message", "oscillates"]
+__all__ = ["HUNTS", "case_caption", "case_message", "figure_of_merit", "oscillates", "ranking"]
 
 OSCILLATES = 20e-3  # rad/s RMS above 50 Hz; the statements' measure
 HUNTS = 2.0  # reversals/s while the reference is at rest
@@ -25,37 +25,46 @@ def oscillates(run: Run, at_rest: bool) -> bool:
     return _get(run, "velocity_above_50Hz_rms_rad_s") > OSCILLATES
 
 
-def _figure_of_merit(at_rest: bool) -> tuple[str, str]:
-    return ("steady_state_error_rad", "steady-state error") if at_rest else ("position_rms_rad", "RMS error")
+def figure_of_merit(at_rest: bool) -> tuple[str, str]:
+    """The metric by which runs are ranked, and its name.
+
+    A reference that comes to rest is judged by its second half, and by the RMS there: the mean would reward a
+    limit cycle around the target.
+    """
+    if at_rest:
+        return "second_half_position_rms_rad", "RMS error in the second half"
+    return "position_rms_rad", "RMS error"
 
 
-def _ranked(runs: Sequence[Run], name: str) -> list[Run]:
-    return sorted((r for r in runs if math.isfinite(_get(r, name))), key=lambda r: abs(_get(r, name)))
+def ranking(runs: Sequence[Run], name: str) -> list[Run]:
+    """Finished runs, the least of a metric first."""
+    done = (r for r in runs if not r.failure and math.isfinite(_get(r, name)))
+    return sorted(done, key=lambda r: _get(r, name))
 
 
 def case_message(runs: Sequence[Run], at_rest: bool, linear: Sequence[str]) -> str:
-    """One line: which compensator tracks best, beside the controllers without one."""
-    name, words = _figure_of_merit(at_rest)
-    ranked = _ranked(runs, name)
-    best = next((r for r in ranked if r.controller not in linear), ranked[0] if ranked else None)
-    if best is None:
+    """Which run tracks best; the best compensator where that is another; the other linear controllers."""
+    name, words = figure_of_merit(at_rest)
+    ranked = ranking(runs, name)
+    if not ranked:
         return "no run was finished"
-    rest = [
-        f"{r.controller} {quantity(abs(_get(r, name)), 'rad')}"
-        for r in runs
-        if r.controller in linear and r != best
-    ]
-    return f"Least {words}: {best.controller} {quantity(abs(_get(best, name)), 'rad')}" + (
-        f" ({', '.join(rest)})" if rest else ""
-    )
+    numbers = {r.controller: f"{r.controller} {quantity(_get(r, name), 'rad')}" for r in ranked}
+    best = ranked[0].controller
+    helped = next((c for c in numbers if c not in linear), best)
+    parts = [f"Least {words}: {numbers[best]}"]
+    if helped != best:
+        parts.append(f"best compensator {numbers[helped]}")
+    rest = [numbers[r.controller] for r in runs if r.controller in linear and r.controller in numbers]
+    rest = [words for words in rest if words != numbers[best]]
+    return "; ".join([*parts, *([", ".join(rest)] if rest else [])])
 
 
 def case_caption(runs: Sequence[Run], at_rest: bool) -> str:
     """Two or three sentences: the order by error, who oscillates, who stands still."""
-    name, words = _figure_of_merit(at_rest)
-    ranked = _ranked(runs, name)
+    name, words = figure_of_merit(at_rest)
+    ranked = ranking(runs, name)
     sentences = [
-        f"By {'the size of the ' if at_rest else ''}{words}, best first: "
+        f"By {words}, best first: "
         + ", ".join(f"{r.controller} {quantity(_get(r, name), 'rad')}" for r in ranked)
         + "."
     ]

@@ -65,11 +65,11 @@ def reference_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
         number = motion_number(reference) if is_thesis(view.result) else ""
         stem = folder / COMMON / named(number, f"reference-{reference}")
         message = f"Reference: {what(view, reference)}"
-        window = steady_window(record)
+        window = steady_window(record) or (0.0, float(record.time[-1]))
         panels: list[Panel] = []
         for channel, word in (("position_reference", "position"), ("velocity_reference", "velocity")):
             factor, unit = scaled(float(np.max(np.abs(record[channel]))), record.units[channel])
-            shown = record.time <= (window[1] if window else np.inf)
+            shown = record.time <= window[1]
             x, y = envelope(record.time[shown], record[channel][shown] * factor)
             panels.append(Panel([Curve(x, y, "", plots.LAWS["gms"])], f"{word} ({unit})", "time (s)", window))
         title = heading(
@@ -188,24 +188,28 @@ def result_panels(case: Case, controllers: Sequence[str], at_rest: bool) -> list
         return []
     first = max(records.values(), key=lambda r: float(r.time[-1]))
     errors = {name: r["position_reference"] - r["position"] for name, r in records.items()}
-    # At rest the 97th percentile leaves the transient aside.
-    sizes = {name: float(np.percentile(np.abs(e), 97.0 if at_rest else 100.0)) for name, e in errors.items()}
+    # At rest the second half counts, which leaves the transient aside.
+    sizes = {name: float(np.max(np.abs(e[e.size // 2 if at_rest else 0 :]))) for name, e in errors.items()}
     limit = readable_limit(sorted(sizes.values()), case.kind == "feedback")
     p_factor, p_unit = scaled(float(np.ptp(first["position_reference"])), "rad")
     e_factor, e_unit = scaled(limit, "rad")
-    # The legend's handles, in the study's order; the lines themselves may be thinned.
-    positions = [Curve(first.time[:0], first.time[:0], n, style_of(n, controllers)) for n in records]
+    # Far outside the axes a line need not go on.
+    shown = {n: np.clip(e, -2 * limit, 2 * limit) for n, e in errors.items()}
+    styles = {
+        n: drawn_style(style_of(n, controllers), (r.time, r["position"]), (r.time, shown[n]))
+        for n, r in records.items()
+    }
+    # The legend's handles, in the study's order.
+    positions = [Curve(first.time[:0], first.time[:0], n, styles[n]) for n in records]
     positions.insert(0, Curve(first.time[:0], first.time[:0], "reference", REFERENCE))
     deviations: list[Curve] = []
     # Large errors first, so that small ones are drawn over them.
     for name in sorted(records, key=lambda n: -sizes[n]):
-        record, style = records[name], style_of(name, controllers)
-        positions.append(curve(record.time, p_factor * record["position"], style))
+        record, style = records[name], styles[name]
+        positions.append(Curve(*envelope(record.time, p_factor * record["position"]), "", style))
         # A line that is outside the axes most of the time only hides the others.
         if np.mean(np.abs(errors[name]) > limit) < 0.35:
-            deviations.append(
-                curve(record.time, e_factor * np.clip(errors[name], -2 * limit, 2 * limit), style)
-            )
+            deviations.append(Curve(*envelope(record.time, e_factor * shown[name]), "", style))
     x, y = envelope(first.time, p_factor * first["position_reference"])
     positions.append(Curve(x, y, "", REFERENCE))
     low, high = float(y.min()), float(y.max())
@@ -214,24 +218,29 @@ def result_panels(case: Case, controllers: Sequence[str], at_rest: bool) -> list
         Panel(positions, f"position ({p_unit})", "time (s)", (0.0, float(first.time[-1])),
               (low - margin, high + margin), f"{case.rule} slip rule"),
         Panel(deviations, f"position error ({e_unit})", "time (s)", None, (-e_factor * limit, e_factor * limit),
-              off_scale(sizes, limit)),
+              off_scale(sizes, limit, at_rest)),
     ]  # fmt: skip
 
 
-def off_scale(sizes: dict[str, float], limit: float) -> str:
-    """Which errors go beyond the limit, and how far."""
+def off_scale(sizes: dict[str, float], limit: float, at_rest: bool) -> str:
+    """Which errors go beyond the limit, and how far: over the whole run, at rest in its second half."""
     factor, unit = scaled(limit, "rad")
     words = [f"{name} {factor * size:.3g}" for name, size in sizes.items() if size > limit]
-    return f"off scale: {', '.join(words)} {unit}" if words else ""
+    what = "off scale in the second half" if at_rest else "off scale"
+    return f"{what}: {', '.join(words)} {unit}" if words else ""
 
 
-def curve(x: Array, y: Array, style: plots.Style) -> Curve:
-    """An unlabelled curve of its envelope; a dense oscillation is drawn thin and without dashes."""
-    x, y = envelope(x, y)
+def drawn_style(style: plots.Style, *lines: tuple[Array, Array]) -> plots.Style:
+    """The style in which lines are drawn, and named in the legend: thin and without dashes if one is dense."""
+    return replace(style, dashes="-", width=0.6) if any(dense(x, y) for x, y in lines) else style
+
+
+def dense(x: Array, y: Array) -> bool:
+    """Whether a line oscillates so often that its dashes could not be told apart."""
+    _, y = envelope(x, y)
     steps = np.diff(y)
     steps = steps[np.abs(steps) > 0.02 * np.ptp(y)]  # A ripple within the line's width is none.
-    turns = int(np.sum(steps[1:] * steps[:-1] < 0.0))
-    return Curve(x, y, "", replace(style, dashes="-", width=0.6) if turns > DENSE else style)
+    return int(np.sum(steps[1:] * steps[:-1] < 0.0)) > DENSE
 
 
 def readable_limit(sizes: Sequence[float], feedback: bool) -> float:

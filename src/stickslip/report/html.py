@@ -13,7 +13,7 @@ from stickslip.analyse.claims import CLAIMS, Claim, Verdict, judge
 from stickslip.report._notes import notes
 from stickslip.report._tables import metrics_tables
 from stickslip.report._view import StudyView, is_thesis
-from stickslip.report.captions import case_message
+from stickslip.report.captions import case_message, figure_of_merit, ranking
 from stickslip.report.figures import COMMON, Figure
 
 __all__ = ["render"]
@@ -41,6 +41,7 @@ def render(view: StudyView, figures: Sequence[Figure]) -> str:
         overview=_overview(view),
         tables=metrics_tables(view),
         rules=view.rules,
+        resting=_resting(view),
         claims=[_claim(c, verdicts, figures) for c in CLAIMS] if verdicts else [],
         parts=_parts(view, figures),
         failed=[run for run in view.runs.values() if run.failure],
@@ -81,27 +82,33 @@ def _tally(verdicts: Mapping[str, Mapping[str, Verdict]]) -> list[dict[str, Any]
     return [{"count": n, "words": words} for words, n in sorted(counts.items(), key=lambda item: -item[1])]
 
 
+def _resting(view: StudyView) -> list[str]:
+    """The references that come to rest."""
+    return [r for r in view.references if view.reference_kind(r) == "step"]
+
+
 def _summary(view: StudyView) -> list[str]:
     """Which controllers are best how often, and what failed."""
     lines: list[str] = []
+    resting = _resting(view)
+    halves = f" ({', '.join(resting)}: in the second half)" if resting else ""
     for rule in view.rules:
-        groups = [view.group(rule, r, f) for r in view.references for f in view.frictions]
         wins: dict[str, int] = {}
-        for group in groups:
-            finished = [r for r in group if not r.failure and "position_rms_rad" in r.metrics]
-            if finished:
-                best = min(finished, key=lambda r: r.metrics["position_rms_rad"]).controller
-                wins[best] = wins.get(best, 0) + 1
+        for reference in view.references:
+            merit, _ = figure_of_merit(view.reference_kind(reference) == "step")
+            for friction in view.frictions:
+                for run in ranking(view.group(rule, reference, friction), merit)[:1]:
+                    wins[run.controller] = wins.get(run.controller, 0) + 1
         listed = ", ".join(f"{name} {n}" for name, n in sorted(wins.items(), key=lambda item: -item[1]))
         lines.append(
-            f"Least RMS position error of {sum(wins.values())} cases, {rule} rule: {listed or 'none'}."
+            f"Least RMS position error of {sum(wins.values())} cases{halves}, {rule} rule: {listed or 'none'}."
         )
     failed = sum(bool(run.failure) for run in view.runs.values())
     return [*lines, f"{failed} of {len(view.runs)} runs failed." if failed else "No run failed."]
 
 
 def _overview(view: StudyView) -> list[dict[str, Any]]:
-    """The best compensator of every reference and friction, rule by rule."""
+    """The least error of every reference and friction, rule by rule."""
     linear = [c for c in view.controllers if not view.compensation(c)]
     rows: list[dict[str, Any]] = []
     for reference in view.references:

@@ -169,12 +169,15 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
     columns = max(1, min(4, len(named), LEGEND // (longest + 9)))
     rows = math.ceil(len(named) / columns)
     heading = textwrap.wrap(title, 64)
-    head = 0.37 + 0.13 * len(heading)
+    lines = textwrap.wrap(message, 78, break_on_hyphens=False)
+    head = 0.24 + 0.13 * (len(heading) + max(1, len(lines)))
     total = head + height * len(panels) + 0.26 + 0.17 * rows
     figure: Any = Figure(figsize=(WIDTH, total))
     FigureCanvasAgg(figure)
     figure.text(0.02, 1.0 - 0.07 / total, "\n".join(heading), va="top", fontsize=8.0, fontweight="bold")
-    figure.text(0.02, 1.0 - (head - 0.25) / total, message, va="top", fontsize=7.5, color="#444444")
+    figure.text(
+        0.02, 1.0 - (0.12 + 0.13 * len(heading)) / total, "\n".join(lines), va="top", fontsize=7.5, color="#444444"
+    )  # fmt: skip
     axes: list[Any] = []
     shared = len({p.x_label for p in panels if p.x_label}) == 1
     for i, panel in enumerate(panels):
