@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -89,10 +92,12 @@ def run(
     folder = files.claim_folder(Path(out), study)
     clock, cpu = time.perf_counter(), time.process_time()
     results: dict[str, Run] = {}
-    for done, finished in enumerate(_finished(wanted, folder, jobs), 1):
-        results[finished.key] = finished
-        if progress:
-            progress(done, len(wanted))
+    with interrupts_between_runs() as check:
+        for done, finished in enumerate(_finished(wanted, folder, jobs), 1):
+            results[finished.key] = finished
+            if progress:
+                progress(done, len(wanted))
+            check()
     for p in everything:
         if p.key not in results and (found := files.find_run(folder, p)):
             results[p.key] = found
@@ -103,6 +108,34 @@ def run(
     kept = [p for p in everything if p.key in results]
     manifest = files.write_manifest(folder, study, only, kept, results, timings)
     return StudyResult(folder, runs, manifest, study.config, more)
+
+
+@contextmanager
+def interrupts_between_runs() -> Generator[Callable[[], None]]:
+    """Hold Ctrl-C back until the run in hand is finished and kept; a second one stops at once.
+
+    Yields what raises KeyboardInterrupt if one was asked for. Raised inside a compilation it would tear the
+    compiler down with it.
+    """
+    asked: list[int] = []
+
+    def note(number: int, frame: object) -> None:
+        if asked:
+            raise KeyboardInterrupt
+        asked.append(number)
+
+    def check() -> None:
+        if asked:
+            raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield check
+        return
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield check
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _finished(planned: Sequence[PlannedRun], folder: Path, jobs: int) -> Iterator[Run]:
