@@ -3,13 +3,15 @@
  * J v' = T_m - T_f on a sinusoid from rest, PD control, a GMS contact (thesis eqs. 2.16 to 2.18), and one of no
  * compensation, LuGre feedforward, GMS feedback. Between events the motion is a cubic (forced) plus a 2x2 matrix
  * exponential (free); the slipping elements of a contact collapse to one scalar, advanced by Lobatto's rule of
- * fourth order and coupled by a corrector; break-aways and reversals are located on the exact flow.
+ * fourth order and coupled by a corrector; break-aways and reversals are located on the exact flow. Steps are the
+ * longest one halved some times, as long as the corrector converges quickly; there is no other control of errors.
  *
  * SPDX-License-Identifier: BSD-3-Clause
  */
 #include <math.h>
 
 #define MOST 16
+#define DEEPEST 24
 enum { NONE = 0, LUGRE_FEEDFORWARD = 1, GMS_FEEDBACK = 2 };
 
 typedef struct {
@@ -26,22 +28,25 @@ typedef struct { double a, b, c, d; } Matrix;            /* flow of (position, v
 typedef struct { double c0, c1, c2, c3; } Cubic;
 typedef struct { double inertia, damping, stiffness, decay, square, discriminant, frequency; } Linear;
 typedef struct { double r, dr, z; } Command;             /* torque by time alone, slope, bristle */
-typedef struct { double weight, share, s, ds, start, exponent, q, q_mid, q_end, s_end, ds_end; } Slip;
+typedef struct { double weight, share, s, ds, start, exponent, q, q_mid, q_end, s_end, ds_end, per_vs; } Slip;
 typedef struct { double h, theta_mid, v_mid, theta_end, v_end, free_position, free_velocity; Cubic c; } Stretch;
 
 typedef struct {
   const Loop *loop;
   int sides, first[3], slips[MOST], any;
-  double force[MOST], offset[MOST], t, theta, v, sigma, base;
+  double force[MOST], offset[MOST], load[MOST], slope[MOST], t, theta, v, sigma, base;
   Slip slip[2];
   Linear lin;
+  Matrix halves[DEEPEST];    /* flows over half a step of every level, */
+  unsigned known;            /* where its bit is set */
   Command command;
 } State;
 
 static const Contact *contact(const State *s, int side) { return side ? &s->loop->model : &s->loop->plant; }
 
-static double curve(const Contact *p, double v) {
-  double x = v / p->vs;
+static double curve(const State *s, int side, double v) {
+  const Contact *p = contact(s, side);
+  double x = v * s->slip[side].per_vs;
   return p->fc + (p->fs - p->fc) * exp(-x * x);
 }
 
@@ -133,6 +138,7 @@ static void arrange(State *s) {
   double stiffness = p->kp, damping = p->kd;
   s->base = 0.0;
   s->any = 0;
+  s->known = 0;
   for (int side = 0; side < s->sides; side++) {
     const Contact *law = contact(s, side);
     Slip *slip = &s->slip[side];
@@ -145,6 +151,8 @@ static void arrange(State *s) {
         slip->s += s->force[i];
       } else {
         s->offset[i] = s->force[i] - k * s->theta;
+        s->load[i] = s->offset[i] / law->share[i - s->first[side]];
+        s->slope[i] = k / law->share[i - s->first[side]];
         stiffness += slip->weight * k;
         s->base += slip->weight * s->offset[i];
       }
@@ -152,7 +160,7 @@ static void arrange(State *s) {
     slip->start = slip->s;
     if (slip->share > 0.0) {
       s->any = 1;
-      slip->q = 1.0 / curve(law, s->v);
+      slip->q = 1.0 / curve(s, side, s->v);
       slip->ds = law->attraction * (slip->share * s->sigma - slip->s * slip->q);
     }
   }
@@ -169,11 +177,10 @@ static double trigger(const State *s, double theta, double v) {
     double top = -1e9;
     for (int i = s->first[side]; i < s->first[side + 1]; i++)
       if (!s->slips[i]) {
-        int j = i - s->first[side];
-        double load = direction * (s->offset[i] + law->stiffness[j] * theta) / law->share[j];
+        double load = direction * (s->load[i] + s->slope[i] * theta);
         if (load > top) top = load;
       }
-    double limit = top > law->fc ? curve(law, v) : law->fc;
+    double limit = top > law->fc ? curve(s, side, v) : law->fc;
     if (top - limit > g) g = top - limit;
   }
   return g;
@@ -198,7 +205,7 @@ static void change_modes(State *s) {
     double direction = s->v >= 0.0 ? 1.0 : -1.0;
     for (int side = 0; side < s->sides; side++) {
       const Contact *law = contact(s, side);
-      double level = curve(law, s->v);
+      double level = curve(s, side, s->v);
       for (int i = s->first[side]; i < s->first[side + 1]; i++)
         if (!s->slips[i] && direction * s->force[i] >= law->share[i - s->first[side]] * level - 1e-10) {
           s->slips[i] = 1;
@@ -211,25 +218,27 @@ static void change_modes(State *s) {
 
 /* ---- one stretch ---- */
 
-static double advance_slip(const Contact *law, Slip *p, double sigma, double h, double v_mid, double v_end) {
-  double c = law->attraction, goal = c * p->share * sigma;
-  p->q_mid = 1.0 / curve(law, v_mid);
-  p->q_end = 1.0 / curve(law, v_end);
+enum { MOST_ROUNDS = 3, FEW_ROUNDS = 2 };
+
+static void advance_slip(State *s, int side, double h, double v_mid, double v_end) {
+  Slip *p = &s->slip[side];
+  double c = contact(s, side)->attraction, goal = c * p->share * s->sigma;
+  p->q_mid = 1.0 / curve(s, side, v_mid);
+  p->q_end = 1.0 / curve(s, side, v_end);
   double right_mid = p->s + h * (5.0 / 24.0 * p->ds + 7.0 / 24.0 * goal);
   double right_end = p->s + h / 6.0 * (p->ds + 5.0 * goal);
   double m11 = 1.0 + h * c * p->q_mid / 3.0, m12 = -h * c * p->q_end / 24.0;
   double m21 = 2.0 * h * c * p->q_mid / 3.0, m22 = 1.0 + h * c * p->q_end / 6.0;
-  double inverse = 1.0 / (m11 * m22 - m12 * m21), mid = (right_mid * m22 - m12 * right_end) * inverse;
-  p->s_end = (m11 * right_end - m21 * right_mid) * inverse;
+  p->s_end = (m11 * right_end - m21 * right_mid) / (m11 * m22 - m12 * m21);
   p->ds_end = goal - c * p->q_end * p->s_end;
-  return mid;
 }
 
-/* Returns the error, rad. */
-static double correct(State *s, Stretch *p, Command next, Matrix half, double h, double tol) {
+/* Moves over h; returns how many rounds the corrector took, or more than MOST_ROUNDS. */
+static int correct(State *s, Stretch *p, Command next, Matrix half, double h, double tol) {
   Matrix full = twice(half);
-  double slope = (next.r - s->command.r) / h, error = 0.0;
-  double r2 = (3.0 * slope - 2.0 * s->command.dr - next.dr) / h, r3 = (s->command.dr + next.dr - 2.0 * slope) / (h * h);
+  double per_h = 1.0 / h, slope = (next.r - s->command.r) * per_h;
+  double r2 = (3.0 * slope - 2.0 * s->command.dr - next.dr) * per_h;
+  double r3 = (s->command.dr + next.dr - 2.0 * slope) * per_h * per_h;
   double p0 = s->command.r - s->base, p1 = s->command.dr, p2 = r2, p3 = r3;
   for (int side = 0; side < s->sides; side++) {
     p0 -= s->slip[side].weight * s->slip[side].s;
@@ -243,35 +252,21 @@ static double correct(State *s, Stretch *p, Command next, Matrix half, double h,
     p->free_velocity = s->v - p->c.c1;
     move(p, half, 0.5 * h, &p->theta_mid, &p->v_mid);
     move(p, full, h, &p->theta_end, &p->v_end);
-    if (!s->any) return 0.0;
-    if (round && fabs(p->theta_end - theta) < 0.1 * tol && 1e-3 * fabs(p->v_end - v) < 0.1 * tol) break;
-    if (round == 5) return 1e9;
+    if (!s->any) return 0;
+    if (round && fabs(p->theta_end - theta) < 0.1 * tol && 1e-3 * fabs(p->v_end - v) < 0.1 * tol) return round;
+    if (round == MOST_ROUNDS) return MOST_ROUNDS + 1;
     p2 = r2;
     p3 = r3;
     for (int side = 0; side < s->sides; side++) {
       Slip *q = &s->slip[side];
       if (q->share > 0.0) {
-        advance_slip(contact(s, side), q, s->sigma, h, p->v_mid, p->v_end);
-        double m = (q->s_end - q->s) / h;
-        p2 -= q->weight * (3.0 * m - 2.0 * q->ds - q->ds_end) / h;
-        p3 -= q->weight * (q->ds + q->ds_end - 2.0 * m) / (h * h);
+        advance_slip(s, side, h, p->v_mid, p->v_end);
+        double m = (q->s_end - q->s) * per_h;
+        p2 -= q->weight * (3.0 * m - 2.0 * q->ds - q->ds_end) * per_h;
+        p3 -= q->weight * (q->ds + q->ds_end - 2.0 * m) * per_h * per_h;
       }
     }
   }
-  double a0 = acceleration(&s->lin, p, 0.0, s->theta, s->v);
-  double am = acceleration(&s->lin, p, 0.5 * h, p->theta_mid, p->v_mid);
-  double v = 0.5 * (s->v + p->v_mid) + 0.0625 * h * (a0 - am);
-  for (int side = 0; side < s->sides; side++) {
-    Slip *q = &s->slip[side];
-    if (q->share > 0.0) { /* dS/dt is taken as a parabola: how far is it off at a quarter? */
-      double c = contact(s, side)->attraction, goal = c * q->share * s->sigma;
-      double quarter = hermite(q->s, q->ds, q->s_end, q->ds_end, h, 0.25 * h);
-      double middle = hermite(q->s, q->ds, q->s_end, q->ds_end, h, 0.5 * h);
-      double parabola = 0.375 * q->ds + 0.75 * (goal - c * q->q_mid * middle) - 0.125 * q->ds_end;
-      error += fabs(goal - c * quarter / curve(contact(s, side), v) - parabola);
-    }
-  }
-  return 0.5 * h * error * fmin(2.5e-5 / s->lin.inertia, 1.0 / fabs(s->lin.stiffness));
 }
 
 static double locate(const State *s, const Stretch *p, double low, double high, double g_low, double g_high, double tol) {
@@ -319,53 +314,90 @@ static double find(const State *s, const Stretch *p, double tol) {
 
 /* ---- the loop ---- */
 
+static double amplitude_of(const State *s, const Stretch *p) {
+  double u = p->free_velocity / s->lin.frequency;
+  return s->lin.discriminant > 0.0 ? sqrt(p->free_position * p->free_position + u * u) : 0.0;
+}
+
+static Matrix half_of(State *s, int level, double h) {
+  if (!(s->known >> level & 1)) {
+    s->halves[level] = flow(&s->lin, 0.5 * h);
+    s->known |= 1u << level;
+  }
+  return s->halves[level];
+}
+
+/* Takes one step of at most `left`; returns the rounds it took. */
+static int step(State *s, Stretch *p, Command *next, double longest, double left, double tol, int *level) {
+  for (;; ++*level) {
+    double h = ldexp(longest, -*level);
+    int cut = h > left - 1e-9;
+    if (cut) h = left;
+    *next = command_after(s->loop, s->t, s->command.z, h);
+    int rounds = correct(s, p, *next, cut ? flow(&s->lin, 0.5 * h) : half_of(s, *level, h), h, tol);
+    int rings = amplitude_of(s, p) > 2.0 * tol && s->lin.frequency * h > 3.2;
+    if ((rounds <= MOST_ROUNDS && !rings) || h < 1e-6 || *level == DEEPEST - 1) return rounds;
+  }
+}
+
+/* Position at x: on the exact flow where the free motion shows, else on the cubics through the nodes. */
+static double position_at(const State *s, const Stretch *p, int shows, double x) {
+  if (shows) {
+    double theta, v;
+    move(p, flow(&s->lin, x), x, &theta, &v);
+    return theta;
+  }
+  double half = 0.5 * p->h;
+  if (x > half) return hermite(p->theta_mid, p->v_mid, p->theta_end, p->v_end, half, x - half);
+  return hermite(s->theta, s->v, p->theta_mid, p->v_mid, half, x);
+}
+
+/* Stands at x in the stretch, or at its end. */
+static void advance(State *s, const Stretch *p, Command next, double x, int event) {
+  for (int side = 0; side < s->sides; side++) {
+    Slip *q = &s->slip[side];
+    if (q->share > 0.0) {
+      double f = x / p->h, bend = 2.0 * (q->q + q->q_end) - 4.0 * q->q_mid, slope = q->q_end - q->q - bend;
+      q->exponent += contact(s, side)->attraction * x * (q->q + f * (0.5 * slope + f * bend / 3.0));
+      if (event) q->s_end = hermite(q->s, q->ds, q->s_end, q->ds_end, p->h, x);
+      else q->s = q->s_end, q->ds = q->ds_end, q->q = q->q_end;
+    }
+  }
+  s->theta = p->theta_end;
+  s->v = p->v_end;
+  if (event) move(p, flow(&s->lin, x), x, &s->theta, &s->v);
+  s->command = event ? command_after(s->loop, s->t, s->command.z, x) : next;
+  s->t += x;
+}
+
 /* Writes the position at 0, spacing, 2 spacing, ... (n values); returns the number of events. */
 int baseline(const Loop *p, double duration, double tol, double longest, double spacing, int n, double *out) {
   State s = {.loop = p, .sides = p->compensation == GMS_FEEDBACK ? 2 : 1, .sigma = 1.0};
   Stretch stretch = {0};
   s.first[1] = (int)p->plant.count;
   s.first[2] = s.first[1] + (s.sides == 2 ? (int)p->model.count : 0);
-  s.slip[0].weight = 1.0;
-  s.slip[1].weight = -1.0;
+  s.slip[0] = (Slip){.weight = 1.0, .per_vs = 1.0 / p->plant.vs};
+  s.slip[1] = (Slip){.weight = -1.0, .per_vs = 1.0 / p->model.vs};
   s.command = command_after(p, 0.0, 0.0, 0.0);
   arrange(&s);
   int row = 0, events = 0, after_event = (int)ceil(log2(longest / 2.5e-4)), level = after_event;
   double half_period = M_PI / p->omega, edge = half_period;
   while (s.t < duration - 1e-12) {
-    double end = p->compensation == LUGRE_FEEDFORWARD && edge < duration ? edge : duration, error, amplitude;
-    for (;; level++) {
-      double h = fmin(ldexp(longest, -level), end - s.t);
-      error = correct(&s, &stretch, command_after(p, s.t, s.command.z, h), flow(&s.lin, 0.5 * h), h, tol);
-      amplitude = s.lin.discriminant > 0.0 ? hypot(stretch.free_position, stretch.free_velocity / s.lin.frequency) : 0.0;
-      int rings = amplitude > 2.0 * tol && s.lin.frequency * h > 3.2;
-      if ((error <= tol && !rings) || h < 1e-6) break;
-    }
-    double x = find(&s, &stretch, tol), h = x >= 0.0 ? x : stretch.h, theta, v;
-    Matrix m = flow(&s.lin, h);
-    move(&stretch, m, h, &theta, &v);
-    for (; row < n && row * spacing <= s.t + h + 1e-12; row++) {
-      double at = row * spacing - s.t, velocity;
-      move(&stretch, flow(&s.lin, at), at, &out[row], &velocity);
-    }
-    for (int side = 0; side < s.sides; side++) {
-      Slip *q = &s.slip[side];
-      if (q->share > 0.0) {
-        double f = h / stretch.h, bend = 2.0 * (q->q + q->q_end) - 4.0 * q->q_mid, slope = q->q_end - q->q - bend;
-        q->exponent += contact(&s, side)->attraction * h * (q->q + f * (0.5 * slope + f * bend / 3.0));
-        if (x >= 0.0) q->s_end = hermite(q->s, q->ds, q->s_end, q->ds_end, stretch.h, x);
-        else q->s = q->s_end, q->ds = q->ds_end, q->q = q->q_end;
-      }
-    }
-    s.command = command_after(p, s.t, s.command.z, h);
-    s.t += h;
-    s.theta = theta;
-    s.v = v;
+    double end = p->compensation == LUGRE_FEEDFORWARD && edge < duration ? edge : duration;
+    Command next;
+    int rounds = step(&s, &stretch, &next, longest, end - s.t, tol, &level);
+    double x = find(&s, &stretch, tol), h = x >= 0.0 ? x : stretch.h, amplitude = amplitude_of(&s, &stretch);
+    int rings = s.lin.discriminant > 0.0 && amplitude > 0.2 * tol && s.lin.frequency * stretch.h > 1.0;
+    int shows = rings || (s.lin.discriminant < 0.0 && s.lin.frequency * stretch.h > 0.15);
+    for (; row < n && row * spacing <= s.t + h + 1e-12; row++)
+      out[row] = position_at(&s, &stretch, shows, row * spacing - s.t);
+    advance(&s, &stretch, next, h, x >= 0.0);
     if (s.t >= edge - 1e-12) edge += half_period;
     if (x >= 0.0) {
       events++;
       change_modes(&s);
       if (level < after_event) level = after_event;
-    } else if (error < 0.03 * tol && level > 0 && h >= 0.999 * ldexp(longest, -level)
+    } else if (rounds <= FEW_ROUNDS && level > 0 && h >= 0.999 * ldexp(longest, -level)
                && !(amplitude > 2.0 * tol && 2.0 * s.lin.frequency * h > 3.2)) {
       level--;
     }
