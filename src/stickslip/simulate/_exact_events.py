@@ -213,7 +213,7 @@ def between(
     return NONE, left, g_left
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def find(
     lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, stretch: Any, tol: float
 ) -> float:  # fmt: skip
@@ -311,7 +311,7 @@ def locate(
     return high
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def add_exponents(plan: Any, sides: Any, h: float, x: float) -> None:
     """Add the decay C int 1/s dt of slipping elements over the first x of a stretch of length h."""
     f = x / h
@@ -324,7 +324,7 @@ def add_exponents(plan: Any, sides: Any, h: float, x: float) -> None:
             sides[side * SIDE_SIZE + EXPONENT] += attraction * x * (q0 + f * (0.5 * slope + f * bend / 3.0))
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def settle_forces(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> None:
     """Write every element's force where the loop stands, before modes change."""
     for side in range(int(plan[SIDES])):
@@ -347,7 +347,7 @@ def settle_forces(parameters: Any, plan: Any, elements: Any, sides: Any, loop: A
                 elements[i * ELEMENT_SIZE + FORCE] = elements[i * ELEMENT_SIZE + SHARE] * loop[SIGMA] * s
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def switch(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> None:
     """Change the modes that end here: stick at a reversal, slip where the limit is reached."""
     v = loop[VELOCITY]

@@ -111,7 +111,7 @@ AT_ELEMENTS = AT_SIDES + 2 * SIDE_SIZE
 """Places in `work`; the elements end it."""
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def flow_of_level(lin: Linear, cache: Any, generation: int, level: int, x: float) -> Matrix:
     """The flow over half a step x of a level, computed once for every set of modes."""
     kept = pointer(cache, level * FLOW)
@@ -125,7 +125,7 @@ def flow_of_level(lin: Linear, cache: Any, generation: int, level: int, x: float
     return kept[0], kept[1], kept[2], kept[3]
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def move(
     lin: Linear, parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, loop: Any, stretch: Any,
     cache: Any, generation: int, count: Any, level: int, left: float, tol: float,
@@ -155,7 +155,7 @@ def move(
             level += 1
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def next_level(lin: Linear, stretch: Any, cache: Any, level: int, tol: float) -> int:
     """A longer step after an accurate one that was not cut short."""
     h = stretch[LENGTH]
@@ -172,7 +172,7 @@ def next_level(lin: Linear, stretch: Any, cache: Any, level: int, tol: float) ->
     return level
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def finish_step(plan: Any, sides: Any, loop: Any, stretch: Any, t: float, ki: float) -> None:
     """Stand at the end of the stretch; modes stay."""
     add_exponents(plan, sides, stretch[LENGTH], stretch[LENGTH])

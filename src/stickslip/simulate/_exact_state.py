@@ -101,7 +101,7 @@ def command(parameters: Any, plan: Any, cells: Any, loop: Any, t: float) -> tupl
     return r, dr, goal, rate
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def arrange(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> Linear:
     """Set the loop up for the modes as they are: springs, slipping sums, flow.
 
@@ -140,7 +140,7 @@ def arrange(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) ->
     return lin
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def first_of(plan: Any, side: int) -> int:
     """Index of the first element of a side; that of side 2 ends side 1."""
     if side == 0:
@@ -148,7 +148,7 @@ def first_of(plan: Any, side: int) -> int:
     return int(plan[FIRST_1]) if side == 1 else int(plan[ELEMENTS])
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def gather(plan: Any, elements: Any, sides: Any, side: int, theta: float) -> None:
     """Sum up the springs of the sticking elements, and shares and forces of the slipping ones."""
     spring = 0.0
@@ -181,7 +181,7 @@ def gather(plan: Any, elements: Any, sides: Any, side: int, theta: float) -> Non
     sides[side * SIDE_SIZE + DS] = 0.0
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def begin_slip(parameters: Any, plan: Any, sides: Any, loop: Any, side: int, v: float) -> None:
     """Curve and slope of a side's slipping force at the start of a stretch."""
     s = sliding(parameters, plan, sides, side, v)
