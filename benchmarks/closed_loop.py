@@ -38,9 +38,9 @@ from stickslip.control.linear import place
 from stickslip.jit import kernel
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulate import _forcing, exact
-from stickslip.simulate._case import lay_out
-from stickslip.simulate.closed_loop import simulate
+from stickslip.simulation import _forcing, exact
+from stickslip.simulation._case import lay_out
+from stickslip.simulation.closed_loop import simulate
 
 INERTIA = 3.8623e-4
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}

@@ -164,10 +164,17 @@ def test_record_errors(tmp_path):
 
 def test_meta_of_a_run_is_plain_data():
     from stickslip.model import Reference
-    from stickslip.simulate.closed_loop import simulate
+    from stickslip.simulation.closed_loop import simulate
 
     axis = RigidAxis(1e-3, Model("coulomb", fc=0.1))
     record = simulate(
         axis, Controller(place("PD", 1e-3, 5, 1)), Reference("sine", amplitude=0.1, frequency=1.0), 0.5
     )
     assert json.loads(json.dumps(record.meta))["friction"]["law"] == "coulomb"
+
+
+def test_the_function_is_not_hidden_by_a_folder():
+    """Whatever was imported before, `stickslip.simulate` is the function."""
+    code = "import stickslip.simulation.closed_loop, stickslip.study.study, stickslip; print(stickslip.simulate.__name__)"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == "simulate"

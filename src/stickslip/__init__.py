@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from stickslip.model import Model, Reference
     from stickslip.plugins import law, law_names
     from stickslip.record import Record
-    from stickslip.simulate.closed_loop import simulate
-    from stickslip.simulate.open_loop import respond
+    from stickslip.simulation.closed_loop import simulate
+    from stickslip.simulation.open_loop import respond
     from stickslip.spec import Law, Mode, Par
 
 __version__ = "0.1.0"
@@ -45,8 +45,8 @@ _HOME = {
     "pid": "control.linear",
     "place": "control.linear",
     "pr": "control.linear",
-    "respond": "simulate.open_loop",
-    "simulate": "simulate.closed_loop",
+    "respond": "simulation.open_loop",
+    "simulate": "simulation.closed_loop",
 }
 
 __all__ = [

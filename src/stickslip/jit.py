@@ -69,7 +69,7 @@ def cache_folder() -> Path:
     """The folder for compiled code: STICKSLIP_CACHE, else the user's cache folder, else a temporary one."""
     package = Path(__file__).parent
     digest = hashlib.sha256(f"{numba.__version__} {sys.version} {platform.machine()}".encode())
-    for file in sorted([Path(__file__), *package.glob("simulate/*.py")]):
+    for file in sorted([Path(__file__), *package.glob("simulation/*.py")]):
         digest.update(file.read_bytes())
     home = os.environ.get("STICKSLIP_CACHE") or os.path.join(
         os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "stickslip"

@@ -24,7 +24,7 @@ from stickslip.errors import ParameterError
 from stickslip.jit import compiled_law, flat
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulate.closed_loop import simulate
+from stickslip.simulation.closed_loop import simulate
 from stickslip.spec import Law, Mode, Surroundings
 
 LAWS = [plugins.law(name) for name in plugins.law_names()]
@@ -203,7 +203,7 @@ def test_step_converges_to_rate(law):
     """The law's step and its rate are the same law: fine steps follow an accurate solution of the rate."""
     if law.rate is None or not law.state_fields:
         pytest.skip("no state to integrate")
-    from stickslip.simulate.open_loop import respond
+    from stickslip.simulation.open_loop import respond
 
     motion = Reference("harmonic", amplitude=2e-3, frequency=2.0)
     times = np.linspace(0.0, 0.6, 61)

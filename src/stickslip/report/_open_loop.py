@@ -17,8 +17,8 @@ from stickslip.record import Record
 from stickslip.report._view import StudyView, is_thesis
 from stickslip.report.figures import COMMON, FRICTION_NAMES, Figure, describe, heading, named
 from stickslip.report.plots import Array, Curve, Panel, Style, draw, envelope, scaled, style_of
-from stickslip.simulate.closed_loop import simulate
-from stickslip.simulate.open_loop import respond
+from stickslip.simulation.closed_loop import simulate
+from stickslip.simulation.open_loop import respond
 from stickslip.study.plan import Drive, Response, Study, load
 from stickslip.study.result import StudyResult
 

@@ -18,7 +18,7 @@ from stickslip.control.linear import LINEAR, Gains, place
 from stickslip.errors import ConfigError, InputError, suggestion
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulate.closed_loop import INTEGRATORS
+from stickslip.simulation.closed_loop import INTEGRATORS
 from stickslip.spec import Described, Law
 
 __all__ = [

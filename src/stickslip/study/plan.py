@@ -15,7 +15,7 @@ from stickslip.control.controller import Controller
 from stickslip.errors import ConfigError, InputError, UnknownName
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulate.closed_loop import integrator_for, prepare
+from stickslip.simulation.closed_loop import integrator_for, prepare
 from stickslip.study import build
 from stickslip.study.build import Numerics, Placement
 from stickslip.study.provenance import engine_hash, source_hash

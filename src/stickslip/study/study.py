@@ -14,7 +14,7 @@ from typing import Any
 
 from stickslip.errors import InputError, SimulationError
 from stickslip.record import Record
-from stickslip.simulate.closed_loop import simulate
+from stickslip.simulation.closed_loop import simulate
 from stickslip.study import files
 from stickslip.study.plan import PlannedRun, Study, load, load_run, select
 from stickslip.study.result import Run, StudyResult

@@ -1,7 +1,7 @@
 """Adaptive integrator: Dormand-Prince 5(4) with located events, for any law that gives a ``rate``.
 
-Every switch of the hybrid loop (`stickslip.simulate._loop`) is located on real steps from the same start, and the
-step ends on it (`stickslip.simulate._adaptive_step`). The check on the exact integrator, and the way for laws that it
+Every switch of the hybrid loop (`stickslip.simulation._loop`) is located on real steps from the same start, and the
+step ends on it (`stickslip.simulation._adaptive_step`). The check on the exact integrator, and the way for laws that it
 cannot run.
 """
 
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel
-from stickslip.simulate._adaptive_step import (
+from stickslip.simulation._adaptive_step import (
     EVENT,
     FINAL,
     FOURTH,
@@ -30,7 +30,7 @@ from stickslip.simulate._adaptive_step import (
     dense,
     note,
 )
-from stickslip.simulate._case import (
+from stickslip.simulation._case import (
     COLUMNS,
     DIVERGED,
     DONE,
@@ -55,7 +55,7 @@ from stickslip.simulate._case import (
     Case,
     Outcome,
 )
-from stickslip.simulate._loop import (
+from stickslip.simulation._loop import (
     COMPENSATION_TORQUE,
     EXTRA,
     FRICTION_TORQUE,
@@ -71,7 +71,7 @@ from stickslip.simulate._loop import (
     rates,
     switch,
 )
-from stickslip.simulate._meter import (
+from stickslip.simulation._meter import (
     MAX_WINDOW,
     SIGNALS,
     TURN_COUNT,

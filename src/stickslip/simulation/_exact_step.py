@@ -10,8 +10,8 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulate._case import INERTIA, KI
-from stickslip.simulate._exact_flow import (
+from stickslip.simulation._case import INERTIA, KI
+from stickslip.simulation._exact_flow import (
     Cubic,
     Linear,
     Matrix,
@@ -24,7 +24,7 @@ from stickslip.simulate._exact_flow import (
     twice,
     upper_terms,
 )
-from stickslip.simulate._exact_state import (
+from stickslip.simulation._exact_state import (
     ADDED,
     ATTRACTION,
     BASE,

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulate._case import (
+from stickslip.simulation._case import (
     DIVERGED,
     DONE,
     DURATION,
@@ -23,11 +23,11 @@ from stickslip.simulate._case import (
     VELOCITY_0,
     VELOCITY_LIMIT,
 )
-from stickslip.simulate._exact_events import add_exponents, find, release, set_off, switch
-from stickslip.simulate._exact_flow import Linear, Matrix, flow
-from stickslip.simulate._exact_output import measure, row_after, row_before, write_grid, write_rows
-from stickslip.simulate._exact_rest import rest
-from stickslip.simulate._exact_state import (
+from stickslip.simulation._exact_events import add_exponents, find, release, set_off, switch
+from stickslip.simulation._exact_flow import Linear, Matrix, flow
+from stickslip.simulation._exact_output import measure, row_after, row_before, write_grid, write_rows
+from stickslip.simulation._exact_rest import rest
+from stickslip.simulation._exact_state import (
     COUNTS,
     DR,
     DS,
@@ -66,7 +66,7 @@ from stickslip.simulate._exact_state import (
     begin_slopes,
     command,
 )
-from stickslip.simulate._exact_step import (
+from stickslip.simulation._exact_step import (
     AMPLITUDE,
     DR_END,
     ERROR,

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import call_profile, kernel, pointer
-from stickslip.simulate._case import SAMPLE_TIME
-from stickslip.simulate._fixed_loop import FRICTION, HELP, MOTOR, NUDGE, POSITION, VELOCITY, Loop
-from stickslip.simulate._meter import MAX_WINDOW, meter
+from stickslip.simulation._case import SAMPLE_TIME
+from stickslip.simulation._fixed_loop import FRICTION, HELP, MOTOR, NUDGE, POSITION, VELOCITY, Loop
+from stickslip.simulation._meter import MAX_WINDOW, meter
 
 STEPS, OUTPUTS, EVENTS, ROWS = range(4)  # of the counts
 JUMP = 1e-9  # N·m, from which a change of torque at one time is a jump

@@ -16,10 +16,10 @@ from stickslip.control.linear import Gains, place
 from stickslip.errors import ParameterError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulate import _meter as meter
-from stickslip.simulate import adaptive, fixed
-from stickslip.simulate._case import DIVERGED, DONE, NOT_FINITE, lay_out
-from stickslip.simulate._fixed_sampled import MEMORY, low_passed, measured_position
+from stickslip.simulation import _meter as meter
+from stickslip.simulation import adaptive, fixed
+from stickslip.simulation._case import DIVERGED, DONE, NOT_FINITE, lay_out
+from stickslip.simulation._fixed_sampled import MEMORY, low_passed, measured_position
 
 J = 3.8623e-4
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}

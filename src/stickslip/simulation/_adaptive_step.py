@@ -1,7 +1,7 @@
 """One step of the adaptive integrator: tried, judged, and ended at the first event.
 
 Dormand-Prince 5(4) (Dormand and Prince 1980) with the dense output of Hairer, Norsett and Wanner (Solving ODEs I,
-II.6); where a fast decay limits smooth steps, Runge-Kutta-Chebyshev (`stickslip.simulate._chebyshev`).
+II.6); where a fast decay limits smooth steps, Runge-Kutta-Chebyshev (`stickslip.simulation._chebyshev`).
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel
-from stickslip.simulate._case import DONE, NO_STEP, NOT_FINITE, TOLERANCE
-from stickslip.simulate._chebyshev import chebyshev, chebyshev_error, stages_for
-from stickslip.simulate._loop import (
+from stickslip.simulation._case import DONE, NO_STEP, NOT_FINITE, TOLERANCE
+from stickslip.simulation._chebyshev import chebyshev, chebyshev_error, stages_for
+from stickslip.simulation._loop import (
     COMPENSATION_TORQUE,
     FRICTION_TORQUE,
     MOTOR_TORQUE,

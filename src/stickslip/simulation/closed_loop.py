@@ -23,9 +23,9 @@ from stickslip.errors import (
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.record import Record
-from stickslip.simulate import _case
-from stickslip.simulate._case import COLUMNS, UNITS, Case, Outcome, lay_out
-from stickslip.simulate._meter import metrics
+from stickslip.simulation import _case
+from stickslip.simulation._case import COLUMNS, UNITS, Case, Outcome, lay_out
+from stickslip.simulation._meter import metrics
 
 __all__ = ["INTEGRATORS", "integrator_for", "prepare", "simulate"]
 
@@ -159,13 +159,13 @@ def integrator_for(case: Case, name: str = "auto") -> tuple[str, Any]:
     if name != "auto":
         if name not in INTEGRATORS:
             raise UnknownName("integrator", name, (*INTEGRATORS, "auto"))
-        module = importlib.import_module(f"stickslip.simulate.{name}")
+        module = importlib.import_module(f"stickslip.simulation.{name}")
         if why := module.can_run(case):
             raise InputError(f"the {name} integrator cannot run this: {why}")
         return name, module.run
     reasons: list[str] = []
     for candidate in INTEGRATORS:
-        module = importlib.import_module(f"stickslip.simulate.{candidate}")
+        module = importlib.import_module(f"stickslip.simulation.{candidate}")
         why = module.can_run(case)
         if not why:
             return candidate, module.run

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulate._case import KI
-from stickslip.simulate._exact_events import NONE, applied, stiction
-from stickslip.simulate._exact_state import GOAL, GOAL_RATE, INTEGRAL, POSITION, TIME, R, command
-from stickslip.simulate._exact_step import (
+from stickslip.simulation._case import KI
+from stickslip.simulation._exact_events import NONE, applied, stiction
+from stickslip.simulation._exact_state import GOAL, GOAL_RATE, INTEGRAL, POSITION, TIME, R, command
+from stickslip.simulation._exact_step import (
     GOAL_END,
     GOAL_MID,
     INTEGRAL_END,

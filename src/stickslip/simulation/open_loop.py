@@ -11,8 +11,8 @@ from stickslip.errors import InputError, StepFailure, UnknownName
 from stickslip.jit import compiled_profile, flat
 from stickslip.model import Model, Reference
 from stickslip.record import Record
-from stickslip.simulate._case import Side
-from stickslip.simulate._open_loop import Motion, march
+from stickslip.simulation._case import Side
+from stickslip.simulation._open_loop import Motion, march
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout
 

@@ -20,8 +20,8 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulate._case import FILTER, FROM_MEASUREMENT, FROM_REFERENCE, INERTIA, SAMPLE_TIME, SOURCE
-from stickslip.simulate._fixed_loop import (
+from stickslip.simulation._case import FILTER, FROM_MEASUREMENT, FROM_REFERENCE, INERTIA, SAMPLE_TIME, SOURCE
+from stickslip.simulation._fixed_loop import (
     FILTER_RATE,
     FILTERED,
     FRICTION,

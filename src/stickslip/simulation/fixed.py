@@ -1,6 +1,6 @@
 """Fixed-step integrator: for any law, through its ``step`` alone; the one that runs sampled controllers.
 
-Second order and A-stable (`stickslip.simulate._fixed_step`): the implicit trapezoid, with steps cut at
+Second order and A-stable (`stickslip.simulation._fixed_step`): the implicit trapezoid, with steps cut at
 reversals, break-away and every kink of the reference, and short near rest, where s(v) varies. Where a step
 does not resolve the contact at rest, that is where ``dt`` times the slope of its torque against the velocity
 exceeds `RESOLVED` inertias (a spring k: omega dt > 2 with omega = sqrt(k / J)), the whole run uses an
@@ -17,7 +17,7 @@ import numpy as np
 
 from stickslip.errors import ParameterError
 from stickslip.jit import kernel
-from stickslip.simulate._case import (
+from stickslip.simulation._case import (
     COLUMNS,
     COMPENSATOR_SCALE,
     DIVERGED,
@@ -43,7 +43,7 @@ from stickslip.simulate._case import (
     Outcome,
     Side,
 )
-from stickslip.simulate._fixed_loop import (
+from stickslip.simulation._fixed_loop import (
     FRICTION,
     HEAD,
     HELP,
@@ -58,10 +58,19 @@ from stickslip.simulate._fixed_loop import (
     restart,
     step_plant,
 )
-from stickslip.simulate._fixed_output import EVENTS, OUTPUTS, ROWS, STEPS, measure, record, record_jump, write
-from stickslip.simulate._fixed_sampled import COMPENSATION, HELD, MEMORY, sample
-from stickslip.simulate._fixed_step import GROWTH, LANDING, advance
-from stickslip.simulate._meter import (
+from stickslip.simulation._fixed_output import (
+    EVENTS,
+    OUTPUTS,
+    ROWS,
+    STEPS,
+    measure,
+    record,
+    record_jump,
+    write,
+)
+from stickslip.simulation._fixed_sampled import COMPENSATION, HELD, MEMORY, sample
+from stickslip.simulation._fixed_step import GROWTH, LANDING, advance
+from stickslip.simulation._meter import (
     TURN_COUNT,
     close_standstill,
     new_meter,

@@ -11,9 +11,9 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulate._case import KI, KP
-from stickslip.simulate._exact_flow import UNMOVED, Linear, acceleration, flow, free_motion, moved
-from stickslip.simulate._exact_state import (
+from stickslip.simulation._case import KI, KP
+from stickslip.simulation._exact_flow import UNMOVED, Linear, acceleration, flow, free_motion, moved
+from stickslip.simulation._exact_state import (
     ATTRACTION,
     BREAKAWAY,
     ELEMENT_SIZE,
@@ -50,7 +50,7 @@ from stickslip.simulate._exact_state import (
     first_of,
     sliding,
 )
-from stickslip.simulate._exact_step import (
+from stickslip.simulation._exact_step import (
     LENGTH,
     POSITION_END,
     POSITION_EVENT,

@@ -15,10 +15,10 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, pid, place
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulate import _forcing as forcing
-from stickslip.simulate import _meter as meter
-from stickslip.simulate import adaptive, exact
-from stickslip.simulate._case import DIVERGED, DONE, Case, Outcome, lay_out
+from stickslip.simulation import _forcing as forcing
+from stickslip.simulation import _meter as meter
+from stickslip.simulation import adaptive, exact
+from stickslip.simulation._case import DIVERGED, DONE, Case, Outcome, lay_out
 
 NAMES = ["rms_e", "max_e", "ss_e", "rms_ev", "rms_Tm", "rms_hp", "rev_per_s"]
 COULOMB = Model("coulomb", fc=0.285, sigma2=0.018)

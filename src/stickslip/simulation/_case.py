@@ -123,7 +123,7 @@ class Outcome:
     time : float
         When it ended, s.
     meter, turns : array
-        `stickslip.simulate._meter`'s accumulator and turning points; untouched where the case is not metered.
+        `stickslip.simulation._meter`'s accumulator and turning points; untouched where the case is not metered.
     counts : mapping
         steps, rejected, events.
     """

@@ -15,7 +15,7 @@ from stickslip.control.linear import pd, place
 from stickslip.errors import Divergence
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulate.closed_loop import simulate
+from stickslip.simulation.closed_loop import simulate
 
 LINEAR = [f"{r}/{f}/{c}" for r in CASES for f in ("nominal", "plus10", "minus10") for c in ("PD", "PID")]
 # Explicit steps leave ringing of 1e-8 rad/s in a contact that has come to rest; the reference has none.

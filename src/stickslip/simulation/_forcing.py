@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import call_profile, call_step, kernel, pointer
-from stickslip.simulate._case import Array, Case
+from stickslip.simulation._case import Array, Case
 
 __all__ = ["CELL_SIZE", "NO_CELLS", "feedforward"]
 

@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulate._loop import rates
+from stickslip.simulation._loop import rates
 
 __all__ = ["chebyshev", "chebyshev_error", "stages_for"]
 

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.jit import flat
-from stickslip.simulate import _exact_state as col
-from stickslip.simulate._case import (
+from stickslip.simulation import _exact_state as col
+from stickslip.simulation._case import (
     COLUMNS,
     DURATION,
     FROM_MEASUREMENT,
@@ -33,9 +33,9 @@ from stickslip.simulate._case import (
     Outcome,
     Side,
 )
-from stickslip.simulate._exact_kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, LONGEST_STEP, solve
-from stickslip.simulate._forcing import NO_CELLS, feedforward
-from stickslip.simulate._meter import SIZE, close_standstill, new_meter, settle_band_of
+from stickslip.simulation._exact_kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, LONGEST_STEP, solve
+from stickslip.simulation._forcing import NO_CELLS, feedforward
+from stickslip.simulation._meter import SIZE, close_standstill, new_meter, settle_band_of
 from stickslip.spec import Elements, Option
 
 __all__ = ["Prepared", "can_run", "prepare", "run"]
@@ -264,7 +264,7 @@ def even_spacing(grid: Array) -> float:
 
 
 def run(case: Case) -> Outcome:
-    """Run `case`; see `stickslip.simulate._case.Outcome`.
+    """Run `case`; see `stickslip.simulation._case.Outcome`.
 
     Raises
     ------

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import call_guards, call_holding, call_profile, call_rate, call_switch, kernel, pointer
-from stickslip.simulate._case import (
+from stickslip.simulation._case import (
     COMPENSATOR_SCALE,
     FILTER,
     FROM_MEASUREMENT,

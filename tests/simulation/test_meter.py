@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.model import Reference
-from stickslip.simulate._meter import (
+from stickslip.simulation._meter import (
     HIGH_PASS,
     close_standstill,
     limit_cycle,

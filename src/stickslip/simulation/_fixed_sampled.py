@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from stickslip.jit import call_step, kernel, pointer
-from stickslip.simulate._case import (
+from stickslip.simulation._case import (
     ENCODER,
     FILTER,
     FROM_MEASUREMENT,

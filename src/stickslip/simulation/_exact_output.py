@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulate._case import COLUMNS
-from stickslip.simulate._exact_flow import UNMOVED, Linear, flow, free_motion, moved
-from stickslip.simulate._exact_state import (
+from stickslip.simulation._case import COLUMNS
+from stickslip.simulation._exact_flow import UNMOVED, Linear, flow, free_motion, moved
+from stickslip.simulation._exact_state import (
     EDGE,
     GOAL,
     GOAL_RATE,
@@ -28,7 +28,7 @@ from stickslip.simulate._exact_state import (
     command,
     torques,
 )
-from stickslip.simulate._exact_step import (
+from stickslip.simulation._exact_step import (
     FREE_POSITION,
     FREE_VELOCITY,
     cubic_of,
@@ -37,7 +37,7 @@ from stickslip.simulate._exact_step import (
     slip_force_at,
     state_at,
 )
-from stickslip.simulate._meter import MAX_WINDOW, meter
+from stickslip.simulation._meter import MAX_WINDOW, meter
 
 ROW_SIZE = len(COLUMNS)
 SHORTEST_WINDOW = 2e-8

@@ -13,9 +13,9 @@ import math
 from typing import Any
 
 from stickslip.jit import call_profile, call_value, kernel, pointer
-from stickslip.simulate._case import GAIN, INERTIA, KD, KI, KP, KR
-from stickslip.simulate._exact_flow import Linear, linear
-from stickslip.simulate._forcing import CELL_SIZE
+from stickslip.simulation._case import GAIN, INERTIA, KD, KI, KP, KR
+from stickslip.simulation._exact_flow import Linear, linear
+from stickslip.simulation._forcing import CELL_SIZE
 
 # ---- columns of `elements` (those of finite stiffness) -------------------------------------------------------
 STIFFNESS, SHARE, FORCE, OFFSET, SLIPS, LOAD_AT_0, LOAD_SLOPE, ELEMENT_SIZE = range(8)
