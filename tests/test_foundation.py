@@ -175,6 +175,6 @@ def test_meta_of_a_run_is_plain_data():
 
 def test_the_function_is_not_hidden_by_a_folder():
     """Whatever was imported before, `stickslip.simulate` is the function."""
-    code = "import stickslip.simulation.closed_loop, stickslip.study.study, stickslip; print(stickslip.simulate.__name__)"
+    code = "import stickslip.simulation.closed_loop, stickslip; print(stickslip.simulate.__name__)"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "simulate"
