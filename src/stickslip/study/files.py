@@ -139,15 +139,29 @@ def _cell(value: float | None) -> str:
 def _write_parquet(folder: Path, runs: Sequence[Run], names: Sequence[str]) -> None:
     pyarrow: Any = importlib.import_module("pyarrow")  # Any: it has no types.
     parquet: Any = importlib.import_module("pyarrow.parquet")
-    columns: dict[str, Any] = {
-        key: pyarrow.array([getattr(run, key) for run in runs], pyarrow.string()) for key in KEYS
-    }
-    for name in names:
-        values = [run.metrics.get(name, math.nan) for run in runs]
-        columns[name] = pyarrow.array(values, pyarrow.float64(), from_pandas=True)
+    columns = [_text_column(pyarrow, [getattr(run, key) for run in runs]) for key in KEYS]
+    columns += [_number_column(pyarrow, [run.metrics.get(name, math.nan) for run in runs]) for name in names]
     draft = folder / "metrics.parquet.part"
-    parquet.write_table(pyarrow.table(columns), draft)
+    parquet.write_table(pyarrow.Table.from_arrays(columns, names=[*KEYS, *names]), draft)
     os.replace(draft, folder / "metrics.parquet")
+
+
+# From buffers, since `pyarrow.array` imports pandas wherever it is installed.
+
+
+def _text_column(pyarrow: Any, values: Sequence[str]) -> Any:
+    encoded = [value.encode() for value in values]
+    ends = np.cumsum([0, *(len(e) for e in encoded)]).astype(np.int32)
+    buffers = [None, pyarrow.py_buffer(ends), pyarrow.py_buffer(b"".join(encoded))]
+    return pyarrow.Array.from_buffers(pyarrow.string(), len(values), buffers)
+
+
+def _number_column(pyarrow: Any, values: Sequence[float]) -> Any:
+    """Doubles; NaN becomes null."""
+    numbers = np.array(values, dtype=np.float64)
+    known = np.packbits(~np.isnan(numbers), bitorder="little")
+    buffers = [pyarrow.py_buffer(known), pyarrow.py_buffer(numbers)]
+    return pyarrow.Array.from_buffers(pyarrow.float64(), numbers.size, buffers)
 
 
 # ---- the manifest -----------------------------------------------------------------------------------------------
