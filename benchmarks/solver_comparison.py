@@ -24,6 +24,7 @@ from stickslip.jit import call_guards, call_rate, call_switch, compiled_law, fla
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation._adaptive_step import stages
+from stickslip.simulation._dormand_prince import NODES, TABLEAU
 from stickslip.simulation._loop import EXTRA, LAWS, arrays_of, begin_side, events, rates, switch
 from stickslip.simulation.closed_loop import prepare, simulate
 from stickslip.simulation.open_loop import respond
@@ -66,7 +67,7 @@ def prescribed(
             continue
         start[:] = z
         for s in range(6):
-            c = (0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0)[s]
+            c = NODES[s]
             for j in range(size // 2):
                 z[j] = start[j]
                 for m in range(s):
@@ -78,19 +79,6 @@ def prescribed(
             z[j] = start[j]
             for m in range(6):
                 z[j] += h * TABLEAU[6, m] * stage[m, j]
-
-
-TABLEAU = np.array(
-    [
-        [0, 0, 0, 0, 0, 0],
-        [1 / 5, 0, 0, 0, 0, 0],
-        [3 / 40, 9 / 40, 0, 0, 0, 0],
-        [44 / 45, -56 / 15, 32 / 9, 0, 0, 0],
-        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0],
-        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0],
-        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
-    ]
-)
 
 
 @kernel()

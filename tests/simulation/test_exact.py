@@ -249,3 +249,14 @@ def test_integral_action_leaves_no_error():
     gains = pid(20.0, 400.0, 0.2)
     outcome = exact.run(loop(FREE, Controller(gains), Reference("step", amplitude=0.01, tau=0.02), 3.0))
     assert abs(column(outcome, 3)[-1] - 0.01) < 1e-9
+
+
+def test_an_open_loop_torque_is_left_to_the_adaptive_integrator():
+    """Without a proportional gain a free slide would take minute steps; "auto" takes the next integrator."""
+    w = 2.0 * math.pi
+    torque = Reference("harmonic", amplitude=0.35 / w, frequency=1.0, phase=-0.5 * math.pi)
+    axis = RigidAxis(INERTIA, Model("gms", **PLANT))
+    record = simulate(axis, Controller(Gains(kp=0.0, kr=1.0)), torque, 1.0)
+    assert record.meta["integrator"] == "adaptive"
+    # identification.json of the reference: the largest position of this record.
+    assert record["position"].max() == pytest.approx(0.3368436348, abs=1e-6)

@@ -14,6 +14,7 @@ import numpy as np
 from stickslip.jit import kernel
 from stickslip.simulation._case import DONE, NO_STEP, NOT_FINITE, TOLERANCE
 from stickslip.simulation._chebyshev import chebyshev, chebyshev_error, stages_for
+from stickslip.simulation._dormand_prince import ERROR, NODES, TABLEAU
 from stickslip.simulation._loop import (
     COMPENSATION_TORQUE,
     FRICTION_TORQUE,
@@ -48,22 +49,6 @@ PROBE = 100.0
 """Length of the probe, in tolerances."""
 LARGEST_GAIN = 4.0
 """Step times decay rate from which Chebyshev steps cost less than Dormand-Prince ones."""
-
-# Dormand and Prince's coefficients: row s leads to stage s, at the fraction NODES[s] of the step; the last row is
-# the fifth-order solution (stage 6 is its rate), ERROR the difference to the fourth-order one.
-TABLEAU = np.array(
-    [
-        [0, 0, 0, 0, 0, 0],
-        [1 / 5, 0, 0, 0, 0, 0],
-        [3 / 40, 9 / 40, 0, 0, 0, 0],
-        [44 / 45, -56 / 15, 32 / 9, 0, 0, 0],
-        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0],
-        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0],
-        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
-    ]
-)
-NODES = np.array([0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1, 1])
-ERROR = np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 
 
 @kernel()

@@ -12,30 +12,14 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from stickslip.jit import call_guards, call_profile, call_rate, call_step, call_switch, kernel, pointer
+from stickslip.simulation._dormand_prince import ERROR, NODES, TABLEAU
 
 STEP, RATE, GUARDS, SWITCH = range(4)  # places in `Side.addresses`
 POSITION, VELOCITY, ACCELERATION = range(3)
 NUDGE = 1e-11  # s, by which one-sided values of the motion lie inside the stretch between two kinks
 FINE = 0.1  # of the law's velocity scale, by which the velocity near rest may change in a step
 SHORTEST = 1e-14  # s, relative above 1 s
-
-NODES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
-STAGES = np.array(
-    [
-        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0],
-        [44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0],
-        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0],
-        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0],
-        [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
-    ]
-)
-# Fifth order less fourth.
-ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 
 
 class Motion(NamedTuple):
@@ -74,7 +58,7 @@ def attempt_rate(m: Motion, t: float, h: float, y: Any, out: Any) -> float:
         for j in range(n):
             total = 0.0
             for i in range(stage):
-                total += STAGES[stage, i] * m.slopes[i, j]
+                total += TABLEAU[stage, i] * m.slopes[i, j]
             out[j] = y[j] + h * total
             m.slopes[stage, j] = 0.0
         v = move(m, t + NODES[stage] * h)

@@ -61,6 +61,8 @@ def can_run(case: Case) -> str:
         return "the exact integrator runs controllers in continuous time, not with a sample time"
     if math.isfinite(controller.torque_limit):
         return "the exact integrator needs a controller without a torque limit"
+    if controller.gains.kp == 0.0 and case.plant.model is not None and case.plant.model.law.state_fields:
+        return "the exact integrator needs a proportional gain: sliding freely, it would take minute steps"
     helper = controller.compensator
     if helper is not None and helper.filter_hz is not None:
         return "the exact integrator needs a compensator without a velocity filter"
