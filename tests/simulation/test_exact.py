@@ -19,6 +19,7 @@ from stickslip.simulation import _forcing as forcing
 from stickslip.simulation import _meter as meter
 from stickslip.simulation import adaptive, exact
 from stickslip.simulation._case import DIVERGED, DONE, Case, Outcome, lay_out
+from stickslip.simulation.closed_loop import simulate
 
 NAMES = ["rms_e", "max_e", "ss_e", "rms_ev", "rms_Tm", "rms_hp", "rev_per_s"]
 COULOMB = Model("coulomb", fc=0.285, sigma2=0.018)
