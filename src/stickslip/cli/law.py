@@ -1,29 +1,50 @@
-"""Explain a friction law: its equation, its parameters with units and bounds, its choices, its source."""
+"""Explain a friction law: its equation, its parameters with units and bounds, its choices, its source.
+
+    stickslip law gms
+    stickslip law lugre --plot                        draws law-lugre.png
+    stickslip law gms --plot gms.svg --set slip_rule=literal --set k=[1e4,5e3] --set alpha=[0.5,0.5]
+    stickslip law my_law.py --plot
+
+The picture shows the torque along a slow sine, in pre-sliding, and after steps in velocity.
+"""
 
 from __future__ import annotations
 
 import argparse
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from stickslip.spec import Field
+    from stickslip.model import Model
+    from stickslip.spec import Field, Law
 
-SUMMARY = "explain a friction law: equation, parameters with units and bounds, source"
+SUMMARY = "explain a friction law: equation, parameters with units and bounds, source, picture"
+DEFAULT = Path()
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """The name."""
+    """The name, the picture, parameters."""
     parser.add_argument("name", help="a law that `stickslip laws` lists, or the path of a law's file")
+    parser.add_argument(
+        "--plot", type=Path, nargs="?", const=DEFAULT, metavar="FILE",
+        help="draw the law into FILE.png, .svg or .pdf (default: law-NAME.png here)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE",
+        help="another value of a parameter, or another option of a choice; may be repeated",
+    )  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the description of the law."""
+    """Print the description of the law; draw it."""
     from stickslip import plugins
 
     law = plugins.law(args.name)
+    model = with_values(law, args.set)
     print(f"{law.name}: {law.title}\n\n  {law.equation}\n")
-    table("parameters", law.fields)
+    table("parameters", model.law.fields)
     table("state", law.state_fields)
     for choice in law.choices:
         options = ", ".join(
@@ -33,11 +54,59 @@ def run(args: argparse.Namespace) -> int:
     print(f"passive: {law.passive}\nsource: {'; '.join(law.source)}\n\nas a study's file has it:")
     written = args.name if args.name.endswith(".py") else law.name
     print(f"  law = {json.dumps(written, ensure_ascii=False)}")
-    for f in law.fields:
-        if f.name in law.example:
-            value = law.example[f.name]
-            print(f"  {f.name} = {list(value) if f.per_element else value}")
+    for name, option in model.law.chosen.items():
+        print(f'  {name} = "{option}"')
+    for name, value in shown_values(model, args.set).items():
+        print(f"  {name} = {value}")
+    if args.plot is not None:
+        draw(model, args.plot)
     return 0
+
+
+def with_values(law: Law, settings: Sequence[str]) -> Model:
+    """The law with its example's parameters and the values that were set."""
+    from stickslip.model import Model
+
+    given = dict(setting(text) for text in settings)
+    names = {choice.name for choice in law.choices}
+    choices = {k: v for k, v in given.items() if k in names and isinstance(v, str)}
+    chosen = law.having(**choices) if choices else law
+    return Model(chosen, **{**law.example, **{k: v for k, v in given.items() if k not in choices}})
+
+
+def setting(text: str) -> tuple[str, Any]:
+    """Name and value of NAME=VALUE; the value is as in a TOML file, a word needs no quotes."""
+    import tomllib
+
+    from stickslip.errors import InputError
+
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise InputError(f"--set {text!r} is no NAME=VALUE; write it like fs=0.3 or k=[1e4,5e3]")
+    try:
+        return name.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return name.strip(), value.strip()
+
+
+def shown_values(model: Model, settings: Sequence[str]) -> dict[str, Any]:
+    """The example's parameters and those that were set, as plain data."""
+    named = {*model.law.example, *(text.partition("=")[0].strip() for text in settings)}
+    values: dict[str, Any] = model.parameters._asdict()
+    return {
+        f.name: list(values[f.name]) if f.per_element else values[f.name]
+        for f in model.law.fields
+        if f.name in named
+    }
+
+
+def draw(model: Model, path: Path) -> None:
+    """Draw the law and say where."""
+    from stickslip.report.law_pictures import draw_law
+
+    target = Path(f"law-{model.law.name}.png") if path == DEFAULT else path
+    draw_law(model, target)
+    print(f"\npicture: {target}")
 
 
 def table(title: str, fields: tuple[Field, ...]) -> None:

@@ -15,13 +15,15 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Curve", "Panel", "Style", "draw", "envelope", "scaled", "style_of"]
+__all__ = ["Curve", "Panel", "Style", "draw", "envelope", "save", "scaled", "style_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WIDTH = 4.4  # inches: printed at half a page's width, 8 points stay above 5
 DPI = 144
 LEGEND = 80  # characters in a row of the legend, 9 of them an entry's line and gap
+FORMATS = (".svg", ".png", ".pdf")
+DATES = {".svg": "Date", ".pdf": "CreationDate"}
 RC: dict[str, Any] = {
     "font.size": 8.0,
     "axes.titlesize": 8.0,
@@ -105,6 +107,8 @@ class Panel:
         None fits the data.
     note : str
         A line above the axes.
+    legend : str
+        Where inside the axes its lines are named ("lower right"); empty: in the figure's one legend below.
     """
 
     curves: Sequence[Curve]
@@ -113,6 +117,7 @@ class Panel:
     x_limits: tuple[float, float] | None = None
     y_limits: tuple[float, float] | None = None
     note: str = ""
+    legend: str = ""
 
 
 def envelope(x: Array, y: Array, bins: int = 380) -> tuple[Array, Array]:
@@ -151,27 +156,45 @@ def draw(path: Path, title: str, message: str, panels: Sequence[Panel], height: 
     height : float
         Of one panel, inches.
     """
+    targets = [path.with_name(path.name + suffix) for suffix in (".svg", ".png")]
+    save(targets, title, message, panels, height)
+
+
+def save(
+    targets: Sequence[Path], title: str, message: str, panels: Sequence[Panel], height: float = 2.0
+) -> None:
+    """Draw panels as `draw` does and save them in the formats that the suffixes name.
+
+    Parameters
+    ----------
+    targets : sequence of Path
+        Files that end in one of `FORMATS`; their folders are made.
+    title, message, panels, height
+        As for `draw`.
+    """
     settings: Any = importlib.import_module("matplotlib").rc_context(RC)
     with settings:
         figure = _figure(title, message, panels, height)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # No date in the file: the same study gives the same bytes.
-        figure.savefig(path.with_name(path.name + ".svg"), format="svg", metadata={"Date": None})
-        figure.savefig(path.with_name(path.name + ".png"), format="png", dpi=DPI)
+        for target in targets:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            # No date in the file: the same study gives the same bytes.
+            undated = {"metadata": {DATES[target.suffix]: None}} if target.suffix in DATES else {}
+            figure.savefig(target, format=target.suffix[1:], dpi=DPI, **undated)
 
 
 def _figure(title: str, message: str, panels: Sequence[Panel], height: float) -> Any:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    named = dict.fromkeys(c.label for p in panels for c in p.curves if c.label)
+    common = [p for p in panels if not p.legend]
+    named = dict.fromkeys(c.label for p in common for c in p.curves if c.label)
     longest = max((len(name) for name in named), default=0)
     columns = max(1, min(4, len(named), LEGEND // (longest + 9)))
     rows = math.ceil(len(named) / columns)
     heading = textwrap.wrap(title, 64)
-    lines = textwrap.wrap(message, 78, break_on_hyphens=False)
+    lines = textwrap.wrap(message, 74, break_on_hyphens=False)
     head = 0.24 + 0.13 * (len(heading) + max(1, len(lines)))
-    total = head + height * len(panels) + 0.26 + 0.17 * rows
+    total = head + height * len(panels) + (0.26 if common else 0.0) + 0.17 * rows
     figure: Any = Figure(figsize=(WIDTH, total))
     FigureCanvasAgg(figure)
     figure.text(0.02, 1.0 - 0.07 / total, "\n".join(heading), va="top", fontsize=8.0, fontweight="bold")
@@ -183,11 +206,12 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
     for i, panel in enumerate(panels):
         top = head + height * i
         # Fixed margins: matplotlib's layout engines take longer than the drawing.
-        box = (0.14, 1.0 - (top + height - 0.14) / total, 0.83, (height - 0.2) / total)
+        foot = 0.2 if shared else 0.52  # Room for every panel's own label where the axes differ.
+        box = (0.14, 1.0 - (top + height + 0.06 - foot) / total, 0.83, (height - foot) / total)
         axes.append(figure.add_axes(box, sharex=axes[0] if axes and shared else None))
         _fill(axes[-1], panel, bare=shared and i < len(panels) - 1)
     handles = {line.get_label(): line for a in axes for line in a.get_lines() if line.get_label()[0] != "_"}
-    if len(handles) > 1:
+    if len(named) > 1:
         shown = [handles[name] for name in named]
         figure.legend(
             handles=shown, loc="lower center", ncols=columns, bbox_to_anchor=(0.53, 0.0), columnspacing=1.4,
@@ -208,6 +232,8 @@ def _fill(axes: Any, panel: Panel, bare: bool) -> None:
         axes.set_xlim(*panel.x_limits)
     if panel.y_limits:
         axes.set_ylim(*panel.y_limits)
+    if panel.legend:
+        axes.legend(loc=panel.legend, borderaxespad=0.2, labelspacing=0.3, fontsize=7.0)
     if panel.note:
         axes.text(
             1.0,

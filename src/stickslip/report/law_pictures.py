@@ -1,0 +1,255 @@
+"""The picture of a law: what it answers to a slow sine, to small motion, and to steps in velocity.
+
+It is made from the law's own `step`, whatever the law: built in, installed, or a file of a user. The scales of
+the motions are read off the law (`scales_of`), so that a new law needs nothing but its description.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.model import Model
+from stickslip.report.plots import FORMATS, Array, Curve, Panel, Style, save, scaled
+from stickslip.spec import Law, Surroundings
+
+__all__ = [
+    "Response",
+    "Scales",
+    "draw_law",
+    "follow",
+    "presliding",
+    "scales_of",
+    "slow_sine",
+    "velocity_steps",
+]
+
+USUAL_VELOCITY = 0.01  # rad/s, for a law that declares no scale: the thesis's Stribeck velocity
+USUAL_DISTANCE = 1e-4  # rad, for a law without pre-sliding
+RISING = Style("#D55E00", (0, (4, 1.2)), 1.4)
+FALLING = Style("#0072B2", "-", 1.2)
+OUTER = Style("#777777", "-", 1.0)
+INNER = Style("#D55E00", (0, (4, 1.2)), 1.6)
+STEADY = Style("#000000", (0, (1, 1.5)), 1.0)
+TORQUE = Style("#0072B2", "-", 1.4)
+
+
+@dataclass(frozen=True)
+class Response:
+    """A law's answer to a motion that starts at rest: arrays of shape (n,).
+
+    Attributes
+    ----------
+    time, position, velocity, torque : array
+        s, rad, rad/s, N·m (or m, m/s, N).
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    torque: Array
+
+    def part(self, chosen: Any) -> Response:
+        """The rows of a slice or a mask."""
+        return Response(self.time[chosen], self.position[chosen], self.velocity[chosen], self.torque[chosen])
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Over which velocity (rad/s) and displacement (rad) a law's torque changes."""
+
+    velocity: float
+    distance: float
+
+
+def follow(model: Model, time: Any, velocity: Any) -> Response:
+    """March a contact that starts at rest along velocities that are linear between the times.
+
+    Parameters
+    ----------
+    model : Model
+    time, velocity : array, shape (n,)
+        s and rad/s. A time that occurs twice makes a jump of the velocity.
+    """
+    law, p = model.law, model.parameters
+    z, x = law.state(p), 0.0
+    position, torque = np.zeros(time.size), np.zeros(time.size)
+    v0, before = float(velocity[0]), float(time[0])
+    for i, (t, v1) in enumerate(zip(time.tolist(), velocity.tolist())):
+        dt = t - before
+        x += 0.5 * (v0 + v1) * dt
+        # A jump is a step of no length from the new velocity: nothing moves while it lasts.
+        torque[i] = law.step(v0 if dt > 0.0 else v1, v1, dt, z, p, Surroundings(position=x))
+        position[i], v0, before = x, v1, t
+    return Response(np.asarray(time, float), position, np.asarray(velocity, float), torque)
+
+
+def scales_of(model: Model) -> Scales:
+    """Read the scales of a law off its answers.
+
+    The velocity is what the law declares; the displacement is where a creeping contact reaches 90 % of its
+    largest torque.
+    """
+    law = model.law
+    velocity = law.velocity_scale(model.parameters) if law.velocity_scale else USUAL_VELOCITY
+    creep = 1e-3 * velocity
+    distance = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 361)])
+    torque = np.abs(follow(model, distance / creep, np.full(distance.size, creep)).torque)
+    reached = float(distance[np.argmax(torque >= 0.9 * np.max(torque))])
+    return Scales(velocity, reached if reached > 1e-9 else USUAL_DISTANCE)
+
+
+def slow_sine(model: Model, scales: Scales) -> Response:
+    """The second period of a sinusoidal velocity, five times the velocity's scale and long against pre-sliding."""
+    peak, n = 5.0 * scales.velocity, 6000
+    w = peak / (1000.0 * scales.distance)
+    time = np.arange(2 * n + 1) * (2.0 * math.pi / w / n)
+    return follow(model, time, peak * np.sin(w * time)).part(slice(n, None))
+
+
+def presliding(model: Model, scales: Scales) -> tuple[Response, Response]:
+    """A slow loop of small motion, and a smaller loop that interrupts it on its way up: (all of it, inner loop)."""
+    turns = [scales.distance * x for x in (0.0, 1.6, -1.6, 0.7, -0.7, 1.6)]
+    speed, n = 1e-3 * scales.velocity, 1500
+    time, velocity = [0.0], [0.0]
+    for x0, x1 in pairwise(turns):
+        # Half a cosine between two turning points: velocity zero at both.
+        phase = np.linspace(0.0, math.pi, n + 1)[1:]
+        took = abs(x1 - x0) / speed
+        velocity += (0.5 * math.pi * (x1 - x0) / took * np.sin(phase)).tolist()
+        time += (time[-1] + took * phase / math.pi).tolist()
+    whole = follow(model, np.array(time), np.array(velocity))
+    back = 4 * n + int(np.searchsorted(whole.position[4 * n :], turns[3]))
+    return whole.part(slice(n, None)), whole.part(slice(3 * n, back + 1))
+
+
+def velocity_steps(model: Model, scales: Scales) -> tuple[Response, tuple[float, float, float]]:
+    """From rest to a low velocity, to a high one, and back; each lasts until the torque is settled."""
+    levels = (0.2 * scales.velocity, 3.0 * scales.velocity, 0.2 * scales.velocity)
+    took = 20.0 * scales.distance / levels[0]
+    for _ in range(8):
+        answer = _steps(model, levels, took)
+        span = float(np.ptp(answer.torque)) or 1.0
+        ends = [answer.part(slice(i * 800 + 400, (i + 1) * 800)).torque for i in range(3)]
+        if all(float(np.ptp(end)) < 2e-3 * span for end in ends):
+            break
+        took *= 2.0
+    return _steps(model, levels, took), levels
+
+
+def _steps(model: Model, levels: Sequence[float], took: float) -> Response:
+    time = np.concatenate([np.linspace(i * took, (i + 1) * took, 800) for i in range(len(levels))])
+    return follow(model, time, np.repeat(np.array(levels), 800))
+
+
+# ---- drawing -------------------------------------------------------------------------------------------------
+
+
+def units_of(law: Law) -> tuple[str, str]:
+    """Units of torque and of position: N·m and rad, or N and m for a law described for a linear axis."""
+    units = " ".join(f.par.unit for f in (*law.fields, *law.state_fields))
+    rotary = "rad" in units or "N·m" in units or "N" not in units
+    return ("N·m", "rad") if rotary else ("N", "m")
+
+
+def draw_law(model: Model, *targets: Path) -> None:
+    """Draw the picture of a law with its parameters.
+
+    Parameters
+    ----------
+    model : Model
+    *targets : Path
+        Files that end in .svg, .png or .pdf.
+
+    Raises
+    ------
+    InputError
+        If a suffix is none of these, or a file cannot be written.
+    """
+    for target in targets:
+        if target.suffix not in FORMATS:
+            raise InputError(f"{target}: no format {target.suffix!r}; end the name in .svg, .png or .pdf")
+    scales = scales_of(model)
+    torque, length = units_of(model.law)
+    word = "torque" if torque == "N·m" else "force"
+    chosen = ", ".join(f"{name} {option}" for name, option in model.law.chosen.items())
+    panels = [
+        _sine_panel(slow_sine(model, scales), f"{word} ({torque})", f"{length}/s"),
+        _presliding_panel(*presliding(model, scales), f"{word} ({torque})", length),
+        _steps_panel(model, velocity_steps(model, scales), f"{word} ({torque})", f"{length}/s"),
+    ]
+    title = model.law.title + (f", {chosen}" if chosen else "")
+    try:
+        save(targets, title, _described(model), panels, 2.0)
+    except OSError as error:
+        raise InputError(
+            f"cannot write {error.filename or targets[0]} ({error.strerror}); choose another place"
+        ) from None
+
+
+def _described(model: Model) -> str:
+    """The parameters in a line or two."""
+    words: list[str] = []
+    for f in model.law.fields:
+        value = getattr(model.parameters, f.name)
+        numbers = [f"{x:.5g}" for x in value] if f.per_element else [f"{value:.5g}"]
+        words.append(f"{f.name} = {' '.join(numbers)}".replace(" ", "\u00a0"))
+    return ", ".join(words)
+
+
+def _sine_panel(answer: Response, label: str, unit: str) -> Panel:
+    factor, unit = scaled(float(np.max(np.abs(answer.velocity))), unit)
+    curves = [
+        Curve(factor * part.velocity, part.torque, name, style)
+        for name, style, part in (
+            ("speed rising", RISING, _where(answer, _gaining(answer))),
+            ("speed falling", FALLING, _where(answer, ~_gaining(answer))),
+        )
+    ]
+    return Panel(curves, label, f"velocity ({unit})", note="slow sine", legend="lower right")
+
+
+def _gaining(answer: Response) -> Any:
+    return np.gradient(np.abs(answer.velocity)) >= 0.0
+
+
+def _where(answer: Response, chosen: Any) -> Response:
+    """The answer with gaps where it is not chosen, joined to its neighbours."""
+    wide = chosen | np.roll(chosen, 1)
+    return Response(answer.time, answer.position, answer.velocity, np.where(wide, answer.torque, np.nan))
+
+
+def _presliding_panel(outer: Response, inner: Response, label: str, unit: str) -> Panel:
+    reach = float(np.max(np.abs(outer.position)))
+    factor, unit = scaled(reach, unit)
+    limits = (-1.1 * factor * reach, 1.9 * factor * reach)  # room for the names
+    curves = [
+        Curve(factor * outer.position, outer.torque, "outer loop", OUTER),
+        Curve(factor * inner.position, inner.torque, "inner loop", INNER),
+    ]
+    note = "pre-sliding: slow motion, reversed inside a larger one"
+    return Panel(curves, label, f"position ({unit})", limits, note=note, legend="lower right")
+
+
+def _steps_panel(
+    model: Model, answered: tuple[Response, tuple[float, float, float]], label: str, unit: str
+) -> Panel:
+    answer, levels = answered
+    factor, second = scaled(float(answer.time[-1]), "s")
+    curves = [Curve(factor * answer.time, answer.torque, "torque" if "torque" in label else "force", TORQUE)]
+    if model.law.steady:
+        steady = np.array([model.law.steady(v, model.parameters) for v in levels])
+        curves.append(Curve(factor * answer.time, np.repeat(steady, 800), "at constant velocity", STEADY))
+    each, unit = scaled(levels[1], unit)
+    words = ", ".join(f"{each * v:.3g}" for v in levels)
+    note = f"from rest, steps in velocity: {words} {unit}"
+    low, high = float(np.min(answer.torque)), float(np.max(answer.torque))
+    limits = (min(0.0, 1.1 * low), max(0.0, 1.1 * high) or 1.0)
+    return Panel(curves, label, f"time ({second})", None, limits, note, "lower right")
