@@ -54,7 +54,8 @@ __all__ = [
 class Par:
     """What a number means: its unit, symbol, meaning and bounds.
 
-    ``positive`` makes the lower bound 0, excluded. A parameter without ``default`` must be given.
+    ``positive`` makes the lower bound 0, excluded. A parameter without ``default`` must be given. ``shares`` says
+    that the values of all elements add up to 1.
     """
 
     unit: str
@@ -64,6 +65,7 @@ class Par:
     upper: float = math.inf
     positive: bool = False
     default: float | None = None
+    shares: bool = False
 
     def complaint(self, value: float) -> str:
         """Say what is wrong with `value`, or return the empty string."""

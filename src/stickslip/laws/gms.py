@@ -24,7 +24,8 @@ class Params(NamedTuple):
 
     k: Annotated[tuple[float, ...], Par("N·m/rad", "k_i", "stiffness of element i", positive=True)]
     alpha: Annotated[
-        tuple[float, ...], Par("-", "alpha_i", "share of element i in s(v)", positive=True, upper=1.0)
+        tuple[float, ...],
+        Par("-", "alpha_i", "share of element i in s(v)", positive=True, upper=1.0, shares=True),
     ]
     c: Annotated[float, Par("N·m/s", "C", "attraction parameter", positive=True)]
     sigma2: Annotated[

@@ -1,0 +1,162 @@
+"""What an identification hands back: estimates with intervals and verdicts, a model, pictures as plain numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import UnknownName
+from stickslip.model import Model
+
+__all__ = ["Estimate", "Identification", "Picture", "Trace"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """One identified number.
+
+    Attributes
+    ----------
+    name, unit, symbol : str
+        ``k[1]`` is element 1 (counted from 0) of parameter ``k``.
+    value, std : float
+        Point estimate and standard deviation; std is not a number where the noise level is unknown.
+    lower, upper : float
+        95 % interval; infinite where the data set no limit.
+    identified : bool
+    verdict : str
+        Why it is not identified; empty where it is.
+    """
+
+    name: str
+    unit: str
+    symbol: str
+    value: float
+    std: float
+    lower: float
+    upper: float
+    identified: bool
+    verdict: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data; what is not finite becomes None, since JSON has no such numbers."""
+        numbers = {k: getattr(self, k) for k in ("value", "std", "lower", "upper")}
+        return {
+            "name": self.name, "unit": self.unit, "symbol": self.symbol,
+            **{k: v if math.isfinite(v) else None for k, v in numbers.items()},
+            "identified": self.identified, "verdict": self.verdict,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One set of points of a picture.
+
+    Attributes
+    ----------
+    label : str
+        Empty for none in the legend.
+    x, y : array, shape (n,)
+    kind : str
+        "line", "points", "dashes", "band" (between `y` and `y2`), or "vertical" (a line at every x).
+    y2 : array, shape (n,), optional
+    """
+
+    label: str
+    x: Array
+    y: Array
+    kind: str = "line"
+    y2: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """One pair of axes as plain numbers; `stickslip.report.identification.draw_picture` draws it.
+
+    Attributes
+    ----------
+    name : str
+        For a file's name.
+    title, message : str
+        What it is; what it shows.
+    x_label, y_label : str
+        With the unit.
+    traces : tuple of Trace
+    x_scale : str
+        "linear" or "log".
+    """
+
+    name: str
+    title: str
+    message: str
+    x_label: str
+    y_label: str
+    traces: tuple[Trace, ...]
+    x_scale: str = "linear"
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """The result of one method.
+
+    Attributes
+    ----------
+    method : str
+    model : Model or None
+        None where the method does not yield a whole law.
+    estimates : tuple of Estimate
+    correlation : array, shape (n, n)
+        Of the estimates, in their order; not a number where it is undefined.
+    misfit : mapping of str to float
+        Numbers that say how well it fits, the unit at the end of the name: ``rms_Nm``.
+    notes : tuple of str
+        What the user must know, one sentence each.
+    measure_next : tuple of str
+        What to measure to settle what is not identified.
+    pictures : tuple of Picture
+    details : mapping
+        The method's own numbers, plain data or arrays.
+    findings : tuple
+        What the check of the records found, in its order.
+    """
+
+    method: str
+    model: Model | None
+    estimates: tuple[Estimate, ...]
+    correlation: Array
+    misfit: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+    measure_next: tuple[str, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    details: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    findings: tuple[Any, ...] = ()
+
+    def __getitem__(self, name: str) -> Estimate:
+        for estimate in self.estimates:
+            if estimate.name == name:
+                return estimate
+        raise UnknownName("estimate", name, [e.name for e in self.estimates])
+
+    @property
+    def not_identified(self) -> tuple[str, ...]:
+        """Names of the estimates that the data do not determine."""
+        return tuple(e.name for e in self.estimates if not e.identified)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Law, estimates, correlation, misfit and sentences as plain data for JSON; no pictures."""
+        correlation = [[c if math.isfinite(c) else None for c in row] for row in self.correlation.tolist()]
+        return {
+            "method": self.method,
+            "model": self.model.as_dict() if self.model else None,
+            "estimates": [e.as_dict() for e in self.estimates],
+            "correlation": correlation,
+            "misfit": {k: float(v) for k, v in self.misfit.items()},
+            "notes": list(self.notes),
+            "measure_next": list(self.measure_next),
+        }

@@ -1,0 +1,256 @@
+"""Free and frozen parameters of a law, and of what moves with it, as one flat vector for optimisers.
+
+The coordinates of the vector are the logarithm of a positive parameter, the parameter over its typical size
+otherwise, and log ratios for shares that add up to 1, so that steps of the same size matter alike and no step
+inside the bounds leaves what the law allows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError, UnknownName
+from stickslip.model import Model
+from stickslip.spec import Par
+
+__all__ = ["Parameter", "Vector"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+LARGEST = 230.0
+"""Logarithms of parameters stay between 1e-100 and 1e100, so that no step overflows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of a vector.
+
+    Attributes
+    ----------
+    name : str
+        ``fc``; ``k[1]`` for element 1 (counted from 0).
+    par : Par
+    value : float
+        Where the search starts, or the value it is frozen at.
+    free : bool
+    shares : str
+        The name of the group whose values add up to 1; empty for none.
+    scale : float
+        Typical size of a parameter that may be zero or negative.
+    """
+
+    name: str
+    par: Par
+    value: float
+    free: bool = True
+    shares: str = ""
+    scale: float = 1.0
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether its coordinate is a logarithm: it is positive by its bounds."""
+        return self.par.positive or self.par.lower > 0.0
+
+    @property
+    def nonnegative(self) -> bool:
+        """Whether its bounds exclude negative values."""
+        return self.par.positive or self.par.lower >= 0.0
+
+    def coordinate(self, value: float) -> float:
+        """The coordinate of a value."""
+        if self.logarithmic:
+            return math.log(value) if value > 0.0 else -LARGEST
+        return value / self.scale
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Lower and upper bound of the coordinate."""
+        low = self.coordinate(max(self.par.lower, 0.0)) if self.logarithmic else self.par.lower / self.scale
+        if self.par.upper < math.inf:
+            return low, self.coordinate(self.par.upper)
+        return low, LARGEST if self.logarithmic else math.inf
+
+
+class Vector:
+    """Free and frozen parameters, and the map between their values and the optimiser's coordinates.
+
+    Parameters
+    ----------
+    model : Model or None
+        The law, and the values at which its parameters start or are frozen.
+    free, frozen : sequence of str, optional
+        Names of the free or the frozen parameters; ``k`` means every element, ``k[1]`` one. Without `free` all
+        are free but those in `frozen`.
+    extra : sequence of Parameter
+        Other numbers (inertia, offset); they come first.
+    """
+
+    def __init__(
+        self,
+        model: Model | None,
+        free: Iterable[str] | None = None,
+        frozen: Iterable[str] = (),
+        extra: Sequence[Parameter] = (),
+    ) -> None:
+        self.base = model
+        everything = [*extra, *_parameters_of(model)]
+        chosen = None if free is None else _matched(list(free), everything)
+        held = _matched(list(frozen), everything)
+        self.parameters: tuple[Parameter, ...] = tuple(
+            replace(p, free=p.free and p.name not in held and (chosen is None or p.name in chosen))
+            for p in everything
+        )
+        self.free: tuple[Parameter, ...] = tuple(p for p in self.parameters if p.free)
+        self._plain = [p for p in self.free if not p.shares]
+        groups = dict.fromkeys(p.shares for p in self.free if p.shares)
+        self._groups = [[p for p in self.free if p.shares == g] for g in groups]
+        self._fixed = {p.name: p.value for p in self.parameters if not p.free}
+
+    # ---- sizes and bounds ------------------------------------------------------------------------------------
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the free parameters, in the order of `values`."""
+        return tuple(p.name for p in self.free)
+
+    @property
+    def size(self) -> int:
+        """The number of coordinates: one less than the free parameters for every group of shares."""
+        return len(self._plain) + sum(len(g) - 1 for g in self._groups)
+
+    @property
+    def start(self) -> Array:
+        """Coordinates of the values at which the search starts, shape (size,)."""
+        return self.coordinates({p.name: p.value for p in self.free})
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds of the coordinates, shape (size,)."""
+        return np.array([p.limits[0] for p in self._plain] + [-30.0] * (self.size - len(self._plain)))
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds of the coordinates, shape (size,)."""
+        return np.array([p.limits[1] for p in self._plain] + [30.0] * (self.size - len(self._plain)))
+
+    def coordinate_of(self, name: str) -> int | None:
+        """The place of a free parameter's own coordinate; None for a share."""
+        return next((i for i, p in enumerate(self._plain) if p.name == name), None)
+
+    # ---- the map ---------------------------------------------------------------------------------------------
+
+    def coordinates(self, values: Mapping[str, float]) -> Array:
+        """Coordinates of named values of the free parameters, shape (size,)."""
+        out = [p.coordinate(values[p.name]) for p in self._plain]
+        for group in self._groups:
+            last = values[group[-1].name]
+            out += [math.log(values[p.name] / last) for p in group[:-1]]
+        return np.clip(np.array(out, dtype=np.float64), self.lower, self.upper)
+
+    def named(self, u: Array) -> dict[str, float]:
+        """Every parameter by name, frozen ones too."""
+        values = dict(self._fixed)
+        for x, p in zip(u, self._plain, strict=False):
+            values[p.name] = math.exp(x) if p.logarithmic else x * p.scale
+        place = len(self._plain)
+        for group in self._groups:
+            ratios = [*u[place : place + len(group) - 1].tolist(), 0.0]
+            place += len(group) - 1
+            top = max(ratios)
+            parts = [math.exp(x - top) for x in ratios]
+            whole = 1.0 - sum(p.value for p in self.parameters if p.shares == group[0].shares and not p.free)
+            factor = whole / math.fsum(parts)
+            values.update({p.name: factor * x for p, x in zip(group, parts, strict=True)})
+        return values
+
+    def values(self, u: Array) -> Array:
+        """Values of the free parameters, shape (number of them,)."""
+        named = self.named(u)
+        return np.array([named[p.name] for p in self.free], dtype=np.float64)
+
+    def jacobian(self, u: Array) -> Array:
+        """Derivatives of the free values by the coordinates, shape (free parameters, size)."""
+        values = self.values(u)
+        place = {p.name: i for i, p in enumerate(self.free)}
+        out = np.zeros((len(self.free), self.size))
+        for j, p in enumerate(self._plain):
+            out[place[p.name], j] = values[place[p.name]] if p.logarithmic else p.scale
+        column = len(self._plain)
+        for group in self._groups:
+            rows = [place[p.name] for p in group]
+            part = values[rows]
+            for j in range(len(group) - 1):
+                out[rows, column + j] = -part * part[j] / part.sum()
+                out[rows[j], column + j] += part[j]
+            column += len(group) - 1
+        return out
+
+    def law_parameters(self, u: Array) -> Any:
+        """The law's parameters, unchecked: for the inner loop of a fit."""
+        assert self.base is not None
+        return self.base.law.Parameters(**self._law_values(u))
+
+    def packed(self, u: Array) -> Array:
+        """The law's parameters as the flat array that compiled functions read."""
+        assert self.base is not None
+        return np.array(self.base.law.pack(self.law_parameters(u)), dtype=np.float64)
+
+    def model(self, u: Array) -> Model:
+        """The law with these parameters.
+
+        Raises
+        ------
+        ParameterError
+            If the law refuses them together (`Law.check`).
+        """
+        assert self.base is not None
+        return Model(self.base.law, **self._law_values(u))
+
+    def complaint(self, u: Array) -> str:
+        """What the law has against these parameters together; empty for nothing."""
+        assert self.base is not None
+        check = self.base.law.check
+        return check(self.law_parameters(u)) if check else ""
+
+    def _law_values(self, u: Array) -> dict[str, Any]:
+        assert self.base is not None
+        named = self.named(u)
+        count = self.base.law.elements_in(self.base.parameters)
+        return {
+            f.name: tuple(named[f"{f.name}[{i}]"] for i in range(count)) if f.per_element else named[f.name]
+            for f in self.base.law.fields
+        }
+
+
+def _parameters_of(model: Model | None) -> list[Parameter]:
+    """Every number of a model's law, all free."""
+    if model is None:
+        return []
+    out: list[Parameter] = []
+    for f in model.law.fields:
+        value: Any = getattr(model.parameters, f.name)
+        shares = f.name if f.per_element and f.par.shares else ""
+        numbers = list(value) if f.per_element else [value]
+        for i, number in enumerate(numbers):
+            name = f"{f.name}[{i}]" if f.per_element else f.name
+            out.append(Parameter(name, f.par, float(number), True, shares, abs(float(number)) or 1.0))
+    return out
+
+
+def _matched(wanted: list[str], parameters: Sequence[Parameter]) -> set[str]:
+    """The full names that `wanted` means."""
+    names = [p.name for p in parameters]
+    out: set[str] = set()
+    for name in wanted:
+        hits = [n for n in names if n == name or n.partition("[")[0] == name]
+        if not hits:
+            raise UnknownName("parameter", name, names)
+        out.update(hits)
+    if not names:
+        raise InputError("there is no parameter to identify; give a law or parameters")
+    return out
