@@ -39,11 +39,13 @@ __all__ = [
     "call_holding",
     "call_profile",
     "call_rate",
+    "call_sample",
     "call_step",
     "call_switch",
     "call_value",
     "compiled_law",
     "compiled_profile",
+    "compiled_sample",
     "kernel",
     "pointer",
 ]
@@ -59,6 +61,7 @@ SIGNATURES = {
     "sliding": FLOAT(FLOAT, ARRAY),
     "holding": FLOAT(FLOAT, ARRAY, ARRAY, ARRAY),
     "profile": types.void(FLOAT, ARRAY, ARRAY),
+    "sample": FLOAT(FLOAT, FLOAT, FLOAT, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
 }
 
 # ---- where compiled code is kept --------------------------------------------------------------------------
@@ -156,6 +159,7 @@ call_switch: Any = _caller("switch", 5, False)
 call_value: Any = _caller("steady", 2, True)
 call_holding: Any = _caller("holding", 4, True)
 call_profile: Any = _caller("profile", 3, False)
+call_sample: Any = _caller("sample", 8, True)
 
 
 # ---- laws and references ----------------------------------------------------------------------------------
@@ -203,6 +207,12 @@ def compiled_profile(name: str, function: Callable[..., Any], layout: Layout) ->
     """Compile a reference's ``profile(t, p, out)``; returns its address."""
     motion = Layout(("position", "velocity", "acceleration"))
     return _compile(name, {"profile": function}, {"p": layout, "out": motion})["profile"]
+
+
+def compiled_sample(name: str, function: Callable[..., Any], layouts: Mapping[str, Layout]) -> int:
+    """Compile one sample of a controller, ``sample(position, wanted, wanted_velocity, n, m, z, p, u)``;
+    returns its address."""
+    return _compile(name, {"sample": function}, layouts)["sample"]
 
 
 def _compile(

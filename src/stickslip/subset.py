@@ -22,7 +22,7 @@ from typing import Any
 from stickslip.errors import LawError, suggestion
 from stickslip.spec import Field, Law, Surroundings
 
-__all__ = ["Layout", "law_layouts", "lower"]
+__all__ = ["COUNT", "Layout", "law_layouts", "lower", "named"]
 
 BUILTINS = {"abs", "min", "max", "range", "len", "float", "int"}
 MATH = {
@@ -115,33 +115,56 @@ def lower(
     """
     done: dict[str, ast.FunctionDef] = {}
     for name, function in entries.items():
-        _lower_one(name, function, layouts, done, stack=())
+        _translate(name, function, layouts, done, stack=(), flat=True)
     return done
 
 
-def _lower_one(
+def named(
+    entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout]
+) -> dict[str, ast.FunctionDef]:
+    """Check functions and everything they call, and keep their fields by name (``p.k[i]``).
+
+    Arguments, order and errors as in `lower`. Constants of the file are numbers in the result; the number of
+    elements is the name ``elements_``. This is what export writes in other languages.
+    """
+    done: dict[str, ast.FunctionDef] = {}
+    for name, function in entries.items():
+        _translate(name, function, layouts, done, stack=(), flat=False)
+    return done
+
+
+def _translate(
     name: str,
     function: Callable[..., Any],
     layouts: Mapping[str, Layout],
     done: dict[str, ast.FunctionDef],
     stack: tuple[str, ...],
+    *,
+    flat: bool,
 ) -> None:
     if name in done:
         return
     tree, where = _parsed(function)
     if name in stack:
         raise LawError(f"{where.at(tree)}: {function.__name__} calls itself; use a `for` loop instead")
-    translator = _Translator(where, layouts, [a.arg for a in tree.args.args], function.__globals__)
+    translator = _Translator(where, layouts, [a.arg for a in tree.args.args], function.__globals__, flat)
     body = [s for s in (translator.visit(statement) for statement in tree.body) if s is not None]
-    if translator.counts:
+    if translator.counts and flat:
         # Once at the top: the compiler cannot know that writing to a state leaves the parameters alone.
         body.insert(0, translator.counted())
     for callee, target in translator.calls.items():
-        _lower_one(callee, target, layouts, done, (*stack, name))
+        _translate(callee, target, layouts, done, (*stack, name), flat=flat)
     arguments = ast.arguments([], [ast.arg(a.arg) for a in tree.args.args], None, [], [], None, [])
+    if not flat:
+        body = [*_docstring(tree), *body]
     done[name] = ast.fix_missing_locations(
         ast.FunctionDef(name=name, args=arguments, body=body or [ast.Pass()], decorator_list=[])
     )
+
+
+def _docstring(tree: ast.FunctionDef) -> list[ast.stmt]:
+    text = ast.get_docstring(tree)
+    return [ast.Expr(ast.Constant(text))] if text else []
 
 
 @dataclass
@@ -174,6 +197,7 @@ class _Translator(ast.NodeTransformer):
     layouts: Mapping[str, Layout]
     arguments: list[str]
     scope: dict[str, Any]
+    flat: bool
     calls: dict[str, Callable[..., Any]] = field(default_factory=dict[str, Callable[..., Any]])
     locals: set[str] = field(default_factory=set[str])
     counts: bool = False
@@ -241,6 +265,8 @@ class _Translator(ast.NodeTransformer):
                 f"{self.where.at(node)}: {name} has no field {node.attr!r}; "
                 f"{suggestion(node.attr, layout.scalars + layout.blocks)}"
             )
+        if not self.flat:
+            return node
         return self.element(name, ast.Constant(layout.scalars.index(node.attr)), node)
 
     def visit_Subscript(self, node: ast.Subscript) -> Any:
@@ -249,6 +275,8 @@ class _Translator(ast.NodeTransformer):
         name, layout = self.structure(node.value)
         if node.value.attr not in layout.blocks:
             raise self.refuse(node, f"{name}.{node.value.attr}[...]", "it has one value, not one per element")
+        if not self.flat:
+            return ast.copy_location(ast.Subscript(node.value, self.visit(node.slice), node.ctx), node)
         first = len(layout.scalars) + (1 if layout.counted else 0)
         block = layout.blocks.index(node.value.attr)
         index: ast.expr = self.visit(node.slice)

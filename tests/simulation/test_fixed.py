@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,13 +14,13 @@ from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
+from stickslip.control.sampled import Memory, design_filter, low_passed, measured_position
 from stickslip.errors import ParameterError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation import _meter as meter
 from stickslip.simulation import adaptive, fixed
 from stickslip.simulation._case import DIVERGED, DONE, NOT_FINITE, lay_out
-from stickslip.simulation._fixed_sampled import MEMORY, low_passed, measured_position
 
 J = 3.8623e-4
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
@@ -319,14 +320,18 @@ def test_the_drive_counts_positions():
 
 
 def test_the_drives_filter_halves_the_power_at_its_corner():
-    memory, period = np.zeros(MEMORY), 1e-3
     corner = 2.0 * math.pi * 50.0
-    out = [low_passed(memory, math.sin(corner * period * i), corner, period) for i in range(4000)]
+    n = SimpleNamespace(filter=corner, sample_time=1e-3)
+    memory, constant = at_start(), at_start()
+    design_filter(n, memory)
+    design_filter(n, constant)
+    out = [low_passed(memory, math.sin(corner * 1e-3 * i)) for i in range(4000)]
     assert np.sqrt(2.0) * np.std(out[2000:]) == pytest.approx(math.sqrt(0.5), rel=1e-6)
-    constant = np.zeros(MEMORY)
-    assert [low_passed(constant, 1.0, corner, period) for _ in range(400)][-1] == pytest.approx(
-        1.0, abs=1e-12
-    )
+    assert [low_passed(constant, 1.0) for _ in range(400)][-1] == pytest.approx(1.0, abs=1e-12)
+
+
+def at_start():
+    return SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0))
 
 
 # ---- ends of runs -----------------------------------------------------------------------------------------

@@ -46,6 +46,8 @@ class Loop(NamedTuple):
     helper_parameters: Any
     profile: int
     reference_parameters: Any
+    sampler: int
+    settings: Any
     plant_states: int
     damped: bool
     steep: bool

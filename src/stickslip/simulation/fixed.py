@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.control.sampled import settings
 from stickslip.errors import ParameterError
-from stickslip.jit import kernel
+from stickslip.jit import call_sample, kernel, pointer
 from stickslip.simulation._case import (
     COLUMNS,
     COMPENSATOR_SCALE,
@@ -51,7 +52,6 @@ from stickslip.simulation._fixed_loop import (
     NUDGE,
     POSITION,
     SIDE,
-    STEP,
     VELOCITY,
     Loop,
     copy,
@@ -68,7 +68,6 @@ from stickslip.simulation._fixed_output import (
     record_jump,
     write,
 )
-from stickslip.simulation._fixed_sampled import COMPENSATION, HELD, MEMORY, sample
 from stickslip.simulation._fixed_step import GROWTH, LANDING, advance
 from stickslip.simulation._meter import (
     TURN_COUNT,
@@ -76,6 +75,7 @@ from stickslip.simulation._meter import (
     new_meter,
     settle_band_of,
 )
+from stickslip.simulation._sampled import COMPENSATION, MEMORY, sampler
 from stickslip.spec import Surroundings
 
 __all__ = ["can_run", "run"]
@@ -146,6 +146,8 @@ def loop_of(case: Case, dt: float) -> Loop:
         case.compensator.parameters,
         case.profile,
         case.reference_parameters,
+        sampler(case.compensator.model.law if case.compensator.model else None),
+        np.array(settings(case.controller)),
         case.plant.state.size,
         bool(dt * contact_slope(case.plant, dt) > RESOLVED * n[INERTIA]),
         bool(dt * help_slope > RESOLVED * n[INERTIA]),
@@ -296,11 +298,12 @@ def reach(
 @kernel()
 def act(loop: Loop, a: Any, memory: Any) -> None:
     """Let the sampled controller act on the state a and hold its output."""
-    sample(
-        loop.numbers, memory, loop.helper[STEP], loop.helper_parameters, loop.surroundings, a[POSITION],
-        loop.motion[0] - NUDGE * loop.motion[1], loop.motion[1],
+    wanted = loop.motion[0] - NUDGE * loop.motion[1]
+    a[MOTOR] = call_sample(
+        loop.sampler, a[POSITION], wanted, loop.motion[1], pointer(loop.settings, 0), pointer(memory, 0),
+        pointer(memory, MEMORY), pointer(loop.helper_parameters, 0), pointer(loop.surroundings, 0),
     )  # fmt: skip
-    a[MOTOR], a[HELP] = memory[HELD], memory[COMPENSATION]
+    a[HELP] = memory[COMPENSATION]
 
 
 @kernel()
