@@ -1,0 +1,188 @@
+"""One implicit step of an axis that a drive moves: what output-error identification simulates.
+
+The axis obeys M dv/dt = T_drive - T_gravity - offset - F, with F from any law through its ``step``. Each step is
+Alexander's SDIRK of order 2 (Alexander 1977, SIAM J. Numer. Anal. 14): two stages of backward Euler over which
+the law sees a constant velocity. It is L-stable, so that a contact stiffer than the step resolves comes to rest
+instead of ringing, and a fit may try any stiffness. A law whose torque jumps at zero velocity holds the axis
+while the impulse of the stage lies within what it withstands.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from stickslip.jit import call_holding, call_step, kernel
+
+GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
+ROUNDING = 1e-13  # of the velocity, relative above 1e-2
+
+# ---- the plant's numbers ----------------------------------------------------------------------------------
+(
+    INERTIA, OFFSET, GRAVITY, GRAVITY_ANGLE, DRIVE_GAIN, BACK_EMF, LOAD_MOTOR, LOAD_EXTERNAL, BACKLASH,
+    SCALED_BY_LOAD, PERIOD, HARMONICS, FOURIER,
+) = range(13)  # fmt: skip
+# From FOURIER on: for each harmonic the cosine's and sine's torque, then the cosine's and sine's share of friction.
+
+
+class Plant(NamedTuple):
+    """What a step reads besides the state, and scratch for the law's state.
+
+    All but the whole numbers are addresses: arrays in a tuple would count references at every access, which took
+    half of a step's time.
+    """
+
+    numbers: Any
+    step: int
+    holding: int
+    parameters: Any
+    surroundings: Any
+    base: Any
+    trial: Any
+    states: int
+
+
+@kernel(inline=True)
+def harmonics(n: Any, q: float, first: int) -> float:
+    """Sum of the Fourier series that starts at column `first` (0: torque, 2: share of friction)."""
+    total = 0.0
+    for i in range(int(n[HARMONICS])):
+        angle = 2.0 * math.pi * (i + 1) * q / n[PERIOD]
+        at = FOURIER + 4 * i + first
+        total += n[at] * math.cos(angle) + n[at + 1] * math.sin(angle)
+    return total
+
+
+@kernel(inline=True)
+def outer(n: Any, q: float) -> float:
+    """Torque that position alone makes, opposing motion in the positive direction: gravity, offset, cogging."""
+    torque = n[OFFSET]
+    if n[GRAVITY] != 0.0:
+        torque += n[GRAVITY] * math.sin(q - n[GRAVITY_ANGLE])
+    if n[HARMONICS] > 0.0:
+        torque += harmonics(n, q, 0)
+    return torque
+
+
+@kernel(inline=True)
+def share(n: Any, q: float, v: float, drive: float) -> float:
+    """Factor on friction from the position, and the load of the gearing in ``surroundings``' sense."""
+    return 1.0 + harmonics(n, q, 2) if n[HARMONICS] > 0.0 else 1.0
+
+
+@kernel(inline=True)
+def load_of(n: Any, q: float, v: float, drive: float) -> float:
+    """Load on the contact over the load at which its parameters hold: it grows with the torques that meet in it."""
+    if n[LOAD_MOTOR] == 0.0 and n[LOAD_EXTERNAL] == 0.0:
+        return 1.0
+    motor = drive - n[BACK_EMF] * v
+    return 1.0 + abs(n[LOAD_MOTOR] * motor - n[LOAD_EXTERNAL] * outer(n, q))
+
+
+@kernel(inline=True)
+def friction(plant: Plant, z0: Any, v: float, h: float, factor: float) -> float:
+    """Torque of the contact after a step at constant velocity from the state z0; ``trial`` holds its new state."""
+    for i in range(plant.states):
+        plant.trial[i] = z0[i]
+    return factor * call_step(
+        plant.step, v, v, h, plant.trial, plant.parameters, plant.surroundings
+    )
+
+
+@kernel(inline=True)
+def unbalance(
+    plant: Plant, z0: Any, q0: float, v0: float, drive: float, h: float, factor: float, v: float
+) -> float:
+    """M (v - v0) - h (torques at the end of the stage): zero at the velocity that solves it."""
+    n = plant.numbers
+    applied = drive - n[BACK_EMF] * v - outer(n, q0 + h * v)
+    return n[INERTIA] * (v - v0) - h * (applied - friction(plant, z0, v, h, factor))
+
+
+@kernel()
+def stage(
+    plant: Plant, z0: Any, q0: float, v0: float, drive: float, h: float, factor: float, guess: float
+) -> float:
+    """The velocity after a stage of backward Euler from (q0, v0, z0); ``trial`` holds the law's new state."""
+    n = plant.numbers
+    low, side = 0.0, 0.0
+    if plant.holding != 0:
+        impulse = n[INERTIA] * v0 + h * (drive - outer(n, q0))
+        side = 1.0 if impulse > 0.0 else -1.0
+        held = factor * call_holding(
+            plant.holding, side, z0, plant.parameters, plant.surroundings
+        )
+        if abs(impulse) <= h * held:
+            friction(plant, z0, 0.0, h, factor)
+            return 0.0
+        f_low = side * h * held - impulse
+        low, high = 0.0, (impulse - side * h * held) / n[INERTIA]
+    else:
+        low = guess
+        f_low = unbalance(plant, z0, q0, v0, drive, h, factor, low)
+        if f_low == 0.0:
+            return low
+        high = low - f_low / n[INERTIA]
+    # From here: the unbalance at `low` has the sign from which `high` leads away; widen until it changes.
+    stride = high - low
+    f_high = unbalance(plant, z0, q0, v0, drive, h, factor, high)
+    for _ in range(60):
+        if f_high * f_low <= 0.0 or not math.isfinite(f_high):
+            break
+        low, f_low = high, f_high
+        stride *= 2.0
+        high = low + stride
+        f_high = unbalance(plant, z0, q0, v0, drive, h, factor, high)
+    return narrow(plant, z0, q0, v0, drive, h, factor, low, f_low, high, f_high)
+
+
+@kernel()
+def narrow(
+    plant: Plant, z0: Any, q0: float, v0: float, drive: float, h: float, factor: float,
+    low: float, f_low: float, high: float, f_high: float,
+) -> float:  # fmt: skip
+    """Root between two velocities of opposite unbalance: Illinois, every fourth time the middle."""
+    enough = plant.numbers[INERTIA] * ROUNDING
+    for count in range(100):
+        if abs(f_high) <= enough * max(1e-2, abs(high)) or not math.isfinite(f_high):
+            break
+        x = high - f_high * (high - low) / (f_high - f_low)
+        if count % 4 == 3 or not min(low, high) < x < max(low, high):
+            x = 0.5 * (low + high)
+        f = unbalance(plant, z0, q0, v0, drive, h, factor, x)
+        if f * f_high < 0.0:
+            low, f_low = high, f_high
+        else:
+            f_low *= 0.5
+        high, f_high = x, f
+        if abs(high - low) <= ROUNDING * max(1e-2, abs(high)):
+            break
+    return high
+
+
+@kernel()
+def advance(plant: Plant, state: Any, z: Any, drive: float, rate: float, h: float) -> None:
+    """Move ``state`` (position, velocity) and the law's state z on by h.
+
+    ``drive`` is the torque of the drive at standstill at the begin, ``rate`` its slope in time.
+    """
+    n = plant.numbers
+    q, v = state[0], state[1]
+    part, rest = GAMMA * h, (1.0 - GAMMA) * h
+    u = plant.surroundings
+    u[0], u[1] = q, load_of(n, q, v, drive)
+    factor = share(n, q, v, drive) * (u[1] if n[SCALED_BY_LOAD] != 0.0 else 1.0)
+    middle = stage(plant, z, q, v, drive + rate * part, part, factor, v)
+    ratio = rest / part
+    # The second stage starts from the begin, moved on for `rest` with the slopes of the first.
+    for i in range(plant.states):
+        plant.base[i] = z[i]
+    friction(plant, plant.base, middle, rest, factor)
+    for i in range(plant.states):
+        plant.base[i] = plant.trial[i]
+    q_base = q + rest * middle
+    v_base = v + ratio * (middle - v)
+    end = stage(plant, plant.base, q_base, v_base, drive + rate * h, part, factor, middle + (middle - v))
+    for i in range(plant.states):
+        z[i] = plant.trial[i]
+    state[0], state[1] = q_base + part * end, end
