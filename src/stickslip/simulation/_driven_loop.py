@@ -111,14 +111,13 @@ def follow(
         h = dt / acts / substeps
         for act in range(acts):
             u = command(c, m, signals, k, y, dt / acts)
+            push = c[TRACK_KP] * (signals[k, POSITION] - y) + c[TRACK_KD] * (signals[k, VELOCITY] - state[1])
             if act == 0:
-                out[k, OUT_DRIVE] = u
+                out[k, OUT_DRIVE], out[k, OUT_CORRECTION] = u, push
             if k == rows - 1:
                 break
             rate = slope(c, signals, k, dt)
             gain = n[DRIVE_GAIN] * signals[k, SUPPLY]
-            push = c[TRACK_KP] * (signals[k, POSITION] - y) + c[TRACK_KD] * (signals[k, VELOCITY] - state[1])
-            out[k, OUT_CORRECTION] = push
             push += disturbance[k]
             for i in range(substeps):
                 advance(plant, state, z, gain * (u + rate * h * i) + push, gain * rate, h)

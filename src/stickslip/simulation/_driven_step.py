@@ -65,8 +65,8 @@ def outer(n: Any, q: float) -> float:
 
 
 @kernel(inline=True)
-def share(n: Any, q: float, v: float, drive: float) -> float:
-    """Factor on friction from the position, and the load of the gearing in ``surroundings``' sense."""
+def share(n: Any, q: float) -> float:
+    """Factor on friction from the position."""
     return 1.0 + harmonics(n, q, 2) if n[HARMONICS] > 0.0 else 1.0
 
 
@@ -84,9 +84,7 @@ def friction(plant: Plant, z0: Any, v: float, h: float, factor: float) -> float:
     """Torque of the contact after a step at constant velocity from the state z0; ``trial`` holds its new state."""
     for i in range(plant.states):
         plant.trial[i] = z0[i]
-    return factor * call_step(
-        plant.step, v, v, h, plant.trial, plant.parameters, plant.surroundings
-    )
+    return factor * call_step(plant.step, v, v, h, plant.trial, plant.parameters, plant.surroundings)
 
 
 @kernel(inline=True)
@@ -109,9 +107,7 @@ def stage(
     if plant.holding != 0:
         impulse = n[INERTIA] * v0 + h * (drive - outer(n, q0))
         side = 1.0 if impulse > 0.0 else -1.0
-        held = factor * call_holding(
-            plant.holding, side, z0, plant.parameters, plant.surroundings
-        )
+        held = factor * call_holding(plant.holding, side, z0, plant.parameters, plant.surroundings)
         if abs(impulse) <= h * held:
             friction(plant, z0, 0.0, h, factor)
             return 0.0
@@ -171,7 +167,7 @@ def advance(plant: Plant, state: Any, z: Any, drive: float, rate: float, h: floa
     part, rest = GAMMA * h, (1.0 - GAMMA) * h
     u = plant.surroundings
     u[0], u[1] = q, load_of(n, q, v, drive)
-    factor = share(n, q, v, drive) * (u[1] if n[SCALED_BY_LOAD] != 0.0 else 1.0)
+    factor = share(n, q) * (u[1] if n[SCALED_BY_LOAD] != 0.0 else 1.0)
     middle = stage(plant, z, q, v, drive + rate * part, part, factor, v)
     ratio = rest / part
     # The second stage starts from the begin, moved on for `rest` with the slopes of the first.

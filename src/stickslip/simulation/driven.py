@@ -8,6 +8,7 @@ stiffness; a step of it costs about 0.3 us.
 
 from __future__ import annotations
 
+import ast
 import math
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -20,6 +21,7 @@ from stickslip.model import Model
 from stickslip.simulation import _driven_loop as loop
 from stickslip.simulation import _driven_step as plant
 from stickslip.spec import Law, Surroundings
+from stickslip.subset import law_layouts, lower
 
 __all__ = ["COLUMNS", "Course", "Drive", "Harmonics", "Loop", "Mechanics", "drive_axis"]
 
@@ -152,7 +154,9 @@ class Drive:
         if self.kind not in KINDS:
             raise UnknownName("kind of drive", self.kind, KINDS)
         if self.time.size < 2 or np.any(np.diff(self.time) <= 0.0):
-            raise InputError("drive: times must ascend strictly, at least two of them; sort and merge the record")
+            raise InputError(
+                "drive: times must ascend strictly, at least two of them; sort and merge the record"
+            )
         if (self.kind == "feedback") != (self.controller is not None):
             raise InputError("drive: a controller belongs to kind 'feedback'; give both or neither")
         for name in ("signal", "supply", "position", "velocity", "disturbance"):
@@ -225,9 +229,10 @@ class Course:
 
 def reads_load(law: Law) -> bool:
     """Whether the law's own functions depend on the load; the engine scales the torque of one that does not."""
-    functions = [f for f in (law.step, law.rate, law.holding) if f is not None]
-    names = {name for f in functions for name in getattr(f, "__code__", f).co_names}
-    return "load" in names
+    functions = {"step": law.step} if law.holding is None else {"step": law.step, "holding": law.holding}
+    translated = lower({f"_{name}_": function for name, function in functions.items()}, law_layouts(law))
+    place = Surroundings._fields.index("load")
+    return any(f"u[{place}]" in ast.unparse(function) for function in translated.values())
 
 
 def drive_axis(mechanics: Mechanics, friction: Model, drive: Drive) -> Array:
