@@ -88,7 +88,7 @@ def _law_in(path: str) -> Law:
     found = getattr(module, "LAW", None)
     if not isinstance(found, Law):
         raise LawError(f"{path} defines no law; end it with `LAW = Law(...)`")
-    functions = ("step", "rate", "guards", "switch", "steady", "holding")
+    functions = ("step", "rate", "guards", "switch", "steady", "holding", "stored")
     lower({n: getattr(found, n) for n in functions if getattr(found, n)}, law_layouts(found))
     return found
 

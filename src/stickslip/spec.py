@@ -18,9 +18,12 @@ Argument order, everywhere: velocity, time step, state ``z``, parameters ``p``, 
 ``check(p)``                           a sentence that says what is wrong with the parameters, or ""
 ``modes(p)``                           the law as elements that stick as springs and slip along one curve
                                        (what the exact integrator runs on)
+``stored(z, p)``                       energy that the contact could give back, J, where it is defined: the
+                                       work done on it less the rise of this is dissipated, never negative
+                                       where the law is passive
 =====================================  =============================================================
 
-All but the last two are written in the scalar subset (see `stickslip.subset`): they run as plain Python, are
+All but `check` and `modes` are written in the scalar subset (see `stickslip.subset`): they run as plain Python, are
 compiled by numba and exported to C, from the same lines. Friction torque is positive when it opposes positive
 velocity, as in J dv/dt = T_m - T_f (thesis eq. 3.1).
 """
@@ -113,10 +116,14 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """One way to fill a `Choice`: a function in the scalar subset and the parameters it brings along."""
+    """One way to fill a `Choice`: a function in the scalar subset and the parameters it brings along.
+
+    ``passive`` is False where the law can give energy back with it.
+    """
 
     function: Callable[..., float]
     params: type | None = None
+    passive: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,10 +305,18 @@ class Law(Described):
         Its equation in LaTeX; thesis equation numbers and keys of ``references.bib``.
     example : mapping
         Parameters of a real contact, for pictures, documentation and the contract tests.
-    odd, rate_independent : bool
-        Declarations that the contract tests hold it to.
+    odd : bool
+        The opposite motion gives the opposite torque. A declaration, as the five below: the contract tests hold
+        the law to each, and show a counterexample where it declares otherwise.
     passive : str
-        "always", "never", or the condition under which it only dissipates, tested by `is_passive`; empty: not stated.
+        "always", "never", or the condition under which it only dissipates, tested by `is_passive` (and by the
+        options of its choices, see `dissipates`); empty: not stated.
+    rate_independent : bool
+        Without its viscous part (sigma2 = 0) the torque depends on the path, not on the pace.
+    non_local_memory : bool
+        Inner loops of the pre-sliding hysteresis close, and the outer curve is resumed where it was left.
+    continuous : bool
+        The torque is continuous in time while the velocity is.
     velocity_scale : callable or None
         ``velocity_scale(p)``: a velocity over which the torque changes much; steps near rest stay below it.
     """
@@ -321,12 +336,15 @@ class Law(Described):
     holding: Callable[..., float] | None = None
     check: Callable[[Any], str] | None = None
     modes: Callable[[Any], Elements] | None = None
+    stored: Callable[..., float] | None = None
     velocity_scale: Callable[[Any], float] | None = None
     choices: tuple[Choice, ...] = ()
     odd: bool = True
     passive: str = ""
     is_passive: Callable[[Any], bool] | None = None
     rate_independent: bool = False
+    non_local_memory: bool = False
+    continuous: bool = True
     chosen: Mapping[str, str] = field(default_factory=dict[str, str])
     variants: dict[tuple[tuple[str, str], ...], Law] = field(default_factory=dict[Any, Any], repr=False)
     """Laws made from this one by `having`; shared with them, so that each exists (and is compiled) once."""
@@ -339,7 +357,7 @@ class Law(Described):
         object.__setattr__(self, "state_fields", fields_of(self.State))
         make: Any = namedtuple  # whose fields are not known to a type checker
         object.__setattr__(self, "Parameters", make(self.Params.__name__, [f.name for f in self.fields]))
-        for function in ("step", "rate", "guards", "switch", "steady", "holding", "check", "modes"):
+        for function in ("step", "rate", "guards", "switch", "steady", "holding", "check", "modes", "stored"):
             raw = getattr(self, function)
             if raw is not None:
                 object.__setattr__(self, function, self._bound(raw))
@@ -385,6 +403,12 @@ class Law(Described):
                 scope[name] = rescoped(value, scope)
         scope.update({choice.replaces: self.option(choice).function for choice in self.choices})
         return rescoped(function, scope)
+
+    def dissipates(self, p: Any) -> bool:
+        """Whether the law, with its chosen options, is declared passive with the parameters `p`."""
+        if self.passive in ("", "never") or not all(self.option(c).passive for c in self.choices):
+            return False
+        return self.is_passive is None or self.is_passive(p)
 
     # ---- state ---------------------------------------------------------------------------------------
 

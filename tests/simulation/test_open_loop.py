@@ -28,6 +28,8 @@ MODELS = {
     "lugre": LUGRE,
     "coulomb": COULOMB,
     "stribeck": Model("stribeck", k=3.5e4, **CURVE),
+    "dahl_1.0": Model("dahl", sigma0=3.5e4, fc=0.285),
+    "dahl_1.5": Model("dahl", sigma0=3.5e4, fc=0.285, delta_d=1.5),
 }
 
 

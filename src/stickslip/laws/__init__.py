@@ -3,4 +3,4 @@
 To add a law, write its file and add its name to this tuple.
 """
 
-LAWS = ("coulomb", "stribeck", "lugre", "gms")
+LAWS = ("coulomb", "stribeck", "dahl", "lugre", "maxwell_slip", "gms")

@@ -25,6 +25,6 @@ def literal(direction: float, force: float) -> float:
 SLIP_RULE = Choice(
     "slip_rule",
     replaces="load_of",
-    options={"signed": Option(signed), "literal": Option(literal)},
+    options={"signed": Option(signed), "literal": Option(literal, passive=False)},
     default="signed",
 )

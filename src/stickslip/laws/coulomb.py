@@ -46,6 +46,11 @@ def holding(direction: float, z: Any, p: Any, u: Any) -> float:
     return p.fc
 
 
+def stored(z: Any, p: Any) -> float:
+    """Energy that the contact could give back, J: none."""
+    return 0.0
+
+
 def modes(p: Any) -> Elements:
     """One rigid element that slips at F_C at once."""
     inf = float("inf")
@@ -65,5 +70,7 @@ LAW = Law(
     passive="always",
     holding=holding,
     modes=modes,
-    rate_independent=False,
+    stored=stored,
+    rate_independent=True,
+    continuous=False,
 )

@@ -198,4 +198,5 @@ LAW = Law(
     velocity_scale=lambda p: p.vs,
     choices=(CURVE, SLIP_RULE),
     passive="signed slip rule",
+    non_local_memory=True,
 )

@@ -80,6 +80,11 @@ def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
     return p.sigma0 * z.z + p.sigma1 * dz + p.sigma2 * v1
 
 
+def stored(z: Any, p: Any) -> float:
+    """Energy of the bristles, J."""
+    return 0.5 * p.sigma0 * z.z * z.z
+
+
 def is_passive(p: Any) -> bool:
     """Barabanov and Ortega's condition: necessary and sufficient."""
     return p.sigma2 >= p.sigma1 * (p.fs - p.fc) / p.fc
@@ -108,4 +113,5 @@ LAW = Law(
     choices=(CURVE,),
     passive="sigma2 >= sigma1 (fs - fc) / fc",
     is_passive=is_passive,
+    stored=stored,
 )

@@ -44,6 +44,11 @@ def rate(v: float, z: Any, p: Any, u: Any, dz: Any) -> float:
     return steady(v, p)
 
 
+def stored(z: Any, p: Any) -> float:
+    """Energy that the contact could give back, J: none."""
+    return 0.0
+
+
 LAW = Law(
     "stribeck",
     Params,
@@ -55,6 +60,7 @@ LAW = Law(
     example={"k": 3.5e4, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01},  # thesis Table 3
     rate=rate,
     steady=steady,
+    stored=stored,
     passive="always",
     check=check_levels,
     velocity_scale=lambda p: p.vs,
