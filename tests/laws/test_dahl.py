@@ -94,7 +94,7 @@ def test_adaptive_and_fixed_integrators_agree(delta_d):
     ]
     one, other = (np.interp(grid, r.time, r["position"]) for r in paths)
     assert np.ptp(one) > 0.2
-    assert np.abs(one - other).max() < 3e-7
+    assert np.abs(one - other).max() < 2e-6  # of the fixed steps
 
 
 def test_a_step_across_a_reversal_is_cut_there():
