@@ -1,0 +1,3 @@
+"""A law leaves Python: one file a target. `TARGETS` names them."""
+
+TARGETS = ("c99",)

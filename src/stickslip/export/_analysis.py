@@ -1,0 +1,250 @@
+"""What a translation must know about a function of the scalar subset: types, locals, what it writes.
+
+Functions come as `stickslip.subset.named` returns them. Everything is a real number but loop counters,
+indices and conditions.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from stickslip.subset import COUNT
+
+__all__ = ["Facts", "Kind", "analyse", "kind_of"]
+
+Kind = Literal["real", "int", "bool"]
+
+INT_CALLS = {"int"}
+
+
+@dataclass(frozen=True)
+class Facts:
+    """A function seen through.
+
+    Attributes
+    ----------
+    arguments : tuple of str
+    returns : bool
+        Whether it returns a number.
+    kinds : mapping
+        Every local name (loop counters included) to its type.
+    declared : mapping
+        id of a statement to the names that its assignment declares.
+    opened : mapping
+        id of a statement to the names that must be declared, as zero, before it.
+    structures : frozenset of str
+        Arguments whose fields it, or a function it calls, uses (or that it does not use at all).
+    writes : frozenset of str
+        Of these, the ones that are changed.
+    uses : frozenset of str
+        Every name that occurs.
+    """
+
+    arguments: tuple[str, ...]
+    returns: bool
+    kinds: Mapping[str, Kind]
+    declared: Mapping[int, tuple[str, ...]]
+    opened: Mapping[int, tuple[str, ...]]
+    structures: frozenset[str]
+    writes: frozenset[str]
+    uses: frozenset[str]
+
+
+def analyse(functions: Mapping[str, ast.FunctionDef]) -> dict[str, Facts]:
+    """Look through functions, callees first."""
+    known: dict[str, Facts] = {}
+    for name, tree in functions.items():
+        known[name] = _facts(tree, known)
+    return known
+
+
+def kind_of(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
+    """The type of an expression."""
+    if isinstance(node, ast.Constant):
+        return "int" if isinstance(node.value, int) and not isinstance(node.value, bool) else "real"
+    if isinstance(node, ast.Name):
+        return "int" if node.id == COUNT else kinds.get(node.id, "real")
+    if isinstance(node, (ast.Compare, ast.BoolOp)):
+        return "bool"
+    if isinstance(node, ast.UnaryOp):
+        return "bool" if isinstance(node.op, ast.Not) else kind_of(node.operand, kinds)
+    if isinstance(node, ast.BinOp):
+        both = {kind_of(node.left, kinds), kind_of(node.right, kinds)}
+        whole = both == {"int"} and isinstance(node.op, (ast.Add, ast.Sub, ast.Mult))
+        return "int" if whole else "real"
+    if isinstance(node, ast.IfExp):
+        return "int" if {kind_of(node.body, kinds), kind_of(node.orelse, kinds)} == {"int"} else "real"
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in INT_CALLS:
+        return "int"
+    return "real"
+
+
+def _facts(tree: ast.FunctionDef, known: Mapping[str, Facts]) -> Facts:
+    arguments = tuple(a.arg for a in tree.args.args)
+    kinds = _kinds(tree)
+    declared: dict[int, tuple[str, ...]] = {}
+    opened: dict[int, tuple[str, ...]] = {}
+    for name in kinds:
+        if name not in arguments:
+            _place(name, tree.body, declared, opened)
+    used = {n.id for statement in tree.body for n in ast.walk(statement) if isinstance(n, ast.Name)}
+    returns = any(isinstance(n, ast.Return) and n.value is not None for n in ast.walk(tree))
+    structures = frozenset(arguments) - _plain(tree, known)
+    return Facts(
+        arguments, returns, kinds, declared, opened, structures, _writes(tree, known), frozenset(used)
+    )
+
+
+# ---- types --------------------------------------------------------------------------------------------------
+
+
+def _kinds(tree: ast.FunctionDef) -> dict[str, Kind]:
+    """The type of every local name: whole only where every value it gets is whole."""
+    kinds: dict[str, Kind] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
+            kinds[node.target.id] = "int"
+    for _ in range(3):  # a name may take its type from another
+        for node in ast.walk(tree):
+            for name, value in _assigned(node):
+                got = kind_of(value, kinds)
+                kinds[name] = got if kinds.get(name, got) == got else "real"
+    return kinds
+
+
+def _assigned(node: ast.AST) -> Iterator[tuple[str, ast.expr]]:
+    if isinstance(node, ast.Assign):
+        for target in node.targets:
+            if isinstance(target, ast.Name):
+                yield target.id, node.value
+    elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
+        yield node.target.id, ast.BinOp(ast.Name(node.target.id), node.op, node.value)
+
+
+# ---- where names are declared ---------------------------------------------------------------------------------
+
+
+def _place(
+    name: str,
+    block: Sequence[ast.stmt],
+    declared: dict[int, tuple[str, ...]],
+    opened: dict[int, tuple[str, ...]],
+) -> None:
+    """Declare `name` in the innermost block that holds all of its uses."""
+    users = [s for s in block if _mentions(s, name)]
+    first = users[0]
+    if len(users) == 1:
+        inner = [b for b in _blocks(first) if any(_mentions(s, name) for s in b)]
+        if isinstance(first, ast.For) and isinstance(first.target, ast.Name) and first.target.id == name:
+            return  # the loop declares its own counter
+        outside = _mentions_outside_blocks(first, name)
+        if len(inner) == 1 and not outside and (not isinstance(first, ast.For) or _sets(inner[0], name)):
+            return _place(name, inner[0], declared, opened)
+        if len(inner) > 1 and not outside and all(_sets(b, name) for b in inner):
+            for each in inner:
+                _place(name, each, declared, opened)
+            return None
+    if _is_assignment(first, name):
+        declared[id(first)] = (*declared.get(id(first), ()), name)
+    elif all(_own_counter(s, name) for s in users):
+        return None
+    else:
+        opened[id(first)] = (*opened.get(id(first), ()), name)
+    return None
+
+
+def _own_counter(statement: ast.stmt, name: str) -> bool:
+    """Whether the statement is a loop that counts by `name`."""
+    return (
+        isinstance(statement, ast.For)
+        and isinstance(statement.target, ast.Name)
+        and statement.target.id == name
+    )
+
+
+def _mentions(node: ast.AST, name: str) -> bool:
+    return any(isinstance(n, ast.Name) and n.id == name for n in ast.walk(node))
+
+
+def _blocks(statement: ast.stmt) -> list[list[ast.stmt]]:
+    if isinstance(statement, ast.If):
+        return [b for b in (statement.body, statement.orelse) if b]
+    return [statement.body] if isinstance(statement, ast.For) else []
+
+
+def _mentions_outside_blocks(statement: ast.stmt, name: str) -> bool:
+    if isinstance(statement, ast.If):
+        return _mentions(statement.test, name)
+    if isinstance(statement, ast.For):
+        return _mentions(statement.iter, name) or _mentions(statement.target, name)
+    return True
+
+
+def _is_assignment(statement: ast.stmt, name: str) -> bool:
+    """Whether the statement gives `name` its value without reading it."""
+    return (
+        isinstance(statement, ast.Assign)
+        and len(statement.targets) == 1
+        and isinstance(statement.targets[0], ast.Name)
+        and statement.targets[0].id == name
+        and not _mentions(statement.value, name)
+    )
+
+
+def _sets(block: Sequence[ast.stmt], name: str) -> bool:
+    """Whether every passage through the block gives `name` a value before it is read."""
+    first = next((s for s in block if _mentions(s, name)), None)
+    if first is None:
+        return True
+    if _is_assignment(first, name):
+        return True
+    if not isinstance(first, ast.If) or _mentions(first.test, name):
+        return False
+    inner = [b for b in _blocks(first) if any(_mentions(s, name) for s in b)]
+    alone = sum(_mentions(s, name) for s in block) == 1
+    return (alone or len(inner) == 2) and all(_sets(b, name) for b in inner)
+
+
+# ---- structured arguments ---------------------------------------------------------------------------------
+
+
+def _plain(tree: ast.FunctionDef, known: Mapping[str, Facts]) -> set[str]:
+    """Names that occur as numbers: neither before a dot nor handed on as a structure."""
+    owners: set[int] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute):
+            owners.add(id(node.value))
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in known:
+            callee = known[node.func.id]
+            owners |= {id(g) for g, a in zip(node.args, callee.arguments) if a in callee.structures}
+    return {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and id(n) not in owners}
+
+
+# ---- what a function changes ---------------------------------------------------------------------------------
+
+
+def _writes(tree: ast.FunctionDef, known: Mapping[str, Facts]) -> frozenset[str]:
+    out: set[str] = set()
+    for node in ast.walk(tree):
+        targets = node.targets if isinstance(node, ast.Assign) else []
+        if isinstance(node, ast.AugAssign):
+            targets = [node.target]
+        out.update(owner for target in targets if (owner := _owner(target)))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in known:
+            callee = known[node.func.id]
+            for given, argument in zip(node.args, callee.arguments):
+                if argument in callee.writes and isinstance(given, ast.Name):
+                    out.add(given.id)
+    return frozenset(out)
+
+
+def _owner(target: ast.expr) -> str | None:
+    """z of ``z.force[i]``; None for a local name."""
+    while isinstance(target, (ast.Subscript, ast.Attribute)):
+        target = target.value
+        if isinstance(target, ast.Name):
+            return target.id
+    return None

@@ -1,0 +1,229 @@
+"""Functions of the scalar subset in C99.
+
+Structured arguments become pointers to structures, fields keep their names, elements are arrays of fixed size.
+Numbers are written with all their digits and every operation keeps its place, so that a compiler which neither
+contracts nor reassociates gives the bits of plain Python.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from stickslip.export._analysis import Facts, analyse
+from stickslip.export._language import ATOM, UNARY, Language
+from stickslip.subset import COUNT
+
+__all__ = ["Dialect", "function", "functions"]
+
+MATH = {"fabs", "exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
+        "floor", "ceil", "copysign", "pow", "hypot"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How the C of one export is spelt.
+
+    Attributes
+    ----------
+    prefix : str
+        Of every name.
+    single : bool
+        ``float`` instead of ``double``.
+    structures : mapping
+        Structured argument to its type's name, without the prefix.
+    """
+
+    prefix: str
+    single: bool
+    structures: Mapping[str, str]
+
+    @property
+    def real(self) -> str:
+        """The type of a number."""
+        return "float" if self.single else "double"
+
+    @property
+    def elements(self) -> str:
+        """The macro that holds the number of elements."""
+        return f"{self.prefix.upper()}_ELEMENTS"
+
+    def number(self, value: float) -> str:
+        """A number with all its digits; a single one rounded by us, not by the compiler."""
+        if math.isinf(value):
+            # The macro is a float.
+            infinity = "INFINITY" if self.single else "(double)INFINITY"
+            return infinity if value > 0.0 else f"-{infinity}"
+        if not self.single:
+            return repr(value)
+        import numpy as np
+
+        text = str(np.float32(value))
+        return (text if "." in text or "e" in text else text + ".0") + "f"
+
+
+class _C(Language):
+    operators: ClassVar[dict[type[ast.AST], str]] = {
+        **Language.operators, ast.And: "&&", ast.Or: "||", ast.Not: "!"
+    }  # fmt: skip
+
+    def __init__(self, facts: Facts, dialect: Dialect, known: Mapping[str, Facts]) -> None:
+        super().__init__(facts)
+        self.dialect = dialect
+        self.known = known
+
+    # ---- expressions ---------------------------------------------------------------------------------
+
+    def name(self, name: str) -> str:
+        return self.dialect.elements if name == COUNT else name
+
+    def number(self, value: float) -> str:
+        return self.dialect.number(value)
+
+    def as_real(self, node: ast.expr) -> str:
+        return f"({self.dialect.real}){self.expression(node, ATOM)}"
+
+    def field(self, node: ast.Attribute) -> str:
+        assert isinstance(node.value, ast.Name)
+        if node.value.id == "math":
+            return {"pi": self.number(math.pi), "inf": self.number(math.inf)}[node.attr]
+        return f"{node.value.id}->{node.attr}"
+
+    def element(self, node: ast.Subscript) -> str:
+        assert isinstance(node.value, ast.Attribute)
+        return f"{self.field(node.value)}[{self.expression(node.slice)}]"
+
+    def call(self, node: ast.Call) -> str:
+        if isinstance(node.func, ast.Attribute):
+            return self.library(node.func.attr, node.args)
+        assert isinstance(node.func, ast.Name)
+        name = node.func.id
+        if name == "abs":
+            return self.library("fabs", node.args)
+        if name in ("min", "max"):
+            return self.extreme(name, node.args)
+        if name == "float":
+            return f"({self.dialect.real}){self.expression(node.args[0], ATOM)}"
+        if name == "int":
+            return f"(int){self.expression(node.args[0], ATOM)}"
+        callee = self.known[name]
+        given = [
+            a.id if argument in callee.structures and isinstance(a, ast.Name) else self.real(a)
+            for a, argument in zip(node.args, callee.arguments)
+        ]
+        return f"{self.dialect.prefix}{name}({', '.join(given)})"
+
+    def library(self, name: str, arguments: Sequence[ast.expr]) -> str:
+        """A call of math.h, in the precision of this export."""
+        if name not in MATH:
+            raise self.refused(ast.Name(name))
+        return f"{name}{'f' if self.dialect.single else ''}({', '.join(self.real(a) for a in arguments)})"
+
+    def extreme(self, name: str, arguments: Sequence[ast.expr]) -> str:
+        """min and max as Python has them: the first of equals (fmin and fmax differ for NaN)."""
+        first, *rest = [self.real(a) for a in arguments]
+        for other in rest:
+            first = f"{self.dialect.prefix}_{name}({first}, {other})"
+        return first
+
+    def power(self, node: ast.BinOp) -> str:
+        return self.library("pow", [node.left, node.right])
+
+    def choice(self, node: ast.IfExp) -> str:
+        test, yes, no = self.expression(node.test), self.real(node.body, UNARY), self.real(node.orelse, UNARY)
+        return f"({test}) ? {yes} : {no}"
+
+    # ---- statements ----------------------------------------------------------------------------------
+
+    def type_of(self, name: str) -> str:
+        return {"real": self.dialect.real, "int": "int", "bool": "int"}[self.facts.kinds[name]]
+
+    def declaration(self, name: str) -> list[str]:
+        zero = "0" if self.facts.kinds[name] != "real" else self.number(0.0)
+        return [f"{self.type_of(name)} {name} = {zero};"]
+
+    def assignment(self, node: ast.Assign) -> list[str]:
+        target = node.targets[0]
+        own = isinstance(target, ast.Name)
+        whole = own and self.facts.kinds.get(target.id, "real") != "real"
+        value = self.expression(node.value) if whole else self.real(node.value)
+        if own and target.id in self.facts.declared.get(id(node), ()):
+            return [f"{self.type_of(target.id)} {target.id} = {value};"]
+        return [f"{self.expression(target)} = {value};"]
+
+    def returning(self, node: ast.Return) -> list[str]:
+        return ["return;" if node.value is None else f"return {self.real(node.value)};"]
+
+    def call_statement(self, node: ast.Call) -> list[str]:
+        callee = self.known.get(node.func.id) if isinstance(node.func, ast.Name) else None
+        return [f"{'(void)' if callee and callee.returns else ''}{self.call(node)};"]
+
+    def leave(self) -> str:
+        return "break;"
+
+    def condition(self, node: ast.If, depth: int) -> list[str]:
+        pad = self.indent * depth
+        out = [f"{pad}if ({self.expression(node.test)}) {{", *self.block(node.body, depth + 1)]
+        while (
+            len(node.orelse) == 1
+            and isinstance(node.orelse[0], ast.If)
+            and not self.facts.opened.get(id(node.orelse[0]))
+        ):
+            node = node.orelse[0]
+            out += [f"{pad}}} else if ({self.expression(node.test)}) {{", *self.block(node.body, depth + 1)]
+        if node.orelse:
+            out += [f"{pad}}} else {{", *self.block(node.orelse, depth + 1)]
+        return [*out, f"{pad}}}"]
+
+    def else_if(self, node: ast.If) -> ast.If | None:
+        """The condition that is all there is to the other branch."""
+        only = node.orelse[0] if len(node.orelse) == 1 else None
+        return only if isinstance(only, ast.If) and id(only) not in self.facts.opened else None
+
+    def loop(self, node: ast.For, depth: int) -> list[str]:
+        assert isinstance(node.target, ast.Name)
+        assert isinstance(node.iter, ast.Call)
+        pad, i = self.indent * depth, node.target.id
+        first, last = (["0"] if len(node.iter.args) == 1 else []) + [
+            self.expression(a) for a in node.iter.args
+        ]
+        head = f"for (int {i} = {first}; {i} < {last}; {i}++)"
+        return [f"{pad}{head} {{", *self.block(node.body, depth + 1), f"{pad}}}"]
+
+
+def head(name: str, facts: Facts, dialect: Dialect) -> str:
+    """The head of a function, without its bracket."""
+    given: list[str] = []
+    for argument in facts.arguments:
+        kind = dialect.structures.get(argument) if argument in facts.structures else None
+        if kind is None:
+            given.append(f"{dialect.real} {argument}")
+        else:
+            constant = "" if argument in facts.writes else "const "
+            given.append(f"{constant}{dialect.prefix}_{kind} *{argument}")
+    return f"{dialect.real if facts.returns else 'void'} {dialect.prefix}{name}({', '.join(given)})"
+
+
+def function(
+    name: str, tree: ast.FunctionDef, known: Mapping[str, Facts], dialect: Dialect, *, public: bool
+) -> list[str]:
+    """The lines of one function; ``public`` ones are not static."""
+    facts = known[name]
+    out = [f"{'' if public else 'static '}{head(name, facts, dialect)}", "{"]
+    out += [f"    (void){a};" for a in facts.arguments if a not in facts.uses]
+    out += _C(facts, dialect, known).block(tree.body, 1)
+    return [*out, "}"]
+
+
+def functions(
+    trees: Mapping[str, ast.FunctionDef], dialect: Dialect, public: Sequence[str]
+) -> list[tuple[str, str, list[str]]]:
+    """Name, docstring and lines of every function, callees first."""
+    known = analyse(trees)
+    return [
+        (name, ast.get_docstring(tree) or "", function(name, tree, known, dialect, public=name in public))
+        for name, tree in trees.items()
+    ]

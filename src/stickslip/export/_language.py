@@ -1,0 +1,202 @@
+"""How functions of the scalar subset are written in another language: what the languages share.
+
+A language is a subclass of `Language` that says how it writes a name, a number, a call and a statement. The
+order of every arithmetic operation is kept, so that a target with IEEE arithmetic gives the same bits.
+"""
+
+from __future__ import annotations
+
+import ast
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar
+
+from stickslip.errors import LawError
+from stickslip.export._analysis import Facts, Kind, kind_of
+
+__all__ = ["Language"]
+
+ADDITIVE, MULTIPLICATIVE, UNARY, POWER, ATOM = 6, 7, 8, 9, 10
+OR, AND, NOT, COMPARISON, CONDITION = 1, 2, 3, 4, 0
+
+
+class Language(ABC):
+    """One function at a time: `lines` gives its body.
+
+    Attributes
+    ----------
+    indent : str
+    operators : mapping
+        How an operator of Python is spelt.
+    """
+
+    indent: ClassVar[str] = "    "
+    operators: ClassVar[dict[type[ast.AST], str]] = {
+        ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<",
+        ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.And: "and", ast.Or: "or", ast.Not: "not ",
+        ast.USub: "-", ast.UAdd: "+",
+    }  # fmt: skip
+
+    def __init__(self, facts: Facts) -> None:
+        self.facts = facts
+
+    # ---- statements ----------------------------------------------------------------------------------
+
+    def block(self, statements: Sequence[ast.stmt], depth: int) -> list[str]:
+        """The lines of a block, indented `depth` times."""
+        out: list[str] = []
+        for statement in statements:
+            for name in self.facts.opened.get(id(statement), ()):
+                out += self.indented(self.declaration(name), depth)
+            out += self.statement(statement, depth)
+        return out
+
+    def statement(self, node: ast.stmt, depth: int) -> list[str]:
+        """The lines of one statement."""
+        if isinstance(node, ast.Assign):
+            return self.indented(self.assignment(node), depth)
+        if isinstance(node, ast.AugAssign):
+            value = ast.BinOp(node.target, node.op, node.value)
+            return self.indented(self.assignment(ast.Assign([node.target], value)), depth)
+        if isinstance(node, ast.Return):
+            return self.indented(self.returning(node), depth)
+        if isinstance(node, ast.If):
+            return self.condition(node, depth)
+        if isinstance(node, ast.For):
+            return self.loop(node, depth)
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
+            return self.indented(self.call_statement(node.value), depth)
+        if isinstance(node, ast.Break):
+            return self.indented([self.leave()], depth)
+        if isinstance(node, (ast.Pass, ast.Expr)):
+            return []
+        raise self.refused(node)
+
+    def indented(self, lines: Sequence[str], depth: int) -> list[str]:
+        """Lines set in."""
+        return [self.indent * depth + line for line in lines]
+
+    def refused(self, node: ast.AST) -> LawError:
+        """The error for something this language has no words for."""
+        return LawError(f"`{ast.unparse(node)}` has no translation; write it with + - * / and math functions")
+
+    # ---- expressions ---------------------------------------------------------------------------------
+
+    def kind(self, node: ast.expr) -> Kind:
+        """The type of an expression here."""
+        return kind_of(node, self.facts.kinds)
+
+    def real(self, node: ast.expr, at: int = CONDITION) -> str:
+        """An expression where a real number is wanted."""
+        if self.kind(node) != "int":
+            return self.expression(node, at)
+        if isinstance(node, ast.Constant):
+            return self.number(float(node.value))  # type: ignore[arg-type]
+        return self.as_real(node)
+
+    def expression(self, node: ast.expr, at: int = CONDITION) -> str:
+        """An expression, in brackets where its surroundings bind more tightly than `at`."""
+        text, binds = self.written(node)
+        return f"({text})" if binds < at else text
+
+    def written(self, node: ast.expr) -> tuple[str, int]:
+        """An expression and how tightly it binds."""
+        if isinstance(node, ast.Constant):
+            return self.constant(node), ATOM
+        if isinstance(node, ast.Name):
+            return self.name(node.id), ATOM
+        if isinstance(node, ast.Attribute):
+            return self.field(node), ATOM
+        if isinstance(node, ast.Subscript):
+            return self.element(node), ATOM
+        if isinstance(node, ast.Call):
+            return self.call(node), ATOM
+        if isinstance(node, ast.BinOp):
+            return self.binary(node)
+        if isinstance(node, ast.UnaryOp):
+            if isinstance(node.op, ast.Not):
+                return self.operators[ast.Not] + self.expression(node.operand, ATOM), NOT
+            return self.operators[type(node.op)] + self.expression(node.operand, UNARY), UNARY
+        if isinstance(node, ast.BoolOp):
+            binds = AND if isinstance(node.op, ast.And) else OR
+            joint = f" {self.operators[type(node.op)]} "
+            return joint.join(self.expression(v, NOT) for v in node.values), binds
+        if isinstance(node, ast.Compare):
+            return self.comparison(node)
+        if isinstance(node, ast.IfExp):
+            return self.choice(node), CONDITION
+        raise self.refused(node)
+
+    def constant(self, node: ast.Constant) -> str:
+        """A number as it stands."""
+        if isinstance(node.value, bool) or not isinstance(node.value, (int, float)):
+            raise self.refused(node)
+        return str(node.value) if isinstance(node.value, int) else self.number(node.value)
+
+    def binary(self, node: ast.BinOp) -> tuple[str, int]:
+        """Arithmetic of two operands, in the order in which Python does it."""
+        if isinstance(node.op, ast.Pow):
+            return self.power(node), self.binds_power()
+        if type(node.op) not in (ast.Add, ast.Sub, ast.Mult, ast.Div):
+            raise self.refused(node)
+        binds = ADDITIVE if isinstance(node.op, (ast.Add, ast.Sub)) else MULTIPLICATIVE
+        whole = self.kind(node) == "int"
+        write = self.expression if whole else self.real
+        return (
+            f"{write(node.left, binds)} {self.operators[type(node.op)]} {write(node.right, binds + 1)}",
+            binds,
+        )
+
+    def comparison(self, node: ast.Compare) -> tuple[str, int]:
+        """A comparison; a chain is the conjunction of its links."""
+        operands = [node.left, *node.comparators]
+        whole = all(self.kind(o) == "int" for o in operands)
+        write = self.expression if whole else self.real
+        links = [
+            f"{write(a, ADDITIVE)} {self.operators[type(op)]} {write(b, ADDITIVE)}"
+            for a, op, b in zip(operands, node.ops, operands[1:])
+        ]
+        if len(links) == 1:
+            return links[0], COMPARISON
+        return f" {self.operators[ast.And]} ".join(self.bracketed(link) for link in links), AND
+
+    def bracketed(self, text: str) -> str:
+        """A comparison inside a conjunction."""
+        return f"({text})"
+
+    def binds_power(self) -> int:
+        """How tightly a power binds here (an atom where it is a call)."""
+        return ATOM
+
+    # ---- what a language must say --------------------------------------------------------------------
+
+    @abstractmethod
+    def name(self, name: str) -> str: ...
+    @abstractmethod
+    def number(self, value: float) -> str: ...
+    @abstractmethod
+    def as_real(self, node: ast.expr) -> str: ...
+    @abstractmethod
+    def field(self, node: ast.Attribute) -> str: ...
+    @abstractmethod
+    def element(self, node: ast.Subscript) -> str: ...
+    @abstractmethod
+    def call(self, node: ast.Call) -> str: ...
+    @abstractmethod
+    def power(self, node: ast.BinOp) -> str: ...
+    @abstractmethod
+    def choice(self, node: ast.IfExp) -> str: ...
+    @abstractmethod
+    def declaration(self, name: str) -> list[str]: ...
+    @abstractmethod
+    def assignment(self, node: ast.Assign) -> list[str]: ...
+    @abstractmethod
+    def returning(self, node: ast.Return) -> list[str]: ...
+    @abstractmethod
+    def call_statement(self, node: ast.Call) -> list[str]: ...
+    @abstractmethod
+    def leave(self) -> str: ...
+    @abstractmethod
+    def condition(self, node: ast.If, depth: int) -> list[str]: ...
+    @abstractmethod
+    def loop(self, node: ast.For, depth: int) -> list[str]: ...

@@ -1,0 +1,48 @@
+"""Templates and text."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import jinja2
+
+__all__ = ["ascii_only", "first_line", "render"]
+
+LETTERS = {
+    "·": "*", "²": "^2", "³": "^3", "°": "deg", "µ": "u", "μ": "u", "−": "-", "–": "-", "×": "x", "≤": "<=",
+    "≥": ">=",
+}  # fmt: skip
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    import jinja2
+
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("stickslip.export"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=False,
+        autoescape=False,
+    )
+
+
+def render(template: str, **values: Any) -> str:
+    """Fill a template of this package."""
+    from stickslip import __version__
+
+    return _environment().get_template(template).render(version=__version__, **values)
+
+
+def ascii_only(text: str) -> str:
+    """Text for compilers and terminals that know no other letters."""
+    for letter, plain in LETTERS.items():
+        text = text.replace(letter, plain)
+    return text.encode("ascii", "replace").decode().replace("*/", "* /")
+
+
+def first_line(text: str) -> str:
+    """The summary of a docstring."""
+    return text.strip().splitlines()[0] if text.strip() else ""

@@ -1,0 +1,221 @@
+"""C99: header and source of a law, optionally with its whole sampled controller.
+
+One definition feeds it: the functions of the law's file, printed by `stickslip.export._c`. In double precision
+and without contraction the code gives the bits of plain Python (tested); in single precision it is within
+`SINGLE_BOUND` of the largest torque.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from stickslip.control.sampled import Memory, Settings, sampled_by, settings
+from stickslip.export._analysis import analyse
+from stickslip.export._c import Dialect, functions, head
+from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export.golden import as_csv, golden
+from stickslip.export.job import Check, Export, Job
+from stickslip.export.target import Target
+from stickslip.spec import Field, Law, Surroundings, fields_of
+from stickslip.subset import Layout, law_layouts, named
+
+__all__ = ["SINGLE_BOUND", "TARGET", "dialect_of", "translated", "write"]
+
+SINGLE_BOUND = 2e-3
+"""Largest error of single precision, as a share of the largest torque of the golden vectors."""
+
+STRUCTURES = {
+    "z": "state", "dz": "state", "g": "state", "p": "parameters", "u": "surroundings", "n": "settings", "m": "memory",
+}  # fmt: skip
+SURROUNDINGS = {
+    "position": "position, rad",
+    "load": "normal load over the one of the parameters, -",
+    "temperature": "temperature, degC",
+}
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-builtin", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion",
+         "-Wdouble-promotion", "-Werror")  # fmt: skip
+
+
+def dialect_of(job: Job) -> Dialect:
+    """How the C of this job is spelt."""
+    return Dialect(job.name, job.single, STRUCTURES)
+
+
+def translated(job: Job) -> dict[str, Any]:
+    """The functions of the law, and of the controller where there is one, as trees of the subset."""
+    law = job.model.law
+    entries = {"_step": law.step, **({"_steady": law.steady} if law.steady else {})}
+    layouts = law_layouts(law)
+    if job.controller is not None:
+        # The law's own step comes by the name under which the controller calls it.
+        helper = job.controller.compensator
+        entries["_sample"] = sampled_by(law if helper else None)
+        layouts = {
+            **layouts,
+            "n": Layout.of(fields_of(Settings), counted=False),
+            "m": Layout.of(fields_of(Memory), counted=False),
+        }
+    return named(entries, layouts)
+
+
+def write(job: Job) -> Export:
+    """Header, source, golden vectors, a program that checks them, and how to use it."""
+    law, p, dialect = job.model.law, job.model.parameters, dialect_of(job)
+    trees = translated(job)
+    known = analyse(trees)
+    public = [n for n in ("_step", "_steady", "_sample") if n in trees]
+    written = functions(trees, dialect, public)
+    about = {name: ascii_only(first_line(doc)) for name, doc, _ in written}
+    vectors = golden(job.model)
+    scale = float(max(abs(vectors.torque).max(), 1e-12))
+    common: dict[str, Any] = {
+        "x": job.name, "X": job.name.upper(), "title": ascii_only(law.title), "real": dialect.real,
+        "elements": law.elements_in(p), "source": ascii_only("; ".join(law.source)),
+        "equation": textwrap.wrap(ascii_only(law.equation), 110, break_long_words=False),
+        "surroundings": ", ".join(dialect.number(x) for x in Surroundings()),
+        "controller": controller_of(job, dialect), "bound": SINGLE_BOUND if job.single else 0.0, "scale": repr(scale),
+        "count": len(vectors.v0),
+    }  # fmt: skip
+    header = render(
+        "c99.h.j2",
+        **common,
+        structures=list(structures(job, dialect)),
+        public=[{"about": about[n], "head": head(n, known[n], dialect)} for n in public],
+    )
+    code = [{"about": about[name], "lines": lines} for name, _, lines in written]
+    text = "\n".join(line for part in code for line in part["lines"])
+    source = render(
+        "c99.c.j2",
+        **common,
+        functions=code,
+        extremes=[n for n in ("min", "max") if f"{job.name}_{n}(" in text],
+        init=[*given(law.fields, p._asdict(), "p", dialect)],
+        reset=[*cleared(law, dialect)],
+    )
+    rows = [", ".join(repr(float(x)) for x in row) for row in zip(*vectors)]
+    table = [
+        {"name": f.name, "value": getattr(p, f.name), "unit": f.par.unit, "meaning": f.par.meaning}
+        for f in law.fields
+    ]
+    return Export(
+        {
+            f"{job.name}.h": header,
+            f"{job.name}.c": source,
+            f"{job.name}_check.c": render("c99_check.c.j2", **common, rows=rows),
+            "golden.csv": as_csv(vectors),
+            "README.md": render("c99_readme.md.j2", **common, table=table),
+        }
+    )
+
+
+# ---- structures and their values ------------------------------------------------------------------------------
+
+
+def structures(job: Job, dialect: Dialect) -> Iterable[Mapping[str, Any]]:
+    """The structures of the header."""
+    law = job.model.law
+    yield structure("parameters", "Parameters of the law.", law.fields, dialect)
+    yield structure("state", "What the contact remembers from step to step.", law.state_fields, dialect)
+    around = [
+        {"declared": f"{dialect.real} {name};", "meaning": SURROUNDINGS.get(name, name)}
+        for name in Surroundings._fields
+    ]
+    yield {
+        "name": "surroundings",
+        "about": "What the contact depends on besides its velocity.",
+        "fields": around,
+    }
+    if job.controller is not None:
+        yield structure("settings", "Settings of the sampled controller.", fields_of(Settings), dialect)
+        yield structure("memory", "What the controller remembers.", fields_of(Memory), dialect)
+
+
+def structure(name: str, about: str, fields: Sequence[Field], dialect: Dialect) -> Mapping[str, Any]:
+    """One structure; C has no empty ones."""
+    lines = [
+        {
+            "declared": f"{dialect.real} {f.name}{f'[{dialect.elements}]' if f.per_element else ''};",
+            "meaning": ascii_only(f"{f.par.meaning}, {f.par.unit}"),
+        }
+        for f in fields
+    ]
+    return {
+        "name": name,
+        "about": about,
+        "fields": lines or [{"declared": "char none;", "meaning": "this law has none"}],
+    }
+
+
+def given(fields: Sequence[Field], values: Mapping[str, Any], owner: str, dialect: Dialect) -> Iterable[str]:
+    """Assignments of numbers to a structure's fields."""
+    for f in fields:
+        numbers = values[f.name] if f.per_element else [values[f.name]]
+        for i, x in enumerate(numbers):
+            place = f"[{i}]" if f.per_element else ""
+            yield f"{owner}->{f.name}{place} = {dialect.number(float(x))};"
+    if not fields:
+        yield f"{owner}->none = 0;"
+
+
+def cleared(law: Law, dialect: Dialect) -> Iterable[str]:
+    """Assignments that put a state to rest."""
+    zero = dialect.number(0.0)
+    for f in law.state_fields:
+        if f.per_element:
+            yield f"for (int i = 0; i < {dialect.elements}; i++) {{ z->{f.name}[i] = {zero}; }}"
+        else:
+            yield f"z->{f.name} = {zero};"
+    if not law.state_fields:
+        yield "z->none = 0;"
+
+
+def controller_of(job: Job, dialect: Dialect) -> Mapping[str, Any] | None:
+    """Initial values of the controller's structures."""
+    if job.controller is None:
+        return None
+    numbers = settings(job.controller)._asdict()
+    zeros = dict.fromkeys(Memory._fields, 0.0)
+    return {
+        "init": [*given(fields_of(Settings), numbers, "n", dialect)],
+        "reset": [*given(fields_of(Memory), zeros, "m", dialect)],
+        "sample_time": numbers["sample_time"],
+    }
+
+
+# ---- the check -------------------------------------------------------------------------------------------------
+
+
+def check(job: Job, export: Export) -> Check:
+    """Compile with every compiler at hand, warnings as errors, and run the golden vectors."""
+    compilers = [c for c in ("gcc", "clang") if shutil.which(c)]
+    if not compilers:
+        return Check(None, "neither gcc nor clang is installed")
+    errors: dict[str, float] = {}
+    with TemporaryDirectory() as folder:
+        for name, content in export.files.items():
+            Path(folder, name).write_text(str(content))
+        for compiler in compilers:
+            sources = [f"{job.name}.c", f"{job.name}_check.c"]
+            built = run([compiler, *FLAGS, *sources, "-lm", "-o", "check"], folder)
+            if built.returncode:
+                return Check(False, f"{compiler}: {built.stderr.strip().splitlines()[0]}")
+            ran = run(["./check"], folder)
+            errors[compiler] = float(ran.stdout or "nan")
+            if ran.returncode:
+                return Check(False, f"{compiler}: {errors[compiler]:.3g} N·m off the definition", errors)
+    worst = max(errors.values())
+    return Check(True, f"{' and '.join(compilers)}: at most {worst:.3g} N·m off the definition", errors)
+
+
+def run(command: Sequence[str], folder: str) -> subprocess.CompletedProcess[str]:
+    """Run a tool in a folder."""
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+TARGET = Target("c99", "C99 header and source", write, check, precision=True, controller=True)

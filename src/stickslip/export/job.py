@@ -1,0 +1,85 @@
+"""What is to be exported, and what comes of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from stickslip.control.controller import Controller
+from stickslip.errors import InputError
+from stickslip.model import Model
+
+__all__ = ["CannotCarry", "Check", "Export", "Job"]
+
+IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")
+
+
+class CannotCarry(InputError):
+    """A target has no room for a part of the model; the message names what is lost and what to take instead."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be exported.
+
+    Attributes
+    ----------
+    model : Model
+        The law and its parameters.
+    name : str
+        Prefix of every name in the target's language.
+    controller : Controller or None
+        The whole sampled controller, with the model in its compensator; None exports the law alone.
+    single : bool
+        Single precision, where the target has the choice.
+    """
+
+    model: Model
+    name: str
+    controller: Controller | None = None
+    single: bool = False
+
+    def __post_init__(self) -> None:
+        if not IDENTIFIER.fullmatch(self.name):
+            raise InputError(
+                f"{self.name!r} is no name in most languages; use letters, digits and _, a letter first (--name)"
+            )
+        if self.controller is not None and self.controller.sample_time <= 0.0:
+            raise InputError(
+                "a controller in continuous time cannot be exported; give it a sample_time greater than 0"
+            )
+
+
+@dataclass(frozen=True)
+class Export:
+    """Files by name, and what the user must know about them.
+
+    Attributes
+    ----------
+    files : mapping of str to str or bytes
+    notes : tuple of str
+        What the target does not hold, and by how much it differs.
+    """
+
+    files: Mapping[str, str | bytes]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Check:
+    """What running the export in its target said.
+
+    Attributes
+    ----------
+    passed : bool or None
+        None where the target's tool is not installed.
+    text : str
+        One line.
+    numbers : mapping
+        Errors measured.
+    """
+
+    passed: bool | None
+    text: str
+    numbers: Mapping[str, float] = field(default_factory=dict[str, float])

@@ -1,0 +1,185 @@
+"""The C of every registered law and of the sampled controller against compiled and plain Python."""
+
+import ctypes
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from stickslip import plugins
+from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.controller import Controller
+from stickslip.control.linear import place
+from stickslip.control.sampled import Memory, sampled_by, settings
+from stickslip.errors import InputError
+from stickslip.export import c99
+from stickslip.export.golden import golden, random_steps
+from stickslip.export.job import Job
+from stickslip.jit import call_sample, call_step, compiled_law, flat, kernel, pointer
+from stickslip.model import Model
+from stickslip.simulation._sampled import MEMORY, sampler
+from stickslip.spec import Surroundings
+
+COMPILERS = [c for c in ("gcc", "clang") if shutil.which(c)]
+pytestmark = pytest.mark.skipif(not COMPILERS, reason="needs a C compiler")
+STEPS = 1_000_000
+LAWS = [plugins.law(name) for name in plugins.law_names()]
+every_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+every_compiler = pytest.mark.parametrize("compiler", COMPILERS)
+
+LOOP = """#include "x.h"
+void run(long n, const double *v0, const double *v1, const double *dt, const double *x, double *out)
+{{
+    x_parameters p;
+    x_state z;
+    x_surroundings u = {{ {around} }};
+    x_init(&p);
+    x_reset(&z);
+    for (long i = 0; i < n; i++) {{
+        u.position = ({real})x[i];
+        out[i] = (double)x_step(({real})v0[i], ({real})v1[i], ({real})dt[i], &z, &p, &u);
+    }}
+}}
+"""
+CONTROL = """#include "x.h"
+void run(long n, const double *position, const double *wanted, const double *wanted_velocity, double *out)
+{{
+    x_parameters p;
+    x_state z;
+    x_settings s;
+    x_memory m;
+    x_surroundings u = {{ {around} }};
+    x_init(&p);
+    x_controller_init(&s);
+    x_controller_reset(&m, &z);
+    for (long i = 0; i < n; i++) {{
+        out[i] = x_sample(position[i], wanted[i], wanted_velocity[i], &s, &m, &z, &p, &u);
+    }}
+}}
+"""
+
+
+def built(job, program, folder, compiler, *more):
+    """The exported C with a loop around it, as a function on arrays; one source file where it is baked in."""
+    for name, text in c99.write(job).files.items():
+        (folder / name).write_text(text)
+    around = ", ".join(repr(x) + ("f" if job.single else "") for x in Surroundings())
+    (folder / "run.c").write_text(program.format(around=around, real="float" if job.single else "double"))
+    command = [compiler, *c99.FLAGS, "-shared", "-fPIC", *more, "x.c", "run.c", "-lm", "-o", f"{compiler}.so"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return ctypes.CDLL(str(folder / f"{compiler}.so")).run
+
+
+def answers(run, *inputs):
+    out = np.empty(inputs[0].size)
+    array = ctypes.POINTER(ctypes.c_double)
+    run(ctypes.c_long(out.size), *(np.ascontiguousarray(a).ctypes.data_as(array) for a in (*inputs, out)))
+    return out
+
+
+def example(law):
+    return Model(law, **dict(law.example))
+
+
+@kernel()
+def run_law(step, v0, v1, dt, position, z, p, u, out):
+    for i in range(v0.size):
+        u[0] = position[i]
+        out[i] = call_step(step, v0[i], v1[i], dt[i], pointer(z, 0), pointer(p, 0), pointer(u, 0))
+
+
+def by_compiled_python(model, v0, v1, dt, position):
+    law, p, out = model.law, model.parameters, np.empty(v0.size)
+    z = flat(law.pack_state(law.state(p)))
+    run_law(compiled_law(law).step, v0, v1, dt, position, z, flat(law.pack(p)), np.array(Surroundings()), out)
+    return out
+
+
+@every_compiler
+@every_law
+def test_double_gives_the_bits_of_python(law, compiler, tmp_path):
+    steps = random_steps(STEPS, seed=7)
+    out = answers(built(Job(example(law), "x"), LOOP, tmp_path, compiler), *steps)
+    expected = by_compiled_python(example(law), *steps)
+    assert np.all(np.isfinite(expected))
+    np.testing.assert_array_equal(out, expected)
+
+
+@every_law
+def test_golden_vectors_are_plain_python_and_equal_the_compiled_form(law):
+    vectors = golden(example(law), count=3000, seed=5)
+    np.testing.assert_array_equal(by_compiled_python(example(law), *vectors[:4]), vectors.torque)
+
+
+@every_law
+def test_single_precision_stays_within_its_bound(law, tmp_path):
+    steps = random_steps(20_000, seed=11)
+    out = answers(built(Job(example(law), "x", single=True), LOOP, tmp_path, COMPILERS[0]), *steps)
+    expected = by_compiled_python(example(law), *steps)
+    assert np.abs(out - expected).max() <= c99.SINGLE_BOUND * np.abs(expected).max()
+
+
+@kernel()
+def run_sample(address, position, wanted, wanted_velocity, n, m, p, u, out):
+    for i in range(position.size):
+        out[i] = call_sample(
+            address, position[i], wanted[i], wanted_velocity[i], pointer(n, 0), pointer(m, 0),
+            pointer(m, MEMORY), pointer(p, 0), pointer(u, 0),
+        )  # fmt: skip
+
+
+CONTROLLERS = {
+    "FF": lambda m: Controller(place("PD", 3.86e-4, 36.0, 1.0), Feedforward(m), 0.5, 1e-3, 1e6),
+    "FB-filtered": lambda m: Controller(place("PID", 3.86e-4, 25.0, 1.0), Feedback(m, 0.8, 10.0), sample_time=1e-3),
+    "none": lambda m: Controller(place("PD", 3.86e-4, 36.0, 1.0), None, 0.2, 1e-3, 4096.0),
+}  # fmt: skip
+
+
+def motion(count):
+    draw = np.random.default_rng(3)
+    t = 1e-3 * np.arange(count)
+    wanted = 0.1 * np.sin(2.0 * t) + 0.01 * np.sin(31.0 * t)
+    position = wanted + 1e-3 * np.convolve(draw.standard_normal(count), np.ones(20) / 20.0, "same")
+    position[count // 3 : count // 2] = position[count // 3]  # a standstill
+    return position, wanted, 0.2 * np.cos(2.0 * t) + 0.31 * np.cos(31.0 * t)
+
+
+@pytest.mark.parametrize("kind", CONTROLLERS)
+@every_law
+def test_the_controller_gives_the_bits_of_python(law, kind, tmp_path):
+    model, signals = example(law), motion(100_000)
+    controller = CONTROLLERS[kind](model)
+    run = built(Job(model, "x", controller), CONTROL, tmp_path, COMPILERS[-1])
+    out, helper = answers(run, *signals), controller.compensator
+    expected = np.empty(out.size)
+    memory = np.concatenate([np.zeros(MEMORY), law.pack_state(law.state(model.parameters))])
+    n, p, u = np.array(settings(controller)), flat(law.pack(model.parameters)), np.array(Surroundings())
+    run_sample(sampler(law if helper else None), *signals, n, memory, p, u, expected)
+    np.testing.assert_array_equal(out, expected)
+
+
+def test_the_compiled_controller_gives_the_bits_of_plain_python():
+    from types import SimpleNamespace
+
+    model, signals = example(plugins.law("gms")), motion(2000)
+    controller = CONTROLLERS["FB-filtered"](model)
+    law, n, p = model.law, settings(controller), model.parameters
+    m, z = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0)), law.state(p)
+    u = SimpleNamespace(**Surroundings()._asdict())
+    plain = [sampled_by(law)(*map(float, row), n, m, z, p, u) for row in zip(*signals)]
+    memory, out = np.concatenate([np.zeros(MEMORY), law.pack_state(law.state(p))]), np.empty(2000)
+    run_sample(sampler(law), *signals, np.array(n), memory, flat(law.pack(p)), np.array(Surroundings()), out)
+    np.testing.assert_array_equal(out, plain)
+
+
+def test_a_controller_in_continuous_time_is_refused():
+    with pytest.raises(InputError, match="sample_time"):
+        Job(example(LAWS[0]), "x", Controller(place("PD", 1e-3, 10.0, 1.0)))
+
+
+def test_a_name_that_is_no_identifier_is_refused():
+    with pytest.raises(InputError, match="--name"):
+        Job(example(LAWS[0]), "my law")
