@@ -1,0 +1,235 @@
+"""Which column is which channel: what the user says, then a profile, then what names and units tell."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from stickslip.errors import InputError, suggestion
+from stickslip.finding import Finding
+from stickslip.readers._names import ALIASES, KINDS, ROLES, Name, role_of
+from stickslip.readers._table import Column, Table
+from stickslip.readers._units import parse_unit, spellings
+
+__all__ = ["Choice", "choose", "parse_mapping"]
+
+MAIN = ("time", "position", "velocity", "motor_torque")
+"""Channels that must not be guessed between equals: the wrong one spoils every result."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A channel and the column that fills it.
+
+    Attributes
+    ----------
+    role : str
+    column : str
+        Its name in the file.
+    unit : str
+        As written, or empty where nobody says it: then SI is taken.
+    source : {"map", "profile", "file", "name", "assumed"}
+        Who says the unit: the user, a profile, the file beside the name, the name, nobody.
+    side : {"", "motor", "load"}
+        The side of the gear it is measured on; empty where nobody says it.
+    """
+
+    role: str
+    column: str
+    unit: str
+    source: str
+    side: str = ""
+
+
+def parse_mapping(mapping: Mapping[str, str] | Sequence[str]) -> dict[str, str]:
+    """Channel to what fills it, from a mapping or from strings like "position=q_deg:deg".
+
+    Raises
+    ------
+    InputError
+        If a string has no "=", a channel is unknown or named twice.
+    """
+    if isinstance(mapping, str):
+        mapping = [mapping]
+    pairs: list[tuple[str, str]] = []
+    if isinstance(mapping, Mapping):
+        pairs += mapping.items()
+    else:
+        for text in mapping:
+            role, equals, column = text.partition("=")
+            if not equals or not column.strip():
+                raise InputError(
+                    f"--map {text!r} must be CHANNEL=COLUMN or CHANNEL=COLUMN:UNIT, such as position=q_deg:deg"
+                )
+            pairs.append((role, column))
+    out: dict[str, str] = {}
+    for written, column in pairs:
+        role = ALIASES.get(written.strip(), written.strip())
+        if role not in KINDS:
+            raise InputError(
+                f"--map names the unknown channel {written!r}; {suggestion(written, [*ROLES, *ALIASES])}"
+            )
+        if role in out:
+            raise InputError(f"--map gives {role} twice; give it once")
+        out[role] = column.strip()
+    return out
+
+
+def choose(
+    table: Table, mapping: Mapping[str, str], source: str = "map"
+) -> tuple[list[Choice], list[Finding]]:
+    """Assign columns to channels.
+
+    Parameters
+    ----------
+    table : Table
+    mapping : mapping of str to str
+        As `parse_mapping` gives it; "none" leaves a channel out.
+    source : {"map", "profile"}
+        Where the mapping comes from.
+
+    Raises
+    ------
+    InputError
+        If the mapping names a column that is not there, or a unit that is none or of the wrong kind.
+    """
+    chosen = {
+        role: _explicit(table, role, text, source) for role, text in mapping.items() if text.lower() != "none"
+    }
+    taken = {choice.column for choice in chosen.values()}
+    names = {c.name: role_of(c.name, c.unit if parse_unit(c.unit) else "") for c in table.columns}
+    axis = next((names[c.column].axis for c in chosen.values() if names[c.column].axis), "")
+    findings: list[Finding] = []
+    for role in ROLES:
+        if role in mapping:
+            continue
+        candidates = [c for c in table.columns if c.name not in taken and names[c.name].role == role]
+        column, found = _pick(role, candidates, names, axis)
+        findings += found
+        if column is None:
+            continue
+        axis = axis or names[column.name].axis
+        taken.add(column.name)
+        chosen[role] = _guessed(role, column, names[column.name])
+    return [chosen[role] for role in ROLES if role in chosen], findings
+
+
+def _explicit(table: Table, role: str, text: str, source: str) -> Choice:
+    """What the user says: COLUMN, COLUMN:UNIT, with @load or @motor behind."""
+    side = ""
+    if text not in _names_of(table) and (match := re.fullmatch(r"(.+)@(motor|load)", text)):
+        text, side = match[1], match[2]
+    name, unit = text, ""
+    if _find(table, text) is None and ":" in text:
+        name, unit = (part.strip() for part in text.rsplit(":", 1))
+    column = _find(table, name)
+    if column is None:
+        raise InputError(
+            f"--map {role}={text}: the file has no column {name!r}; {suggestion(name, _names_of(table))}"
+        )
+    if unit:
+        parsed = parse_unit(unit)
+        if parsed is None or parsed.kind not in KINDS[role]:
+            what = "is not a unit that is known" if parsed is None else f"is a unit of {parsed.kind}"
+            current = role == "motor_torque" and parsed is not None and parsed.kind in ("current", "voltage")
+            remedy = (
+                "map it as current and give --torque-constant"
+                if current
+                else f"{role} takes {spellings(KINDS[role])}"
+            )
+            raise InputError(f"--map {role}={text}: {unit!r} {what}; {remedy}")
+        return Choice(role, column.name, unit, source, side)
+    read = role_of(column.name, column.unit if parse_unit(column.unit) else "")
+    guess = _guessed(role, column, read)
+    return Choice(role, column.name, guess.unit, guess.source, side or guess.side)
+
+
+def _find(table: Table, name: str) -> Column | None:
+    """The column of that name, whatever its case."""
+    exact = [c for c in table.columns if c.name == name]
+    found = exact or [c for c in table.columns if c.name.lower() == name.lower()]
+    return found[0] if found else None
+
+
+def _names_of(table: Table) -> list[str]:
+    return [c.name for c in table.columns]
+
+
+def _guessed(role: str, column: Column, name: Name) -> Choice:
+    """A choice with the unit that the file or the name tells, if it suits the channel."""
+    unit, source = (column.unit, "file") if parse_unit(column.unit) else (name.unit, "name")
+    parsed = parse_unit(unit)
+    if parsed is None or parsed.kind not in KINDS[role]:
+        unit, source = "", "assumed"
+    return Choice(role, column.name, unit, source, name.side)
+
+
+def _pick(
+    role: str, candidates: Sequence[Column], names: Mapping[str, Name], axis: str
+) -> tuple[Column | None, list[Finding]]:
+    """The best candidate, and what is to be said of the choice."""
+    if role == "load":
+        unsure = [c for c in candidates if not names[c.name].unit]
+        candidates = [c for c in candidates if names[c.name].unit]
+        if unsure and not candidates:
+            # Drives call their torque or utilisation "load" as well.
+            name = unsure[0].name
+            doubt = f"column {name!r} has no unit: it may be a normal force, a torque or a utilisation; it is not used"
+            remedy = f"if it is the normal force, say --map load={name}:N"
+            return None, [Finding("note", "not-used", doubt, remedy=remedy)]
+    if not candidates:
+        return None, []
+    numbered = sorted({names[c.name].axis for c in candidates if names[c.name].axis}, key=int)
+    remedy = f"if another is meant, say --map {role}=COLUMN"
+    listed = _listed(candidates)
+    if len(numbered) > 1:
+        wanted = axis if axis in numbered else numbered[0]
+        column = next(c for c in candidates if names[c.name].axis == wanted)
+        return column, [
+            Finding(
+                "warning",
+                "ambiguous-column",
+                f"{role} may be any of {listed}: the file has several axes; {column.name!r} was taken",
+                remedy=remedy,
+            )
+        ]
+    ranked = sorted(candidates, key=lambda c: _merit(names[c.name]), reverse=True)
+    first = ranked[0]
+    if len(ranked) == 1:
+        return first, []
+    if _merit(names[first.name]) > _merit(names[ranked[1].name]):
+        return first, [
+            Finding(
+                "note",
+                "ambiguous-column",
+                f"{role} may be any of {listed}; {first.name!r} was taken",
+                remedy=remedy,
+            )
+        ]
+    if role not in MAIN:
+        return None, [
+            Finding(
+                "warning",
+                "ambiguous-column",
+                f"{role} may be any of {listed}; none was taken",
+                remedy=f"say --map {role}=COLUMN to use one",
+            )
+        ]
+    return first, [
+        Finding(
+            "error",
+            "ambiguous-column",
+            f"{role} may be any of {listed}",
+            remedy=f"say which with --map {role}=COLUMN",
+        )
+    ]
+
+
+def _merit(name: Name) -> tuple[int, int, int]:
+    return (name.side != "load", name.sure, bool(name.unit))
+
+
+def _listed(columns: Sequence[Column]) -> str:
+    shown = [repr(c.name) for c in columns[:4]] + (["..."] if len(columns) > 4 else [])
+    return ", ".join(shown)

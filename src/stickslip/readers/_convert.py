@@ -1,0 +1,349 @@
+"""From columns as written to a record in SI units, every step of it named in the record's meta."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.finding import Finding
+from stickslip.readers._choose import Choice
+from stickslip.readers._names import KINDS
+from stickslip.readers._table import Array, Column, Table
+from stickslip.readers._units import SI, Unit, parse_unit
+from stickslip.record import Record
+
+__all__ = ["Drive", "convert"]
+
+LINEAR = {
+    "angle": "length",
+    "angular velocity": "velocity",
+    "angular acceleration": "acceleration",
+    "torque": "force",
+}
+MOTION = (
+    "position",
+    "position_reference",
+    "position_error",
+    "velocity",
+    "velocity_reference",
+    "acceleration",
+)
+EFFORT = ("motor_torque", "friction_torque", "compensation_torque")
+PERIODS = (
+    "dt",
+    "ts",
+    "sampletime",
+    "sample_time",
+    "sampling_time",
+    "deltat",
+    "delta_t",
+    "period",
+    "abtastzeit",
+    "tsample",
+    "sampling_period",
+)
+RATES = (
+    "fs",
+    "samplerate",
+    "sample_rate",
+    "sampling_rate",
+    "rate_hz",
+    "abtastrate",
+    "sampling_frequency",
+    "f_s",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """What the drive's data sheet says and a file does not. NaN where nobody says it.
+
+    Attributes
+    ----------
+    counts_per_rev : float
+        Encoder counts a revolution (4 x lines where the drive counts every edge).
+    rated_torque : float
+        N·m (or N), for torques in percent or per mille.
+    rated_current : float
+        A, for currents in percent or per mille.
+    torque_constant : float
+        N·m/A, for torque = current x torque constant.
+    gear_ratio : float
+        Revolutions of the motor for one of the load.
+    side : {"motor", "load"}
+        The side of the gear that the record is about: what was measured on the other one is converted.
+    """
+
+    counts_per_rev: float = math.nan
+    rated_torque: float = math.nan
+    rated_current: float = math.nan
+    torque_constant: float = math.nan
+    gear_ratio: float = math.nan
+    side: str = "motor"
+
+    def __post_init__(self) -> None:
+        for name in ("counts_per_rev", "rated_torque", "rated_current", "torque_constant", "gear_ratio"):
+            value = getattr(self, name)
+            if not math.isnan(value) and not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"{name} = {value:g} must be greater than 0")
+        if self.side not in ("motor", "load"):
+            raise InputError(f"side = {self.side!r} is not known; choose from motor, load")
+
+    def known(self) -> dict[str, Any]:
+        """What is given, as plain data."""
+        return {k: v for k, v in asdict(self).items() if not (isinstance(v, float) and math.isnan(v))}
+
+
+def convert(
+    table: Table,
+    choices: Sequence[Choice],
+    drive: Drive,
+    sample_time: float | None,
+    findings: Sequence[Finding],
+) -> Record:
+    """Make the record.
+
+    Raises
+    ------
+    InputError
+        If there is no time, a conversion needs a number that nobody gave, or columns differ in length.
+    """
+    said = list(findings)
+    by_role = {choice.role: choice for choice in choices}
+    linear = _is_linear(by_role)
+    columns = {c.name: c for c in table.columns}
+    time, origin, more = _time(table, by_role, columns, sample_time)
+    said += more
+    if time.size == 0:
+        raise InputError("the file has no rows; give a record with samples")
+    channels: dict[str, Array] = {}
+    units: dict[str, str] = {}
+    listed: list[dict[str, Any]] = []
+    for role, choice in by_role.items():
+        if role == "time":
+            listed.append(
+                {
+                    "channel": "time",
+                    "column": choice.column,
+                    "unit": choice.unit or "s",
+                    "source": choice.source,
+                }
+            )
+            continue
+        unit = _unit(choice, linear)
+        scale, target, steps = _scale(choice, unit, drive, linear)
+        values, resampled = _on_clock(columns[choice.column], time, origin, role)
+        said += resampled
+        channels[role] = scale * values + (unit.offset if unit.offset else 0.0)
+        units[role] = target
+        entry = {
+            "channel": role,
+            "column": choice.column,
+            "unit": choice.unit or target,
+            "source": choice.source,
+        }
+        listed.append({**entry, "factor": scale, "side": choice.side or "motor", "steps": steps})
+    derived = _torque_from_current(channels, units, drive, linear)
+    reading = {
+        "format": table.format,
+        "columns": listed,
+        "constants": dict(table.constants),
+        "drive": drive.known(),
+        "time_origin": origin,
+        "findings": [f.as_data() for f in said],
+    }
+    return Record(time, channels, units, {"reading": reading, "derived": derived})
+
+
+# ---- units --------------------------------------------------------------------------------------------------
+
+
+def _is_linear(by_role: dict[str, Choice]) -> bool:
+    """Whether the axis moves along a line: a length, a linear velocity or a force is stated."""
+    stated = [parse_unit(c.unit) for c in by_role.values() if c.unit and c.role in (*MOTION, *EFFORT)]
+    kinds = [u.kind for u in stated if u is not None]
+    return any(k in ("length", "velocity", "acceleration", "force") for k in kinds) and "angle" not in kinds
+
+
+def _unit(choice: Choice, linear: bool) -> Unit:
+    if (unit := parse_unit(choice.unit)) is not None:
+        return unit
+    kind = KINDS[choice.role][0]
+    return Unit(LINEAR.get(kind, kind) if linear else kind)
+
+
+def _scale(choice: Choice, unit: Unit, drive: Drive, linear: bool) -> tuple[float, str, list[str]]:
+    """Factor to SI on the record's side of the gear, the SI unit, and the steps in words."""
+    kind, factor, steps = unit.kind, unit.factor, list[str]()
+    if kind in ("counts", "count rate"):
+        per_rev = _needed(
+            drive.counts_per_rev,
+            choice,
+            "counts",
+            "--counts-per-rev",
+            "position=COLUMN:0.25um for a linear scale",
+        )
+        factor *= 2.0 * math.pi / per_rev
+        kind = "angle" if kind == "counts" else "angular velocity"
+        steps.append(f"2π / {per_rev:g} counts")
+    elif kind == "share" and choice.role in ("motor_torque", "compensation_torque"):
+        rated = _needed(drive.rated_torque, choice, "a share of the rated torque", "--rated-torque")
+        factor, kind = factor * rated, "force" if linear else "torque"
+        steps.append(f"rated torque {rated:g}")
+    elif kind == "share" and choice.role in ("current", "current_reference"):
+        rated = _needed(drive.rated_current, choice, "a share of the rated current", "--rated-current")
+        factor, kind = factor * rated, "current"
+        steps.append(f"rated current {rated:g} A")
+    side = choice.side or "motor"
+    if side != drive.side and choice.role in (*MOTION, *EFFORT) and (choice.side or drive.side == "load"):
+        if choice.side == "load" and choice.source in ("map", "profile") and math.isnan(drive.gear_ratio):
+            raise InputError(
+                f"{choice.role}: column {choice.column!r} is on the load's side of the gear; give --gear-ratio, "
+                f"or --map {choice.role}={choice.column}@motor if it is not"
+            )
+        if not math.isnan(drive.gear_ratio):
+            to_motor = drive.gear_ratio if side == "load" else 1.0 / drive.gear_ratio
+            factor *= to_motor if choice.role in MOTION else 1.0 / to_motor
+            steps.append(f"gear ratio {drive.gear_ratio:g}, {side} to {drive.side} side")
+    return factor, SI[kind], steps
+
+
+def _needed(value: float, choice: Choice, what: str, option: str, other: str = "") -> float:
+    if math.isnan(value):
+        either = f", or --map {other}" if other else ""
+        raise InputError(f"{choice.role}: column {choice.column!r} is in {what}; give {option}{either}")
+    return value
+
+
+def _torque_from_current(
+    channels: dict[str, Array], units: dict[str, str], drive: Drive, linear: bool
+) -> dict[str, str]:
+    """Torque = current x torque constant, where a current and a constant are given and no torque."""
+    if "motor_torque" in channels or "current" not in channels or math.isnan(drive.torque_constant):
+        return {}
+    factor = drive.torque_constant
+    if drive.side == "load":
+        factor *= _ratio_or_one(drive)
+    channels["motor_torque"] = factor * channels["current"]
+    units["motor_torque"] = SI["force" if linear else "torque"]
+    gear = (
+        f" x gear ratio {drive.gear_ratio:g}"
+        if drive.side == "load" and not math.isnan(drive.gear_ratio)
+        else ""
+    )
+    return {
+        "motor_torque": f"current x torque constant {drive.torque_constant:g} {units['motor_torque']}/A{gear}"
+    }
+
+
+def _ratio_or_one(drive: Drive) -> float:
+    return 1.0 if math.isnan(drive.gear_ratio) else drive.gear_ratio
+
+
+# ---- time ---------------------------------------------------------------------------------------------------
+
+
+def _time(
+    table: Table, by_role: dict[str, Choice], columns: dict[str, Column], sample_time: float | None
+) -> tuple[Array, float, list[Finding]]:
+    """The record's time in s, what was taken off it, and what is to be said."""
+    found: list[Finding] = []
+    first = next(
+        (
+            columns[by_role[r].column]
+            for r in ("position", "velocity", "motor_torque", *by_role)
+            if r in by_role and r != "time"
+        ),
+        None,
+    )
+    if sample_time is not None:
+        if not (math.isfinite(sample_time) and sample_time > 0.0):
+            raise InputError(f"sample_time = {sample_time:g} must be greater than 0 s")
+        if first is None:
+            raise InputError("no column is known to be a channel; say which with --map position=COLUMN:UNIT")
+        by_role.pop("time", None)
+        return np.arange(first.values.size, dtype=np.float64) * sample_time, 0.0, found
+    if "time" in by_role:
+        choice = by_role["time"]
+        time = columns[choice.column].values
+        unit = parse_unit(choice.unit)
+        factor = unit.factor if unit is not None else _epoch(time)
+        if unit is None and factor != 1.0:
+            found.append(
+                Finding(
+                    "note",
+                    "time-unit",
+                    f"time {choice.column!r} counts from 1970 in steps of {factor:g} s, by its size",
+                )
+            )
+        return _from_start(time, factor, found)
+    if first is not None and first.clock is not None:
+        return _from_start(first.clock, 1.0, found)
+    for name, value in table.constants.items():
+        key = name.rsplit(".", 1)[-1].lower()
+        if (
+            isinstance(value, float)
+            and math.isfinite(value)
+            and value > 0.0
+            and key in (*PERIODS, *RATES)
+            and first is not None
+        ):
+            period = value if key in PERIODS else 1.0 / value
+            made = f"there is no column of times; they were made from {name} = {value:g}, as {period:g} s a sample"
+            found.append(Finding("warning", "time-made", made, remedy="if wrong, give --sample-time SECONDS"))
+            return np.arange(first.values.size, dtype=np.float64) * period, 0.0, found
+    if first is None:
+        raise InputError(
+            f"no column is known to be a channel among {_some(table)}; say which is which, "
+            "such as --map time=COLUMN:s --map position=COLUMN:deg"
+        )
+    raise InputError(
+        f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give --sample-time SECONDS"
+    )
+
+
+def _some(table: Table) -> str:
+    names = [c.name for c in table.columns]
+    return ", ".join(names[:12]) + (", ..." if len(names) > 12 else "") if names else "none at all"
+
+
+def _epoch(time: Array) -> float:
+    """1, or what times since 1970 count: their size tells, since records are of 2001 to 2286."""
+    finite = time[np.isfinite(time)]
+    size = float(np.median(finite)) if finite.size else 0.0
+    return next((f for f, low in ((1e-9, 1e18), (1e-6, 1e15), (1e-3, 1e12)) if low <= size < 10.0 * low), 1.0)
+
+
+def _from_start(time: Array, factor: float, found: list[Finding]) -> tuple[Array, float, list[Finding]]:
+    """Times in s; large ones, such as dates, count from the first sample."""
+    finite = time[np.isfinite(time)]
+    origin = float(finite[0]) if finite.size else 0.0
+    if abs(origin * factor) < 1e6:
+        origin = 0.0
+    return (time - origin) * factor, origin * factor, found
+
+
+def _on_clock(column: Column, time: Array, origin: float, role: str) -> tuple[Array, list[Finding]]:
+    """The column at the record's times."""
+    if column.clock is None:
+        if column.values.size != time.size:
+            raise InputError(f"{role}: column {column.name!r} has {column.values.size} values, time has {time.size}; "
+                             f"map columns of one table, or leave it out with --map {role}=none")  # fmt: skip
+        return column.values, []
+    own = column.clock - origin
+    if own.shape == time.shape and np.allclose(own, time, rtol=0.0, atol=1e-9, equal_nan=True):
+        return column.values, []
+    good = np.isfinite(own) & np.isfinite(column.values)
+    if np.count_nonzero(good) < 2:
+        return np.full(time.shape, np.nan), []
+    order = np.argsort(own[good], kind="stable")
+    values = np.interp(time, own[good][order], column.values[good][order], left=math.nan, right=math.nan)
+    text = (
+        f"{role} ({column.name!r}) has times of its own and was interpolated linearly at those of the record"
+    )
+    return values, [Finding("note", "resampled", text)]

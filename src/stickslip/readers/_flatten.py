@@ -1,0 +1,259 @@
+"""Nested data (structures, groups, lists of samples) laid out as columns and constants."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.finding import Finding
+from stickslip.readers._table import Column, Table
+
+__all__ = ["as_numbers", "table_of"]
+
+MAX_DEPTH = 12
+MAX_WIDTH = 64
+"""A matrix with more columns than this is a picture or a map, not signals."""
+NAMES = ("name", "Name", "label", "blockName", "Label")
+VALUES = ("values", "Values", "data", "Data", "value")
+TIMES = ("time", "Time", "t", "timestamp")
+
+
+class _Layout:
+    """Collects what a tree holds."""
+
+    def __init__(self) -> None:
+        self.columns: list[Column] = []
+        self.constants: dict[str, float | str] = {}
+        self.findings: list[Finding] = []
+
+    def walk(self, name: str, value: Any, depth: int = 0) -> None:
+        """Lay out one value under a name."""
+        if depth > MAX_DEPTH:
+            self._skipped(name, f"is nested deeper than {MAX_DEPTH} levels")
+        elif isinstance(value, Mapping):
+            self._mapping(name, cast("Mapping[Any, Any]", value), depth)
+        elif isinstance(value, (str, bytes)):
+            self.constants[name] = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+        elif isinstance(value, (list, tuple)):
+            self._list(name, cast("Sequence[Any]", value), depth)
+        elif isinstance(value, np.ndarray):
+            self._array(name, cast("np.ndarray[Any, Any]", value), depth)
+        elif isinstance(value, (bool, int, float, np.number, np.bool_)):
+            self.constants[name] = as_number(value)
+
+    def _mapping(self, name: str, value: Mapping[Any, Any], depth: int) -> None:
+        before = len(self.columns)
+        label = next((str(value[k]) for k in NAMES if isinstance(value.get(k), str) and value[k]), "")
+        inner = next((k for k in VALUES if k in value and not np.isscalar(value[k])), None)
+        if label and inner is not None:
+            unit = next(
+                (str(value[k]) for k in ("unit", "Unit", "units") if isinstance(value.get(k), str)), ""
+            )
+            self.walk(_join(name, label), value[inner], depth + 1)
+            self._give_unit(before, unit)
+        else:
+            for key, item in value.items():
+                self.walk(_join(name, str(key)), item, depth + 1)
+
+    def _give_unit(self, before: int, unit: str) -> None:
+        self.columns[before:] = [
+            Column(c.name, c.values, c.unit or unit, c.clock) for c in self.columns[before:]
+        ]
+
+    def _list(self, name: str, value: Sequence[Any], depth: int) -> None:
+        if not value:
+            return
+        if all(isinstance(item, Mapping) for item in value):
+            samples = cast("Sequence[Mapping[str, Any]]", value)
+            few = len(samples) <= MAX_WIDTH
+            if any(_labelled(s) for s in samples) or (few and any(_has_signals(s) for s in samples)):
+                for i, sample in enumerate(samples):
+                    self.walk(_join(name, "" if _labelled(sample) else str(i)), sample, depth + 1)
+            else:
+                self._samples(name, samples)
+            return
+        if any(isinstance(item, (Mapping, list, tuple, np.ndarray)) for item in value):
+            self._ragged(name, value, depth)
+            return
+        numbers = as_numbers(value)
+        if numbers is None:
+            self._skipped(name, "holds no numbers")
+        else:
+            self._array(name, numbers, depth)
+
+    def _ragged(self, name: str, value: Sequence[Any], depth: int) -> None:
+        rows = [_row(item) for item in value]
+        whole = [r for r in rows if r is not None]
+        if len(whole) == len(rows) and len({r.size for r in whole}) == 1:
+            self._array(name, np.stack(whole), depth)
+            return
+        for i, item in enumerate(value[:MAX_WIDTH]):
+            self.walk(_join(name, str(i)), item, depth + 1)
+
+    def _samples(self, name: str, samples: Sequence[Mapping[str, Any]]) -> None:
+        """A list of samples, each a mapping: one column a key."""
+        flat = [_flat(sample) for sample in samples]
+        keys = dict.fromkeys(key for sample in flat for key in sample)
+        for key in keys:
+            values = [as_number(sample.get(key)) for sample in flat]
+            if all(math.isnan(v) for v in values) and any(isinstance(s.get(key), str) for s in flat):
+                continue
+            # The list's own name says nothing about a signal.
+            self.columns.append(Column(key, np.array(values)))
+
+    def _array(self, name: str, value: np.ndarray[Any, Any], depth: int) -> None:
+        if value.dtype.names:
+            for field in value.dtype.names:
+                self.walk(_join(name, field), value[field], depth + 1)
+            return
+        if value.dtype == object:
+            self._list(name, value.ravel().tolist(), depth + 1)
+            return
+        numbers = _numeric(value)
+        if numbers is None:
+            if value.size == 1:
+                self.constants[name] = str(value.ravel()[0])
+            else:
+                self._skipped(name, f"holds {value.dtype}, not numbers")
+            return
+        numbers = np.squeeze(numbers)
+        if numbers.ndim == 0:
+            self.constants[name] = float(numbers)
+        elif numbers.ndim == 1:
+            if numbers.size:
+                self.columns.append(Column(name, numbers))
+        elif numbers.ndim == 2:
+            self._matrix(name, numbers)
+        else:
+            self._skipped(name, f"has shape {value.shape}; only vectors and matrices are signals")
+
+    def _matrix(self, name: str, value: np.ndarray[Any, Any]) -> None:
+        rows = value if value.shape[0] >= value.shape[1] else value.T
+        if rows.shape[1] > MAX_WIDTH:
+            self._skipped(name, f"has {rows.shape[1]} columns; at most {MAX_WIDTH} are read")
+            return
+        for i in range(rows.shape[1]):
+            self.columns.append(
+                Column(f"{name}[{i}]" if name else f"column {i + 1}", np.ascontiguousarray(rows[:, i]))
+            )
+
+    def _skipped(self, name: str, why: str) -> None:
+        self.findings.append(Finding("note", "not-read", f"{name or 'the file'!r} {why}; it was left out"))
+
+
+def table_of(format_name: str, tree: Any, name: str = "", findings: Sequence[Finding] = ()) -> Table:
+    """Lay out a tree of mappings, lists and arrays.
+
+    Where two or more of its groups hold a time of their own, the columns of each get it as their clock.
+    """
+    layout = _Layout()
+    layout.walk(name, tree)
+    return Table(format_name, _with_clocks(layout.columns), layout.constants, (*findings, *layout.findings))
+
+
+def _with_clocks(columns: list[Column]) -> tuple[Column, ...]:
+    clocks = {_group(c.name): c for c in columns if c.name.rsplit(".", 1)[-1] in TIMES}
+    if len(clocks) < 2:
+        return tuple(columns)
+    out: list[Column] = []
+    for column in columns:
+        # The nearest group above the column that has a time of the same length.
+        group, clock = _group(column.name), None
+        while clock is None:
+            found = clocks.get(group)
+            if found is not None and found.values.size == column.values.size:
+                clock = found
+            if not group:
+                break
+            group = _group(group)
+        if clock is not column:
+            out.append(Column(column.name, column.values, column.unit, clock.values if clock else None))
+    return tuple(out)
+
+
+def _group(name: str) -> str:
+    return name.rsplit(".", 1)[0] if "." in name else ""
+
+
+def _join(group: str, name: str) -> str:
+    return f"{group}.{name}" if group and name else group or name
+
+
+def _labelled(sample: Mapping[str, Any]) -> bool:
+    return any(isinstance(sample.get(k), str) for k in NAMES) and any(
+        not np.isscalar(sample.get(k)) for k in VALUES if k in sample
+    )
+
+
+def _has_signals(sample: Mapping[str, Any]) -> bool:
+    """Whether a value of it is too long to be a vector within one sample."""
+    lists: list[Any] = [v for v in sample.values() if isinstance(v, (list, np.ndarray))]
+    return any(np.size(v) > MAX_WIDTH and np.ndim(v) > 0 for v in lists if not _is_uneven(v))
+
+
+def _is_uneven(value: Any) -> bool:
+    return isinstance(value, list) and any(isinstance(i, (list, Mapping)) for i in cast("list[Any]", value))
+
+
+def _flat(sample: Mapping[str, Any], prefix: str = "", depth: int = 0) -> dict[str, Any]:
+    """One sample without nesting: mappings joined by dots, vectors by [i]."""
+    out: dict[str, Any] = {}
+    for key, value in sample.items():
+        name = _join(prefix, str(key))
+        if isinstance(value, Mapping) and depth < MAX_DEPTH:
+            out |= _flat(cast("Mapping[str, Any]", value), name, depth + 1)
+        elif isinstance(value, (list, tuple)):
+            items = cast("Sequence[Any]", value)
+            out |= {f"{name}[{i}]": item for i, item in enumerate(items[:MAX_WIDTH])}
+        else:
+            out[name] = value
+    return out
+
+
+def as_number(value: Any) -> float:
+    """One value as a float; NaN where it is none."""
+    if isinstance(value, (bool, int, float, np.number, np.bool_)):
+        try:
+            return float(cast("Any", value))
+        except (OverflowError, TypeError):
+            return math.nan
+    if isinstance(value, str):
+        try:
+            return float(value)
+        except ValueError:
+            return math.nan
+    return math.nan
+
+
+def as_numbers(values: Sequence[Any]) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+    """A flat sequence as floats, NaN where an entry is none; None where no entry is a number."""
+    numbers = np.array([as_number(v) for v in values], dtype=np.float64)
+    return None if numbers.size and np.isnan(numbers).all() and not _all_nan(values) else numbers
+
+
+def _all_nan(values: Sequence[Any]) -> bool:
+    return all(isinstance(v, (float, np.floating)) for v in values)
+
+
+def _row(item: Any) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+    """One row of a matrix written as lists."""
+    if isinstance(item, np.ndarray):
+        array = cast("np.ndarray[Any, Any]", item)
+        return _numeric(array) if array.ndim == 1 else None
+    if isinstance(item, (list, tuple)):
+        return as_numbers(cast("Sequence[Any]", item))
+    return None
+
+
+def _numeric(value: np.ndarray[Any, Any]) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+    """An array of numbers as floats; times of NumPy in s; None where it holds something else."""
+    if value.dtype.kind in "biuf":
+        return value.astype(np.float64)
+    if value.dtype.kind in "mM":
+        ticks = value.astype("datetime64[ns]" if value.dtype.kind == "M" else "timedelta64[ns]")
+        seconds = ticks.astype(np.int64) * 1e-9
+        return np.where(np.isnat(ticks), np.nan, seconds)
+    return None

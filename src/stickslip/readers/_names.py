@@ -1,0 +1,325 @@
+"""What a column's name says: its quantity, its unit, its axis and its side.
+
+English, German and the names drives and controllers use (CiA 402 objects, TwinCAT, Sinamics, Sercos, Logix, AKD,
+ODrive, Dynamixel, ROS). A name is cut into words; a role is known by one of its words or by its whole spelling.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from stickslip.readers._units import Unit, parse_unit
+
+__all__ = ["ALIASES", "KINDS", "ROLES", "Name", "role_of", "words"]
+
+KINDS: dict[str, tuple[str, ...]] = {
+    "time": ("time",),
+    "position": ("angle", "length", "counts"),
+    "position_reference": ("angle", "length", "counts"),
+    "position_error": ("angle", "length", "counts"),
+    "velocity": ("angular velocity", "velocity", "count rate"),
+    "velocity_reference": ("angular velocity", "velocity", "count rate"),
+    "acceleration": ("angular acceleration", "acceleration"),
+    "motor_torque": ("torque", "force", "share"),
+    "friction_torque": ("torque", "force"),
+    "compensation_torque": ("torque", "force", "share"),
+    "current": ("current", "share"),
+    "current_reference": ("current", "share"),
+    "voltage": ("voltage",),
+    "load": ("force", "torque", "share"),
+    "temperature": ("temperature",),
+}
+"""The channels a file can fill, and the kinds of unit each may have; the first is meant where none is given."""
+
+ROLES = tuple(KINDS)
+
+ALIASES = {
+    "torque": "motor_torque",
+    "force": "motor_torque",
+    "friction": "friction_torque",
+    "reference": "position_reference",
+    "angle": "position",
+    "speed": "velocity",
+    "normal_force": "load",
+}
+"""Short names accepted in a mapping."""
+
+
+def _table(text: str) -> dict[str, tuple[str, ...]]:
+    """A mapping from "key: word word ..." lines; indented lines go on."""
+    out: dict[str, tuple[str, ...]] = {}
+    key = ""
+    for word in text.split():
+        if word.endswith(":"):
+            key = word[:-1]
+            out[key] = ()
+        else:
+            out[key] += (word,)
+    return out
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+WORDS = _table(
+    """
+    time: time zeit timestamp zeitstempel datetime uhrzeit elapsed seconds clock stamp
+    position: position positions pos angle winkel lage weg displacement deflection theta phi posn encoder enc
+        resolver lageist lagesoll stellung rotation stroke hub posist possoll istpos sollpos istposition
+        sollposition istlage solllage lageistwert lagesollwert actpos setpos lastposition qpos drehwinkel
+        motorposition ptpos
+    velocity: velocity velocities vel velo speed geschwindigkeit drehzahl omega qvel nist nsoll vist vsoll
+        drehzahlistwert drehzahlsollwert istdrehzahl solldrehzahl actvelo setvelo istgeschwindigkeit
+        sollgeschwindigkeit geschw dtheta dphi rpm
+    acceleration: acceleration acc accel beschleunigung ddtheta acceler
+    motor_torque: torque torques trq tau drehmoment moment effort kraft force istmoment sollmoment
+        momentenistwert drehmomentistwert torqueforce tq thrust mist
+    friction_torque: friction reibung reibmoment reibkraft reibungsmoment reibungskraft
+    current: current currents strom iq amps iqist stromistwert iststrom motorstrom cur amperage
+    voltage: voltage volts spannung volt uq motorspannung vir
+    load: normal normalforce normalkraft preload vorspannung fn load last
+    temperature: temperature temp temperatur motortemp tmp
+    position_error: schleppfehler schleppabstand followingerror lag poserror posdiff regelabweichung
+    """
+)
+"""Words that name a quantity."""
+
+WHOLE = _table(
+    """
+    time: t ts secs s sec time_s tout t_s
+    position: q qm q_m x y th 6064 607a_actual pl.fb s-0-0051 s-0-0053 px x_m qmes q_act pos_estimate
+        encoder.pos_estimate p_act r2521 phi_m theta_m theta_l q_l q_meas
+    velocity: v w dq qd_m dqm dx qdot n 606c vl.fb s-0-0040 vx vel_estimate r0061 r61 r0063 r63 dq_act v_act
+        n_act omega_m w_m v_m thetadot q_dot theta_dot
+    motor_torque: tq te t_m tm tau_m 6077 s-0-0084 r0080 r80 m_act m_motor u_tau tau_act
+    friction_torque: tf t_f ff f_f tau_f m_r mr
+    current: i i_q iq_measured iq_act 6078 il.fb r0078 r78 i_act im i_m ia
+    voltage: u vm u_q u_m v_motor ua input_volts 6079
+    acceleration: a ddq qddot ddx a_act
+    temperature: r0035 r35
+    position_reference: qg q_d qd qr q_r q_ref q_des xd x_d 607a 6062 pl.cmd s-0-0047 input_pos r ref w_pos
+        setpoint sollwert command goal reference theta_d thetad
+    velocity_reference: 60ff 606b vl.cmd s-0-0036 input_vel r0062 r62 dqd dq_d v_d w_d
+    current_reference: iq_setpoint il.cmd r0077
+    position_error: 60f4 e pl.err s-0-0189 error position_error
+    compensation_torque: 60b2 compensation_torque torque_offset
+    """
+)
+"""Whole names (or their last part) that name a quantity."""
+
+WANTED = _words(
+    """
+    cmd command commanded demand demanded des desired drehzahlsollwert fuehrungsgroesse goal input
+    lagesoll lagesollwert nsoll planned possoll ref reference set setpoint setpos setvelo soll
+    solldrehzahl sollgeschwindigkeit solllage sollmoment sollpos sollposition sollwert target trajectory
+    vorgabe vsoll ziel
+    """
+)
+"""Words that say that a quantity is wanted, not measured."""
+
+ERROR = frozenset(["deviation", "diff", "err", "error", "fehler", "following", "lag"])
+LOAD_SIDE = frozenset(
+    [
+        "abtrieb",
+        "arm",
+        "last",
+        "lastposition",
+        "lastseitig",
+        "link",
+        "load",
+        "loadside",
+        "lside",
+        "output",
+        "side2",
+    ]
+)
+MOTOR_SIDE = frozenset(["antrieb", "drive", "mot", "motor", "motorseitig", "rotor"])
+SKIP = _words(
+    """
+    achse act actual axes axis estimate fb feedback filtered internal ist istwert joint meas measured mes
+    present raw value
+    """
+)
+_NO_SIGNAL = _words(
+    """
+    counter enable enabled error_code flag gain id index limit mode state status valid
+    """
+)
+_NO_TAIL = frozenset(["1", "c", "f", "h", "i", "in", "k", "kp", "lb", "m", "min", "p", "u", "x"])
+"""Units that are more often something else at the end of a name."""
+REFERENCED = {
+    "position": "position_reference",
+    "velocity": "velocity_reference",
+    "current": "current_reference",
+}
+
+IN_BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]{1,24}?)\s*[\])>}]")
+AFTER_IN = re.compile(r"\s+in\s+(\S{1,12})\s*$|\s*/\s*(\S{1,12})\s*$", re.IGNORECASE)
+CAMEL = re.compile(r"(?<=[a-zäöüß])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+UMLAUTS = str.maketrans(
+    {
+        "ä": "ae",
+        "ö": "oe",
+        "ü": "ue",
+        "ß": "ss",
+        "θ": "theta",
+        "φ": "phi",
+        "ϕ": "phi",
+        "ω": "omega",
+        "τ": "tau",
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """What a column's name says.
+
+    Attributes
+    ----------
+    role : str
+        A channel, or empty where none is recognised.
+    sure : int
+        2 a whole name, 1 a word among others, 0 a command that may stand for what is measured, or nothing.
+    unit : str
+        The unit written in the name, or empty.
+    axis : str
+        The number that tells axes apart ("pos2" gives "2"), or empty.
+    side : {"", "motor", "load"}
+    """
+
+    role: str
+    sure: int
+    unit: str
+    axis: str
+    side: str
+
+
+def words(name: str) -> list[str]:
+    """The words of a name: at signs, at capitals and between letters and digits, in lower case."""
+    cut = CAMEL.sub(" ", name)
+    return [w for w in re.split(r"[^0-9a-z]+", cut.lower().translate(UMLAUTS)) if w]
+
+
+def role_of(name: str, unit: str = "") -> Name:
+    """Read a column's name; `unit` is the unit that the file gives besides."""
+    bare, inner = _without_unit(name)
+    if not unit and not inner and not _whole(bare):
+        bare, inner = _without_tail(bare)
+    stated = unit or inner
+    parts = words(bare)
+    if not _NO_SIGNAL.isdisjoint(parts):
+        return Name("", 0, stated, "", "")
+    axis = ""
+    if not _whole(bare):
+        if parts and (match := re.fullmatch(r"([a-z]+)(\d{1,2})", parts[-1])):
+            parts[-1], axis = match[1], match[2]
+        elif len(parts) > 1 and re.fullmatch(r"\d{1,2}", parts[-1]):
+            axis = parts.pop()
+    role, sure = _role(bare, parts)
+    parsed = parse_unit(stated) if stated else None
+    if not role and parsed is not None:
+        role, sure = _role_by_unit(parts, parsed), 1
+    if role == "motor_torque" and parsed is not None and parsed.kind == "current":
+        role = "current"
+    if role and parsed is not None and parsed.kind not in KINDS[role]:
+        role, sure = "", 0
+    return Name(role, sure if role else 0, stated, axis, _side(parts, role))
+
+
+def _without_tail(bare: str) -> tuple[str, str]:
+    """A unit written after the last underscore or blank: "q_deg", "omega_rad_s"."""
+    pieces = [p for p in re.split(r"[_\s]+", bare) if p]
+    for count, join in ((2, "/"), (1, "")):
+        tail = join.join(pieces[-count:])
+        if len(pieces) > count and tail not in _NO_TAIL and (unit := parse_unit(tail)) is not None:
+            head = "_".join(pieces[:-count])
+            role = _role(head, words(head))[0]
+            if role in ("", "motor_torque") or unit.kind in KINDS[role]:
+                return head, tail
+    return bare, ""
+
+
+def _without_unit(name: str) -> tuple[str, str]:
+    """The name without the unit in it, and the unit."""
+    for match in reversed(list(IN_BRACKETS.finditer(name))):
+        if parse_unit(match[1]) is not None:
+            return (name[: match.start()] + " " + name[match.end() :]).strip(), match[1]
+    if (match := AFTER_IN.search(name)) and parse_unit(match[1] or match[2]) is not None:
+        return name[: match.start()].strip(), match[1] or match[2]
+    return name.strip(), ""
+
+
+def _whole(bare: str) -> str:
+    """The role that a whole spelling, or its last part after a dot, names."""
+    spelled = bare.lower().translate(UMLAUTS).strip().replace(" ", "_")
+    last = re.split(r"[./|:]", spelled)[-1]
+    code = re.search(r"(?:0x|index_?)?(60[0-9a-f]{2})h?(?::\w+)?$", spelled)
+    for candidate in (spelled, last, code[1] if code else ""):
+        for role, names in WHOLE.items():
+            if candidate in names or candidate in (role, *_aliases(role)):
+                return role
+    return ""
+
+
+def _aliases(role: str) -> tuple[str, ...]:
+    return tuple(a for a, r in ALIASES.items() if r == role)
+
+
+def _role(bare: str, parts: list[str]) -> tuple[str, int]:
+    """The quantity that a name speaks of, and how surely."""
+    if role := _whole(bare):
+        return role, 2
+    wanted = not WANTED.isdisjoint(parts)
+    found = [role for role, known in WORDS.items() if not set(known).isdisjoint(parts)]
+    if "load" in found and len(found) > 1:
+        found.remove("load")  # "load position" is a position on the load's side
+    if "friction_torque" in found:
+        found = ["friction_torque"]
+    if (
+        {"following", "error"} <= set(parts)
+        or "position_error" in found
+        or ("position" in found and not ERROR.isdisjoint(parts))
+    ):
+        return "position_error", 1
+    if "position" in found and len(found) > 1:
+        found = [
+            r for r in found if r != "position" or not {"encoder", "enc", "resolver"} & set(parts)
+        ] or found
+    if len(found) > 1:
+        found = [r for r in found if r != "time"] or found
+    if not found:
+        # A short name with a word around it: "q act", "ist n".
+        rest = [
+            w
+            for w in parts
+            if w not in SKIP and w not in WANTED and w not in LOAD_SIDE and w not in MOTOR_SIDE
+        ]
+        role = _whole(rest[0]) if len(rest) == 1 else ""
+        if not role:
+            return "", 0
+        found = [role]
+    role = found[0]
+    if wanted and role == "motor_torque":
+        return role, 0
+    if wanted:
+        role = REFERENCED.get(role, role if role.endswith("_reference") else "")
+    return role, 1
+
+
+def _role_by_unit(parts: list[str], unit: Unit) -> str:
+    """What an unknown name with a telling unit must be; empty where the unit tells too little."""
+    if not WANTED.isdisjoint(parts):
+        return ""
+    return {"angular velocity": "velocity", "torque": "motor_torque", "current": "current", "voltage": "voltage",
+            "temperature": "temperature", "angle": "position"}.get(unit.kind, "")  # fmt: skip
+
+
+def _side(parts: list[str], role: str) -> str:
+    if role in ("load", ""):
+        return ""
+    if not LOAD_SIDE.isdisjoint(parts):
+        return "load"
+    return "motor" if not MOTOR_SIDE.isdisjoint(parts) else ""

@@ -1,0 +1,314 @@
+"""Text tables: delimiter, decimal comma, header and units are sniffed; TwinCAT Scope's time and value columns too."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.finding import Finding
+from stickslip.readers import _scope
+from stickslip.readers._table import Array, Column, Format, Table
+from stickslip.readers._units import parse_unit
+
+__all__ = ["FORMAT", "cell"]
+
+DIALECTS = (("\t", "."), ("\t", ","), (";", "."), (";", ","), (",", "."), ("|", "."), (" ", "."), (" ", ","))
+"""Delimiter and decimal sign, in the order in which ties are decided."""
+SAMPLE = 400
+"""Lines from which the dialect is told."""
+NO_VALUE = frozenset(
+    (
+        "",
+        "nan",
+        "n/a",
+        "na",
+        "#n/a",
+        "null",
+        "none",
+        "-",
+        "--",
+        "nat",
+        "-nan",
+        "nan(ind)",
+        "-nan(ind)",
+        "1.#qnan",
+        "?",
+    )
+)
+TRUTH = {"true": 1.0, "false": 0.0, "on": 1.0, "off": 0.0, "wahr": 1.0, "falsch": 0.0}
+COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s*")
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How the lines are cut, and where the data begin."""
+
+    delimiter: str
+    decimal: str
+    width: int
+    start: int
+
+    def split(self, line: str) -> list[str]:
+        """The cells of a line."""
+        if self.delimiter == " ":
+            return line.split()
+        if '"' in line:
+            try:
+                return next(csv.reader([line], delimiter=self.delimiter), list[str]())
+            except csv.Error:
+                pass
+        return line.split(self.delimiter)
+
+
+def recognise(head: bytes, path: Path) -> bool:
+    """Text: what no other format claims and has no binary zeros (UTF-16 has, after its mark)."""
+    return bool(head) and (head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" not in head)
+
+
+def read(path: Path) -> Table:
+    """Every column of a text table."""
+    lines = _decode(path).splitlines()
+    dialect = _sniff(path, lines)
+    header = [dialect.split(COMMENT.sub("", line)) for line in lines[: dialect.start] if line.strip()]
+    body = [line for line in lines[dialect.start :] if line.strip()]
+    body, findings = _without_footer(body, dialect)
+    values, odd = _values(body, dialect, dialect.start)
+    findings += odd
+    if (groups := _scope.groups(header, dialect.width)) is not None:
+        # The groups of slower channels end earlier.
+        findings = [f for f in findings if f.code != "short-row"]
+        return Table("csv", _scope.columns(header, groups, values), _scope.constants(header), tuple(findings))
+    names, units = _names(header, dialect.width)
+    if values.shape[1] and np.isnan(values[:, -1]).all() and not names[-1]:
+        values = values[:, :-1]  # a delimiter ends every line
+    columns = tuple(
+        Column(name or f"column {i + 1}", np.ascontiguousarray(values[:, i]), unit)
+        for i, (name, unit) in enumerate(zip(names[: values.shape[1]], units, strict=False))
+    )
+    return Table("csv", columns, _constants(header, dialect), tuple(findings))
+
+
+# ---- bytes to lines -----------------------------------------------------------------------------------------
+
+
+def _decode(path: Path) -> str:
+    data = path.read_bytes()
+    try:
+        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            return data.decode("utf-16")
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        # Every byte means something in Latin-1; Windows' own signs differ in places no number uses.
+        return data.decode("latin-1")
+
+
+def _sniff(path: Path, lines: Sequence[str]) -> Dialect:
+    """The dialect under which most lines of a sample are rows of numbers of one width."""
+    filled = [(i, line) for i, line in enumerate(lines) if line.strip()]
+    sample = filled[:SAMPLE] if len(filled) <= SAMPLE else filled[: SAMPLE // 2] + filled[-SAMPLE // 2 :]
+    best, score = None, 0.0
+    for delimiter, decimal in DIALECTS:
+        trial = Dialect(delimiter, decimal, 0, 0)
+        widths: dict[int, int] = {}
+        for _, line in sample:
+            cells = trial.split(line)
+            if _is_row(cells, decimal):
+                widths[len(cells)] = widths.get(len(cells), 0) + 1
+        if not widths:
+            continue
+        width = max(widths, key=lambda w: (widths[w], w))
+        # A second column is worth more than the last few rows.
+        merit = widths[width] * min(width, 3)
+        if merit > score * 1.001:
+            best, score = Dialect(delimiter, decimal, width, 0), merit
+    if best is None:
+        raise InputError(f"{path} holds no table of numbers; give a file with one row of numbers a sample")
+    start = next(
+        i for i, line in filled if len(c := best.split(line)) == best.width and _is_row(c, best.decimal)
+    )
+    return Dialect(best.delimiter, best.decimal, best.width, start)
+
+
+def _is_row(cells: Sequence[str], decimal: str) -> bool:
+    """Whether most cells are numbers and no other is a word."""
+    numbers = 0
+    for text in cells:
+        value = cell(text, decimal)
+        if value is None:
+            return False
+        numbers += not math.isnan(value)
+    return numbers > 0 and numbers >= 0.5 * len(cells)
+
+
+def _without_footer(body: list[str], dialect: Dialect) -> tuple[list[str], list[Finding]]:
+    """The rows without the words that end some exports."""
+    end = len(body)
+    while end and all(cell(c, dialect.decimal) is None for c in dialect.split(body[end - 1]) if c.strip()):
+        end -= 1
+    if end == len(body) or body[end].strip() == "EOF":
+        return body[:end], []
+    return body[:end], [
+        Finding(
+            "note",
+            "trimmed-footer",
+            f"{len(body) - end} lines of text after the data were left out: {body[end][:40]!r}",
+        )
+    ]
+
+
+# ---- cells to numbers ---------------------------------------------------------------------------------------
+
+
+def cell(text: str, decimal: str) -> float | None:
+    """A cell's number; NaN where it says that there is none, None where it is something else."""
+    word = text.strip().strip('"').strip()
+    if decimal == "," and "," in word:
+        word = word.replace(",", ".") if "." not in word else ""
+        if not word:
+            return None
+    try:
+        return float(word) if "_" not in word else None
+    except ValueError:
+        pass
+    lower = word.lower()
+    if lower in NO_VALUE:
+        return math.nan
+    if lower in TRUTH:
+        return TRUTH[lower]
+    return _moment(word)
+
+
+def _moment(word: str) -> float | None:
+    """A date with time, as s since 1970."""
+    if len(word) < 16 or not word[:4].isdigit():
+        return None
+    try:
+        moment = datetime.fromisoformat(word)
+    except ValueError:
+        return None
+    try:
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    except (OverflowError, ValueError, OSError):
+        return None
+
+
+def _values(body: Sequence[str], dialect: Dialect, start: int) -> tuple[Array, list[Finding]]:
+    """The rows as numbers, shape (n, width); NaN where a cell holds none."""
+    if dialect.decimal == "." or dialect.delimiter != ",":
+        text = "\n".join(body)
+        if dialect.decimal == ",":
+            text = text.replace(",", ".")
+        try:
+            values = np.loadtxt(io.StringIO(text), delimiter=None if dialect.delimiter == " " else dialect.delimiter,
+                                ndmin=2, comments=None)  # fmt: skip
+            if values.shape == (len(body), dialect.width):
+                return values, []
+        except (ValueError, IndexError):
+            pass
+    return _values_one_by_one(body, dialect)
+
+
+def _values_one_by_one(body: Sequence[str], dialect: Dialect) -> tuple[Array, list[Finding]]:
+    values = np.full((len(body), dialect.width), np.nan)
+    short, long, words = list[int](), list[int](), list[tuple[int, int, str]]()
+    for i, line in enumerate(body):
+        cells = dialect.split(line)
+        if len(cells) < dialect.width:
+            short.append(i)
+        elif any(c.strip() for c in cells[dialect.width :]):
+            long.append(i)
+        for j, text in enumerate(cells[: dialect.width]):
+            value = cell(text, dialect.decimal)
+            if value is None:
+                words.append((i, j, text.strip()))
+            else:
+                values[i, j] = value
+    findings: list[Finding] = []
+
+    def warn(code: str, message: str, row: int) -> None:
+        findings.append(Finding("warning", code, message, f"row {row + 1}", "mend or delete these rows"))
+
+    if short:
+        said = f"{len(short)} rows have fewer than {dialect.width} cells; the rest was taken as missing"
+        warn("short-row", said, short[0])
+    if long:
+        warn(
+            "long-row",
+            f"{len(long)} rows have more than {dialect.width} cells; what is beyond was left out",
+            long[0],
+        )
+    if words:
+        row, column, text = words[0]
+        said = f"{len(words)} cells are no numbers and count as missing, first {text[:30]!r} in column {column + 1}"
+        warn("not-a-number", said, row)
+    return values, findings
+
+
+# ---- names and units ----------------------------------------------------------------------------------------
+
+
+def _names(header: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[str]]:
+    """Names and units of the columns, from the last header rows of about that width."""
+    rows = [[c.strip().strip('"').strip() for c in row] for row in header]
+    rows = [
+        row for row in rows if abs(len(row) - width) <= 1 and sum(bool(c) for c in row) >= max(1, width - 2)
+    ]
+    units = [""] * width
+    if len(rows) > 1 and _all_units(rows[-1]):
+        units = [_bare(c) for c in _fitted(rows.pop(), width)]
+    names = _fitted(rows[-1], width) if rows else [""] * width
+    return _distinct(names), units
+
+
+def _all_units(row: Sequence[str]) -> bool:
+    """Whether a row holds nothing but units (or signs for none), and at least one."""
+    told = [_bare(c) for c in row]
+    real = [c for c in told if c not in ("", "-", "1")]
+    return bool(real) and all(parse_unit(c) is not None for c in real)
+
+
+def _bare(text: str) -> str:
+    return re.sub(r"^[\[(<{]\s*|\s*[\])>}]$", "", text.strip())
+
+
+def _fitted(row: Sequence[str], width: int) -> list[str]:
+    return [*row[:width], *[""] * (width - len(row))]
+
+
+def _distinct(names: Sequence[str]) -> list[str]:
+    seen: dict[str, int] = {}
+    out: list[str] = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        out.append(name if not name or seen[name] == 1 else f"{name} ({seen[name]})")
+    return out
+
+
+def _constants(header: Sequence[Sequence[str]], dialect: Dialect) -> dict[str, float | str]:
+    """Lines like "key: value" above the table."""
+    out: dict[str, float | str] = {}
+    for row in header:
+        cells = [c.strip() for c in row if c.strip()]
+        if len(cells) == 1 and re.match(r"[^:=]{1,40}[:=]\s*\S", cells[0]):
+            key, value = re.split(r"[:=]", cells[0], maxsplit=1)
+        elif len(cells) == 2 and dialect.width != 2:
+            key, value = cells
+        else:
+            continue
+        number = cell(value, dialect.decimal)
+        out[key.strip().rstrip(":")] = value.strip() if number is None or math.isnan(number) else number
+    return out
+
+
+FORMAT = Format(
+    "csv", "text (CSV, TSV, TwinCAT Scope)", (".csv", ".tsv", ".txt", ".dat", ".asc", ".log"), recognise, read
+)

@@ -1,0 +1,60 @@
+"""MATLAB files: version 5 to 7.2 by SciPy, version 7.3 (which is HDF5) by h5py."""
+
+from __future__ import annotations
+
+import importlib
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.finding import Finding
+from stickslip.readers import hdf5
+from stickslip.readers._flatten import table_of
+from stickslip.readers._table import Format, Table
+
+__all__ = ["FORMAT"]
+
+
+def recognise(head: bytes, path: Path) -> bool:
+    """Both versions begin with a line of text; version 4 has only its file name."""
+    return head.startswith(b"MATLAB") or (path.suffix.lower() == ".mat" and not head.startswith(b"\x89HDF"))
+
+
+def read(path: Path) -> Table:
+    """Every numeric variable and field of a structure, joined by dots."""
+    with path.open("rb") as file:
+        head = file.read(1024)
+    if head.startswith(b"MATLAB 7.3") or b"\x89HDF" in head:
+        return hdf5.read_tree(path, "mat", matlab=True)
+    loadmat: Any = importlib.import_module("scipy.io").loadmat
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            variables = cast("Mapping[str, Any]", loadmat(path, simplify_cells=True))
+    except Exception as error:  # SciPy raises a dozen kinds on a damaged file
+        raise InputError(f"{path} is no MAT file that can be read ({type(error).__name__}: {error}); "
+                         "save it again with `save file.mat -v7`") from None  # fmt: skip
+    tree = {k: v for k, v in variables.items() if not k.startswith("__") and not _opaque(v)}
+    findings = [
+        Finding("warning", "not-read", f"{k!r} is a MATLAB object, which cannot be read",
+                remedy="save its numbers as arrays, such as `t = ts.Time; q = ts.Data`")
+        for k, v in variables.items() if not k.startswith("__") and _opaque(v)
+    ]  # fmt: skip
+    if "__function_workspace__" in variables and not findings:
+        findings.append(Finding("warning", "not-read", "the file holds MATLAB objects, which cannot be read",
+                                remedy="save their numbers as arrays"))  # fmt: skip
+    return table_of("mat", tree, findings=findings)
+
+
+def _opaque(value: Any) -> bool:
+    if isinstance(value, np.ndarray):
+        fields = cast("np.ndarray[Any, Any]", value).dtype.names
+        return fields is not None and "arr" in fields
+    return type(value).__name__ in ("MatlabOpaque", "MatlabFunction")
+
+
+FORMAT = Format("mat", "MATLAB (v5 to v7.3)", (".mat",), recognise, read)

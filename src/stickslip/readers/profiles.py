@@ -1,0 +1,123 @@
+"""Profiles: what the user once said about a layout of columns, kept for the next file of that layout.
+
+A profile is a TOML file, named by the user or kept under the layout's fingerprint in the user's configuration folder
+(`STICKSLIP_CONFIG`, else `XDG_CONFIG_HOME`/stickslip, `APPDATA`/stickslip or ~/.config/stickslip).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from stickslip.config import read_toml
+from stickslip.errors import InputError
+from stickslip.readers._choose import parse_mapping
+from stickslip.readers._convert import Drive
+from stickslip.readers._table import Table
+
+__all__ = ["Profile", "fingerprint", "folder", "load", "remembered", "save"]
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """What is said about files of one layout.
+
+    Attributes
+    ----------
+    mapping : mapping of str to str
+        Channel to "COLUMN", "COLUMN:UNIT" or "COLUMN:UNIT@side".
+    drive : Drive
+    sample_time : float or None
+        s, for files without times.
+    """
+
+    mapping: Mapping[str, str]
+    drive: Drive
+    sample_time: float | None = None
+
+
+def fingerprint(table: Table) -> str:
+    """Sixteen digits that the names and units of the columns determine, in whatever order they stand."""
+    layout = sorted((c.name, c.unit) for c in table.columns)
+    return hashlib.sha256(json.dumps(layout).encode()).hexdigest()[:16]
+
+
+def folder() -> Path:
+    """Where profiles are kept for this user."""
+    if own := os.environ.get("STICKSLIP_CONFIG"):
+        return Path(own) / "profiles"
+    base = os.environ.get("APPDATA") if os.name == "nt" else os.environ.get("XDG_CONFIG_HOME")
+    return Path(base or Path.home() / ".config") / "stickslip" / "profiles"
+
+
+def remembered(table: Table) -> Path | None:
+    """The profile kept for this layout, if there is one."""
+    path = folder() / f"{fingerprint(table)}.toml"
+    return path if path.is_file() else None
+
+
+def load(path: Path) -> Profile:
+    """Read a profile.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read, or has unknown keys or values.
+    """
+    with read_toml(path) as top:
+        top.text("fingerprint", "")
+        sample_time = top.positive("sample_time", "s", math.nan) if top.has("sample_time") else None
+        mapping: dict[str, str] = {}
+        if top.has("columns"):
+            with top.table("columns") as columns, columns.blamed():
+                mapping = parse_mapping({key: columns.text(key) for key in columns.values})
+        values: dict[str, Any] = {}
+        if top.has("drive"):
+            with top.table("drive") as table, table.blamed():
+                numbers = [f.name for f in fields(Drive) if f.name != "side" and table.has(f.name)]
+                values = {name: table.positive(name, "") for name in numbers}
+                values["side"] = table.choice("side", ("motor", "load"), "motor")
+        return Profile(mapping, Drive(**values), sample_time)
+
+
+def save(profile: Profile, table: Table, path: Path | None = None) -> Path:
+    """Write a profile to a file, or where `remembered` finds it. Returns the path.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    target = path or folder() / f"{fingerprint(table)}.toml"
+    lines = ["# Which column is which channel, for files with these columns:"]
+    lines += [f"#   {_comment(c.name)}" for c in table.columns[:40]]
+    lines += [f"fingerprint = {json.dumps(fingerprint(table))}"]
+    if profile.sample_time is not None:
+        lines.append(f"sample_time = {profile.sample_time!r}")
+    lines += ["", "[columns]", *(f"{role} = {_quoted(text)}" for role, text in profile.mapping.items())]
+    lines += ["", "[drive]", *(f"{key} = {_quoted(value)}" for key, value in profile.drive.known().items())]
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        draft = target.with_name(target.name + ".part")
+        draft.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        os.replace(draft, target)
+    except OSError as error:
+        raise InputError(
+            f"cannot write the profile {target} ({error.strerror or error}); name another file with --profile"
+        ) from None
+    return target
+
+
+def _comment(text: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
+def _quoted(value: str | float) -> str:
+    """A TOML value: JSON's escapes are TOML's, but for the character that JSON leaves alone."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,152 @@
+"""From a file to a record: the format found, the columns chosen, the units converted."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from stickslip.errors import InputError
+from stickslip.readers import profiles
+from stickslip.readers._choose import Choice, choose, parse_mapping
+from stickslip.readers._convert import Drive, convert
+from stickslip.readers._table import Format, Table
+from stickslip.record import Record
+
+__all__ = ["FORMATS", "formats", "open_table", "read", "record_of"]
+
+FORMATS = ("record_file", "mat", "hdf5", "parquet", "numpy_arrays", "json_samples", "csv_text")
+"""One file a format, asked in this order; text is last, since anything may be text."""
+
+
+def formats() -> list[Format]:
+    """Every registered format."""
+    return [importlib.import_module(f"stickslip.readers.{name}").FORMAT for name in FORMATS]
+
+
+def open_table(path: str | os.PathLike[str]) -> Table:
+    """Read a file's columns as they stand.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or its format is not known.
+    """
+    source = Path(path)
+    try:
+        head = b"" if source.is_dir() else _head(source)
+        if not head and not source.is_dir():
+            raise InputError(f"{source} is empty; give a file with samples")
+        known = formats()
+        found = next((f for f in known if f.recognise(head, source)), None)
+        if found is None:
+            titles = ", ".join(f.title for f in known)
+            raise InputError(f"{source} is in no format that is known; formats are {titles}")
+        table = found.read(source)
+    except FileNotFoundError:
+        raise InputError(f"no file {source}; check the path") from None
+    except (OSError, MemoryError) as error:
+        raise InputError(
+            f"{source} cannot be read ({getattr(error, 'strerror', None) or error}); give another file"
+        ) from None
+    if not table.columns:
+        raise InputError(f"{source} holds no columns of numbers; give a file with samples over time")
+    return table
+
+
+def _head(source: Path) -> bytes:
+    with source.open("rb") as file:
+        return file.read(4096)
+
+
+def read(
+    path: str | os.PathLike[str],
+    mapping: Mapping[str, str] | Sequence[str] = (),
+    *,
+    drive: Drive | None = None,
+    profile: str | os.PathLike[str] | None = None,
+    sample_time: float | None = None,
+) -> Record:
+    """Read a file of any known format as a record in SI units.
+
+    Columns that the mapping does not name are guessed from their names and units. What was read from where, with
+    which factor, and what was odd about it, is in ``record.meta["reading"]``; what was computed, in
+    ``record.meta["derived"]``.
+
+    Parameters
+    ----------
+    path : path
+    mapping : mapping of str to str, or sequence of str
+        ``{"position": "q_deg:deg"}`` or ``["position=q_deg:deg"]``: a channel, its column, its unit. A unit may have
+        a factor ("0.25 um"); "@load" behind it says that it was measured on the load's side of the gear; "none"
+        leaves the channel out.
+    drive : Drive
+        Counts a revolution, rated torque, torque constant, gear ratio.
+    profile : path
+        A profile that `stickslip.readers.profiles.save` wrote; the arguments above overrule it.
+    sample_time : float
+        s, for files without times.
+
+    Returns
+    -------
+    Record
+        Channels named as those of simulated records (position, velocity, motor_torque, position_reference, ...).
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, columns are missing or ambiguous, or a unit needs a number that nobody gave.
+    """
+    table = open_table(path)
+    kept = profiles.load(Path(profile)) if profile is not None else None
+    record = record_of(table, mapping, drive=drive, profile=kept, sample_time=sample_time)
+    for finding in cast("list[dict[str, Any]]", record.meta["reading"]["findings"]):
+        if finding["level"] == "error":
+            raise InputError(f"{path}: {finding['message']}; {finding['remedy']}")
+    return with_source(record, Path(path))
+
+
+def record_of(
+    table: Table,
+    mapping: Mapping[str, str] | Sequence[str] = (),
+    *,
+    drive: Drive | None = None,
+    profile: profiles.Profile | None = None,
+    sample_time: float | None = None,
+) -> Record:
+    """The record of a table; errors among the findings about its columns are left to the caller.
+
+    Raises
+    ------
+    InputError
+        As `read`.
+    """
+    said = parse_mapping(mapping)
+    kept = {k: v for k, v in profile.mapping.items() if k not in said} if profile else {}
+    choices, findings = choose(table, {**kept, **said})
+    choices = [_from_profile(c) if c.role in kept and c.source == "map" else c for c in choices]
+    settings = _merged(drive, profile.drive if profile else None)
+    period = sample_time if sample_time is not None or profile is None else profile.sample_time
+    return convert(table, choices, settings, period, [*table.findings, *findings])
+
+
+def with_source(record: Record, path: Path) -> Record:
+    """The record with its file's name and SHA-256 in meta."""
+    meta = dict(record.meta)
+    digest = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+    meta["reading"] = {**meta["reading"], "file": str(path), "sha256": digest}
+    return Record(record.time, record.channels, record.units, meta)
+
+
+def _from_profile(choice: Choice) -> Choice:
+    return Choice(choice.role, choice.column, choice.unit, "profile", choice.side)
+
+
+def _merged(given: Drive | None, kept: Drive | None) -> Drive:
+    """What is given, else what the profile says."""
+    if given is None or kept is None:
+        return given or kept or Drive()
+    return Drive(**{**kept.known(), **given.known()})

@@ -1,0 +1,39 @@
+"""The package's own records: channels with their units, and meta."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import cast
+
+from stickslip.readers._table import Column, Format, Table
+from stickslip.record import Record
+
+__all__ = ["FORMAT"]
+
+
+def recognise(head: bytes, path: Path) -> bool:
+    """A zip archive with the header that `Record.save` writes."""
+    if not head.startswith(b"PK"):
+        return False
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return "__header__.npy" in archive.namelist()
+    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
+        return False
+
+
+def read(path: Path) -> Table:
+    """Time and channels with their units."""
+    record = Record.load(path)
+    columns = [Column("time", record.time, "s")]
+    columns += [Column(name, record[name], record.units[name]) for name in record.channels]
+    constants: dict[str, float | str] = {
+        k: v
+        for k, v in cast("dict[str, object]", dict(record.meta)).items()
+        if isinstance(v, (str, float, int))
+    }
+    return Table("record", tuple(columns), constants)
+
+
+FORMAT = Format("record", "a record of this package", (".npz",), recognise, read)
