@@ -1,3 +1,3 @@
 """A law leaves Python: one file a target. `TARGETS` names them."""
 
-TARGETS = ("c99",)
+TARGETS = ("c99", "python", "matlab")

@@ -1,0 +1,186 @@
+"""Functions of the scalar subset in MATLAB, as Octave reads it too.
+
+Structures are passed by value: a function returns those that it changes after its own value.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from stickslip.export._analysis import Facts, analyse
+from stickslip.export._hoist import hoisted
+from stickslip.export._language import ATOM, Language
+from stickslip.subset import COUNT
+
+__all__ = ["HELPERS", "functions"]
+
+MATH = {"fabs": "abs", "pow": "power"} | {
+    n: n for n in ("exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
+                   "floor", "ceil", "hypot")
+}  # fmt: skip
+HELPERS = {
+    "copysign_": """\
+function y = copysign_(x, s)
+    y = abs(x);
+    if s < 0
+        y = -y;
+    end
+end
+""",
+    "choose_": """\
+function y = choose_(c, a, b)
+    if c
+        y = a;
+    else
+        y = b;
+    end
+end
+""",
+}
+"""Functions that MATLAB lacks."""
+
+
+class _Matlab(Language):
+    operators: ClassVar[dict[type[ast.AST], str]] = {
+        **Language.operators, ast.And: "&&", ast.Or: "||", ast.Not: "~", ast.NotEq: "~="
+    }  # fmt: skip
+
+    def __init__(self, facts: Facts, known: Mapping[str, Facts]) -> None:
+        super().__init__(facts)
+        self.known = known
+
+    # ---- expressions ---------------------------------------------------------------------------------
+
+    def name(self, name: str) -> str:
+        return "p.elements" if name == COUNT else name
+
+    def number(self, value: float) -> str:
+        if math.isinf(value):
+            return "Inf" if value > 0.0 else "-Inf"
+        return repr(value)
+
+    def as_real(self, node: ast.expr) -> str:
+        return self.expression(node, ATOM)
+
+    def field(self, node: ast.Attribute) -> str:
+        assert isinstance(node.value, ast.Name)
+        if node.value.id == "math":
+            return {"pi": "pi", "inf": "Inf"}[node.attr]
+        return f"{node.value.id}.{node.attr}"
+
+    def element(self, node: ast.Subscript) -> str:
+        assert isinstance(node.value, ast.Attribute)
+        return f"{self.field(node.value)}({self.expression(node.slice, ATOM)} + 1)"
+
+    def call(self, node: ast.Call) -> str:
+        if isinstance(node.func, ast.Attribute):
+            return self.library(node.func.attr, node.args)
+        assert isinstance(node.func, ast.Name)
+        name = node.func.id
+        given = [self.argument(a) for a in node.args]
+        if name in ("abs", "min", "max"):
+            return f"{name}({', '.join(given)})"
+        if name == "float":
+            return given[0]
+        if name == "int":
+            return f"fix({given[0]})"
+        return f"{local(name)}({', '.join(given)})"
+
+    def argument(self, node: ast.expr) -> str:
+        return self.expression(node)
+
+    def library(self, name: str, arguments: Sequence[ast.expr]) -> str:
+        """A mathematical function."""
+        if name == "copysign":
+            return f"copysign_({', '.join(self.expression(a) for a in arguments)})"
+        if name not in MATH:
+            raise self.refused(ast.Name(name))
+        return f"{MATH[name]}({', '.join(self.expression(a) for a in arguments)})"
+
+    def power(self, node: ast.BinOp) -> str:
+        return f"power({self.expression(node.left)}, {self.expression(node.right)})"
+
+    def choice(self, node: ast.IfExp) -> str:
+        return f"choose_({self.expression(node.test)}, {self.expression(node.body)}, {self.expression(node.orelse)})"
+
+    # ---- statements ----------------------------------------------------------------------------------
+
+    def declaration(self, name: str) -> list[str]:
+        return []
+
+    def assignment(self, node: ast.Assign) -> list[str]:
+        target, callee = self.expression(node.targets[0]), self.callee(node.value)
+        if callee and callee.writes:
+            assert isinstance(node.value, ast.Call)
+            return [f"[{', '.join([target, *self.changed(node.value, callee)])}] = {self.call(node.value)};"]
+        return [f"{target} = {self.expression(node.value)};"]
+
+    def returning(self, node: ast.Return) -> list[str]:
+        if node.value is None:
+            return ["return;"]
+        return [f"torque_ = {self.expression(node.value)};", "return;"]
+
+    def call_statement(self, node: ast.Call) -> list[str]:
+        callee = self.callee(node)
+        if callee is None or not callee.writes:
+            return []
+        outputs = [*(["~"] if callee.returns else []), *self.changed(node, callee)]
+        return [f"[{', '.join(outputs)}] = {self.call(node)};"]
+
+    def callee(self, node: ast.expr) -> Facts | None:
+        """What is known of the function that is called."""
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            return self.known.get(node.func.id)
+        return None
+
+    def changed(self, node: ast.Call, callee: Facts) -> list[str]:
+        """The structures that a call hands back, in the callee's order."""
+        return [self.expression(g) for g, a in zip(node.args, callee.arguments) if a in callee.writes]
+
+    def leave(self) -> str:
+        return "break;"
+
+    def condition(self, node: ast.If, depth: int) -> list[str]:
+        pad = self.indent * depth
+        out = [f"{pad}if {self.expression(node.test)}", *self.block(node.body, depth + 1)]
+        while len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
+            node = node.orelse[0]
+            out += [f"{pad}elseif {self.expression(node.test)}", *self.block(node.body, depth + 1)]
+        if node.orelse:
+            out += [f"{pad}else", *self.block(node.orelse, depth + 1)]
+        return [*out, f"{pad}end"]
+
+    def loop(self, node: ast.For, depth: int) -> list[str]:
+        assert isinstance(node.target, ast.Name)
+        assert isinstance(node.iter, ast.Call)
+        pad = self.indent * depth
+        first, last = (["0"] if len(node.iter.args) == 1 else []) + [
+            self.expression(a) for a in node.iter.args
+        ]
+        head = f"{pad}for {node.target.id} = {first}:({last} - 1)"
+        return [head, *self.block(node.body, depth + 1), f"{pad}end"]
+
+
+def local(name: str) -> str:
+    """A name that MATLAB allows: none begins with an underscore."""
+    return name.strip("_") + "_"
+
+
+def functions(trees: Mapping[str, ast.FunctionDef]) -> list[tuple[str, str, list[str]]]:
+    """Name, docstring and lines of every function, callees first."""
+    trees = hoisted(trees)
+    known = analyse(trees)
+    out: list[tuple[str, str, list[str]]] = []
+    for name, tree in trees.items():
+        facts = known[name]
+        outputs = [
+            *(["torque_"] if facts.returns else []),
+            *(a for a in facts.arguments if a in facts.writes),
+        ]
+        head = f"function [{', '.join(outputs)}] = {local(name)}({', '.join(facts.arguments)})"
+        lines = [head, *_Matlab(facts, known).block(tree.body, 1), "end"]
+        out.append((name, ast.get_docstring(tree) or "", lines))
+    return out

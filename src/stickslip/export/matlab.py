@@ -1,0 +1,118 @@
+"""MATLAB and Octave: functions of a law, tried in Octave."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Iterable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from stickslip.export._matlab import HELPERS, functions, local
+from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export.golden import as_csv, golden
+from stickslip.export.job import Check, Export, Job
+from stickslip.export.target import Target
+from stickslip.spec import Surroundings
+from stickslip.subset import law_layouts, named
+
+__all__ = ["BOUND", "TARGET"]
+
+BOUND = 1e-12
+"""Largest relative error in Octave, whose exp and power are not the C library's."""
+
+
+def write(job: Job) -> Export:
+    """One file a function, golden vectors and a script that checks them."""
+    law = job.model.law
+    files = {
+        f"{job.name}_parameters.m": "\n".join(_parameters(job)),
+        f"{job.name}_reset.m": "\n".join(_reset(job)),
+        f"{job.name}_surroundings.m": "\n".join(_surroundings(job)),
+    }
+    for entry in ("step", "steady"):
+        function = getattr(law, entry)
+        if function is not None:
+            files[f"{job.name}_{entry}.m"] = _file(
+                job, entry, functions(named({entry: function}, law_layouts(law)))
+            )
+    common = {"x": job.name, "law": law, "bound": repr(BOUND), "steady": law.steady is not None}
+    return Export(
+        {
+            **files,
+            f"{job.name}_check.m": render("matlab_check.m.j2", **common),
+            "golden.csv": as_csv(golden(job.model)),
+            "README.md": render("matlab_readme.md.j2", **common),
+        }
+    )
+
+
+def _file(job: Job, entry: str, parts: list[tuple[str, str, list[str]]]) -> str:
+    """One public function with the local ones that it calls."""
+    *inner, (_, about, lines) = parts
+    own, public = local(entry) + "(", f"{job.name}_{entry}("
+    head = lines[0].replace(own, public, 1)
+    if entry == "step":  # of every law alike, also of one without memory
+        head = head.replace("[torque_]", "[torque_, z]")
+    lines = [head, f"    % {first_line(about)}", f"    % {job.model.law.title}. SI units.", *lines[1:]]
+    text = [*lines, ""]
+    for _, doc, code in inner:
+        text += [code[0], f"    % {first_line(doc)}", *code[1:], ""]
+    used = "\n".join(text)
+    for name, code in HELPERS.items():
+        if f"{name}(" in used:
+            text.append(code)
+    return "\n".join(text)
+
+
+def _parameters(job: Job) -> Iterable[str]:
+    law, p = job.model.law, job.model.parameters
+    yield f"function p = {job.name}_parameters()"
+    yield f"    % Identified parameters: {law.title}."
+    for f in law.fields:
+        value = getattr(p, f.name)
+        shown = f"[{', '.join(map(repr, value))}]" if f.per_element else repr(value)
+        yield f"    p.{f.name} = {shown};  % {f.par.meaning}, {ascii_only(f.par.unit)}"
+    yield f"    p.elements = {law.elements_in(p)};"
+    yield "end\n"
+
+
+def _reset(job: Job) -> Iterable[str]:
+    law = job.model.law
+    yield f"function z = {job.name}_reset()"
+    yield "    % The contact at rest, without load."
+    yield "    z = struct();"
+    for f in law.state_fields:
+        size = f"zeros(1, {law.elements_in(job.model.parameters)})" if f.per_element else "0.0"
+        yield f"    z.{f.name} = {size};  % {f.par.meaning}, {ascii_only(f.par.unit)}"
+    yield "end\n"
+
+
+def _surroundings(job: Job) -> Iterable[str]:
+    yield f"function u = {job.name}_surroundings()"
+    yield "    % What the contact depends on besides its velocity."
+    for name, value in Surroundings()._asdict().items():
+        yield f"    u.{name} = {value!r};"
+    yield "end\n"
+
+
+def check(job: Job, export: Export) -> Check:
+    """Run the golden vectors in Octave."""
+    tool = shutil.which("octave-cli") or shutil.which("octave")
+    if tool is None:
+        return Check(None, "Octave is not installed")
+    with TemporaryDirectory() as folder:
+        for name, content in export.files.items():
+            Path(folder, name).write_text(str(content), encoding="utf-8")
+        command = [tool, "--no-gui", "--norc", "--quiet", "--eval", f"{job.name}_check"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    try:
+        error = float(done.stdout.split()[-1])
+    except (IndexError, ValueError):
+        return Check(False, f"Octave: {' '.join(done.stderr.split())[:300]}")
+    return Check(
+        error <= BOUND, f"Octave: {error:.3g} of the largest torque off the definition", {"octave": error}
+    )
+
+
+TARGET = Target("matlab", "MATLAB and Octave functions", write, check)

@@ -1,0 +1,84 @@
+"""Python: one file without dependencies, for a colleague; its functions are the law's own."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from stickslip.export._text import render
+from stickslip.export.golden import as_csv, golden
+from stickslip.export.job import Check, Export, Job
+from stickslip.export.target import Target
+from stickslip.spec import Field, Surroundings
+from stickslip.subset import COUNT, law_layouts, named
+
+__all__ = ["TARGET"]
+
+
+def write(job: Job) -> Export:
+    """One module, golden vectors, and how to use it."""
+    law, p = job.model.law, job.model.parameters
+    trees = named({"step": law.step, **({"steady": law.steady} if law.steady else {})}, law_layouts(law))
+    for tree in trees.values():
+        _count_by_constant(tree)
+        _indent_docstring(tree)
+    text = render(
+        "python.py.j2",
+        x=job.name,
+        law=law,
+        source="; ".join(law.source),
+        elements=law.elements_in(p),
+        parameters=[*_assigned(law.fields, p)],
+        states=[*_cleared(law.state_fields)],
+        around=[f"{name}={value!r}" for name, value in Surroundings()._asdict().items()],
+        functions=[ast.unparse(tree) for tree in trees.values()],
+        steady=law.steady is not None,
+    )
+    files = {f"{job.name}.py": text, "golden.csv": as_csv(golden(job.model))}
+    return Export({**files, "README.md": render("python_readme.md.j2", x=job.name, law=law)})
+
+
+def _count_by_constant(tree: ast.FunctionDef) -> None:
+    """Call the number of elements by the name of the module's constant."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and node.id == COUNT:
+            node.id = "ELEMENTS"
+
+
+def _indent_docstring(tree: ast.FunctionDef) -> None:
+    """Set the docstring in, which the unparser leaves as it is."""
+    text = ast.get_docstring(tree)
+    if text and "\n" in text:
+        assert isinstance(tree.body[0], ast.Expr)
+        lines = ["    " + line if line else "" for line in text.splitlines()]
+        tree.body[0].value = ast.Constant("\n".join(lines).strip() + "\n    ")
+
+
+def _assigned(fields: Iterable[Field], p: object) -> Iterable[str]:
+    for f in fields:
+        yield f"{f.name}={getattr(p, f.name)!r},  # {f.par.meaning}, {f.par.unit}"
+
+
+def _cleared(fields: Iterable[Field]) -> Iterable[str]:
+    for f in fields:
+        yield f"{f.name}={'[0.0] * ELEMENTS' if f.per_element else '0.0'},  # {f.par.meaning}, {f.par.unit}"
+
+
+def check(job: Job, export: Export) -> Check:
+    """Run the file by itself, away from this package, on its golden vectors."""
+    with TemporaryDirectory() as folder:
+        for name, content in export.files.items():
+            Path(folder, name).write_text(str(content), encoding="utf-8")
+        command = [sys.executable, "-I", f"{job.name}.py", "golden.csv"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode not in (0, 1) or not done.stdout:
+        return Check(False, f"the file does not run: {done.stderr.strip().splitlines()[-1:]}")
+    error = float(done.stdout)
+    return Check(error == 0.0, f"at most {error:.3g} N·m off the definition", {"python": error})
+
+
+TARGET = Target("python", "Python, one file without dependencies", write, check)

@@ -1,0 +1,53 @@
+"""One suite over every pair of law and target: it writes, says what it cannot carry, and passes its own check."""
+
+import importlib
+
+import pytest
+
+from stickslip import plugins
+from stickslip.export import TARGETS
+from stickslip.export.job import CannotCarry, Job
+from stickslip.model import Model
+
+ALL = {name: importlib.import_module(f"stickslip.export.{name}").TARGET for name in TARGETS}
+LAWS = [plugins.law(name) for name in plugins.law_names()]
+
+
+def job(law, **more):
+    return Job(Model(law, **dict(law.example)), law.name.replace("-", "_"), **more)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+@pytest.mark.parametrize("target", ALL.values(), ids=lambda t: t.name)
+def test_a_law_leaves_or_is_refused_with_what_is_lost(target, law):
+    try:
+        export = target.write(job(law))
+    except CannotCarry:
+        with pytest.raises(CannotCarry, match=rf"{law.name}.*--"):  # names the law and offers a way out
+            target.write(job(law))
+        return
+    assert any(name.lower().startswith("readme") for name in export.files)
+    assert all(content for content in export.files.values())
+    if target.check is None:
+        return
+    result = target.check(job(law), export)
+    if result.passed is None:
+        pytest.skip(result.text)
+    assert result.passed, result.text
+
+
+@pytest.mark.parametrize("target", ALL.values(), ids=lambda t: t.name)
+def test_a_targets_check_fails_on_a_wrong_export(target, monkeypatch):
+    if target.check is None:
+        pytest.skip("nothing to run")
+    right, other = job(LAWS[0]), Model(LAWS[0], **{k: 1.1 * v for k, v in LAWS[0].example.items()})
+    export = target.write(right)
+    wrong = target.write(Job(other, right.name))
+    mixed = {
+        **export.files,
+        **{n: c for n, c in wrong.files.items() if "golden" not in n and "check" not in n},
+    }
+    result = target.check(right, type(export)(mixed))
+    if result.passed is None:
+        pytest.skip(result.text)
+    assert not result.passed
