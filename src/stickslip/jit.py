@@ -195,8 +195,9 @@ def compiled_law(law: Law) -> LawPointers:
             if (function := getattr(law, name)) is not None
         }
         for choice in law.choices:
-            if choice.replaces == "sliding":
-                entries["sliding"] = law.option(choice).function
+            curve = law.option(choice).function
+            if choice.replaces == "sliding" and curve is not None:
+                entries["sliding"] = curve
         addresses = _compile(law.name, entries, law_layouts(law))
         _laws[id(law)] = (law, LawPointers(*(addresses.get(name, 0) for name in LawPointers._fields)))
     return _laws[id(law)][1]

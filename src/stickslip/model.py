@@ -35,7 +35,7 @@ class Model:
     __slots__ = ("law", "parameters")
 
     def __init__(self, law: str | Law, choices: Mapping[str, str] | None = None, **parameters: Any) -> None:
-        found = plugins.law(law) if isinstance(law, str) else law
+        found = plugins.law(law) if isinstance(law, str) else plugins.completed(law)
         self.law: Law = found.having(**choices) if choices else found
         self.parameters: Any = self.law.parameters(parameters)
 

@@ -41,13 +41,20 @@ def law(name: str) -> Law:
     if name.endswith(".py"):
         return _law_in(str(Path(name).resolve()))
     if name in importlib.import_module("stickslip.laws").LAWS:
-        found: Law = importlib.import_module(f"stickslip.laws.{name}").LAW
-        return found
+        return completed(importlib.import_module(f"stickslip.laws.{name}").LAW)
     if name in (files := _from_files()):
         return files[name]
     if name in (installed := _installed("stickslip.laws")):
-        return installed[name].load()
+        return completed(installed[name].load())
     raise UnknownName("law", name, law_names())
+
+
+@functools.cache
+def completed(law: Law) -> Law:
+    """The law with the choices that any law has: other parameters for v < 0, modulations."""
+    places = [name.split(".") for name in importlib.import_module("stickslip.laws").COMMON_CHOICES]
+    common = [getattr(importlib.import_module(f"stickslip.laws.{module}"), name) for module, name in places]
+    return law.offering(common)
 
 
 def reference_names() -> tuple[str, ...]:
@@ -90,7 +97,7 @@ def _law_in(path: str) -> Law:
         raise LawError(f"{path} defines no law; end it with `LAW = Law(...)`")
     functions = ("step", "rate", "guards", "switch", "steady", "holding", "stored")
     lower({n: getattr(found, n) for n in functions if getattr(found, n)}, law_layouts(found))
-    return found
+    return completed(found)
 
 
 def _module_at(path: str) -> ModuleType:

@@ -35,8 +35,10 @@ import types
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from dataclasses import fields as dataclass_fields
 from typing import Annotated, Any, NamedTuple, cast, get_args, get_origin, get_type_hints
 
+from stickslip.binding import bound, distinct, first_complaint, least, wrapped
 from stickslip.errors import ParameterError, UnknownName, suggestion
 
 __all__ = [
@@ -58,7 +60,9 @@ class Par:
     """What a number means: its unit, symbol, meaning and bounds.
 
     ``positive`` makes the lower bound 0, excluded. A parameter without ``default`` must be given. ``shares`` says
-    that the values of all elements add up to 1.
+    that the values of all elements add up to 1, ``directional`` that the two directions of motion may have
+    different values. A parameter with several values has one per element, or one per whatever else ``per`` names;
+    parameters with the same ``per`` have equally many.
     """
 
     unit: str
@@ -69,6 +73,8 @@ class Par:
     positive: bool = False
     default: float | None = None
     shares: bool = False
+    directional: bool = False
+    per: str = "element"
 
     def complaint(self, value: float) -> str:
         """Say what is wrong with `value`, or return the empty string."""
@@ -112,31 +118,63 @@ class Field:
     name: str
     par: Par
     per_element: bool
+    like: str = ""
+    """The parameter whose value it takes where it is not given."""
+
+    def twin(self, ending: str) -> Field:
+        """The same parameter for the other direction of motion."""
+        per = self.par.per + (ending if self.par.per != "element" else "")
+        par = replace(
+            self.par, symbol=f"{self.par.symbol}^-", meaning=f"{self.par.meaning}, for v < 0", per=per
+        )
+        return Field(self.name + ending, par, self.per_element, self.name)
 
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """One way to fill a `Choice`: a function in the scalar subset and the parameters it brings along.
+    """One way to fill a `Choice`.
 
-    ``passive`` is False where the law can give energy back with it.
+    Attributes
+    ----------
+    function : callable
+        In the scalar subset; takes the place of the name that the choice replaces.
+    params : type
+        The parameters it brings along, as a law's ``Params``; ``example`` gives values of them.
+    check, velocity_scale : callable
+        As a law's: a complaint about the parameters, the velocity over which the torque changes much.
+    passive : bool
+        False where the law can give energy back with it.
+    doubles : str
+        Ending of the names under which every directional parameter is there once more.
+    wraps : mapping
+        Functions that take the place of the law's own of that name, and call those as ``inner_step`` and so on.
+    keeps_elements : bool
+        Whether the law still is what its ``modes`` say.
     """
 
-    function: Callable[..., float]
+    function: Callable[..., float] | None = None
     params: type | None = None
     passive: bool = True
+    example: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    check: Callable[[Any], str] | None = None
+    velocity_scale: Callable[[Any], float] | None = None
+    doubles: str = ""
+    wraps: Mapping[str, Callable[..., Any]] = field(default_factory=dict[str, Any])
+    keeps_elements: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
     """A part of a law that can be exchanged by name: its sliding curve, its rule from stick to slip.
 
-    ``replaces`` is the name by which the law's functions call it.
+    ``replaces`` is the name by which the law's functions call it; with ``_scale`` after it, its velocity scale.
     """
 
     name: str
     replaces: str
     options: Mapping[str, Option]
     default: str
+    meaning: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +198,13 @@ class Elements:
     constant_curve: bool = False
 
 
+FUNCTIONS = (
+    "step", "rate", "guards", "switch", "steady", "holding", "check", "modes", "velocity_scale", "is_passive",
+    "stored",
+)  # fmt: skip
+"""A law's functions, all of which may call the chosen options."""
+
+
 def fields_of(description: type | None) -> tuple[Field, ...]:
     """Read the annotations of a ``Params`` or ``State`` class."""
     if description is None:
@@ -181,11 +226,6 @@ class Described:
     Parameters: Any
     check: Callable[[Any], str] | None
 
-    @property
-    def has_elements(self) -> bool:
-        """Whether some parameters have a value per element."""
-        return any(f.per_element for f in self.fields)
-
     def parameters(self, values: Mapping[str, Any]) -> Any:
         """Check `values` and return them as this law's NamedTuple.
 
@@ -198,11 +238,13 @@ class Described:
         for name in values:
             if name not in names:
                 raise ParameterError(f"{self.name}: no parameter {name!r}; {suggestion(name, names)}")
-        checked = {f.name: self._checked(f, values.get(f.name, f.par.default)) for f in self.fields}
-        sizes = {f.name: len(checked[f.name]) for f in self.fields if f.per_element}
-        if len(set(sizes.values())) > 1:
-            listing = ", ".join(f"{name} has {size}" for name, size in sizes.items())
-            raise ParameterError(f"{self.name}: every element needs a value of each: {listing}")
+        given = {f.name: values.get(f.name, values.get(f.like, f.par.default)) for f in self.fields}
+        checked = {f.name: self._checked(f, given[f.name]) for f in self.fields}
+        for per in dict.fromkeys(f.par.per for f in self.fields if f.per_element):
+            sizes = {f.name: len(checked[f.name]) for f in self.fields if f.per_element and f.par.per == per}
+            if len(set(sizes.values())) > 1:
+                listing = ", ".join(f"{name} has {size}" for name, size in sizes.items())
+                raise ParameterError(f"{self.name}: every {per} needs a value of each: {listing}")
         p = self.Parameters(**checked)
         complaint = self.check(p) if self.check else ""
         if complaint:
@@ -217,10 +259,10 @@ class Described:
         if f.per_element:
             if isinstance(value, str) or not isinstance(value, Sequence):
                 raise ParameterError(
-                    f"{self.name}: {f.name} = {value!r} must be a list, one number per element"
+                    f"{self.name}: {f.name} = {value!r} must be a list, one number per {f.par.per}"
                 )
             if not value:
-                raise ParameterError(f"{self.name}: {f.name} is empty; give at least one element")
+                raise ParameterError(f"{self.name}: {f.name} is empty; give at least one {f.par.per}")
             numbers = cast(Sequence[Any], value)
             return tuple(self._number(f, v, f"{f.name}[{i}]") for i, v in enumerate(numbers))
         return self._number(f, value, f.name)
@@ -235,19 +277,23 @@ class Described:
 
     def elements_in(self, p: Any) -> int:
         """The number of elements in `p` (0 for a law without)."""
-        return next((len(getattr(p, f.name)) for f in self.fields if f.per_element), 0)
+        return self.count_in(p, "element")
+
+    def count_in(self, p: Any, per: str) -> int:
+        """How many values the parameters with that ``per`` have in `p`."""
+        return next((len(getattr(p, f.name)) for f in self.fields if f.per_element and f.par.per == per), 0)
 
     def pack(self, p: Any) -> list[float]:
         """Return `p` as the flat list that compiled functions read.
 
-        Scalars in order, then (where there are elements) their number, then one block per field.
+        Scalars in order, then the number of elements (and of whatever else parameters have values per), then one
+        block per field with several values.
         """
         flat = [getattr(p, f.name) for f in self.fields if not f.per_element]
-        if self.has_elements:
-            flat.append(float(self.elements_in(p)))
-            for f in self.fields:
-                if f.per_element:
-                    flat.extend(getattr(p, f.name))
+        blocks = [f for f in self.fields if f.per_element]
+        flat += [float(self.count_in(p, per)) for per in dict.fromkeys(f.par.per for f in blocks)]
+        for f in blocks:
+            flat.extend(getattr(p, f.name))
         return flat
 
 
@@ -278,16 +324,6 @@ class ReferenceKind(Described):
     def __post_init__(self) -> None:
         object.__setattr__(self, "fields", fields_of(self.Params))
         object.__setattr__(self, "Parameters", self.Params)
-
-
-def rescoped(function: types.FunctionType, scope: dict[str, Any]) -> types.FunctionType:
-    """Return `function` with other globals."""
-    copy = types.FunctionType(
-        function.__code__, scope, function.__name__, function.__defaults__, function.__closure__
-    )
-    copy.__doc__ = function.__doc__
-    copy.__module__ = function.__module__
-    return copy
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,19 +386,45 @@ class Law(Described):
     """Laws made from this one by `having`; shared with them, so that each exists (and is compiled) once."""
 
     def __post_init__(self) -> None:
-        own = fields_of(self.Params)
-        brought = [f for choice in self.choices for f in fields_of(self.option(choice).params)]
-        own_names = {f.name for f in own}
-        object.__setattr__(self, "fields", own + tuple(f for f in brought if f.name not in own_names))
-        object.__setattr__(self, "state_fields", fields_of(self.State))
+        written = {f.name: getattr(self, f.name) for f in dataclass_fields(self) if f.init}
+        chosen = [self.option(choice) for choice in self.choices]
+        fields: dict[str, Field] = {}
+        for part in (self.Params, *(o.params for o in chosen)):
+            for f in fields_of(part):
+                fields.setdefault(f.name, f)
+        for ending in (o.doubles for o in chosen if o.doubles):
+            fields.update(
+                {(twin := f.twin(ending)).name: twin for f in [*fields.values()] if f.par.directional}
+            )
+        examples: dict[str, Any] = {k: v for o in chosen for k, v in o.example.items()}
+        examples.update(self.example)
         make: Any = namedtuple  # whose fields are not known to a type checker
-        object.__setattr__(self, "Parameters", make(self.Params.__name__, [f.name for f in self.fields]))
-        for function in ("step", "rate", "guards", "switch", "steady", "holding", "check", "modes", "stored"):
-            raw = getattr(self, function)
-            if raw is not None:
-                object.__setattr__(self, function, self._bound(raw))
+        scope: dict[str, Any] = {}
+        for choice, option in zip(self.choices, chosen):
+            if option.function:
+                scope |= {choice.replaces: option.function, f"{choice.replaces}_scale": option.velocity_scale}
+        parts: dict[str, Any] = {
+            "written": written,
+            "fields": tuple(fields.values()),
+            "state_fields": fields_of(self.State),
+            "Parameters": make(self.Params.__name__, list(fields)),
+            "example": {k: v for k, v in examples.items() if k in fields},
+            **{name: bound(getattr(self, name), scope) for name in FUNCTIONS},
+        }
+        for name, joined in (("check", first_complaint), ("velocity_scale", least)):
+            parts[name] = joined([f for f in (parts[name], *(getattr(o, name) for o in chosen)) if f])
+        for wraps in distinct([o.wraps for o in chosen]):
+            parts.update({n: wrapped(n, parts[n], w, scope) for n, w in wraps.items() if parts.get(n)})
+        if not all(o.keeps_elements for o in chosen):
+            parts["modes"] = None
+        if any(o.doubles for o in chosen):
+            parts["odd"] = False
+        for name, part in parts.items():
+            object.__setattr__(self, name, part)
         self.parameters(dict(self.example))
 
+    written: Mapping[str, Any] = field(init=False, repr=False)
+    """What the law's file says, before any option changed it."""
     fields: tuple[Field, ...] = field(init=False)
     state_fields: tuple[Field, ...] = field(init=False)
     Parameters: Any = field(init=False)
@@ -389,20 +451,19 @@ class Law(Described):
                 raise UnknownName(name.replace("_", " "), option, known[name].options)
         key = tuple(sorted({**self.chosen, **names}.items()))
         if key not in self.variants:
-            self.variants[key] = replace(self, chosen=dict(key))
+            self.variants[key] = self._rewritten(chosen=dict(key))
         return self.variants[key]
 
-    def _bound(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Let `function`, and the functions of its file that it calls, call the chosen options."""
-        if not self.choices or not isinstance(function, types.FunctionType):
-            return function
-        home = function.__globals__
-        scope = dict(home)
-        for name, value in home.items():
-            if isinstance(value, types.FunctionType) and value.__globals__ is home:
-                scope[name] = rescoped(value, scope)
-        scope.update({choice.replaces: self.option(choice).function for choice in self.choices})
-        return rescoped(function, scope)
+    def offering(self, choices: Sequence[Choice]) -> Law:
+        """Return this law with further choices; those that it has by name stay as they are."""
+        own = {choice.name for choice in self.choices}
+        more = tuple(choice for choice in choices if choice.name not in own)
+        return self._rewritten(choices=self.choices + more, variants={}) if more else self
+
+    def _rewritten(self, **changes: Any) -> Law:
+        """The law as its file has it, but for `changes`."""
+        written: dict[str, Any] = {**self.written, **changes}
+        return Law(**written)
 
     def dissipates(self, p: Any) -> bool:
         """Whether the law, with its chosen options, is declared passive with the parameters `p`."""

@@ -19,17 +19,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from stickslip.binding import NEGATIVE, negative
 from stickslip.errors import LawError, suggestion
 from stickslip.spec import Field, Law, Surroundings
 
 __all__ = ["COUNT", "Layout", "law_layouts", "lower", "named"]
 
+COUNT = "elements_"
+"""The name of the number of elements."""
 BUILTINS = {"abs", "min", "max", "range", "len", "float", "int"}
 MATH = {
     "exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
     "floor", "ceil", "fabs", "copysign", "pi", "inf", "pow", "hypot",
 }  # fmt: skip
-COUNT = "elements_"
 STATEMENTS = (
     ast.Assign,
     ast.AugAssign,
@@ -67,16 +69,29 @@ class Layout:
     scalars: tuple[str, ...]
     blocks: tuple[str, ...] = ()
     counted: bool = False
-    """The array holds its number of elements after its scalars (parameters do, states ask the parameters)."""
+    """The array holds its numbers of elements after its scalars (parameters do, states ask the parameters)."""
+    pers: tuple[str, ...] = ()
+    """What each block has a value per; empty: elements."""
 
     @staticmethod
     def of(fields: Sequence[Field], *, counted: bool) -> Layout:
         """Scalars in order, then one block per field that has a value per element."""
+        mixed = any(f.per_element and f.par.per != "element" for f in fields)
         return Layout(
             tuple(f.name for f in fields if not f.per_element),
             tuple(f.name for f in fields if f.per_element),
             counted,
+            tuple(f.par.per for f in fields if f.per_element) if mixed else (),
         )
+
+    def per(self, block: int) -> str:
+        """What a block has a value per."""
+        return self.pers[block] if self.pers else "element"
+
+    @property
+    def counts(self) -> tuple[str, ...]:
+        """What the numbers after the scalars count."""
+        return tuple(dict.fromkeys(map(self.per, range(len(self.blocks)))))
 
 
 def law_layouts(law: Law) -> dict[str, Layout]:
@@ -114,8 +129,9 @@ def lower(
         With file, line and what to write instead.
     """
     done: dict[str, ast.FunctionDef] = {}
+    names = _Names()
     for name, function in entries.items():
-        _translate(name, function, layouts, done, stack=(), flat=True)
+        _translate(names.of(name, _Target(function)), _Target(function), layouts, done, names, (), flat=True)
     return done
 
 
@@ -125,35 +141,63 @@ def named(
     """Check functions and everything they call, and keep their fields by name (``p.k[i]``).
 
     Arguments, order and errors as in `lower`. Constants of the file are numbers in the result; the number of
-    elements is the name ``elements_``. This is what export writes in other languages.
+    elements is the name ``elements_``, of points ``points_`` and so on. This is what export writes in other
+    languages.
     """
     done: dict[str, ast.FunctionDef] = {}
+    names = _Names()
     for name, function in entries.items():
-        _translate(name, function, layouts, done, stack=(), flat=False)
+        _translate(names.of(name, _Target(function)), _Target(function), layouts, done, names, (), flat=False)
     return done
+
+
+@dataclass(frozen=True, eq=False)
+class _Target:
+    """A function to translate; one for v < 0 reads the parameters that hold there."""
+
+    function: Callable[..., Any]
+    negative: bool = False
+
+
+@dataclass
+class _Names:
+    """One name per function translated: files may use the same name for different functions."""
+
+    taken: dict[str, tuple[Any, bool]] = field(default_factory=dict[str, Any])
+
+    def of(self, wanted: str, target: _Target) -> str:
+        name, count = wanted + (NEGATIVE if target.negative else ""), 1
+        key = (getattr(target.function, "__code__", target.function), target.negative)
+        while self.taken.setdefault(name, key) != key:
+            count += 1
+            name = f"{wanted}_{count}"
+        return name
 
 
 def _translate(
     name: str,
-    function: Callable[..., Any],
+    target: _Target,
     layouts: Mapping[str, Layout],
     done: dict[str, ast.FunctionDef],
+    names: _Names,
     stack: tuple[str, ...],
     *,
     flat: bool,
 ) -> None:
     if name in done:
         return
+    function = target.function
     tree, where = _parsed(function)
     if name in stack:
         raise LawError(f"{where.at(tree)}: {function.__name__} calls itself; use a `for` loop instead")
-    translator = _Translator(where, layouts, [a.arg for a in tree.args.args], function.__globals__, flat)
+    arguments = [a.arg for a in tree.args.args]
+    translator = _Translator(where, layouts, arguments, function.__globals__, flat, names, target.negative)
     body = [s for s in (translator.visit(statement) for statement in tree.body) if s is not None]
-    if translator.counts and flat:
+    if flat:
         # Once at the top: the compiler cannot know that writing to a state leaves the parameters alone.
-        body.insert(0, translator.counted())
-    for callee, target in translator.calls.items():
-        _translate(callee, target, layouts, done, (*stack, name), flat=flat)
+        body[:0] = [translator.counted(per) for per in translator.counts]
+    for callee, called in translator.calls.items():
+        _translate(callee, called, layouts, done, names, (*stack, name), flat=flat)
     arguments = ast.arguments([], [ast.arg(a.arg) for a in tree.args.args], None, [], [], None, [])
     if not flat:
         body = [*_docstring(tree), *body]
@@ -198,9 +242,11 @@ class _Translator(ast.NodeTransformer):
     arguments: list[str]
     scope: dict[str, Any]
     flat: bool
-    calls: dict[str, Callable[..., Any]] = field(default_factory=dict[str, Callable[..., Any]])
+    names: _Names
+    negative: bool
+    calls: dict[str, _Target] = field(default_factory=dict[str, _Target])
     locals: set[str] = field(default_factory=set[str])
-    counts: bool = False
+    counts: dict[str, None] = field(default_factory=dict[str, None])
 
     def refuse(self, node: ast.AST, what: str, remedy: str) -> LawError:
         return LawError(f"{self.where.at(node)}: {what} is outside the scalar subset; {remedy}")
@@ -277,11 +323,12 @@ class _Translator(ast.NodeTransformer):
             raise self.refuse(node, f"{name}.{node.value.attr}[...]", "it has one value, not one per element")
         if not self.flat:
             return ast.copy_location(ast.Subscript(node.value, self.visit(node.slice), node.ctx), node)
-        first = len(layout.scalars) + (1 if layout.counted else 0)
+        first = len(layout.scalars) + (len(layout.counts) if layout.counted else 0)
         block = layout.blocks.index(node.value.attr)
         index: ast.expr = self.visit(node.slice)
-        if block:
-            offset = ast.BinOp(ast.Constant(block), ast.Mult(), self.count(node))
+        before = [layout.per(i) for i in range(block)]
+        for per in reversed(dict.fromkeys(before)):
+            offset = ast.BinOp(ast.Constant(before.count(per)), ast.Mult(), self.count(node, per))
             index = ast.BinOp(offset, ast.Add(), index)
         if first:
             index = ast.BinOp(ast.Constant(first), ast.Add(), index)
@@ -302,14 +349,28 @@ class _Translator(ast.NodeTransformer):
         if name in BUILTINS:
             node.args = [self.visit(a) for a in node.args]
             return node
-        target = self.scope.get(name)
-        if not isinstance(target, types.FunctionType):
+        function = self.scope.get(name)
+        if not isinstance(function, types.FunctionType) or function is negative:
             known = [n for n, v in self.scope.items() if isinstance(v, types.FunctionType)]
             raise self.refuse(node, f"{name}()", suggestion(name, [*known, *BUILTINS]))
-        self.calls["_" + name] = target
-        node.func = ast.copy_location(ast.Name("_" + name, ast.Load()), node)
-        node.args = [a if self.is_structure(a) else self.visit(a) for a in node.args]
+        target = _Target(function, self.negative or any(map(self.is_negative, node.args)))
+        callee = self.names.of("_" + name, target)
+        self.calls[callee] = target
+        node.func = ast.copy_location(ast.Name(callee, ast.Load()), node)
+        node.args = [self.argument(a) for a in node.args]
         return node
+
+    def argument(self, node: ast.expr) -> ast.expr:
+        """An argument of a call: `negative(p)` is `p`, read by a callee of its own."""
+        if isinstance(node, ast.Call) and self.is_negative(node):
+            node = node.args[0]
+        return node if self.is_structure(node) else self.visit(node)
+
+    def is_negative(self, node: ast.expr) -> bool:
+        """Whether this is `negative(p)`."""
+        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name) or len(node.args) != 1:
+            return False
+        return self.scope.get(node.func.id) is negative
 
     # ---- structured arguments --------------------------------------------------------------------------
 
@@ -320,30 +381,36 @@ class _Translator(ast.NodeTransformer):
         owner = node.value
         if not isinstance(owner, ast.Name) or not self.is_structure(owner):
             raise self.refuse(node, f"`.{node.attr}` here", f"fields belong to {', '.join(self.layouts)}")
-        return owner.id, self.layouts[owner.id]
+        layout = self.layouts[owner.id]
+        if self.negative and owner.id == "p" and node.attr + NEGATIVE in layout.scalars + layout.blocks:
+            node.attr += NEGATIVE
+        return owner.id, layout
 
     def element(self, name: str, index: ast.expr, like: ast.expr) -> ast.expr:
         return ast.copy_location(
             ast.Subscript(ast.Name(name, ast.Load()), index, getattr(like, "ctx", ast.Load())), like
         )
 
-    def count(self, node: ast.AST) -> ast.expr:
-        """The number of elements, which the parameters hold after their scalars."""
+    def count(self, node: ast.AST, per: str) -> ast.expr:
+        """The number of elements (or what else), which the parameters hold after their scalars."""
         if "p" not in self.arguments:
             raise self.refuse(
                 node, "a field per element without `p`", "pass the parameters `p` to this function"
             )
-        self.counts = True
-        return ast.Name(COUNT, ast.Load())
+        self.counts[per] = None
+        return ast.Name(f"{per}s_", ast.Load())
 
-    def counted(self) -> ast.stmt:
-        """The statement that reads the number of elements."""
-        place = ast.Constant(len(self.layouts["p"].scalars))
+    def counted(self, per: str) -> ast.stmt:
+        """The statement that reads a number of elements."""
+        layout = self.layouts["p"]
+        place = ast.Constant(len(layout.scalars) + layout.counts.index(per))
         read = ast.Subscript(ast.Name("p", ast.Load()), place, ast.Load())
-        return ast.Assign([ast.Name(COUNT, ast.Store())], ast.Call(ast.Name("int", ast.Load()), [read], []))
+        count = ast.Call(ast.Name("int", ast.Load()), [read], [])
+        return ast.Assign([ast.Name(f"{per}s_", ast.Store())], count)
 
     def length(self, node: ast.Call) -> ast.expr:
         of = node.args[0] if len(node.args) == 1 else None
-        if not isinstance(of, ast.Attribute) or of.attr not in self.structure(of)[1].blocks:
+        layout = self.structure(of)[1] if isinstance(of, ast.Attribute) else None
+        if not isinstance(of, ast.Attribute) or layout is None or of.attr not in layout.blocks:
             raise self.refuse(node, "this len()", "use len(p.field) of a field that has a value per element")
-        return ast.copy_location(self.count(node), node)
+        return ast.copy_location(self.count(node, layout.per(layout.blocks.index(of.attr))), node)

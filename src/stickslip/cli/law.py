@@ -71,7 +71,7 @@ def with_values(law: Law, settings: Sequence[str]) -> Model:
     names = {choice.name for choice in law.choices}
     choices = {k: v for k, v in given.items() if k in names and isinstance(v, str)}
     chosen = law.having(**choices) if choices else law
-    return Model(chosen, **{**law.example, **{k: v for k, v in given.items() if k not in choices}})
+    return Model(chosen, **{**chosen.example, **{k: v for k, v in given.items() if k not in choices}})
 
 
 def setting(text: str) -> tuple[str, Any]:

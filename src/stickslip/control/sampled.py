@@ -16,8 +16,9 @@ import types
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.binding import rescoped
 from stickslip.control.controller import Controller
-from stickslip.spec import Law, Par, rescoped
+from stickslip.spec import Law, Par
 
 __all__ = [
     "FROM_MEASUREMENT",

@@ -3,4 +3,7 @@
 To add a law, write its file and add its name to this tuple.
 """
 
+COMMON_CHOICES = ("_symmetry.SYMMETRY",)
+"""Choices of every law, whether its file names them or not."""
+
 LAWS = ("coulomb", "stribeck", "dahl", "lugre", "maxwell_slip", "gms")

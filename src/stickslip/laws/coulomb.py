@@ -8,26 +8,25 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.laws._viscous import VISCOUS
+from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Elements, Law, Par
 
 __all__ = ["LAW"]
 
 
 class Params(NamedTuple):
-    """Parameters of Coulomb with viscous friction, thesis Table 2."""
+    """Parameters besides the viscous part's, thesis Table 2."""
 
-    fc: Annotated[float, Par("N·m", "F_C", "Coulomb torque", lower=0.0)]
-    sigma2: Annotated[
-        float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)
-    ]
+    fc: Annotated[float, Par("N·m", "F_C", "Coulomb torque", lower=0.0, directional=True)]
 
 
 def steady(v: float, p: Any) -> float:
     """Torque at constant velocity, N·m; thesis eq. 3.19."""
     if v > 0.0:
-        return p.fc + p.sigma2 * v
+        return p.fc + viscous(v, p)
     if v < 0.0:
-        return p.sigma2 * v - p.fc
+        return viscous(v, p) - p.fc
     return 0.0
 
 
@@ -70,6 +69,7 @@ LAW = Law(
     passive="always",
     holding=holding,
     modes=modes,
+    choices=(VISCOUS,),
     stored=stored,
     rate_independent=True,
     continuous=False,

@@ -12,6 +12,8 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.laws._direction import direction_ends, direction_of
+from stickslip.laws._viscous import VISCOUS
+from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Law, Mode, Par
 
 __all__ = ["LAW"]
@@ -21,13 +23,10 @@ class Params(NamedTuple):
     """Parameters of thesis eq. 2.7."""
 
     sigma0: Annotated[float, Par("N·m/rad", "sigma_0", "stiffness at rest", positive=True)]
-    fc: Annotated[float, Par("N·m", "F_C", "Coulomb torque", positive=True)]
+    fc: Annotated[float, Par("N·m", "F_C", "Coulomb torque", positive=True, directional=True)]
     delta_d: Annotated[
         float,
         Par("-", "delta_d", "shape factor of the stress-strain curve", lower=0.0, upper=20.0, default=1.0),
-    ]
-    sigma2: Annotated[
-        float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)
     ]
 
 
@@ -46,7 +45,7 @@ def rate(v: float, z: Any, p: Any, u: Any, dz: Any) -> float:
     if abs(z.mode) < 2.0:
         r = 1.0 - direction_of(v) * z.force / p.fc
         dz.force = math.copysign(p.sigma0 * abs(r) ** p.delta_d, r) * v
-    return z.force + p.sigma2 * v
+    return z.force + viscous(v, p)
 
 
 def guards(v: float, z: Any, p: Any, u: Any, g: Any) -> None:
@@ -101,12 +100,12 @@ def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
         slide(0.5 * v1 * (dt - part), z, p)
     else:
         slide(0.5 * (v0 + v1) * dt, z, p)
-    return z.force + p.sigma2 * v1
+    return z.force + viscous(v1, p)
 
 
 def steady(v: float, p: Any) -> float:
     """Torque at constant velocity, N·m."""
-    return p.fc * direction_of(v) + p.sigma2 * v
+    return p.fc * direction_of(v) + viscous(v, p)
 
 
 def stored(z: Any, p: Any) -> float:
@@ -129,6 +128,7 @@ LAW = Law(
     switch=switch,
     steady=steady,
     stored=stored,
+    choices=(VISCOUS,),
     passive="always",
     rate_independent=True,
 )

@@ -10,10 +10,13 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.laws._curve import CURVE, check_levels
+from stickslip.laws._curve import CURVE
 from stickslip.laws._curve import stribeck as sliding
+from stickslip.laws._curve import stribeck_scale as sliding_scale
 from stickslip.laws._stick import SLIP_RULE
 from stickslip.laws._stick import signed as load_of
+from stickslip.laws._viscous import VISCOUS
+from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Elements, Law, Mode, Par
 
 __all__ = ["LAW"]
@@ -28,9 +31,6 @@ class Params(NamedTuple):
         Par("-", "alpha_i", "share of element i in s(v)", positive=True, upper=1.0, shares=True),
     ]
     c: Annotated[float, Par("N·m/s", "C", "attraction parameter", positive=True)]
-    sigma2: Annotated[
-        float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)
-    ]
 
 
 class State(NamedTuple):
@@ -43,7 +43,7 @@ class State(NamedTuple):
 def rate(v: float, z: Any, p: Any, u: Any, dz: Any) -> float:
     """Torque now, N·m; writes dF_i/dt, N·m/s. Thesis eqs. 2.16 to 2.18."""
     s = sliding(v, p)
-    torque = p.sigma2 * v
+    torque = viscous(v, p)
     for i in range(len(p.k)):
         torque += z.force[i]
         if z.mode[i] == 0.0:
@@ -85,9 +85,9 @@ def steady(v: float, p: Any) -> float:
     for i in range(len(p.k)):
         total += p.alpha[i]
     if v > 0.0:
-        return total * sliding(v, p) + p.sigma2 * v
+        return total * sliding(v, p) + viscous(v, p)
     if v < 0.0:
-        return p.sigma2 * v - total * sliding(v, p)
+        return viscous(v, p) - total * sliding(v, p)
     return 0.0
 
 
@@ -152,7 +152,7 @@ def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
         advance(v0, v1, dt, z, p)
     if v1 == 0.0:
         stick(z, p)
-    torque = p.sigma2 * v1
+    torque = viscous(v1, p)
     for i in range(len(p.k)):
         torque += z.force[i]
     return torque
@@ -163,12 +163,12 @@ def check(p: Any) -> str:
     total = math.fsum(p.alpha)
     if abs(total - 1.0) > 1e-6:
         return f"alpha adds up to {total:g}; the shares of the elements add up to 1 (thesis eq. 2.19)"
-    return check_levels(p)
+    return ""
 
 
 def modes(p: Any) -> Elements:
     """The law as it stands: this is the form itself."""
-    return Elements(p.k, p.alpha, p.c, p.sigma2, sliding(0.0, p), p.vs)
+    return Elements(p.k, p.alpha, p.c, p.sigma2, sliding(0.0, p), sliding_scale(p))
 
 
 LAW = Law(
@@ -195,8 +195,7 @@ LAW = Law(
     steady=steady,
     check=check,
     modes=modes,
-    velocity_scale=lambda p: p.vs,
-    choices=(CURVE, SLIP_RULE),
+    choices=(CURVE, VISCOUS, SLIP_RULE),
     passive="signed slip rule",
     non_local_memory=True,
 )

@@ -9,8 +9,11 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.laws._curve import CURVE, check_levels
+from stickslip.laws._curve import CURVE, extremes
 from stickslip.laws._curve import stribeck as sliding
+from stickslip.laws._curve import stribeck_scale as sliding_scale
+from stickslip.laws._viscous import VISCOUS
+from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Law, Par
 
 __all__ = ["LAW"]
@@ -21,9 +24,6 @@ class Params(NamedTuple):
 
     sigma0: Annotated[float, Par("N·m/rad", "sigma_0", "bristle stiffness", positive=True)]
     sigma1: Annotated[float, Par("N·m·s/rad", "sigma_1", "micro-viscous damping", lower=0.0, default=0.0)]
-    sigma2: Annotated[
-        float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)
-    ]
 
 
 class State(NamedTuple):
@@ -35,15 +35,15 @@ class State(NamedTuple):
 def rate(v: float, z: Any, p: Any, u: Any, dz: Any) -> float:
     """Torque now, N·m; writes dz/dt, rad/s. Thesis eqs. 2.8, 2.9."""
     dz.z = v - p.sigma0 * abs(v) / sliding(v, p) * z.z
-    return p.sigma0 * z.z + p.sigma1 * dz.z + p.sigma2 * v
+    return p.sigma0 * z.z + p.sigma1 * dz.z + viscous(v, p)
 
 
 def steady(v: float, p: Any) -> float:
     """Torque at constant velocity, N·m; thesis eq. 2.11."""
     if v > 0.0:
-        return sliding(v, p) + p.sigma2 * v
+        return sliding(v, p) + viscous(v, p)
     if v < 0.0:
-        return p.sigma2 * v - sliding(v, p)
+        return viscous(v, p) - sliding(v, p)
     return 0.0
 
 
@@ -77,7 +77,7 @@ def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
     else:
         z.z = relax(v0, v1, dt, z.z, p)
     dz = v1 - p.sigma0 * abs(v1) / sliding(v1, p) * z.z
-    return p.sigma0 * z.z + p.sigma1 * dz + p.sigma2 * v1
+    return p.sigma0 * z.z + p.sigma1 * dz + viscous(v1, p)
 
 
 def stored(z: Any, p: Any) -> float:
@@ -86,8 +86,9 @@ def stored(z: Any, p: Any) -> float:
 
 
 def is_passive(p: Any) -> bool:
-    """Barabanov and Ortega's condition: necessary and sufficient."""
-    return p.sigma2 >= p.sigma1 * (p.fs - p.fc) / p.fc
+    """Barabanov and Ortega's condition, necessary and sufficient for the curve of eq. 2.10."""
+    low, high = extremes(sliding, p, sliding_scale(p))
+    return p.sigma2 >= p.sigma1 * (high - low) / low
 
 
 LAW = Law(
@@ -108,9 +109,7 @@ LAW = Law(
     State=State,
     rate=rate,
     steady=steady,
-    check=check_levels,
-    velocity_scale=lambda p: p.vs,
-    choices=(CURVE,),
+    choices=(CURVE, VISCOUS),
     passive="sigma2 >= sigma1 (fs - fc) / fc",
     is_passive=is_passive,
     stored=stored,

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.laws._viscous import VISCOUS
+from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Elements, Law, Mode, Par
 
 __all__ = ["LAW"]
@@ -19,9 +21,9 @@ class Params(NamedTuple):
     """Parameters of the elements, thesis eq. 2.14."""
 
     k: Annotated[tuple[float, ...], Par("N·m/rad", "k_i", "stiffness of element i", positive=True)]
-    w: Annotated[tuple[float, ...], Par("N·m", "W_i", "torque at which element i slips", positive=True)]
-    sigma2: Annotated[
-        float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)
+    w: Annotated[
+        tuple[float, ...],
+        Par("N·m", "W_i", "torque at which element i slips", positive=True, directional=True),
     ]
 
 
@@ -34,7 +36,7 @@ class State(NamedTuple):
 
 def rate(v: float, z: Any, p: Any, u: Any, dz: Any) -> float:
     """Torque now, N·m; writes dF_i/dt, N·m/s."""
-    torque = p.sigma2 * v
+    torque = viscous(v, p)
     for i in range(len(p.k)):
         torque += z.force[i]
         dz.force[i] = 0.0
@@ -74,11 +76,12 @@ def slide(distance: float, z: Any, p: Any) -> None:
     """Move the elements by `distance`, rad, in one direction: exact, whatever the velocity."""
     for i in range(len(p.k)):
         force = z.force[i] + p.k[i] * distance
-        z.mode[i] = 0.0
-        if force >= p.w[i]:
+        if distance != 0.0:
+            z.mode[i] = 0.0
+        if distance > 0.0 and force >= p.w[i]:
             force = p.w[i]
             z.mode[i] = 1.0
-        elif force <= -p.w[i]:
+        elif distance < 0.0 and force <= -p.w[i]:
             force = -p.w[i]
             z.mode[i] = -1.0
         z.force[i] = force
@@ -92,7 +95,7 @@ def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
         slide(0.5 * v1 * (dt - part), z, p)
     else:
         slide(0.5 * (v0 + v1) * dt, z, p)
-    torque = p.sigma2 * v1
+    torque = viscous(v1, p)
     for i in range(len(p.k)):
         torque += z.force[i]
     return torque
@@ -104,9 +107,9 @@ def steady(v: float, p: Any) -> float:
     for i in range(len(p.k)):
         total += p.w[i]
     if v > 0.0:
-        return total + p.sigma2 * v
+        return total + viscous(v, p)
     if v < 0.0:
-        return p.sigma2 * v - total
+        return viscous(v, p) - total
     return 0.0
 
 
@@ -141,6 +144,7 @@ LAW = Law(
     switch=switch,
     steady=steady,
     stored=stored,
+    choices=(VISCOUS,),
     modes=modes,
     passive="always",
     rate_independent=True,

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.laws._curve import CURVE, check_levels
+from stickslip.laws._curve import CURVE
 from stickslip.laws._curve import stribeck as sliding
+from stickslip.laws._viscous import VISCOUS
+from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Law, Par
 
 __all__ = ["LAW"]
@@ -19,14 +21,11 @@ class Params(NamedTuple):
     """Parameters besides the sliding curve's, thesis Table 3."""
 
     k: Annotated[float, Par("N·m·s/rad", "k", "steep slope through zero velocity", positive=True)]
-    sigma2: Annotated[
-        float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0, default=0.0)
-    ]
 
 
 def steady(v: float, p: Any) -> float:
     """Torque at constant velocity, N·m; thesis eq. 3.20."""
-    s = sliding(v, p) + p.sigma2 * abs(v)
+    s = sliding(v, p) + viscous(abs(v), p)
     if p.k * abs(v) <= s:
         return p.k * v
     if v > 0.0:
@@ -62,7 +61,5 @@ LAW = Law(
     steady=steady,
     stored=stored,
     passive="always",
-    check=check_levels,
-    velocity_scale=lambda p: p.vs,
-    choices=(CURVE,),
+    choices=(CURVE, VISCOUS),
 )

@@ -241,6 +241,7 @@ def lowest(side: Side, e: Elements) -> float:
     if e.constant_curve or side.model is None:
         return 0.999 * e.breakaway
     curve, p = curve_of(side).function, side.model.parameters
+    assert curve is not None
     speeds = e.velocity_scale * np.concatenate([np.linspace(0.0, 10.0, 21), np.geomspace(10.0, 1e4, 13)])
     return 0.99 * min(curve(sign * float(v), p) for v in speeds for sign in (1.0, -1.0))
 

@@ -142,9 +142,14 @@ def model(table: Table, laws: Mapping[str, Law], base: Model | None = None) -> M
         choices = {k: v for k, v in given.items() if k in options and isinstance(v, str)}
         if "slip_rule" in choices:
             raise table.error("slip_rule", "belongs to the whole run; give it at the top of the file")
-        values: dict[str, Any] = base.parameters._asdict() if base else {}
+        variant = law.having(**choices)
+        kept = {
+            f.name for f in variant.fields
+        }  # another curve leaves the parameters of the former one behind
+        inherited: dict[str, Any] = base.parameters._asdict() if base else {}
+        values = {k: v for k, v in inherited.items() if k in kept}
         values.update({k: v for k, v in given.items() if k not in choices})
-        _refuse_unknown(table, values, law.having(**choices), options)
+        _refuse_unknown(table, values, variant, options)
         found = Model(law, choices, **values)
         return found.scaled(**scale) if scale else found
 
