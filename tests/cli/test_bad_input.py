@@ -42,7 +42,7 @@ STUDY = [
     ("k = [1.0e4, 0.5e4]", "k = [1.0e4, [0.5e4]]", "friction.nominal.k"),
     ("k = [1.0e4, 0.5e4]", "k = [1.0e4]", "alpha has 2"),
     ("alpha = [0.5, 0.5]", "alpha = [0.5, 0.4]", "adds up to 0.9"),
-    ("fs = 0.335\nfc = 0.285\nvs", "fs = 0.2\nfc = 0.285\nvs", "fs = 0.2"),
+    ("fs = 0.335\nfc = 0.285\nvs", "fs = -0.2\nfc = 0.285\nvs", "fs = -0.2"),
     ("delta_s = 2.0", "delta_s = 21.0", "delta_s = 21"),
     ("delta_s = 2.0", "delta_ss = 2.0", "'delta_s'"),
     ("c = 24.0", "", "parameter 'c'"),

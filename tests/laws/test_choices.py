@@ -31,7 +31,7 @@ GREASED = {
     "v2": 0.1758, "sigma2": -0.0054, "fv2": 0.0791, "delta_v": 0.3768,
 }  # fmt: skip
 
-velocities = st.floats(-1.0, 1.0)
+velocities = st.one_of(st.just(0.0), st.floats(1e-9, 1.0), st.floats(-1.0, -1e-9))
 motions = st.lists(st.tuples(velocities, st.floats(-7, 0).map(lambda e: 10.0**e)), min_size=1, max_size=20)
 
 

@@ -100,7 +100,7 @@ def test_the_command_draws_a_law_of_the_user(tmp_path, capsys) -> None:
     [
         (["law", "lugre", "--set", "fs"], "--set 'fs' is no NAME=VALUE"),
         (["law", "lugre", "--set", "f_s=1"], "no parameter 'f_s'"),
-        (["law", "lugre", "--set", "fs=0.1"], "fs = 0.1 N·m lies below fc"),
+        (["law", "lugre", "--set", "fs=-0.1"], "fs = -0.1 N·m must be greater than 0"),
         (["law", "gms", "--set", "slip_rule=other"], "slip rule"),
         (["law", "lugre", "--plot", "x.bmp"], "end the name in .svg, .png or .pdf"),
         (["law", "lugre", "--plot", "/proc/none/x.png"], "cannot write"),
