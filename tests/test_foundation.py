@@ -92,7 +92,7 @@ def test_poles_lie_where_they_were_placed():
         (lambda: Model("gms", **{**GMS.example, "alpha": [0.3] * 4}), "adds up to 1.2"),
         (lambda: Model("gms", **{**GMS.example, "k": [1.0]}), "k has 1, alpha has 4"),
         (lambda: Model("gms", **{**GMS.example, "k": []}), "k is empty"),
-        (lambda: Model("gms", **{**GMS.example, "fs": 0.1}), "fs = 0.1"),
+        (lambda: Model("gms", **{**GMS.example, "fs": -0.1}), "fs = -0.1"),
         (lambda: Model("coulomb", fc="much"), "fc = 'much'"),
         (lambda: Model("coulomb", fc=True), "fc = True"),
     ],
