@@ -106,15 +106,15 @@ def test_linear_fit_has_the_intervals_of_theory(given_noise: float | None) -> No
 
 
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
-    """A rate constant, 200 noise draws: 95 % nominal."""
+    """A rate constant, 100 noise draws: 95 % nominal."""
     x, rng = np.linspace(0.0, 4.0, 15), np.random.default_rng(3)
     inside = 0
-    for _ in range(200):
+    for _ in range(100):
         y = np.exp(-0.7 * x) + rng.normal(0.0, 0.05, x.size)
         out = fit(lambda u, y=y: np.exp(u[0] - x * math.exp(u[1])) - y,
                   vector_of(a=(POSITIVE, 1.0), k=(POSITIVE, 1.0)), starts=2)  # fmt: skip
         inside += out.estimates[1].lower <= 0.7 <= out.estimates[1].upper
-    assert 180 <= inside <= 199
+    assert 89 <= inside <= 100
 
 
 def test_a_parameter_without_effect_is_not_identified() -> None:
@@ -161,13 +161,13 @@ def test_repeats_set_the_noise() -> None:
 def test_correlated_residuals_widen_the_interval() -> None:
     """Noise of an autoregression with coefficient 0.9: the mean's standard deviation grows by sqrt(19)."""
     rng = np.random.default_rng(5)
-    steps = rng.normal(0.0, 1.0, 20_000)
+    steps = rng.normal(0.0, 1.0, 6_000)
     y = np.zeros(steps.size)
     for i in range(1, y.size):
         y[i] = 0.9 * y[i - 1] + steps[i]
     plain = fit(lambda u: u[0] - y, vector_of(a=(ANY, 0.0)), starts=1)
     wide = fit(lambda u: u[0] - y, vector_of(a=(ANY, 0.0)), starts=1, lags=60)
-    assert wide.estimates[0].std / plain.estimates[0].std == pytest.approx(math.sqrt(19.0), rel=0.15)
+    assert wide.estimates[0].std / plain.estimates[0].std == pytest.approx(math.sqrt(19.0), rel=0.25)
     assert wide.estimates[0].upper - wide.estimates[0].lower > 3.5 * (
         plain.estimates[0].upper - plain.estimates[0].lower
     )

@@ -64,7 +64,8 @@ class Trace:
         Empty for none in the legend.
     x, y : array, shape (n,)
     kind : str
-        "line", "points", "dashes", "band" (between `y` and `y2`), or "vertical" (a line at every x).
+        "line", "points", "open points", "faint" (one of many), "band" (between `y` and `y2`), or "vertical" (a line
+        at every x).
     y2 : array, shape (n,), optional
     """
 

@@ -6,6 +6,7 @@ Profiles: Venzon and Moolgavkar (1988), Raue et al. (2009). Correlated residuals
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from stickslip.errors import InputError
 from stickslip.identify.noise import Noise, quantile
 from stickslip.identify.optimum import Optimum, Residuals, descend
 
-__all__ = ["inverse_information", "long_run", "profile_bounds"]
+__all__ = ["inverse_information", "long_run", "profiles_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -42,88 +43,127 @@ def long_run(scores: Array, lags: int) -> Array:
     return total
 
 
-def profile_bounds(
+@dataclass(frozen=True)
+class Profiles:
+    """Profiles of a fit.
+
+    Attributes
+    ----------
+    bounds : mapping of int to (float, float)
+        Interval of each coordinate; infinite where the data set no limit.
+    family : array, shape (m, p)
+        Coordinates met on the way that the noise does not tell from the best fit.
+    better : array, shape (p,), or None
+        A start for a better minimum, if one was met on the way; then the rest is incomplete.
+    """
+
+    bounds: dict[int, tuple[float, float]]
+    family: Array
+    better: Array | None
+
+
+def profiles_of(
     residuals: Residuals, best: Optimum, noise: Noise, lower: Array, upper: Array, lags: int
-) -> tuple[dict[int, tuple[float, float]], Array | None]:
-    """Interval of every coordinate by its profile, and a start for a better minimum if one was met on the way."""
+) -> Profiles:
+    """Follow the profile of every coordinate to both sides."""
     inverse, seen = inverse_information(best.jacobian)
     target = np.full(best.u.size, quantile(noise) * noise.std**2)
     if lags > 0:
         robust = np.diag(inverse @ long_run(best.jacobian * best.residuals[:, None], lags) @ inverse)
         with np.errstate(invalid="ignore", divide="ignore"):
             target = np.where(seen, quantile(noise) * robust / np.diag(inverse), target)
-    out: dict[int, tuple[float, float]] = {}
-    for i in range(best.u.size):
-        ends: list[float] = []
-        for side in (-1.0, 1.0):
+    reach: dict[tuple[int, float], float] = {}
+    family = [best.u]
+    # A second round goes on from fits met on other profiles that lie beyond what the first one reached.
+    for again in (False, True):
+        for i in range(best.u.size):
             valley = inverse[:, i] / inverse[i, i] if inverse[i, i] > 0.0 else np.eye(best.u.size)[i]
             first = math.sqrt(max(float(target[i] * inverse[i, i]), 0.0)) if seen[i] else 1.0
-            end, better = _profile_end(
-                residuals, best, i, side, float(target[i]), min(max(first, 1e-9), 1.0), valley, lower, upper
-            )
-            if better is not None:
-                return out, better
-            ends.append(end)
-        out[i] = (ends[0], ends[1])
-    return out, None
+            for side in (-1.0, 1.0):
+                edge = float(upper[i] if side > 0.0 else lower[i])
+                farthest = min(abs(edge - float(best.u[i])), FARTHEST)
+                begin = max(family, key=lambda u: side * float(u[i] - best.u[i])) if again else best.u
+                near = side * float(begin[i] - best.u[i])
+                if again and near <= 1.01 * reach[i, side]:
+                    continue
+                profile = Profile(residuals, best, i, side, float(target[i]), valley, lower, upper)
+                reach[i, side] = profile.end(min(max(first, 1e-9), 1.0, farthest), farthest, near, begin)
+                family += profile.family
+                if profile.better is not None:
+                    return Profiles({}, np.array(family), profile.better)
+    bounds = {
+        i: (float(best.u[i]) - reach[i, -1.0], float(best.u[i]) + reach[i, 1.0]) for i in range(best.u.size)
+    }
+    return Profiles(bounds, np.array(family), None)
 
 
-def _profile_end(
-    residuals: Residuals, best: Optimum, i: int, side: float, target: float, first: float, valley: Array,
-    lower: Array, upper: Array,
-) -> tuple[float, Array | None]:  # fmt: skip
-    """Where the profile of coordinate i has risen by `target` on one side; infinite where it never does."""
-    origin = float(best.u[i])
-    edge = float(upper[i] if side > 0.0 else lower[i])
-    farthest = min(abs(edge - origin), FARTHEST)
-    near, rise_near, start = 0.0, 0.0, best.u
+class Profile:
+    """One side of the profile of coordinate i: the least sum of squares where it is held at a distance."""
 
-    def rise(distance: float, guess: Array) -> Optimum:
+    def __init__(
+        self, residuals: Residuals, best: Optimum, i: int, side: float, target: float, valley: Array,
+        lower: Array, upper: Array,
+    ) -> None:  # fmt: skip
+        self.residuals, self.best, self.i, self.side = residuals, best, i, side
+        self.target, self.valley, self.lower, self.upper = target, valley, lower, upper
+        self.family: list[Array] = []
+        self.better: Array | None = None
+
+    def end(self, step: float, farthest: float, near: float, start: Array) -> float:
+        """The distance at which the sum of squares has risen by the target; infinite if it does not.
+
+        The search goes outwards from `near`, where `start` is a fit that has not risen so far.
+        """
+        if farthest <= near:
+            return math.inf
+        rise_near, distance = 0.0, min(near + step, farthest)
+        while (gain := self.rise(distance, start)) < self.target:
+            if self.better is not None:
+                return math.nan
+            near, rise_near, start = distance, gain, self.family[-1]
+            step *= 2.0
+            if distance >= farthest:
+                return math.inf
+            distance = min(near + step, farthest)
+        return self._root(near, rise_near, distance, gain, start)
+
+    def _root(self, near: float, rise_near: float, far: float, rise_far: float, start: Array) -> float:
+        for _ in range(12):
+            # The root of the rise is nearly linear in the distance.
+            a, b = math.sqrt(max(rise_near, 0.0)), math.sqrt(min(rise_far, 1e6 * self.target))
+            part = (math.sqrt(self.target) - a) / (b - a)
+            x = near + min(max(part, 0.05), 0.95) * (far - near)
+            gain = self.rise(x, self.family[-1] if self.family else start)
+            if self.better is not None:
+                return math.nan
+            if gain < self.target:
+                near, rise_near = x, gain
+            else:
+                far, rise_far = x, gain
+            if abs(gain - self.target) < 0.01 * self.target or far - near < 1e-3 * far:
+                return x
+        return far
+
+    def rise(self, distance: float, guess: Array) -> float:
+        """By how much the sum of squares is above its minimum; infinite where the model has no values."""
         # Along the valley first; where it bends too much for that, from where the search stands.
         straight = guess.copy()
-        straight[i] = origin + side * distance
-        along = guess + np.clip(valley * (straight[i] - guess[i]), -1.0, 1.0)
-        along[i] = straight[i]
-        best_here: Optimum | None = None
+        straight[self.i] = self.best.u[self.i] + self.side * distance
+        along = guess + np.clip(self.valley * (straight[self.i] - guess[self.i]), -1.0, 1.0)
+        along[self.i] = straight[self.i]
+        gain = math.inf
         for begin in (along, straight):
             try:
-                found = descend(residuals, begin, lower, upper, held=(i,), iterations=40, tolerance=1e-9)
+                found = descend(
+                    self.residuals, begin, self.lower, self.upper,
+                    held=(self.i,), iterations=100, tolerance=1e-9,
+                )  # fmt: skip
             except InputError:  # not finite there
                 continue
-            if best_here is None or found.cost < best_here.cost:
-                best_here = found
-            if best_here.cost - best.cost < target:
+            gain = min(gain, found.cost - self.best.cost)
+            if gain < self.target:
+                self.family.append(found.u)
+                if gain < -1e-6 * self.target:
+                    self.better = found.u
                 break
-        return best_here or Optimum(straight, math.inf, best.residuals, best.jacobian, 0)
-
-    distance = min(first, farthest)
-    if farthest <= 0.0:
-        return side * math.inf, None
-    while True:
-        point = rise(distance, start)
-        gain = point.cost - best.cost
-        if gain < -1e-6 * target:
-            return 0.0, point.u
-        if gain >= target:
-            break
-        if distance >= farthest:
-            return side * math.inf, None
-        near, rise_near, start = distance, gain, point.u
-        distance = min(2.0 * distance, farthest)
-    # The root of the rise is nearly linear in the distance.
-    far, rise_far = distance, gain
-    for _ in range(12):
-        a, b = math.sqrt(max(rise_near, 0.0)), math.sqrt(min(rise_far, 1e6 * target))
-        part = (math.sqrt(target) - a) / (b - a)
-        x = near + min(max(part, 0.05), 0.95) * (far - near)
-        point = rise(x, start)
-        gain = point.cost - best.cost
-        if gain < -1e-6 * target:
-            return 0.0, point.u
-        if gain < target:
-            near, rise_near, start = x, gain, point.u
-        else:
-            far, rise_far = x, gain
-        if abs(gain - target) < 0.01 * target or far - near < 1e-3 * far:
-            return origin + side * x, None
-    return origin + side * far, None
+        return gain

@@ -6,7 +6,7 @@ The noise level is in `stickslip.identify.noise`, the search in `optimum`, profi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.noise import Noise, as_noise, noise_of_fit, quantile
 from stickslip.identify.optimum import Optimum, Residuals, descend, distinct, search, spread_starts
-from stickslip.identify.profile import inverse_information, long_run, profile_bounds
+from stickslip.identify.profile import Profiles, inverse_information, long_run, profiles_of
 from stickslip.identify.vector import Parameter, Vector
 
 __all__ = ["Fit", "fit", "verdict_on"]
@@ -44,6 +44,8 @@ class Fit:
     covariance, correlation : array, shape (free parameters, free parameters)
         Of the values; not a number where the noise or the direction is unknown.
     estimates : tuple of Estimate
+    family : array, shape (m, vector.size)
+        Coordinates of fits, along the profiles and elsewhere, that the noise does not tell from the best.
     """
 
     vector: Vector
@@ -53,6 +55,7 @@ class Fit:
     covariance: Array
     correlation: Array
     estimates: tuple[Estimate, ...]
+    family: Array
 
     @property
     def u(self) -> Array:
@@ -133,24 +136,25 @@ def fit(
     if optima[0].residuals.size == 0:
         raise InputError("no data to fit; give at least one point")
     level = noise_of_fit(optima[0].cost, optima[0].residuals.size, vector.size, known, size)
-    bounds: dict[int, tuple[float, float]] = {}
+    followed = Profiles({}, optima[0].u[None, :], None)
     for _ in range(8 if profiles and level.known else 0):
-        bounds, better = profile_bounds(residuals, optima[0], level, low, high, lags)
-        if better is None:
+        followed = profiles_of(residuals, optima[0], level, low, high, lags)
+        if followed.better is None:
             break
         # A profile met a better minimum: start again from there.
-        found = descend(residuals, better, low, high, tolerance=tolerance)
+        found = descend(residuals, followed.better, low, high, tolerance=tolerance)
         optima = distinct(sorted([found, *optima], key=lambda o: o.cost), 1e-4)
         level = noise_of_fit(optima[0].cost, optima[0].residuals.size, vector.size, known, size)
-        bounds = {}
+        followed = Profiles({}, optima[0].u[None, :], None)
         if not level.known:
             break
     best = optima[0]
     threshold = quantile(level) * level.std**2 if level.known else math.inf
     others = tuple(o for o in optima[1:] if o.cost - best.cost < threshold)
     covariance, correlation = covariance_of(vector, best, level, lags)
-    estimates = _estimates(vector, best, others, level, covariance, bounds, signed_scale)
-    return Fit(vector, best, others, level, covariance, correlation, estimates)
+    family = np.vstack([followed.family, *(o.u for o in others)])
+    estimates = _estimates(vector, best, family, level, covariance, followed.bounds, signed_scale)
+    return Fit(vector, best, others, level, covariance, correlation, estimates, family)
 
 
 def covariance_of(vector: Vector, best: Optimum, noise: Noise, lags: int) -> tuple[Array, Array]:
@@ -178,11 +182,11 @@ def covariance_of(vector: Vector, best: Optimum, noise: Noise, lags: int) -> tup
 
 
 def _estimates(
-    vector: Vector, best: Optimum, others: Sequence[Optimum], noise: Noise, covariance: Array,
+    vector: Vector, best: Optimum, family: Array, noise: Noise, covariance: Array,
     bounds: Mapping[int, tuple[float, float]], signed_scale: float | Mapping[str, float],
 ) -> tuple[Estimate, ...]:  # fmt: skip
     values = vector.values(best.u)
-    elsewhere = [vector.values(o.u) for o in others]
+    elsewhere = np.array([vector.values(u) for u in family])
     width = math.sqrt(quantile(noise)) if noise.known else math.nan
     out: list[Estimate] = []
     for k, p in enumerate(vector.free):
@@ -191,8 +195,8 @@ def _estimates(
         place = vector.coordinate_of(p.name)
         value = float(values[k])
         low, high = interval_of(p, value, width * std, bounds.get(place) if place is not None else None)
-        low = min([low, *(float(e[k]) for e in elsewhere)])
-        high = max([high, *(float(e[k]) for e in elsewhere)])
+        # A fit met on another parameter's profile counts as well: this one's may have lost its valley.
+        low, high = min(low, float(np.min(elsewhere[:, k]))), max(high, float(np.max(elsewhere[:, k])))
         scale = signed_scale.get(p.name, math.nan) if isinstance(signed_scale, Mapping) else signed_scale
         why = verdict_on(p, value, low, high, noise, scale)
         out.append(Estimate(p.name, p.par.unit, p.par.symbol, value, std, low, high, not why, why))

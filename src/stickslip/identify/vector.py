@@ -192,13 +192,19 @@ class Vector:
 
     def law_parameters(self, u: Array) -> Any:
         """The law's parameters, unchecked: for the inner loop of a fit."""
-        assert self.base is not None
-        return self.base.law.Parameters(**self._law_values(u))
+        return self._parameters(self.named(u))
 
     def packed(self, u: Array) -> Array:
         """The law's parameters as the flat array that compiled functions read."""
+        return self._packed(self.named(u))
+
+    def packed_values(self, values: Array) -> Array:
+        """The same for values of the free parameters."""
+        return self._packed({**self._fixed, **dict(zip(self.names, values.tolist(), strict=True))})
+
+    def _packed(self, named: Mapping[str, float]) -> Array:
         assert self.base is not None
-        return np.array(self.base.law.pack(self.law_parameters(u)), dtype=np.float64)
+        return np.array(self.base.law.pack(self._parameters(named)), dtype=np.float64)
 
     def model(self, u: Array) -> Model:
         """The law with these parameters.
@@ -209,7 +215,7 @@ class Vector:
             If the law refuses them together (`Law.check`).
         """
         assert self.base is not None
-        return Model(self.base.law, **self._law_values(u))
+        return Model(self.base.law, **self._law_values(self.named(u)))
 
     def complaint(self, u: Array) -> str:
         """What the law has against these parameters together; empty for nothing."""
@@ -217,9 +223,12 @@ class Vector:
         check = self.base.law.check
         return check(self.law_parameters(u)) if check else ""
 
-    def _law_values(self, u: Array) -> dict[str, Any]:
+    def _parameters(self, named: Mapping[str, float]) -> Any:
         assert self.base is not None
-        named = self.named(u)
+        return self.base.law.Parameters(**self._law_values(named))
+
+    def _law_values(self, named: Mapping[str, float]) -> dict[str, Any]:
+        assert self.base is not None
         count = self.base.law.elements_in(self.base.parameters)
         return {
             f.name: tuple(named[f"{f.name}[{i}]"] for i in range(count)) if f.per_element else named[f.name]

@@ -86,12 +86,18 @@ def style_of(name: str, others: Sequence[str] = ()) -> Style:
 
 @dataclass(frozen=True)
 class Curve:
-    """One line: its points, shape (n,), label (empty for none in the legend) and style."""
+    """One line: its points, shape (n,), label (empty for none in the legend) and style.
+
+    ``kind`` is "line" (as is any word not named here), "points", "open points", "vertical" (a line across the panel
+    at every x) or "band" (filled between y and y2).
+    """
 
     x: Array
     y: Array
     label: str
     style: Style
+    kind: str = "line"
+    y2: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -107,6 +113,8 @@ class Panel:
         None fits the data.
     note : str
         A line above the axes.
+    x_scale : str
+        "linear" or "log".
     legend : str
         Where inside the axes its lines are named ("lower right"); empty: in the figure's one legend below.
     """
@@ -117,6 +125,7 @@ class Panel:
     x_limits: tuple[float, float] | None = None
     y_limits: tuple[float, float] | None = None
     note: str = ""
+    x_scale: str = "linear"
     legend: str = ""
 
 
@@ -220,12 +229,29 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
     return figure
 
 
-def _fill(axes: Any, panel: Panel, bare: bool) -> None:
-    for curve in panel.curves:
+def _line(axes: Any, curve: Curve) -> None:
+    style, label = curve.style, curve.label or "_nolegend_"
+    if curve.kind == "vertical":
+        for x in curve.x:
+            axes.axvline(x, color=style.colour, linestyle=style.dashes, linewidth=style.width, label=label)
+    elif curve.kind in ("points", "open points"):
+        fill = style.colour if curve.kind == "points" else "none"
         axes.plot(
-            curve.x, curve.y, color=curve.style.colour, linestyle=curve.style.dashes,
-            linewidth=curve.style.width, label=curve.label or "_nolegend_",
+            curve.x, curve.y, color=style.colour, linestyle="", marker="o", markersize=3.2, label=label,
+            markerfacecolor=fill, markeredgewidth=0.8,
         )  # fmt: skip
+    else:
+        if curve.kind == "band" and curve.y2 is not None:
+            axes.fill_between(curve.x, curve.y, curve.y2, color=style.colour, alpha=0.25, linewidth=0.0)
+        axes.plot(
+            curve.x, curve.y, color=style.colour, linestyle=style.dashes, linewidth=style.width, label=label
+        )  # fmt: skip
+
+
+def _fill(axes: Any, panel: Panel, bare: bool) -> None:
+    axes.set_xscale(panel.x_scale)
+    for curve in panel.curves:
+        _line(axes, curve)
     axes.set_ylabel(panel.y_label)
     axes.yaxis.set_label_coords(-0.122, 0.5)
     if panel.x_limits:

@@ -1,0 +1,416 @@
+"""The sliding curve: friction at constant velocity, fitted by any law, with a verdict on what is determined.
+
+Thesis 3.1.3.1 (eq. 2.6 through the velocities 3.18, figure 3.8), 4.3.1.1.2 (break-away torque included at zero
+velocity) and 4.3.2.1.2 (eqs. 4.4 and 4.5). Between the lowest velocities the Stribeck parameters replace each
+other: without a point on the downward bend many curves fit alike, whatever the residual says.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError, ParameterError
+from stickslip.identify.estimate import Identification, Picture, Trace
+from stickslip.identify.noise import Noise, as_noise, noise_of_repeats
+from stickslip.identify.selection import Indices, criteria, cross_validate
+from stickslip.identify.starts import separable_starts
+from stickslip.identify.uncertainty import Fit, fit
+from stickslip.identify.vector import Vector
+from stickslip.model import Model
+from stickslip.simulation.steady import Steady
+
+__all__ = ["SlidingPoints", "choose_sliding", "identify_sliding"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+SAME_VELOCITY = 0.005
+"""Velocities within this part of each other are repeats of one."""
+FAMILY = 40
+"""How many of the equally good curves are drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class SlidingPoints:
+    """Friction torque at constant velocities.
+
+    Attributes
+    ----------
+    velocity : array, shape (n,)
+        rad/s; 0 for a break-away torque, whose sign says in which direction.
+    torque : array, shape (n,)
+        N·m, positive against positive velocity.
+    std : array, shape (n,), optional
+        Standard deviations relative to each other; equal where not given.
+    unit : (str, str)
+        Of velocity and torque.
+    """
+
+    velocity: Array
+    torque: Array
+    std: Array | None = None
+    unit: tuple[str, str] = ("rad/s", "N·m")
+
+    def __post_init__(self) -> None:
+        v, t = np.asarray(self.velocity, np.float64), np.asarray(self.torque, np.float64)
+        if v.ndim != 1 or v.shape != t.shape or v.size == 0:
+            raise InputError(
+                f"sliding curve: velocity {v.shape} and torque {t.shape} must be equally long lists"
+            )
+        if not (np.all(np.isfinite(v)) and np.all(np.isfinite(t))):
+            raise InputError(
+                "sliding curve: every velocity and torque must be a finite number; leave out the others"
+            )
+        if self.std is not None and not (self.std.shape == v.shape and np.all(self.std > 0.0)):
+            raise InputError("sliding curve: std needs one positive number per point, or leave it out")
+        object.__setattr__(self, "velocity", v)
+        object.__setattr__(self, "torque", t)
+
+    def __len__(self) -> int:
+        return self.velocity.size
+
+    def __add__(self, other: SlidingPoints) -> SlidingPoints:
+        """These points and others."""
+        both = [replace(p, std=np.ones(len(p))) if p.std is None else p for p in (self, other)]
+        std = (
+            None
+            if self.std is None and other.std is None
+            else np.concatenate([b.std for b in both if b.std is not None])
+        )
+        return SlidingPoints(
+            np.concatenate([self.velocity, other.velocity]), np.concatenate([self.torque, other.torque]), std, self.unit
+        )  # fmt: skip
+
+    def only(self, rows: Any) -> SlidingPoints:
+        """Some of the points."""
+        return replace(self, velocity=self.velocity[rows], torque=self.torque[rows],
+                       std=None if self.std is None else self.std[rows])  # fmt: skip
+
+    def folded(self) -> SlidingPoints:
+        """Negative velocities carried to the positive side, as the thesis averages both directions (4.3.2.1.2)."""
+        side = self.side
+        return replace(self, velocity=np.abs(self.velocity), torque=side * self.torque)
+
+    @property
+    def side(self) -> Array:
+        """Direction of every point, +1 or -1."""
+        return np.where(self.velocity != 0.0, np.sign(self.velocity), np.where(self.torque < 0.0, -1.0, 1.0))
+
+    @property
+    def weight(self) -> Array:
+        """What every residual is multiplied by; 1 in the mean square."""
+        if self.std is None:
+            return np.ones(len(self))
+        return 1.0 / (self.std * math.sqrt(float(np.mean(self.std**-2.0))))
+
+    def repeats(self) -> list[Array]:
+        """Weighted torques at velocities that occur more than once."""
+        order = np.lexsort((self.side, self.velocity))
+        v, side, t = self.velocity[order], self.side[order], (self.torque * self.weight)[order]
+        new = (np.diff(v) > SAME_VELOCITY * np.abs(v[1:])) | (side[1:] != side[:-1])
+        cuts = np.flatnonzero(new) + 1
+        return [g for g in np.split(t, cuts) if g.size > 1]
+
+
+def default_noise(points: SlidingPoints, noise: Noise | float | None) -> Noise | None:
+    """The noise given, else that of the repeats."""
+    return as_noise(noise) or noise_of_repeats(points.repeats())
+
+
+def steady_vector(points: SlidingPoints, template: Model, frozen: Iterable[str]) -> Vector:
+    """The template's parameters that act at these velocities free, the others frozen."""
+    vector = Vector(template, frozen=frozen)
+    steady = Steady(template.law, points.velocity, points.side)
+    here = steady.torque(vector.packed(vector.start))
+    idle: list[str] = []
+    for p in vector.free:
+        changed = replace(p, value=p.value * 1.1 if p.value else 0.1 * p.scale)
+        values = {q.name: changed.value if q.name == p.name else q.value for q in vector.free}
+        moved = steady.torque(vector.packed(vector.coordinates(values)))
+        if p.shares or float(np.max(np.abs(moved - here))) <= 1e-12 * float(np.max(np.abs(here))):
+            idle.append(p.name)
+    return Vector(template, frozen=[*frozen, *idle])
+
+
+def fit_sliding(
+    points: SlidingPoints, template: Model, noise: Noise | None, frozen: Iterable[str], starts: int, profiles: bool,
+    seed: int = 0,
+) -> Fit:  # fmt: skip
+    """Weighted least squares of the law's torque at constant velocity, from many starts."""
+    vector = steady_vector(points, template, frozen)
+    if not vector.free:
+        raise InputError(f"{template.law.name}: no free parameter acts at constant velocity")
+    steady, weight = Steady(template.law, points.velocity, points.side), points.weight
+    target = points.torque * weight
+
+    def model(values: Array) -> Array:
+        return weight * steady.torque(vector.packed_values(values))
+
+    def residuals(u: Array) -> Array:
+        return weight * steady.torque(vector.packed(u)) - target
+
+    first = separable_starts(model, target, vector, starts, seed=seed)
+    fc = float(np.median(np.abs(points.torque)))
+    fast = float(np.max(np.abs(points.velocity)))
+    scales = {
+        p.name: fc if p.par.unit == "N·m" else fc / fast if "s/rad" in p.par.unit else fc for p in vector.free
+    }
+    return fit(
+        residuals, vector, noise=noise, size=float(np.max(np.abs(points.torque))), signed_scale=scales,
+        starts=first, profiles=profiles,
+    )  # fmt: skip
+
+
+def identify_sliding(
+    points: SlidingPoints,
+    template: Model,
+    *,
+    noise: Noise | float | None = None,
+    frozen: Sequence[str] = (),
+    starts: int = 40,
+) -> Identification:
+    """Fit a law's curve to torques at constant velocity (thesis 3.1.3.1).
+
+    Parameters
+    ----------
+    points : SlidingPoints
+        With the break-away torque at zero velocity where it was measured.
+    template : Model
+        The law with its choices (``curve``); its values are where the search starts. Parameters that do not act at
+        constant velocity stay as they are.
+    noise : Noise or float, optional
+        Standard deviation of a point, N·m. Without it, that of repeated velocities.
+    frozen : sequence of str
+        Parameters that stay at the template's values.
+    starts : int
+        Random starts of the search.
+
+    Returns
+    -------
+    Identification
+        ``details["family"]``: parameters of equally good curves, shape (m, free parameters);
+        ``details["next_velocity"]``: where one more point would tell them apart best, rad/s (None: all is told).
+
+    Raises
+    ------
+    InputError
+        If there are fewer points than parameters, or nothing is free.
+    """
+    level = default_noise(points, noise)
+    count = steady_vector(points, template, frozen).size
+    if len(points) < count:
+        raise InputError(
+            f"{template.law.name}: {count} parameters need at least {count} points, there are {len(points)}; "
+            "measure at more velocities or freeze parameters"
+        )
+    found = fit_sliding(points, template, level, frozen, starts, profiles=True)
+    unknown = [e.name for e in found.estimates if not e.identified]
+    settling = next_velocity(points, found) if unknown and found.noise.known else None
+    model, notes = _model_of(found)
+    notes += _noise_notes(found)
+    told: list[str] = []
+    if unknown and found.noise.known:
+        notes.append(f"The data do not determine {_listed(unknown)}: equally good curves differ in them.")
+    if settling is not None:
+        told.append(f"Measure the torque at a constant velocity of {settling:.3g} {points.unit[0]}.")
+    elif not found.noise.known:
+        told.append("Repeat some velocities, so that the noise level is known.")
+    return Identification(
+        "sliding", model, found.estimates, found.correlation, _misfit(points, found), tuple(notes), tuple(told),
+        (curve_picture(points, found, settling), residual_picture(points, found)),
+        {
+            "free": found.vector.names,
+            "family": np.array([found.vector.values(u) for u in found.family]),
+            "next_velocity": settling, "noise_Nm": found.noise.std, "noise_source": found.noise.source,
+        },
+    )  # fmt: skip
+
+
+def choose_sliding(
+    points: SlidingPoints,
+    templates: Mapping[str, Model],
+    *,
+    noise: Noise | float | None = None,
+    starts: int = 40,
+    folds: int = 10,
+) -> tuple[str, Identification, dict[str, dict[str, float]]]:
+    """Fit several curves and choose: the fewest parameters whose error on points left out is not worse.
+
+    Among those within one standard error of the least cross-validated error (Breiman et al. 1984), the one with the
+    least AICc.
+
+    Returns
+    -------
+    name : str
+        Of the chosen template.
+    result : Identification
+        Its fit; the table of all of them is in its notes and in ``details["comparison"]``.
+    table : dict
+        Per template: parameters, rms_Nm, aicc, bic, cross_validated_Nm. Templates with more parameters than points
+        can tell are left out.
+    """
+    level = default_noise(points, noise)
+    table: dict[str, dict[str, float]] = {}
+    for name, template in templates.items():
+        count = steady_vector(points, template, ()).size
+        if len(points) < count + 2:
+            continue
+        found = fit_sliding(points, template, level, (), starts, profiles=False)
+        scores = criteria(found.optimum.cost, len(points), count, level)
+
+        begin = _model_of(found)[0] or template
+
+        def error(fitted: Indices, left_out: Indices, template: Model = begin) -> Array:
+            return left_out_error(points, template, fitted, left_out)
+
+        table[name] = {
+            "parameters": count, "rms_Nm": found.rms, "aicc": scores.aicc, "bic": scores.bic,
+            "cross_validated_Nm": cross_validate(error, len(points), folds),
+        }  # fmt: skip
+    if not table:
+        raise InputError(
+            f"{len(points)} points are too few for any of the curves; measure at more velocities"
+        )
+    chosen = _best(table, len(points))
+    result = identify_sliding(points, templates[chosen], noise=level, starts=starts)
+    return chosen, replace(result, details={**result.details, "comparison": table}), table
+
+
+def left_out_error(points: SlidingPoints, template: Model, fitted: Indices, left_out: Indices) -> Array:
+    """Weighted errors at some points of the curve fitted to the others."""
+    found = fit_sliding(points.only(fitted), template, None, (), 2, profiles=False)
+    rest = points.only(left_out)
+    steady = Steady(template.law, rest.velocity, rest.side)
+    return points.weight[left_out] * (steady.torque(found.vector.packed(found.u)) - rest.torque)
+
+
+def _best(table: Mapping[str, Mapping[str, float]], n: int) -> str:
+    least = min(row["cross_validated_Nm"] for row in table.values())
+    room = least * (1.0 + 1.0 / math.sqrt(2.0 * n))  # one standard error of a root mean square of n errors
+    near = [name for name, row in table.items() if row["cross_validated_Nm"] <= room]
+    return min(near, key=lambda name: table[name]["aicc"])
+
+
+def next_velocity(points: SlidingPoints, found: Fit) -> float | None:
+    """The velocity inside the measured range at which one more point would tell most, rad/s.
+
+    Each of the equally good curves is taken as the truth in turn; a point tells most where the curves that would
+    still agree with it, within the noise, span the least in their parameters. None where no point would tell.
+    """
+    fast = np.abs(points.velocity[points.velocity != 0.0])
+    if fast.size == 0:
+        return None
+    grid: Array = np.array(np.geomspace(float(np.min(fast)), float(np.max(fast)), 200), dtype=np.float64)
+    steady = Steady(_law(found), grid, np.ones(grid.size))
+    curves = np.array([steady.torque(found.vector.packed(u)) for u in found.family])
+    usable = np.all(np.isfinite(curves), axis=1)
+    curves, family = curves[usable], found.family[usable]
+    if family.shape[0] < 3:
+        return None
+    span = np.ptp(family, axis=0)
+    place = family[:, span > 0.0] / span[span > 0.0]
+    distance = np.max(np.abs(place[:, None, :] - place[None, :, :]), axis=2)
+    left: list[float] = []
+    for k in range(grid.size):
+        agrees = np.abs(curves[:, None, k] - curves[None, :, k]) <= 3.0 * found.noise.std
+        remaining: Array = distance * agrees
+        left.append(float(remaining.max(axis=1).mean()))
+    best = left.index(min(left))
+    return float(grid.tolist()[best]) if left[best] < 0.9 * max(left) else None
+
+
+def _law(found: Fit) -> Any:
+    assert found.vector.base is not None
+    return found.vector.base.law
+
+
+# ---- what is said about it -----------------------------------------------------------------------------------
+
+
+def _model_of(found: Fit) -> tuple[Model | None, list[str]]:
+    try:
+        return found.vector.model(found.u), []
+    except ParameterError as error:
+        return None, [f"No law of this package holds these values together: {error}."]
+
+
+def _noise_notes(found: Fit) -> list[str]:
+    if not found.noise.known:
+        return [
+            "The noise level is unknown, so that nothing can be called identified; give it or repeat velocities."
+        ]
+    return [f"Noise of a point: {found.noise.std:.3g} N·m ({found.noise.source})."]
+
+
+def _misfit(points: SlidingPoints, found: Fit) -> dict[str, float]:
+    weighted = found.optimum.residuals
+    scores = criteria(found.optimum.cost, len(points), found.vector.size, found.noise)
+    return {
+        "rms_Nm": found.rms, "worst_Nm": float(np.max(np.abs(weighted / points.weight))), "aicc": scores.aicc,
+        "bic": scores.bic, "points": float(len(points)), "parameters": float(found.vector.size),
+    }  # fmt: skip
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+# ---- pictures ------------------------------------------------------------------------------------------------
+
+
+def curve_picture(points: SlidingPoints, found: Fit, settling: float | None) -> Picture:
+    """The points, the best curve, and curves that fit as well (thesis figures 3.7 to 3.9, 4.33).
+
+    Negative velocities are carried to the positive side; break-away torques stand at the left edge.
+    """
+    fast = np.abs(points.velocity[points.velocity != 0.0])
+    edge = 0.4 * float(np.min(fast))
+    grid = np.geomspace(edge, 1.02 * float(np.max(fast)), 300)
+    sides = {side: Steady(_law(found), side * grid, np.full(grid.size, side)) for side in (1.0, -1.0)}
+    unknown = [e.name for e in found.estimates if not e.identified] if found.noise.known else []
+    shown = [s for s in sides if np.any(points.side == s)]
+    best = {s: s * sides[s].torque(found.vector.packed(found.u)) for s in shown}
+    same = len(shown) == 2 and bool(np.allclose(best[1.0], best[-1.0], rtol=1e-9))
+    traces: list[Trace] = []
+    stride = max(1, found.family.shape[0] // FAMILY)
+    for u in found.family[::stride] if unknown else ():
+        curve = shown[0] * sides[shown[0]].torque(found.vector.packed(u))
+        if np.all(np.isfinite(curve)):
+            traces.append(Trace("" if traces else "equally good", grid, curve, "faint"))
+    for s in shown[:1] if same else shown:
+        label = "best fit" if same or len(shown) == 1 else f"best fit, v {'>' if s > 0.0 else '<'} 0"
+        traces.append(Trace(label, grid, best[s]))
+    for s in shown:
+        rows = points.side == s
+        x = np.maximum(np.abs(points.velocity[rows]), edge)
+        label = "measured" if len(shown) == 1 else f"measured, v {'>' if s > 0.0 else '<'} 0"
+        traces.append(Trace(label, x, s * points.torque[rows], "points" if s > 0.0 else "open points"))
+    message = "The data determine every parameter of this curve."
+    if unknown:
+        message = f"Not determined: {_listed(unknown)}."
+    elif not found.noise.known:
+        message = "Noise unknown: no parameter can be called identified."
+    if settling is not None:
+        traces.append(Trace("measure here next", np.array([settling]), np.array([math.nan]), "vertical"))
+        message += f" One more point at {settling:.3g} {points.unit[0]} would tell most."
+    if np.any(points.velocity == 0.0):
+        message += " The points at the left edge are break-away torques."
+    return Picture(
+        "sliding", f"Sliding curve: {_law(found).title}", message, f"velocity ({points.unit[0]})",
+        f"friction torque ({points.unit[1]})", tuple(traces), "log",
+    )  # fmt: skip
+
+
+def residual_picture(points: SlidingPoints, found: Fit) -> Picture:
+    """Residuals over velocity."""
+    rest = found.optimum.residuals / points.weight
+    zero = np.array([float(np.min(points.velocity)), float(np.max(points.velocity))])
+    traces = (Trace("", zero, 0.0 * zero), Trace("", points.velocity, rest, "points"))
+    return Picture(
+        "sliding-residuals", "Sliding curve: residuals", f"Root mean square {found.rms:.3g} {points.unit[1]}",
+        f"velocity ({points.unit[0]})", f"model minus measured ({points.unit[1]})", traces,
+    )  # fmt: skip

@@ -1,0 +1,73 @@
+"""Pictures of an identification: draws `stickslip.identify.estimate.Picture` in the house style."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.estimate import Identification, Picture, Trace
+from stickslip.report import plots
+
+__all__ = ["draw_identification", "draw_picture"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+DASHES: tuple[Any, ...] = (
+    "-",
+    (0, (5, 1.5)),
+    (0, (3, 1, 1, 1)),
+    (0, (1.5, 0.8)),
+    (0, (7, 1.5, 1.5, 1.5)),
+    (0, (1, 1)),
+)
+
+
+def draw_identification(result: Identification, folder: Path) -> tuple[Path, ...]:
+    """Draw every picture of a result; returns the PNG files (an SVG lies beside each)."""
+    return tuple(draw_picture(picture, folder) for picture in result.pictures)
+
+
+def draw_picture(picture: Picture, folder: Path) -> Path:
+    """Draw one picture into `folder` as SVG and PNG; returns the PNG."""
+    stem = folder / picture.name
+    styles = iter(zip(LINES, DASHES, strict=True))
+    x_factor, x_label = _readable(picture.x_label, [t.x for t in picture.traces])
+    if picture.x_scale == "log":
+        x_factor, x_label = 1.0, picture.x_label
+    y_factor, y_label = _readable(picture.y_label, [t.y for t in picture.traces if t.kind != "vertical"])
+    curves = [_curve(trace, x_factor, y_factor, styles) for trace in picture.traces]
+    panel = plots.Panel(curves, y_label, x_label, x_scale=picture.x_scale)
+    plots.draw(stem, picture.title, picture.message, [panel], 2.7)
+    return stem.with_name(stem.name + ".png")
+
+
+def _readable(label: str, values: Sequence[Array]) -> tuple[float, str]:
+    """Factor and label in which small values read well: milli or micro before the unit in the label."""
+    words, _, unit = label.rpartition(" (")
+    if not words or unit in ("-)", "s)"):
+        return 1.0, label
+    largest = max((float(np.nanmax(np.abs(v))) for v in values if v.size), default=1.0)
+    factor, shown = plots.scaled(largest, unit.rstrip(")"))
+    return factor, f"{words} ({shown})"
+
+
+def _curve(trace: Trace, x_factor: float, y_factor: float, styles: Iterator[tuple[str, Any]]) -> plots.Curve:
+    if trace.kind == "points":
+        style = plots.Style("#000000", "", 1.1)
+    elif trace.kind == "open points":
+        style = plots.Style("#D55E00", "", 1.1)
+    elif trace.kind == "faint":
+        style = plots.Style("#E69F00", "-", 0.5)
+    elif trace.kind == "vertical":
+        style = plots.Style("#D55E00", (0, (1.5, 1)), 1.3)
+    elif not trace.label:
+        style = plots.Style("#555555", (0, (1, 1.5)), 0.8)
+    else:
+        colour, dashes = next(styles)
+        style = plots.Style(colour, dashes, 1.4)
+    y2 = None if trace.y2 is None else y_factor * trace.y2
+    return plots.Curve(x_factor * trace.x, y_factor * trace.y, trace.label, style, kind=trace.kind, y2=y2)

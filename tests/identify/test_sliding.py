@@ -1,0 +1,176 @@
+"""The sliding curve: the thesis's experiments on its own friction, segments of records, choice of a curve."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
+from stickslip.errors import InputError
+from stickslip.identify.segments import constant_velocity_segments, sliding_points
+from stickslip.identify.sliding import SlidingPoints, choose_sliding, identify_sliding
+from stickslip.report.identification import draw_identification
+
+TABLE_1 = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
+VELOCITIES = np.array([0.001, 0.025, 0.03, 0.04, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0])  # (3.18)
+PLANT = Model("gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, **TABLE_1)
+GUESS = Model("lugre", sigma0=1e4, sigma2=0.005, fs=0.5, fc=0.1, vs=0.05, delta_s=1.0)
+
+
+def friction(velocity: np.ndarray, model: Model = PLANT) -> np.ndarray:
+    return np.array([model.law.steady(v, model.parameters) for v in velocity])
+
+
+def without_second_point() -> SlidingPoints:
+    kept = np.arange(VELOCITIES.size) != 1
+    return SlidingPoints(VELOCITIES[kept], friction(VELOCITIES[kept]))
+
+
+def test_table_1_to_six_digits() -> None:
+    result = identify_sliding(SlidingPoints(VELOCITIES, friction(VELOCITIES)), GUESS)
+    assert {n: result[n].value for n in TABLE_1} == pytest.approx(TABLE_1, rel=1e-7)
+    # The residual of a perfect fit says nothing about the noise.
+    assert set(result.not_identified) == set(TABLE_1)
+    assert "noise" in result["fs"].verdict
+
+
+@pytest.mark.parametrize(
+    ("noise", "all_points", "undetermined"),
+    [
+        (1e-6, True, set()),
+        (1e-6, False, {"fs", "vs", "delta_s"}),
+        (1e-4, True, {"fs", "vs", "delta_s"}),
+        (1e-4, False, {"fs", "vs", "delta_s"}),
+    ],
+)
+def test_figure_3_8(noise: float, all_points: bool, undetermined: set[str]) -> None:
+    points = SlidingPoints(VELOCITIES, friction(VELOCITIES)) if all_points else without_second_point()
+    result = identify_sliding(points, GUESS, noise=noise)
+    assert set(result.not_identified) == undetermined
+    if not undetermined:
+        assert [result[n].std / result[n].value for n in ("vs", "delta_s")] == pytest.approx(
+            [0.05, 0.05], abs=0.006
+        )
+    else:
+        family = result.details["family"]
+        shape = family[:, result.details["free"].index("delta_s")]
+        # The reference found perfect-looking fits from 1.35 to 4.24.
+        assert np.min(shape) < 1.36
+        assert np.max(shape) > 4.23
+        assert result.measure_next
+
+
+def test_the_point_asked_for_settles_it() -> None:
+    points = without_second_point()
+    wanted = identify_sliding(points, GUESS, noise=1e-6).details["next_velocity"]
+    assert 0.001 < wanted < 0.03
+    added = points + SlidingPoints(np.array([wanted]), friction(np.array([wanted])))
+    assert identify_sliding(added, GUESS, noise=1e-6).not_identified == ()
+
+
+def test_intervals_with_noise_hold_the_truth() -> None:
+    """Both directions, break-away points at zero velocity, repeats that set the noise; 20 draws."""
+    rng = np.random.default_rng(1)
+    v = np.array([0.0, 0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.2, 0.5, 1.0])
+    v = np.concatenate([v, -v, v, -v])
+    truth = np.where(v == 0.0, np.repeat([1.0, -1.0, 1.0, -1.0], 10) * 0.335, friction(v))
+    inside = 0
+    for _ in range(20):
+        result = identify_sliding(SlidingPoints(v, truth + rng.normal(0.0, 1e-3, v.size)), GUESS, starts=6)
+        assert result.details["noise_source"].startswith("repeats")
+        inside += sum(result[n].lower <= TABLE_1[n] <= result[n].upper for n in TABLE_1)
+        assert result.not_identified == ()
+    assert 88 <= inside <= 100
+
+
+def test_weights_let_a_bad_point_count_for_little() -> None:
+    torque = friction(VELOCITIES)
+    torque[5] += 0.05
+    std = np.where(np.arange(12) == 5, 1.0, 1e-5)
+    result = identify_sliding(SlidingPoints(VELOCITIES, torque, std), GUESS)
+    assert result["fc"].value == pytest.approx(0.285, rel=1e-4)
+
+
+def test_a_curve_is_chosen_by_what_it_predicts() -> None:
+    """With little noise the Stribeck curve is; where friction has no Stribeck effect, Coulomb's line is."""
+    rng = np.random.default_rng(2)
+    v = np.array([0.002, 0.005, 0.01, 0.015, 0.02, 0.04, 0.08, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0] * 2)
+    templates = {"Coulomb": Model("coulomb", fc=0.2, sigma2=0.01), "Stribeck": GUESS}
+    noise = rng.normal(0.0, 1e-3, v.size)
+    name, result, table = choose_sliding(SlidingPoints(v, friction(v) + noise), templates)
+    assert name == "Stribeck"
+    assert table["Stribeck"]["cross_validated_Nm"] == pytest.approx(1e-3, rel=0.5)
+    line = 0.285 + 0.018 * v + noise
+    assert choose_sliding(SlidingPoints(v, line), templates)[0] == "Coulomb"
+    assert set(result.details["comparison"]) == set(templates)
+
+
+def test_bad_points_get_one_clear_error() -> None:
+    with pytest.raises(InputError, match="5 parameters need at least 5 points"):
+        identify_sliding(SlidingPoints(np.ones(3), np.ones(3)), GUESS)
+    with pytest.raises(InputError, match="equally long"):
+        SlidingPoints(np.ones(3), np.ones(2))
+    with pytest.raises(InputError, match="finite"):
+        SlidingPoints(np.array([1.0, math.nan]), np.ones(2))
+
+
+# ---- records -----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def staircase() -> Record:
+    """A simulated constant-velocity experiment in both directions, with a torque that varies with the position."""
+    axis = RigidAxis(3.8623e-4, PLANT)
+    parts = []
+    for k, speed in enumerate([3.0, -3.0, 1.0, -1.0]):
+        run = simulate(axis, Controller(Gains(kp=20.0, kd=0.2, kr=0.2)), Reference("ramp", velocity=speed),
+                       (2.0 * math.pi * 2 + 1.0) / abs(speed), output=2e-3)  # fmt: skip
+        parts.append((k, run))
+    time, rows = [], {"position": [], "motor_torque": []}
+    clock = 0.0
+    for _, run in parts:
+        time.append(run.time + clock)
+        clock = time[-1][-1] + 1e-6
+        rows["position"].append(run["position"])
+        rows["motor_torque"].append(run["motor_torque"] + 0.03 * np.sin(3.0 * run["position"]))
+    channels = {n: np.concatenate(v) for n, v in rows.items()}
+    return Record(np.concatenate(time), channels, {"position": "rad", "motor_torque": "N·m"})
+
+
+def test_segments_are_found_and_averaged_over_whole_revolutions(staircase: Record) -> None:
+    segments = constant_velocity_segments(staircase)
+    assert [s.velocity for s in segments] == pytest.approx([3.0, -3.0, 1.0, -1.0], rel=1e-3)
+    assert [s.revolutions for s in segments] == [2, 2, 2, 2]
+    assert [s.torque for s in segments] == pytest.approx(friction(np.array([3.0, -3.0, 1.0, -1.0])), abs=2e-4)
+    points, notes = sliding_points([staircase])
+    assert len(points) == 4
+    assert "20 degrees" in notes[0]
+
+
+def test_a_segment_shorter_than_a_revolution_is_said(staircase: Record) -> None:
+    early = staircase.time < 1.5
+    short = Record(
+        staircase.time[early], {n: staircase[n][early] for n in staircase.channels}, staircase.units
+    )
+    _, notes = sliding_points(short)
+    assert "less than a revolution" in notes[1]
+
+
+def test_a_record_without_constant_velocity_is_one_clear_error() -> None:
+    time = np.linspace(0.0, 1.0, 500)
+    still = Record(
+        time, {"position": 0.0 * time, "motor_torque": time}, {"position": "rad", "motor_torque": "N·m"}
+    )
+    with pytest.raises(InputError, match="no stretch of constant velocity"):
+        sliding_points(still)
+    swinging = Record(time, {"position": np.sin(6.0 * time), "motor_torque": time}, still.units)
+    with pytest.raises(InputError, match="no stretch of constant velocity"):
+        sliding_points(swinging)
+
+
+def test_pictures_are_drawn(tmp_path: Path) -> None:
+    result = identify_sliding(without_second_point(), GUESS, noise=1e-6)
+    assert any(t.kind == "vertical" for t in result.pictures[0].traces)
+    assert sum(t.kind == "faint" for t in result.pictures[0].traces) > 10
+    assert all(path.stat().st_size > 5000 for path in draw_identification(result, tmp_path))
