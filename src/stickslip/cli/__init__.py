@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 from stickslip.errors import InputError, StickslipError
 
-__all__ = ["VERBS", "main"]
+__all__ = ["VERBS", "main", "parser_of"]
 
 VERBS = ("study", "simulate", "laws", "law", "rerun", "version")
 
@@ -45,9 +45,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 141
 
 
-def _dispatch(argv: list[str]) -> int:
-    # Only the verb that is called is imported; all of them where help or a complaint lists them.
-    names = argv[:1] if argv and argv[0] in VERBS else VERBS
+def parser_of(names: Sequence[str] = VERBS) -> argparse.ArgumentParser:
+    """The parser of these verbs; their modules are imported."""
     parser = Parser(prog="stickslip", description="Friction of a servo axis: simulated and compensated.")
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     verbs = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs")
@@ -57,6 +56,12 @@ def _dispatch(argv: list[str]) -> int:
                                formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
         module.arguments(sub)
         sub.set_defaults(run=module.run)
+    return parser
+
+
+def _dispatch(argv: list[str]) -> int:
+    # Only the verb that is called is imported; all of them where help or a complaint lists them.
+    parser = parser_of(argv[:1] if argv and argv[0] in VERBS else VERBS)
     try:
         args: Any = parser.parse_args(argv)
     except SystemExit as leaving:  # --help

@@ -4,11 +4,37 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from stickslip.errors import InputError
 from stickslip.study.result import StudyResult
 
-__all__ = ["write"]
+if TYPE_CHECKING:
+    from stickslip.report.figures import Figure
+
+__all__ = ["draw", "write"]
+
+
+def draw(result: StudyResult) -> list[Figure]:
+    """Draw a study's figures into ``figures/`` of its folder, as SVG and PNG.
+
+    Parameters
+    ----------
+    result : StudyResult
+        What was not run is left out.
+
+    Returns
+    -------
+    list of Figure
+        With titles, captions and the stems of the files.
+    """
+    from stickslip.report._open_loop import comparison_figures, drive_figures, response_figures
+    from stickslip.report._view import StudyView
+    from stickslip.report.figures import reference_figures, result_figures
+
+    view = StudyView(result)
+    makers = (reference_figures, response_figures, drive_figures, comparison_figures, result_figures)
+    return [figure for make in makers for figure in make(view, result.folder / "figures")]
 
 
 def write(result: StudyResult) -> Path:
@@ -29,26 +55,13 @@ def write(result: StudyResult) -> Path:
     InputError
         If the folder cannot be written.
     """
-    from stickslip.report._open_loop import comparison_figures, drive_figures, response_figures
     from stickslip.report._view import StudyView
-    from stickslip.report.figures import reference_figures, result_figures
     from stickslip.report.html import render
 
     view = StudyView(result)
-    folder = result.folder / "figures"
     target = result.folder / "report.html"
     try:
-        figures = [
-            figure
-            for make in (
-                reference_figures,
-                response_figures,
-                drive_figures,
-                comparison_figures,
-                result_figures,
-            )
-            for figure in make(view, folder)
-        ]
+        figures = draw(result)
         draft = target.with_name("report.html.part")
         draft.write_text(render(view, figures), encoding="utf-8")
         os.replace(draft, target)

@@ -252,4 +252,4 @@ def _steps_panel(
     note = f"from rest, steps in velocity: {words} {unit}"
     low, high = float(np.min(answer.torque)), float(np.max(answer.torque))
     limits = (min(0.0, 1.1 * low), max(0.0, 1.1 * high) or 1.0)
-    return Panel(curves, label, f"time ({second})", None, limits, note, "lower right")
+    return Panel(curves, label, f"time ({second})", None, limits, note, legend="lower right")

@@ -47,11 +47,12 @@ RC: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Style:
-    """Colour (Okabe-Ito, safe for the colour-blind), dashes and width (points) of a line."""
+    """Colour (Okabe-Ito, safe for the colour-blind), dashes, width (points) and marker of a line."""
 
     colour: str
     dashes: Any = "-"
     width: float = 1.1
+    marker: str = ""
 
 
 REFERENCE = Style("#000000", (0, (1, 1.5)), 1.3)
@@ -113,7 +114,7 @@ class Panel:
         None fits the data.
     note : str
         A line above the axes.
-    x_scale : str
+    x_scale, y_scale : str
         "linear" or "log".
     legend : str
         Where inside the axes its lines are named ("lower right"); empty: in the figure's one legend below.
@@ -127,6 +128,7 @@ class Panel:
     note: str = ""
     x_scale: str = "linear"
     legend: str = ""
+    y_scale: str = "linear"
 
 
 def envelope(x: Array, y: Array, bins: int = 380) -> tuple[Array, Array]:
@@ -244,12 +246,14 @@ def _line(axes: Any, curve: Curve) -> None:
         if curve.kind == "band" and curve.y2 is not None:
             axes.fill_between(curve.x, curve.y, curve.y2, color=style.colour, alpha=0.25, linewidth=0.0)
         axes.plot(
-            curve.x, curve.y, color=style.colour, linestyle=style.dashes, linewidth=style.width, label=label
+            curve.x, curve.y, color=style.colour, linestyle=style.dashes, linewidth=style.width, label=label,
+            marker=style.marker, markersize=3.5,
         )  # fmt: skip
 
 
 def _fill(axes: Any, panel: Panel, bare: bool) -> None:
     axes.set_xscale(panel.x_scale)
+    axes.set_yscale(panel.y_scale)
     for curve in panel.curves:
         _line(axes, curve)
     axes.set_ylabel(panel.y_label)

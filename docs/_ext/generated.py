@@ -1,0 +1,88 @@
+"""Write the pages that are made from the package before Sphinx looks for pages, and run those that are executed."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import api_pages
+import command_pages
+import example_pages
+import law_pages
+import nomenclature_page
+import reference_pages
+import sessions
+import study_page
+from pages import DOCS, GENERATED, ROOT, write
+from sphinx.application import Sphinx
+from sphinx.util import logging
+
+log = logging.getLogger(__name__)
+
+RUN = ("tutorial.md", "howto/*.md", "explanation/*.md")
+"""Pages that are executed (`sessions`)."""
+
+
+def generate(app: Sphinx, config: Any) -> None:
+    """Write and run."""
+    for make in MAKERS:
+        start = time.perf_counter()
+        make()
+        log.info("%s.%s: %.1f s", make.__module__, make.__name__, time.perf_counter() - start)
+    for page in sorted(page for pattern in RUN for page in DOCS.glob(pattern)):
+        run(page)
+
+
+def work_precision() -> None:
+    """Measure and draw the work-precision diagram, unless the package is as it was."""
+    script, stamp = ROOT / "benchmarks" / "work_precision.py", GENERATED / ".work_precision"
+    now = hashlib.sha256(script.read_bytes() + package_hash().encode()).hexdigest()
+    if stamp.exists() and stamp.read_text() == now:
+        return
+    command = [sys.executable, str(script), str(GENERATED / "work_precision")]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    write(GENERATED / "work_precision.txt", done.stdout)
+    stamp.write_text(now)
+
+
+def run(page: Path) -> None:
+    """Run a page, unless page and package are as they were; what goes wrong is a warning, which fails the build."""
+    if not any(sessions.blocks(page.read_text(encoding="utf-8"))):
+        return
+    folder = GENERATED / "sessions" / page.stem
+    stamp = folder / ".stamp"
+    now = hashlib.sha256(page.read_bytes() + package_hash().encode()).hexdigest()
+    if stamp.exists() and stamp.read_text() == now:
+        return
+    start = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, str(DOCS / "_ext" / "sessions.py"), str(page), str(folder)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    if done.returncode:
+        log.warning("%s", done.stderr.strip())
+    else:
+        stamp.write_text(now)
+    log.info("%s: %.1f s", page.name, time.perf_counter() - start)
+
+
+def package_hash() -> str:
+    """A hash of the package's sources."""
+    parts = [p.read_bytes() for p in sorted((ROOT / "src").rglob("*.py"))]
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()
+
+
+MAKERS = (
+    law_pages.make, reference_pages.make, command_pages.make, nomenclature_page.make, api_pages.make,
+    example_pages.make, study_page.make, work_precision,
+)  # fmt: skip
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Before the environment looks for pages."""
+    app.connect("config-inited", generate)
+    return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
