@@ -16,8 +16,8 @@ Argument order, everywhere: velocity, time step, state ``z``, parameters ``p``, 
 ``holding(direction, z, p, u)``        the largest torque a contact at rest withstands in that direction
                                        (laws whose torque jumps at zero velocity)
 ``check(p)``                           a sentence that says what is wrong with the parameters, or ""
-``modes(p)``                           the law as elements that stick as springs and slip along one curve
-                                       (what the exact integrator runs on)
+``modes(p)``                           the law as `Elements` that stick as springs and slip along one curve, or as
+                                       a `Bristle` (what the exact integrator runs on), or None
 ``stored(z, p)``                       energy that the contact could give back, J, where it is defined: the
                                        work done on it less the rise of this is dissipated, never negative
                                        where the law is passive
@@ -42,6 +42,7 @@ from stickslip.binding import bound, distinct, first_complaint, least, wrapped
 from stickslip.errors import ParameterError, UnknownName, suggestion
 
 __all__ = [
+    "Bristle",
     "Choice",
     "Described",
     "Elements",
@@ -186,12 +187,30 @@ class Elements:
 
     ``stiffness`` may be infinite (the element holds rigidly: Coulomb, Stribeck), and ``attraction`` may be
     infinite (the slipping force is share_i s(v) at once: Maxwell-slip). ``curve`` tells whether s depends on
-    the velocity; where it does not, ``breakaway`` is its value.
+    the velocity; where it does not, ``breakaway`` is its value. With a finite ``slope`` rigid elements do not hold at
+    rest: the torque is slope v as far as its magnitude stays below that of sliding.
     """
 
     stiffness: tuple[float, ...]
     share: tuple[float, ...]
     attraction: float
+    viscous: float
+    breakaway: float
+    velocity_scale: float
+    constant_curve: bool = False
+    slope: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Bristle:
+    """A law as one bristle that bends as a spring and gives way in proportion to the distance slid.
+
+    dF/dt = stiffness (v - |v| F / s(v)); the torque is F + (damping / stiffness) dF/dt + viscous v: LuGre (thesis eqs.
+    2.8 and 2.9 with F = sigma_0 z), Dahl with shape factor 1. The other fields are those of `Elements`.
+    """
+
+    stiffness: float
+    damping: float
     viscous: float
     breakaway: float
     velocity_scale: float
@@ -371,7 +390,7 @@ class Law(Described):
     steady: Callable[..., float] | None = None
     holding: Callable[..., float] | None = None
     check: Callable[[Any], str] | None = None
-    modes: Callable[[Any], Elements] | None = None
+    modes: Callable[[Any], Elements | Bristle | None] | None = None
     stored: Callable[..., float] | None = None
     velocity_scale: Callable[[Any], float] | None = None
     choices: tuple[Choice, ...] = ()

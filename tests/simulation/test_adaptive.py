@@ -34,7 +34,7 @@ def test_pd_and_pid_agree_with_the_reference(case, rule, study_reference):
 @pytest.mark.parametrize("law", ["stribeck", "lugre"])
 @pytest.mark.parametrize("reference", ["low", "step"])
 def test_feedback_agrees_with_the_reference(reference, law, rule, study_reference):
-    """The runs that only this integrator can do; bands where the reference calls them sensitive."""
+    """Feedback that grows near rest; bands where the reference calls it sensitive."""
     for friction in ("nominal", "plus10", "minus10"):
         case = f"{reference}/{friction}/FB-{law}"
         axis, controller, motion, duration = thesis_run(case)

@@ -20,9 +20,12 @@ from stickslip.simulation import _meter as meter
 from stickslip.simulation import adaptive, exact
 from stickslip.simulation._case import DIVERGED, DONE, Case, Outcome, lay_out
 from stickslip.simulation.closed_loop import simulate
+from stickslip.spec import Bristle
 
 NAMES = ["rms_e", "max_e", "ss_e", "rms_ev", "rms_Tm", "rms_hp", "rev_per_s"]
 COULOMB = Model("coulomb", fc=0.285, sigma2=0.018)
+OTHER = Model("lugre", **PARAMETERS["lugre"])
+OTHER.law = replace(OTHER.law, modes=None, variants={})
 FREE = Model("coulomb", fc=0.0, sigma2=0.018)
 GMS = Model("gms", **PLANT)
 SINE = CASES["low"][0]
@@ -56,7 +59,9 @@ def column(outcome: Outcome, index: int) -> np.ndarray:
 
 @pytest.mark.parametrize("rule", ["signed", "literal"])
 @pytest.mark.parametrize(
-    "controller", ["PD", "PID", "FF-coulomb", "FF-stribeck", "FF-lugre", "FF-gms", "FB-coulomb", "FB-gms"]
+    "controller",
+    ["PD", "PID"]
+    + [f"{how}-{law}" for how in ("FF", "FB") for law in ("coulomb", "stribeck", "lugre", "gms")],
 )
 @pytest.mark.parametrize("motion", ["low", "high", "step"])
 def test_study_against_the_reference(motion, controller, rule, study_reference):
@@ -139,7 +144,9 @@ def test_mirror_symmetry():
     np.testing.assert_allclose(column(up, 3), -column(down, 3), atol=1e-12)
 
 
-@pytest.mark.parametrize("controller", ["PD", "PID", "FF-lugre", "FB-gms", "FB-coulomb"])
+@pytest.mark.parametrize(
+    "controller", ["PD", "PID", "FF-lugre", "FB-gms", "FB-coulomb", "FB-lugre", "FB-stribeck"]
+)
 def test_error_follows_the_tolerance(controller):
     axis, control, reference, duration = thesis_run(f"low/nominal/{controller}")
     duration = min(duration, 1.3)
@@ -231,7 +238,7 @@ def test_feedforward_table_follows_the_law():
         (Controller(PD, sample_time=1e-3), "sample time"),
         (Controller(PD, torque_limit=1.0), "torque limit"),
         (Controller(PD, Feedforward(COULOMB, filter_hz=10.0)), "filter"),
-        (Controller(PD, Feedback(Model("lugre", **PARAMETERS["lugre"]))), "compensator"),
+        (Controller(PD, Feedback(OTHER)), "compensator"),
     ],
 )
 def test_refusals_are_one_sentence(controller, words):
@@ -241,9 +248,47 @@ def test_refusals_are_one_sentence(controller, words):
         exact.run(case)
 
 
-def test_plants_without_elements_are_refused():
-    case = loop(Model("lugre", **PARAMETERS["lugre"]), Controller(PD), SINE, 0.1)
-    assert "plant" in exact.can_run(case)
+def test_plants_without_modes_are_refused():
+    assert "plant" in exact.can_run(loop(OTHER, Controller(PD), SINE, 0.1))
+    creeping = loop(Model("stribeck", **PARAMETERS["stribeck"]), Controller(PD), SINE, 0.1)
+    assert "steep slope" in exact.can_run(creeping)
+
+
+@pytest.mark.parametrize("sigma1", [0.0, 0.1, 2.0])
+@pytest.mark.parametrize("compensated", [False, True])
+def test_a_bristle_in_the_plant_against_the_adaptive_integrator(sigma1, compensated):
+    friction = Model("lugre", **{**PARAMETERS["lugre"], "sigma1": sigma1})
+    helper = Feedback(Model("lugre", **PARAMETERS["lugre"]), gain=0.8) if compensated else None
+    case = loop(friction, Controller(PD, helper), SINE, 1.5)
+    a, b = exact.run(case), adaptive.run(case)
+    assert np.max(np.abs(column(a, 3) - column(b, 3))) < 2e-8
+    assert np.max(np.abs(column(a, 6) - column(b, 6))) < 1e-4
+
+
+def test_a_users_bristle_needs_no_more_than_its_description():
+    """Dahl friction (shape factor 1) on a free axis: F = F_C (1 - exp(-k x / F_C)), so the energy is closed."""
+    law = replace(
+        Model("lugre", **PARAMETERS["lugre"]).law,
+        modes=lambda p: Bristle(p.sigma0, p.sigma1, p.sigma2, p.fc, 0.0, constant_curve=True),
+        variants={},
+    )
+    friction = Model("lugre", sigma0=50.0, sigma1=0.0, sigma2=0.0, fs=0.3, fc=0.3, vs=0.01)
+    friction.law = law
+    start = 20.0
+    case = loop(friction, Controller(Gains(kp=1e-9)), SINE, 0.012, initial=(0.0, start))
+    outcome = exact.run(case)
+    x, v, friction_torque = column(outcome, 3), column(outcome, 4), column(outcome, 6)
+    np.testing.assert_allclose(friction_torque, 0.3 * (1.0 - np.exp(-50.0 * x / 0.3)), atol=1e-9)
+    spent = 0.3 * x - 0.3 * 0.3 / 50.0 * (1.0 - np.exp(-50.0 * x / 0.3))
+    np.testing.assert_allclose(v, np.sqrt(start**2 - 2.0 * spent / INERTIA), rtol=1e-9)
+
+
+def test_a_less_steep_slope_against_the_adaptive_integrator():
+    """A layer of 1 mrad/s instead of 10 urad/s: it takes many steps to cross."""
+    helper = Feedback(Model("stribeck", **{**PARAMETERS["stribeck"], "k": 300.0}))
+    case = loop(GMS, Controller(PD, helper), SINE, 0.6)
+    a, b = exact.run(case), adaptive.run(case)
+    assert np.max(np.abs(column(a, 3) - column(b, 3))) < 1e-7
 
 
 def test_integral_action_leaves_no_error():

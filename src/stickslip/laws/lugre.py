@@ -14,7 +14,7 @@ from stickslip.laws._curve import stribeck as sliding
 from stickslip.laws._curve import stribeck_scale as sliding_scale
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
-from stickslip.spec import Law, Par
+from stickslip.spec import Bristle, Law, Par
 
 __all__ = ["LAW"]
 
@@ -91,6 +91,11 @@ def is_passive(p: Any) -> bool:
     return p.sigma2 >= p.sigma1 * (high - low) / low
 
 
+def modes(p: Any) -> Bristle:
+    """The law as it stands, with F = sigma0 z."""
+    return Bristle(p.sigma0, p.sigma1, p.sigma2, sliding(0.0, p), sliding_scale(p))
+
+
 LAW = Law(
     "lugre",
     Params,
@@ -109,6 +114,7 @@ LAW = Law(
     State=State,
     rate=rate,
     steady=steady,
+    modes=modes,
     choices=(CURVE, VISCOUS),
     passive="sigma2 >= sigma1 (fs - fc) / fc",
     is_passive=is_passive,

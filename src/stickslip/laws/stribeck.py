@@ -10,9 +10,10 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.laws._curve import CURVE
 from stickslip.laws._curve import stribeck as sliding
+from stickslip.laws._curve import stribeck_scale as sliding_scale
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
-from stickslip.spec import Law, Par
+from stickslip.spec import Elements, Law, Par
 
 __all__ = ["LAW"]
 
@@ -48,6 +49,12 @@ def stored(z: Any, p: Any) -> float:
     return 0.0
 
 
+def modes(p: Any) -> Elements:
+    """One rigid element on the curve, behind the steep slope."""
+    inf = float("inf")
+    return Elements((inf,), (1.0,), inf, p.sigma2, sliding(0.0, p), sliding_scale(p), slope=p.k)
+
+
 LAW = Law(
     "stribeck",
     Params,
@@ -61,5 +68,6 @@ LAW = Law(
     steady=steady,
     stored=stored,
     passive="always",
+    modes=modes,
     choices=(CURVE, VISCOUS),
 )

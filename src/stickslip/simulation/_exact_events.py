@@ -11,26 +11,28 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulation._case import KI, KP
 from stickslip.simulation._exact_flow import UNMOVED, Linear, acceleration, flow, free_motion, moved
+from stickslip.simulation._exact_rest import NONE, set_off
 from stickslip.simulation._exact_state import (
     ATTRACTION,
-    BREAKAWAY,
+    BENDS,
     ELEMENT_SIZE,
     ELEMENTS,
     EXPONENT,
     FORCE,
-    HELD,
-    INTEGRAL,
+    INSIDE,
+    KIND,
+    LAYER,
     LITERAL,
     LOAD_AT_0,
     LOAD_SLOPE,
     LOWEST,
+    NARROW,
     OFFSET,
     POSITION,
     Q_END,
     Q_MID,
-    RIGID,
+    RELAXES,
     S_NOW,
     S_START,
     SCALE,
@@ -44,13 +46,12 @@ from stickslip.simulation._exact_state import (
     STIFFNESS,
     VELOCITY,
     WATCHED,
-    WEIGHT,
     Q,
-    R,
+    S,
     first_of,
     sliding,
 )
-from stickslip.simulation._exact_step import (
+from stickslip.simulation._exact_stretch import (
     LENGTH,
     POSITION_END,
     POSITION_EVENT,
@@ -62,13 +63,14 @@ from stickslip.simulation._exact_step import (
     state_at,
 )
 
-NONE = -1.0
 NEAR = 1e-3
 """N·m: a guess of how far the event function is below zero."""
 NOISE = 1e-12
 """Velocities this small (rad/s) may be rounding errors of one that creeps to zero: no reversal yet."""
 ROUNDING = 1e-10
 """N·m by which a load may seem to miss the limit that it was located at."""
+ON_EDGE = 1e-6
+"""Velocities this near the edge of a steep layer, in parts of it, are on it."""
 MOST_DIPS = 6
 LOOK, MOST_LOOKS, LOOKS_AT_TURN = 0.1, 16.0, 8
 """Where an event may hide between two nodes, it is looked for at every such change of velocity, in parts of v_s,
@@ -105,8 +107,10 @@ def trigger(
     """The largest event function at a state: not negative where a mode ends."""
     g = -1e9
     if loop[WATCHED] > 0.0:
-        g = -VELOCITY_WEIGHT * (loop[SIGMA] * v + NOISE)
+        g = -VELOCITY_WEIGHT * (loop[SIGMA] * v - loop[NARROW] + NOISE)
     for side in range(int(plan[SIDES])):
+        if sides[side * SIDE_SIZE + INSIDE] > 0.0:
+            g = max(g, VELOCITY_WEIGHT * (abs(v) - sides[side * SIDE_SIZE + LAYER]))
         if sides[side * SIDE_SIZE + STICKING] > 0.0:
             top = heaviest(plan, elements, sides, side, theta, v)
             # The curve is only asked for where its lowest level is in reach.
@@ -163,13 +167,14 @@ def grazing(
     sigma = loop[SIGMA]
     a0 = sigma * a0
     a1 = sigma * a1
-    if not (a0 < 0.0 and a1 > 0.0 and sigma * v1 > 0.0 and sigma * v1 < -a0 * stretch[LENGTH]):
+    edge = loop[NARROW]
+    if not (a0 < 0.0 and a1 > 0.0 and sigma * v1 > edge and sigma * v1 - edge < -a0 * stretch[LENGTH]):
         return NONE
     c = cubic_of(stretch)
     for _ in range(MOST_DIPS):
         x = x0 + (x1 - x0) * min(max(a0 / (a0 - a1), 0.1), 0.9)
         theta, v = state_at(lin, stretch, x)
-        if sigma * v <= -NOISE:
+        if sigma * v <= edge - NOISE:
             return x
         a = sigma * acceleration(lin, c, x, theta, v)
         # The velocity falls no further than its tangent.
@@ -179,7 +184,7 @@ def grazing(
         else:
             a1 = a
             x1 = x
-        if sigma * v > max(-a0, a1) * (x1 - x0):
+        if sigma * v - edge > max(-a0, a1) * (x1 - x0):
             break
     return NONE
 
@@ -316,8 +321,8 @@ def add_exponents(plan: Any, sides: Any, h: float, x: float) -> None:
     """Add the decay C int 1/s dt of slipping elements over the first x of a stretch of length h."""
     f = x / h
     for side in range(int(plan[SIDES])):
-        attraction = sides[side * SIDE_SIZE + ATTRACTION]
-        if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and attraction < math.inf:
+        if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and sides[side * SIDE_SIZE + KIND] == RELAXES:
+            attraction = sides[side * SIDE_SIZE + ATTRACTION]
             q0 = sides[side * SIDE_SIZE + Q]
             bend = 2.0 * (q0 + sides[side * SIDE_SIZE + Q_END]) - 4.0 * sides[side * SIDE_SIZE + Q_MID]
             slope = sides[side * SIDE_SIZE + Q_END] - q0 - bend
@@ -328,8 +333,11 @@ def add_exponents(plan: Any, sides: Any, h: float, x: float) -> None:
 def settle_forces(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> None:
     """Write every element's force where the loop stands, before modes change."""
     for side in range(int(plan[SIDES])):
+        if sides[side * SIDE_SIZE + KIND] == BENDS:
+            sides[side * SIDE_SIZE + S] = sides[side * SIDE_SIZE + S_NOW]
+            continue
         decay = math.exp(-sides[side * SIDE_SIZE + EXPONENT])
-        moves = sides[side * SIDE_SIZE + ATTRACTION] < math.inf
+        moves = sides[side * SIDE_SIZE + KIND] == RELAXES
         s = 0.0 if moves else sliding(parameters, plan, sides, side, loop[VELOCITY])
         for i in range(first_of(plan, side), first_of(plan, side + 1)):
             if elements[i * ELEMENT_SIZE + SLIPS] == 0.0:
@@ -352,12 +360,15 @@ def switch(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> 
     """Change the modes that end here: stick at a reversal, slip where the limit is reached."""
     v = loop[VELOCITY]
     settle_forces(parameters, plan, elements, sides, loop)
+    for side in range(int(plan[SIDES])):
+        enter_or_leave(sides, loop, side, v)
     if loop[WATCHED] > 0.0 and loop[SIGMA] * v <= 1e-9 * abs(v):
         for i in range(int(plan[ELEMENTS])):
             elements[i * ELEMENT_SIZE + SLIPS] = 0.0
         if loop[SIGMA] * v > 0.0:
             loop[VELOCITY] = 0.0
-        set_off(plan, elements, sides, parameters, loop)
+        if not set_off(plan, elements, sides, parameters, loop):
+            loop[SIGMA] = -loop[SIGMA]
         return
     direction = 1.0 if v >= 0.0 else -1.0
     for side in range(int(plan[SIDES])):
@@ -374,56 +385,14 @@ def switch(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> 
 
 
 @kernel(exact=False)
-def stiction(plan: Any, sides: Any) -> float:
-    """Half the net interval of torque that rigid elements hold at rest, N·m; negative where they repel."""
-    total = 0.0
-    for side in range(int(plan[SIDES])):
-        total += (
-            sides[side * SIDE_SIZE + WEIGHT]
-            * sides[side * SIDE_SIZE + RIGID]
-            * sides[side * SIDE_SIZE + BREAKAWAY]
-        )
-    return total
-
-
-@kernel(exact=False)
-def applied(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> float:
-    """Torque on the resting axis without its rigid elements, N·m."""
-    torque = loop[R] + parameters[KI] * loop[INTEGRAL] - parameters[KP] * loop[POSITION]
-    for side in range(int(plan[SIDES])):
-        for i in range(first_of(plan, side), first_of(plan, side + 1)):
-            torque -= sides[side * SIDE_SIZE + WEIGHT] * elements[i * ELEMENT_SIZE + FORCE]
-    return torque
-
-
-@kernel(exact=False)
-def set_off(plan: Any, elements: Any, sides: Any, parameters: Any, loop: Any) -> None:
-    """At v = 0, with rigid elements: rest, or the direction in which the axis goes on.
-
-    Rigid friction in the plant holds what lies inside its interval, less the jump of a compensator that acts on
-    sign(v). A compensator that jumps by more than the plant repels: the axis goes on through zero.
-    """
-    rigid = sides[RIGID] > 0.0 or (plan[SIDES] > 1 and sides[SIDE_SIZE + RIGID] > 0.0)
-    if not rigid:
+def enter_or_leave(sides: Any, loop: Any, side: int, v: float) -> None:
+    """Pass the edge of a steep layer if the axis stands there."""
+    edge = sides[side * SIDE_SIZE + LAYER]
+    if edge == 0.0:
         return
-    interval = stiction(plan, sides)
-    torque = applied(parameters, plan, elements, sides, loop)
-    before = loop[SIGMA]
-    loop[HELD] = 0.0
-    if abs(torque) > max(interval, 0.0):
-        loop[SIGMA] = 1.0 if torque > 0.0 else -1.0
-    elif interval < 0.0 and before != 0.0:
-        loop[SIGMA] = -before
-    else:
-        loop[SIGMA] = 0.0
-        loop[HELD] = 1.0
-        loop[VELOCITY] = 0.0
-    if loop[SIGMA] * loop[VELOCITY] < 0.0:
-        loop[VELOCITY] = 0.0
-
-
-@kernel(exact=False)
-def release(plan: Any, elements: Any, sides: Any, parameters: Any, loop: Any) -> None:
-    """Leave rest in the direction of the applied torque."""
-    loop[HELD] = 0.0
-    loop[SIGMA] = 1.0 if applied(parameters, plan, elements, sides, loop) > 0.0 else -1.0
+    if sides[side * SIDE_SIZE + INSIDE] > 0.0:
+        if abs(v) >= (1.0 - ON_EDGE) * edge:
+            sides[side * SIDE_SIZE + INSIDE] = 0.0
+            loop[SIGMA] = 1.0 if v > 0.0 else -1.0
+    elif loop[SIGMA] * v <= (1.0 + ON_EDGE) * edge:
+        sides[side * SIDE_SIZE + INSIDE] = 1.0

@@ -112,6 +112,14 @@ def hermite(y0: float, d0: float, y1: float, d1: float, h: float, x: float) -> f
 
 
 @kernel(exact=False)
+def hermite_slope(y0: float, d0: float, y1: float, d1: float, h: float, x: float) -> float:
+    """Slope of `hermite` at x."""
+    s = x / h
+    r = 1.0 - s
+    return 6.0 * s * r * (y1 - y0) / h + r * (r - 2.0 * s) * d0 + s * (s - 2.0 * r) * d1
+
+
+@kernel(exact=False)
 def upper_terms(y0: float, d0: float, y1: float, d1: float, inverse: float) -> tuple[float, float]:
     """Quadratic and cubic coefficients of `hermite`; ``inverse`` is 1/h."""
     slope = (y1 - y0) * inverse
@@ -120,16 +128,14 @@ def upper_terms(y0: float, d0: float, y1: float, d1: float, inverse: float) -> t
 
 @kernel(exact=False, inline=True)
 def relaxed(
-    attraction: float, goal: float, s0: float, d0: float, q_mid: float, q_end: float, h: float
+    goal_mid: float, goal_end: float, s0: float, d0: float, a_mid: float, a_end: float, h: float
 ) -> tuple[float, float, float]:
-    """Advance dS/dt = goal - attraction q S by Lobatto IIIA of fourth order; q is given at mid and end.
+    """Advance dS/dt = goal - a S by Lobatto IIIA of fourth order; goal and decay a are given at mid and end.
 
     Returns S in the middle and at the end, and its slope at the end.
     """
-    a_mid = attraction * q_mid
-    a_end = attraction * q_end
-    right_mid = s0 + h * (5.0 / 24.0 * d0 + 7.0 / 24.0 * goal)
-    right_end = s0 + h / 6.0 * (d0 + 5.0 * goal)
+    right_mid = s0 + h / 24.0 * (5.0 * d0 + 8.0 * goal_mid - goal_end)
+    right_end = s0 + h / 6.0 * (d0 + 4.0 * goal_mid + goal_end)
     m11 = 1.0 + h * a_mid / 3.0
     m12 = -h * a_end / 24.0
     m21 = 2.0 * h * a_mid / 3.0
@@ -137,4 +143,4 @@ def relaxed(
     inverse = 1.0 / (m11 * m22 - m12 * m21)
     s_mid = (right_mid * m22 - m12 * right_end) * inverse
     s_end = (m11 * right_end - m21 * right_mid) * inverse
-    return s_mid, s_end, goal - a_end * s_end
+    return s_mid, s_end, goal_end - a_end * s_end

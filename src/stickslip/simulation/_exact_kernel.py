@@ -23,11 +23,13 @@ from stickslip.simulation._case import (
     VELOCITY_0,
     VELOCITY_LIMIT,
 )
-from stickslip.simulation._exact_events import add_exponents, find, release, set_off, switch
+from stickslip.simulation._exact_bend import bend
+from stickslip.simulation._exact_events import add_exponents, find, switch
 from stickslip.simulation._exact_flow import Linear, Matrix, flow
 from stickslip.simulation._exact_output import measure, row_after, row_before, write_grid, write_rows
-from stickslip.simulation._exact_rest import rest
+from stickslip.simulation._exact_rest import applied, release, rest, set_off
 from stickslip.simulation._exact_state import (
+    BENT,
     COUNTS,
     DR,
     DS,
@@ -41,7 +43,9 @@ from stickslip.simulation._exact_state import (
     GRID_ROWS,
     GRID_WRITTEN,
     HELD,
+    INSIDE,
     INTEGRAL,
+    LAYER,
     LOOP_SIZE,
     POSITION,
     Q_END,
@@ -63,17 +67,16 @@ from stickslip.simulation._exact_state import (
     R,
     S,
     arrange,
-    begin_slopes,
     command,
 )
-from stickslip.simulation._exact_step import (
+from stickslip.simulation._exact_step import NOT_CONVERGED, correct, look_ahead
+from stickslip.simulation._exact_stretch import (
     AMPLITUDE,
     DR_END,
     ERROR,
     GOAL_END,
     INTEGRAL_END,
     LENGTH,
-    NOT_CONVERGED,
     POSITION_END,
     POSITION_EVENT,
     R_END,
@@ -82,10 +85,8 @@ from stickslip.simulation._exact_step import (
     STRETCH_SIZE,
     VELOCITY_END,
     VELOCITY_EVENT,
-    correct,
     free_amplitude,
     integral_at,
-    look_ahead,
     slip_force_at,
 )
 
@@ -99,8 +100,12 @@ DEEPEST = 24
 """Steps are the longest one halved up to this many times, so that their flows are computed once per mode."""
 QUARTER_PERIODS = 3.2
 """A visible ringing is not stepped over: radians of it in one step."""
+MOST_GROWTH = 8.0
+"""Unstable motion grows by no more than exp of this in one step."""
 
 
+SOON = 1e-9
+"""Time at which the commanded torque tells where a free axis sets off, s."""
 FLOW = 6
 """Entries per level in the cache of flows: a matrix, the generation of modes it belongs to, and the step."""
 AT_LOOP = COUNTS
@@ -125,14 +130,23 @@ def flow_of_level(lin: Linear, cache: Any, generation: int, level: int, x: float
     return kept[0], kept[1], kept[2], kept[3]
 
 
+@kernel(exact=False)
+def growth_of(lin: Linear) -> float:
+    """Rate at which unstable motion grows, 1/s; not positive where none does."""
+    return lin.frequency - lin.decay if lin.discriminant < 0.0 else 0.0
+
+
 @kernel(exact=False, inline=True)
 def move(
     lin: Linear, parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, loop: Any, stretch: Any,
     cache: Any, generation: int, count: Any, level: int, left: float, tol: float,
 ) -> int:  # fmt: skip
     """Take one step of at most `left`, shortened until it is accurate; returns its level, or -1."""
+    growth = growth_of(lin)
     while True:
         count[STEPS] += 1.0
+        while level < DEEPEST and growth * min(left, cache[level * FLOW + 5]) > MOST_GROWTH:
+            level += 1
         h = cache[level * FLOW + 5]
         if h > left - 1e-9:
             h = left
@@ -156,14 +170,15 @@ def move(
 
 
 @kernel(exact=False, inline=True)
-def next_level(lin: Linear, stretch: Any, cache: Any, level: int, tol: float) -> int:
+def next_level(lin: Linear, loop: Any, stretch: Any, cache: Any, level: int, tol: float) -> int:
     """A longer step after an accurate one that was not cut short."""
     h = stretch[LENGTH]
     if h < 0.999 * cache[level * FLOW + 5]:
         return level
     error = stretch[ERROR]
     shortest = max(0, level - 3)
-    while level > shortest and error < 0.03 * tol and stretch[ROUNDS] <= 2:
+    rounds = 3.0 if loop[BENT] > 0.0 else 2.0
+    while level > shortest and error < 0.03 * tol and stretch[ROUNDS] <= rounds:
         h *= 2.0
         if stretch[AMPLITUDE] > 2.0 * tol and lin.frequency * h > QUARTER_PERIODS:
             break
@@ -228,8 +243,14 @@ def start(parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, loo
     if loop[VELOCITY] != 0.0:
         loop[SIGMA] = 1.0 if loop[VELOCITY] > 0.0 else -1.0
     stand(parameters, plan, cells, loop)
-    if loop[VELOCITY] == 0.0:
-        set_off(plan, elements, sides, parameters, loop)
+    for side in range(int(plan[SIDES])):
+        sides[side * SIDE_SIZE + INSIDE] = (
+            1.0 if abs(loop[VELOCITY]) < sides[side * SIDE_SIZE + LAYER] else 0.0
+        )
+    if loop[VELOCITY] == 0.0 and not set_off(plan, elements, sides, parameters, loop):
+        r, _, _, _ = command(parameters, plan, cells, loop, SOON)
+        push = applied(parameters, plan, elements, sides, loop) + r - loop[R]
+        loop[SIGMA] = 1.0 if push >= 0.0 else -1.0
 
 
 @kernel(exact=False)
@@ -246,7 +267,7 @@ def ended(parameters: Any, loop: Any) -> int:
 
 @kernel(exact=False)
 def pass_break(
-    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, now: float, following: float
+    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, now: float, following: float
 ) -> bool:  # fmt: skip
     """Stand on the other side of a break; returns whether the commanded torque jumps."""
     before = loop[R]
@@ -255,7 +276,6 @@ def pass_break(
     loop[EDGE_HIGH] = following - EDGE
     loop[UNSEEN] = 0.0
     stand(parameters, plan, cells, loop)
-    begin_slopes(parameters, plan, sides, loop, lin)
     return abs(loop[R] - before) > 1e-9
 
 
@@ -316,6 +336,9 @@ def solve(
         if held:
             event = rest(parameters, plan, cells, elements, sides, loop, stretch, left)
         else:
+            if loop[BENT] > 0.0:
+                lin = bend(parameters, plan, sides, loop, min(left, cache[level * FLOW + 5]))
+                generation += 1
             level = move(
                 lin, parameters, plan, cells, elements, sides, loop, stretch, cache, generation, count, level, left,
                 tol,
@@ -341,17 +364,18 @@ def solve(
             switch(parameters, plan, elements, sides, loop)
             if held:
                 release(plan, elements, sides, parameters, loop)
+            slow_again = growth_of(lin) * FIRST_STEP > MOST_GROWTH
             lin = arrange(parameters, plan, elements, sides, loop)
             generation += 1
-            level = max(level, after_event)
+            level = after_event if slow_again else max(level, after_event)
         else:
             finish_step(plan, sides, loop, stretch, loop[TIME] + h, parameters[KI])
             if not held:
-                level = next_level(lin, stretch, cache, level, tol)
+                level = next_level(lin, loop, stretch, cache, level, tol)
         jumps = happens
         if h >= left - EDGE:
             following = min(next_break + 1, break_array.size - 1)
-            if pass_break(lin, parameters, plan, cells, sides, loop, breaks[next_break], breaks[following]):
+            if pass_break(parameters, plan, cells, sides, loop, breaks[next_break], breaks[following]):
                 jumps = True
             next_break = following
         if full and jumps:

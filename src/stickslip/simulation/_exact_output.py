@@ -9,12 +9,14 @@ from stickslip.jit import kernel, pointer
 from stickslip.simulation._case import COLUMNS
 from stickslip.simulation._exact_flow import UNMOVED, Linear, flow, free_motion, moved
 from stickslip.simulation._exact_state import (
+    DS,
     EDGE,
     GOAL,
     GOAL_RATE,
     GRID_ROWS,
     GRID_WRITTEN,
     INTEGRAL,
+    LAG,
     POSITION,
     ROWS,
     ROWS_WRITTEN,
@@ -28,20 +30,20 @@ from stickslip.simulation._exact_state import (
     command,
     torques,
 )
-from stickslip.simulation._exact_step import (
+from stickslip.simulation._exact_stretch import (
     FREE_POSITION,
     FREE_VELOCITY,
     cubic_of,
     free_amplitude,
     integral_at,
-    slip_force_at,
+    slip_torque_at,
     state_at,
 )
 from stickslip.simulation._meter import MAX_WINDOW, meter
 
 ROW_SIZE = len(COLUMNS)
-SHORTEST_WINDOW = 2e-8
-"""Shorter stretches are left out of the metrics (s); the high-pass loses its digits there."""
+SHORTEST_WINDOW = 1e-10
+"""Shorter stretches are left out of the metrics (s)."""
 
 
 UNSEEN = 1e-8
@@ -110,8 +112,8 @@ def signals(
 ) -> tuple[float, float, float, float, float]:  # fmt: skip
     """Reference position and velocity; motor, friction and compensating torque at x inside the stretch."""
     r, _, goal, rate = command(parameters, plan, cells, loop, loop[TIME] + x)
-    s0 = slip_force_at(sides, stretch, 0, x)
-    s1 = slip_force_at(sides, stretch, 1, x) if plan[SIDES] > 1 else 0.0
+    s0 = slip_torque_at(sides, stretch, 0, x)
+    s1 = slip_torque_at(sides, stretch, 1, x) if plan[SIDES] > 1 else 0.0
     integral = integral_at(parameters, loop, stretch, x)
     tm, tf, th = torques(parameters, plan, sides, loop, r, goal, rate, integral, theta, v, s0, s1)
     return goal, rate, tm, tf, th
@@ -157,13 +159,14 @@ def row_after(parameters: Any, plan: Any, sides: Any, loop: Any, count: Any, row
     last = int(count[ROWS_WRITTEN]) - 1
     if last < 0 or not room_for_event(plan, count):
         return
-    s1 = sides[SIDE_SIZE + S] if plan[SIDES] > 1 else 0.0
+    s0 = sides[S] + sides[LAG] * sides[DS]
+    s1 = sides[SIDE_SIZE + S] + sides[SIDE_SIZE + LAG] * sides[SIDE_SIZE + DS] if plan[SIDES] > 1 else 0.0
     goal = loop[GOAL]
     rate = loop[GOAL_RATE]
     theta = loop[POSITION]
     v = loop[VELOCITY]
     tm, tf, th = torques(
-        parameters, plan, sides, loop, loop[R], goal, rate, loop[INTEGRAL], theta, v, sides[S], s1
+        parameters, plan, sides, loop, loop[R], goal, rate, loop[INTEGRAL], theta, v, s0, s1
     )  # fmt: skip
     before = pointer(rows, last * ROW_SIZE)
     if abs(tm - before[5]) + abs(tf - before[6]) + abs(th - before[7]) > 1e-6:
@@ -171,20 +174,32 @@ def row_after(parameters: Any, plan: Any, sides: Any, loop: Any, count: Any, row
 
 
 @kernel(exact=False)
-def window_of(lin: Linear, stretch: Any) -> float:
-    """Longest window whose five nodes follow the free motion, s.
+def window_for(rate: float, speed: float) -> float:
+    """Longest window whose five nodes follow a free motion of that rate (1/s) and velocity (rad/s), s.
 
-    Boole's rule is wrong by about 2e-3 y^6 of the oscillating part for nodes y/2 of a radian apart.
+    Boole's rule is wrong by about 2e-3 y^6 of the changing part for nodes y/2 of a radian apart.
     """
-    if lin.discriminant > 0.0:
-        rate = max(lin.frequency, lin.decay)
-    else:
-        rate = lin.decay + lin.frequency
-    speed = abs(stretch[FREE_VELOCITY]) + rate * abs(stretch[FREE_POSITION])
     if speed < UNSEEN:
         return MAX_WINDOW
     y = max(0.03, min(1.0, 0.1 * (1e-2 / (speed + 1e-12)) ** (1.0 / 3.0)))
     return min(MAX_WINDOW, 2.0 * y / (abs(rate) + 1e-9))
+
+
+@kernel(exact=False)
+def window_of(lin: Linear, stretch: Any) -> float:
+    """Longest window whose five nodes follow the free motion, s."""
+    p = stretch[FREE_POSITION]
+    q = stretch[FREE_VELOCITY]
+    if lin.discriminant > 0.0:
+        rate = max(lin.frequency, lin.decay)
+        return window_for(rate, abs(q) + rate * abs(p))
+    fast = -lin.decay - lin.frequency
+    slow = -lin.decay + lin.frequency
+    share = 0.5 / (lin.frequency + 1e-9)
+    return min(
+        window_for(fast, abs(fast * (q - slow * p)) * share),
+        window_for(slow, abs(slow * (q - fast * p)) * share),
+    )
 
 
 @kernel(exact=False)

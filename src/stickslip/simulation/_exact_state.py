@@ -9,7 +9,6 @@ from the decay exp(-integral of C/s) when a mode changes. Where C is infinite, S
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from stickslip.jit import call_profile, call_value, kernel, pointer
@@ -24,8 +23,15 @@ STIFFNESS, SHARE, FORCE, OFFSET, SLIPS, LOAD_AT_0, LOAD_SLOPE, ELEMENT_SIZE = ra
 # ---- columns of `sides` --------------------------------------------------------------------------------------
 (
     WEIGHT, ATTRACTION, BREAKAWAY, LOWEST, SCALE, VISCOUS, RIGID, SLIPPING, STICKING, SPRING, SPRING_OFFSET,
-    VARIES, S, DS, Q, S_START, EXPONENT, S_MID, S_END, DS_END, Q_MID, Q_END, S_NOW, LIFT, KEPT,
-) = range(25)  # fmt: skip
+    VARIES, S, DS, Q, S_START, EXPONENT, S_MID, S_END, DS_END, Q_MID, Q_END, S_NOW, LIFT,
+    KIND, BRISTLE, LAG, STEEP, STEEPNESS, LAYER, INSIDE, DAMPING, KEPT,
+) = range(33)  # fmt: skip
+"""BRISTLE: stiffness of a bristle, LAG: its damping over its stiffness. STEEP: share that rises with the slope
+STEEPNESS through the layer |v| < LAYER; INSIDE is 1 there. DAMPING: torque over velocity in the flow."""
+
+RELAXES, FOLLOWS, BENDS = 0.0, 1.0, 2.0
+"""What KIND says of the force of what slips: it relaxes towards the curve, is on the curve at once, or is that of a
+bristle (`_exact_bend` has the last two)."""
 
 SIDE_SIZE = KEPT + 4
 """From KEPT on: two velocities with their values of the sliding curve."""
@@ -34,8 +40,11 @@ SIDE_SIZE = KEPT + 4
 (
     TIME, POSITION, VELOCITY, SIGMA, HELD, INTEGRAL, ADDED, WATCHED, NONLINEAR, BASE,
     R, DR, GOAL, GOAL_RATE, EDGE_LOW, EDGE_HIGH, CELL, UNSEEN, SEEN_LENGTH, STORM_COUNT, STORM_SINCE, CALM,
-    PROFILE_OUT,
-) = range(23)  # fmt: skip
+    BENT, EVEN_STIFFNESS, EVEN_DAMPING, EVEN_BASE, FLOOR, NARROW, PROFILE_OUT,
+) = range(29)  # fmt: skip
+"""BENT: a force changes the flow from step to step; EVEN_...: stiffness, damping and offset of all the others. FLOOR:
+least stiffness. NARROW: the velocity at which a steep layer begins, where the axis is outside."""
+
 LOOP_SIZE = PROFILE_OUT + 3
 
 # ---- entries of `plan`: addresses (exact as floats), offsets and sizes ---------------------------------------
@@ -49,6 +58,8 @@ LOOP_SIZE = PROFILE_OUT + 3
 # ---- entries of `count` --------------------------------------------------------------------------------------
 STEPS, REJECTED, EVENTS, ROWS_WRITTEN, GRID_WRITTEN, COUNTS = range(6)
 
+IN_LAYER = 1e-4
+"""Stiffness added in a steep layer, over slope²/J."""
 EDGE = 1e-12
 """One-sided limits at a break are taken this far from it, s."""
 
@@ -113,14 +124,30 @@ def arrange(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) ->
     total = parameters[KP]
     damping = parameters[KD]
     loop[BASE] = 0.0
+    loop[BENT] = 0.0
+    loop[NARROW] = 0.0
+    floor = plan[STIFFNESS_FLOOR]
     slips = False
     sticks = False
     loop[NONLINEAR] = 1.0 if parameters[KI] != 0.0 else 0.0
     for side in range(int(plan[SIDES])):
         w = sides[side * SIDE_SIZE + WEIGHT]
-        damping += w * sides[side * SIDE_SIZE + VISCOUS]
-        gather(plan, elements, sides, side, theta)
-        sides[side * SIDE_SIZE + SLIPPING] += sides[side * SIDE_SIZE + RIGID] * abs(loop[SIGMA])
+        sides[side * SIDE_SIZE + DAMPING] = sides[side * SIDE_SIZE + VISCOUS]
+        if sides[side * SIDE_SIZE + KIND] == BENDS:
+            begin_bristle(sides, side, theta, loop[HELD])
+        else:
+            gather(plan, elements, sides, side, theta)
+            sides[side * SIDE_SIZE + SLIPPING] += sides[side * SIDE_SIZE + RIGID] * abs(loop[SIGMA])
+        if sides[side * SIDE_SIZE + STEEP] > 0.0:
+            if sides[side * SIDE_SIZE + INSIDE] > 0.0:
+                sides[side * SIDE_SIZE + DAMPING] = sides[side * SIDE_SIZE + STEEPNESS]
+                # Over the moment that a crossing takes, this spring moves nothing.
+                steep = w * sides[side * SIDE_SIZE + STEEPNESS]
+                floor = max(floor, IN_LAYER * steep * steep / parameters[INERTIA])
+            else:
+                sides[side * SIDE_SIZE + SLIPPING] += sides[side * SIDE_SIZE + STEEP]
+                loop[NARROW] = max(loop[NARROW], sides[side * SIDE_SIZE + LAYER])
+        damping += w * sides[side * SIDE_SIZE + DAMPING]
         total += w * sides[side * SIDE_SIZE + SPRING]
         loop[BASE] += w * sides[side * SIDE_SIZE + SPRING_OFFSET]
         sticks = sticks or sides[side * SIDE_SIZE + STICKING] > 0.0
@@ -129,15 +156,20 @@ def arrange(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) ->
             begin_slip(parameters, plan, sides, loop, side, v)
             if sides[side * SIDE_SIZE + VARIES] > 0.0:
                 loop[NONLINEAR] = 1.0
+                if sides[side * SIDE_SIZE + KIND] != RELAXES:
+                    loop[BENT] = 1.0
     loop[WATCHED] = 1.0 if slips else 0.0
-    loop[CALM] = 1.0 if not sticks and total > 0.0 and damping > 0.0 and parameters[KI] == 0.0 else 0.0
+    calm = not sticks and total > 0.0 and damping > 0.0 and parameters[KI] == 0.0 and loop[BENT] == 0.0
+    loop[CALM] = 1.0 if calm else 0.0
+    loop[EVEN_STIFFNESS] = total
+    loop[EVEN_DAMPING] = damping
+    loop[EVEN_BASE] = loop[BASE]
+    loop[FLOOR] = floor
     loop[ADDED] = 0.0
-    if abs(total) < plan[STIFFNESS_FLOOR]:
-        loop[ADDED] = 2.0 * plan[STIFFNESS_FLOOR]
+    if abs(total) < floor:
+        loop[ADDED] = 2.0 * floor
         loop[NONLINEAR] = 1.0
-    lin = linear(parameters[INERTIA], damping, total + loop[ADDED])
-    begin_slopes(parameters, plan, sides, loop, lin)
-    return lin
+    return linear(parameters[INERTIA], damping, total + loop[ADDED])
 
 
 @kernel(exact=False, inline=True)
@@ -182,37 +214,32 @@ def gather(plan: Any, elements: Any, sides: Any, side: int, theta: float) -> Non
 
 
 @kernel(exact=False, inline=True)
+def begin_bristle(sides: Any, side: int, theta: float, held: float) -> None:
+    """All of a bristle's force is slipping force, until `_exact_bend.bend` takes the part that follows the position."""
+    sides[side * SIDE_SIZE + S] += (
+        sides[side * SIDE_SIZE + SPRING] * theta + sides[side * SIDE_SIZE + SPRING_OFFSET]
+    )
+    sides[side * SIDE_SIZE + S_NOW] = sides[side * SIDE_SIZE + S]
+    sides[side * SIDE_SIZE + SPRING] = 0.0
+    sides[side * SIDE_SIZE + SPRING_OFFSET] = 0.0
+    sides[side * SIDE_SIZE + DS] = 0.0
+    sides[side * SIDE_SIZE + SLIPPING] = 1.0 - held
+
+
+@kernel(exact=False, inline=True)
 def begin_slip(parameters: Any, plan: Any, sides: Any, loop: Any, side: int, v: float) -> None:
     """Curve and slope of a side's slipping force at the start of a stretch."""
-    s = sliding(parameters, plan, sides, side, v)
-    attraction = sides[side * SIDE_SIZE + ATTRACTION]
-    if attraction < math.inf:
+    kind = sides[side * SIDE_SIZE + KIND]
+    if kind == RELAXES:
+        s = sliding(parameters, plan, sides, side, v)
         sides[side * SIDE_SIZE + Q] = 1.0 / s
-        sides[side * SIDE_SIZE + DS] = attraction * (
+        sides[side * SIDE_SIZE + DS] = sides[side * SIDE_SIZE + ATTRACTION] * (
             sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA] - sides[side * SIDE_SIZE + S] / s
         )
-    else:
+    elif kind == FOLLOWS:
+        s = sliding(parameters, plan, sides, side, v)
         sides[side * SIDE_SIZE + S] = sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA] * s
         sides[side * SIDE_SIZE + S_NOW] = sides[side * SIDE_SIZE + S]
-
-
-@kernel(exact=False)
-def begin_slopes(parameters: Any, plan: Any, sides: Any, loop: Any, lin: Linear) -> None:
-    """Slopes of the forces that follow the curve at once, from the acceleration."""
-    pull = loop[R] + parameters[KI] * loop[INTEGRAL] - loop[BASE]
-    pull -= (lin.stiffness - loop[ADDED]) * loop[POSITION] + lin.damping * loop[VELOCITY]
-    for side in range(int(plan[SIDES])):
-        pull -= sides[side * SIDE_SIZE + WEIGHT] * sides[side * SIDE_SIZE + S]
-    for side in range(int(plan[SIDES])):
-        if (
-            sides[side * SIDE_SIZE + ATTRACTION] == math.inf
-            and sides[side * SIDE_SIZE + SLIPPING] > 0.0
-            and sides[side * SIDE_SIZE + VARIES] > 0.0
-        ):
-            slope = curve_slope(parameters, plan, sides, side, loop[VELOCITY])
-            sides[side * SIDE_SIZE + DS] = (
-                sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA] * slope * pull / lin.inertia
-            )
 
 
 @kernel(exact=False)
@@ -240,12 +267,12 @@ def torques(
             sides[SIDE_SIZE + SPRING] * theta
             + sides[SIDE_SIZE + SPRING_OFFSET]
             + s_helper
-            + sides[SIDE_SIZE + VISCOUS] * v
+            + sides[SIDE_SIZE + DAMPING] * v
         )
         helped -= sides[SIDE_SIZE + WEIGHT] * model
     motor = parameters[KP] * (goal - theta) + parameters[KR] * rate - parameters[KD] * v
     motor += parameters[KI] * integral + helped
     if loop[HELD] > 0.0:
         return motor, motor, helped
-    friction = sides[SPRING] * theta + sides[SPRING_OFFSET] + s_plant + sides[VISCOUS] * v
+    friction = sides[SPRING] * theta + sides[SPRING_OFFSET] + s_plant + sides[DAMPING] * v
     return motor, friction, helped

@@ -11,13 +11,11 @@ from typing import Any
 
 from stickslip.jit import kernel
 from stickslip.simulation._case import INERTIA, KI
+from stickslip.simulation._exact_bend import bristle_rate, bristle_terms, curve_rest, curve_terms
 from stickslip.simulation._exact_flow import (
-    Cubic,
     Linear,
     Matrix,
     acceleration,
-    flow,
-    hermite,
     moved,
     particular,
     relaxed,
@@ -28,14 +26,18 @@ from stickslip.simulation._exact_state import (
     ADDED,
     ATTRACTION,
     BASE,
+    BENDS,
     CALM,
     CELLS,
     DR,
     DS,
     DS_END,
+    FOLLOWS,
     GOAL,
     GOAL_RATE,
     INTEGRAL,
+    KIND,
+    LAG,
     LIFT,
     NONLINEAR,
     POSITION,
@@ -57,16 +59,26 @@ from stickslip.simulation._exact_state import (
     R,
     S,
     command,
-    curve_slope,
     sliding,
 )
-
-# ---- entries of `stretch`: the motion over one accepted step -------------------------------------------------
-(
-    LENGTH, C0, C1, C2, C3, FREE_POSITION, FREE_VELOCITY, POSITION_MID, VELOCITY_MID, POSITION_END, VELOCITY_END,
-    R_MID, R_END, DR_END, GOAL_MID, RATE_MID, GOAL_END, RATE_END, INTEGRAL_END, AMPLITUDE, ERROR, ROUNDS,
-    POSITION_EVENT, VELOCITY_EVENT, STRETCH_SIZE,
-) = range(25)  # fmt: skip
+from stickslip.simulation._exact_stretch import (
+    DR_END,
+    GOAL_END,
+    GOAL_MID,
+    INTEGRAL_END,
+    LENGTH,
+    POSITION_END,
+    POSITION_MID,
+    R_END,
+    R_MID,
+    RATE_END,
+    RATE_MID,
+    VELOCITY_END,
+    VELOCITY_MID,
+    cubic_of,
+    remember,
+    slip_force_at,
+)
 
 NOT_CONVERGED = 1e9
 UNCHANGED, FINEST_CHANGE, ROUNDING = 0.01, 1e-12, 4e-16
@@ -76,6 +88,8 @@ WIDEST = 1.0
 """Change of velocity over half a stretch, in parts of v_s, above which s(v) is not resolved near v = 0."""
 CALM_SHARE = 0.2
 """Where nothing sticks, the loop's own damping takes away what slipping forces are wrong by."""
+BRISTLE_SHARE = 4.0
+"""Errors of a bristle in feedback grow: it is a negative spring near rest."""
 SHORT = 2e-8  # s
 STEEPEST = 1e5
 """Largest particular solution, rad: more would cost too many digits."""
@@ -115,33 +129,28 @@ def look_ahead(parameters: Any, plan: Any, cells: Any, loop: Any, stretch: Any, 
 
 @kernel(exact=False, inline=True)
 def slip_terms(
-    lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, c: Cubic, side: int, h: float, v_mid: float,
+    parameters: Any, plan: Any, sides: Any, loop: Any, side: int, h: float, theta_mid: float, v_mid: float,
     theta_end: float, v_end: float,
-) -> tuple[float, float, float]:  # fmt: skip
-    """Advance the slipping force of a side along the motion; returns its two upper coefficients and its misfit."""
+) -> tuple[float, float]:  # fmt: skip
+    """Advance the slipping force of a side along the motion; returns its two upper coefficients."""
+    kind = sides[side * SIDE_SIZE + KIND]
+    if kind == BENDS:
+        return bristle_terms(parameters, plan, sides, loop, side, h, theta_mid, v_mid, theta_end, v_end)
+    if kind == FOLLOWS:
+        return curve_terms(parameters, plan, sides, loop, side, h, v_mid, v_end)
+    q_mid = 1.0 / sliding(parameters, plan, sides, side, v_mid)
+    q_end = 1.0 / sliding(parameters, plan, sides, side, v_end)
+    attraction = sides[side * SIDE_SIZE + ATTRACTION]
+    goal = attraction * sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA]
     s0 = sides[side * SIDE_SIZE + S]
     d0 = sides[side * SIDE_SIZE + DS]
-    goal = sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA]
-    s_mid = sliding(parameters, plan, sides, side, v_mid)
-    s_end = sliding(parameters, plan, sides, side, v_end)
-    if sides[side * SIDE_SIZE + ATTRACTION] < math.inf:
-        q_mid = 1.0 / s_mid
-        q_end = 1.0 / s_end
-        attraction = sides[side * SIDE_SIZE + ATTRACTION]
-        middle, end, slope = relaxed(attraction, attraction * goal, s0, d0, q_mid, q_end, h)
-        sides[side * SIDE_SIZE + Q_MID] = q_mid
-        sides[side * SIDE_SIZE + Q_END] = q_end
-    else:
-        middle = goal * s_mid
-        end = goal * s_end
-        steepness = curve_slope(parameters, plan, sides, side, v_end)
-        slope = goal * steepness * acceleration(lin, c, h, theta_end, v_end)
+    middle, end, slope = relaxed(goal, goal, s0, d0, attraction * q_mid, attraction * q_end, h)
+    sides[side * SIDE_SIZE + Q_MID] = q_mid
+    sides[side * SIDE_SIZE + Q_END] = q_end
     sides[side * SIDE_SIZE + S_MID] = middle
     sides[side * SIDE_SIZE + S_END] = end
     sides[side * SIDE_SIZE + DS_END] = slope
-    u2, u3 = upper_terms(s0, d0, end, slope, 1.0 / h)
-    # Zero for relaxing forces: Lobatto's middle lies on the cubic. `slip_error` judges those.
-    return u2, u3, abs(middle - (0.5 * (s0 + end) + 0.125 * h * (d0 - slope)))
+    return upper_terms(s0, d0, end, slope, 1.0 / h)
 
 
 @kernel(exact=False, inline=True)
@@ -158,8 +167,10 @@ def hides_curve(plan: Any, sides: Any, v0: float, v1: float, v2: float) -> bool:
 
 
 @kernel(exact=False, inline=True)
-def slip_error(lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, stretch: Any) -> float:
-    """Error of the relaxing slipping forces at the end of the stretch, N·m.
+def slip_error(
+    lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, stretch: Any
+) -> tuple[float, float]:  # fmt: skip
+    """Errors of the slipping forces, N·m: at the end of the stretch, and between its nodes.
 
     Lobatto's rule takes dS/dt as a parabola; the error is judged by how far dS/dt lies from it at a quarter.
     """
@@ -169,22 +180,53 @@ def slip_error(lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, s
     a1 = acceleration(lin, c, 0.5 * h, stretch[POSITION_MID], stretch[VELOCITY_MID])
     v = 0.5 * (loop[VELOCITY] + stretch[VELOCITY_MID]) + 0.0625 * h * (a0 - a1)
     total = 0.0
+    between = 0.0
     for side in range(int(plan[SIDES])):
-        attraction = sides[side * SIDE_SIZE + ATTRACTION]
-        if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and attraction < math.inf:
-            goal = attraction * sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA]
+        kind = sides[side * SIDE_SIZE + KIND]
+        if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and kind == FOLLOWS:
+            if sides[side * SIDE_SIZE + VARIES] > 0.0:
+                between += curve_error(lin, parameters, plan, sides, loop, stretch, side)
+        elif sides[side * SIDE_SIZE + SLIPPING] > 0.0:
             sides[side * SIDE_SIZE + LIFT] = 0.0
             force = slip_force_at(sides, stretch, side, 0.25 * h)
-            slope = goal - attraction * force / sliding(parameters, plan, sides, side, v)
-            middle = goal - attraction * sides[side * SIDE_SIZE + Q_MID] * sides[side * SIDE_SIZE + S_MID]
+            if kind == BENDS:
+                theta = 0.5 * (loop[POSITION] + stretch[POSITION_MID])
+                theta += 0.0625 * h * (loop[VELOCITY] - stretch[VELOCITY_MID])
+                slope = bristle_rate(parameters, plan, sides, loop, side, theta, v, force)
+                middle = bristle_rate(
+                    parameters, plan, sides, loop, side, stretch[POSITION_MID], stretch[VELOCITY_MID],
+                    sides[side * SIDE_SIZE + S_MID],
+                )  # fmt: skip
+            else:
+                attraction = sides[side * SIDE_SIZE + ATTRACTION]
+                goal = attraction * sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA]
+                slope = goal - attraction * force / sliding(parameters, plan, sides, side, v)
+                middle = goal - attraction * sides[side * SIDE_SIZE + Q_MID] * sides[side * SIDE_SIZE + S_MID]
             parabola = (
                 0.375 * sides[side * SIDE_SIZE + DS]
                 + 0.75 * middle
                 - 0.125 * sides[side * SIDE_SIZE + DS_END]
             )
             sides[side * SIDE_SIZE + LIFT] = 16.0 / 3.0 * (slope - parabola) / (h * h * h)
-            total += abs(sides[side * SIDE_SIZE + WEIGHT] * (slope - parabola))
-    return h / 3.0 * total
+            off = abs(sides[side * SIDE_SIZE + WEIGHT] * (slope - parabola))
+            total += BRISTLE_SHARE * off if kind == BENDS else off
+            between += sides[side * SIDE_SIZE + LAG] * off
+    return h / 3.0 * total, between
+
+
+@kernel(exact=False, inline=True)
+def curve_error(
+    lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, stretch: Any, side: int
+) -> float:  # fmt: skip
+    """How far a force on the curve lies from its cubic at three quarters, N·m."""
+    h = stretch[LENGTH]
+    c = cubic_of(stretch)
+    a1 = acceleration(lin, c, 0.5 * h, stretch[POSITION_MID], stretch[VELOCITY_MID])
+    a2 = acceleration(lin, c, h, stretch[POSITION_END], stretch[VELOCITY_END])
+    v = 0.5 * (stretch[VELOCITY_MID] + stretch[VELOCITY_END]) + 0.0625 * h * (a1 - a2)
+    sides[side * SIDE_SIZE + LIFT] = 0.0
+    off = curve_rest(parameters, plan, sides, loop, side, v) - slip_force_at(sides, stretch, side, 0.75 * h)
+    return abs(sides[side * SIDE_SIZE + WEIGHT] * off)
 
 
 @kernel(exact=False)
@@ -239,7 +281,8 @@ def tangents(parameters: Any, plan: Any, sides: Any, loop: Any) -> tuple[float, 
     p0 = -loop[BASE]
     p1 = 0.0
     for side in range(int(plan[SIDES])):
-        p0 -= sides[side * SIDE_SIZE + WEIGHT] * sides[side * SIDE_SIZE + S]
+        lagging = sides[side * SIDE_SIZE + LAG] * sides[side * SIDE_SIZE + DS]
+        p0 -= sides[side * SIDE_SIZE + WEIGHT] * (sides[side * SIDE_SIZE + S] + lagging)
         p1 -= sides[side * SIDE_SIZE + WEIGHT] * sides[side * SIDE_SIZE + DS]
     if parameters[KI] != 0.0 or loop[ADDED] != 0.0:
         p0 += parameters[KI] * loop[INTEGRAL] + loop[ADDED] * loop[POSITION]
@@ -261,6 +304,7 @@ def correct(
     p2 = r2
     p3 = r3
     start = p0
+    tangent = p1
     misfit = abs(command_misfit)
     theta_end = loop[POSITION]
     v_end = loop[VELOCITY]
@@ -286,17 +330,20 @@ def correct(
                 return NOT_CONVERGED
         impulse = h * (p0 + h * (0.5 * p1 + h * (p2 / 3.0 + h * 0.25 * p3)))
         p0 = start
+        p1 = tangent
         p2 = r2
         p3 = r3
         misfit = abs(command_misfit)
         for side in range(int(plan[SIDES])):
             if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and sides[side * SIDE_SIZE + VARIES] > 0.0:
-                u2, u3, m = slip_terms(
-                    lin, parameters, plan, sides, loop, c, side, h, v_mid, theta_end, v_end
+                u2, u3 = slip_terms(
+                    parameters, plan, sides, loop, side, h, theta_mid, v_mid, theta_end, v_end
                 )
-                p2 -= bent * sides[side * SIDE_SIZE + WEIGHT] * u2
-                p3 -= bent * sides[side * SIDE_SIZE + WEIGHT] * u3
-                misfit += abs(sides[side * SIDE_SIZE + WEIGHT]) * m
+                w = bent * sides[side * SIDE_SIZE + WEIGHT]
+                lag = sides[side * SIDE_SIZE + LAG]
+                p1 -= 2.0 * w * lag * u2
+                p2 -= w * (u2 + 3.0 * lag * u3)
+                p3 -= w * u3
         if parameters[KI] != 0.0 or loop[ADDED] != 0.0:
             u2, u3, m = loop_terms(
                 lin, parameters, loop, stretch, impulse, h, theta_mid, v_mid, theta_end, v_end
@@ -322,80 +369,9 @@ def error_of(
     moves = min(h * (0.05 * h / lin.inertia + 0.02 / math.sqrt(lin.inertia * k)), 0.5 / k)
     error = misfit * moves
     if loop[NONLINEAR] > 0.0:
-        bump = slip_error(lin, parameters, plan, sides, loop, stretch)
+        bump, between = slip_error(lin, parameters, plan, sides, loop, stretch)
+        error += between * min(h * (0.1 * h / lin.inertia + 0.25 / math.sqrt(lin.inertia * k)), 0.5 / k)
         # What a slipping force is wrong by at the end stays for as long as it relaxes.
         slip = bump * (moves + 0.5 * min(LASTING * LASTING / lin.inertia, 1.0 / k))
         error += CALM_SHARE * slip if loop[CALM] > 0.0 else slip
     return error
-
-
-@kernel(exact=False, inline=True)
-def remember(
-    stretch: Any, c: Cubic, h: float, free_position: float, free_velocity: float, theta_mid: float, v_mid: float,
-    theta_end: float, v_end: float, rounds: int,
-) -> None:  # fmt: skip
-    """Keep the motion over the stretch."""
-    stretch[LENGTH] = h
-    stretch[C0] = c[0]
-    stretch[C1] = c[1]
-    stretch[C2] = c[2]
-    stretch[C3] = c[3]
-    stretch[FREE_POSITION] = free_position
-    stretch[FREE_VELOCITY] = free_velocity
-    stretch[POSITION_MID] = theta_mid
-    stretch[VELOCITY_MID] = v_mid
-    stretch[POSITION_END] = theta_end
-    stretch[VELOCITY_END] = v_end
-    stretch[ROUNDS] = rounds
-
-
-@kernel(exact=False)
-def free_amplitude(lin: Linear, stretch: Any) -> float:
-    """Amplitude of the ringing in this stretch, rad; 0 where nothing rings."""
-    if lin.discriminant <= 0.0:
-        return 0.0
-    u = stretch[FREE_VELOCITY] / lin.frequency
-    return math.sqrt(stretch[FREE_POSITION] * stretch[FREE_POSITION] + u * u)
-
-
-@kernel(exact=False)
-def cubic_of(stretch: Any) -> Cubic:
-    """The particular solution of the stretch."""
-    return stretch[C0], stretch[C1], stretch[C2], stretch[C3]
-
-
-@kernel(exact=False, inline=True)
-def state_at(lin: Linear, stretch: Any, x: float) -> tuple[float, float]:
-    """Position and velocity at x inside the stretch, exact for its forcing."""
-    return moved(cubic_of(stretch), flow(lin, x), x, stretch[FREE_POSITION], stretch[FREE_VELOCITY])
-
-
-@kernel(exact=False)
-def slip_force_at(sides: Any, stretch: Any, side: int, x: float) -> float:
-    """Slipping force of a side at x inside the stretch."""
-    if sides[side * SIDE_SIZE + VARIES] == 0.0 or sides[side * SIDE_SIZE + SLIPPING] == 0.0:
-        return sides[side * SIDE_SIZE + S]
-    y = x * (stretch[LENGTH] - x)
-    return sides[side * SIDE_SIZE + LIFT] * y * y + hermite(
-        sides[side * SIDE_SIZE + S],
-        sides[side * SIDE_SIZE + DS],
-        sides[side * SIDE_SIZE + S_END],
-        sides[side * SIDE_SIZE + DS_END],
-        stretch[LENGTH],
-        x,
-    )
-
-
-@kernel(exact=False)
-def integral_at(parameters: Any, loop: Any, stretch: Any, x: float) -> float:
-    """Integral of the position error at x inside the stretch, rad·s."""
-    if parameters[KI] == 0.0:
-        return 0.0
-    return hermite(
-        loop[INTEGRAL],
-        loop[GOAL] - loop[POSITION],
-        stretch[INTEGRAL_END],
-        stretch[GOAL_END] - stretch[POSITION_END],
-        stretch[LENGTH],
-        x,
-    )

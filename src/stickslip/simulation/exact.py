@@ -1,12 +1,14 @@
 """The exact integrator: event-driven flow of a loop that is linear between events.
 
 J dv/dt = T_m - T_f with linear control (thesis eqs. 3.1 and 3.3) and friction made of elements that stick as
-springs and slip along one curve (eqs. 2.16 to 2.18; rigid elements: eq. 2.1). Between two events the motion is a
-matrix exponential under smooth forcing; slipping forces and the integral controller enter through a corrector.
+springs and slip along one curve (eqs. 2.16 to 2.18; rigid elements: eq. 2.1), or of a bristle (eqs. 2.8, 2.9).
+Between two events the motion is a matrix exponential under smooth forcing; slipping forces and the integral
+controller enter through a corrector.
 Nothing is stepped over: break-aways and reversals are located on the exact flow. Tolerance is the error in
 position per step, rad.
 
-`_exact_flow` the flow, `_exact_state` what is remembered, `_exact_step` one stretch, `_exact_events` modes,
+A law is taken as `Elements` or as a `Bristle` (LuGre, Dahl). `_exact_flow` the flow, `_exact_state` what is remembered,
+`_exact_step` one step, `_exact_stretch` the motion inside it, `_exact_bend` bristles and curves, `_exact_events` modes,
 `_exact_rest` stiction, `_exact_output` rows and metrics, `_exact_kernel` the loop, `_forcing` feedforward.
 """
 
@@ -14,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -36,7 +39,7 @@ from stickslip.simulation._case import (
 from stickslip.simulation._exact_kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, LONGEST_STEP, solve
 from stickslip.simulation._forcing import NO_CELLS, feedforward
 from stickslip.simulation._meter import SIZE, close_standstill, new_meter, settle_band_of
-from stickslip.spec import Elements, Option
+from stickslip.spec import Bristle, Elements, Option
 
 __all__ = ["Prepared", "can_run", "prepare", "run"]
 
@@ -47,8 +50,8 @@ NOTHING_1: Array = np.zeros(1)
 NODES: Array = np.zeros((8, 5))
 
 
-def elements_of(side: Side) -> Elements | None:
-    """The law of a side as elements, or None."""
+def elements_of(side: Side) -> Elements | Bristle | None:
+    """The law of a side as elements or a bristle, or None."""
     if side.model is None or side.model.law.modes is None:
         return None
     return side.model.law.modes(side.model.parameters)
@@ -73,6 +76,9 @@ def can_run(case: Case) -> str:
         complaint = _complaint(side)
         if complaint:
             return f"the exact integrator cannot take the {where}: {complaint}"
+    plant = elements_of(case.plant)
+    if isinstance(plant, Elements) and math.isfinite(plant.slope):
+        return "the exact integrator cannot take the plant: it creeps on its steep slope instead of resting"
     return ""
 
 
@@ -80,10 +86,13 @@ def _complaint(side: Side) -> str:
     name = side.model.law.name if side.model else "no law"
     e = elements_of(side)
     if e is None:
-        return f"law {name!r} is not made of sticking and slipping elements"
-    rigid = [k for k in e.stiffness if math.isinf(k)]
-    if rigid and math.isfinite(e.attraction):
-        return f"law {name!r} has rigid elements with a finite attraction"
+        return f"law {name!r} gives no `modes`"
+    if isinstance(e, Elements):
+        rigid = [k for k in e.stiffness if math.isinf(k)]
+        if rigid and math.isfinite(e.attraction):
+            return f"law {name!r} has rigid elements with a finite attraction"
+        if math.isfinite(e.slope) and not crosses_once(side, e):
+            return f"law {name!r} has a steep slope that meets the sliding curve more than once, or never"
     if not e.constant_curve and not side.pointers.sliding:
         return f"law {name!r} has no sliding curve"
     if not e.constant_curve and e.velocity_scale <= 0.0:
@@ -178,11 +187,12 @@ def prepare(case: Case) -> Prepared:
         plan[col.CURVE_0 + 2 * i] = 0 if e.constant_curve else side.pointers.sliding
         plan[col.PARAMETERS_0 + 2 * i] = sum(b.size for b in blocks)
         blocks.append(side.parameters)
-        finite += [
-            [k, a] + [0.0] * (col.ELEMENT_SIZE - 2)
-            for k, a in zip(e.stiffness, e.share, strict=True)
-            if math.isfinite(k)
-        ]
+        if isinstance(e, Elements):
+            finite += [
+                [k, a] + [0.0] * (col.ELEMENT_SIZE - 2)
+                for k, a in zip(e.stiffness, e.share, strict=True)
+                if math.isfinite(k)
+            ]
         if i == 0:
             plan[col.FIRST_1] = len(finite)
         fill_side(sides[i], side, e, weight)
@@ -209,14 +219,56 @@ def prepare(case: Case) -> Prepared:
     return Prepared(case, flat(np.concatenate(blocks)), plan, flat(cells.ravel()), breaks, work)
 
 
-def fill_side(into: Array, side: Side, e: Elements, weight: float) -> None:
+def fill_side(into: Array, side: Side, e: Elements | Bristle, weight: float) -> None:
     """Write the constants of one side."""
-    into[col.WEIGHT], into[col.ATTRACTION], into[col.VISCOUS] = weight, e.attraction, e.viscous
-    into[col.BREAKAWAY], into[col.SCALE] = e.breakaway, 0.0 if e.constant_curve else e.velocity_scale
+    into[col.WEIGHT], into[col.VISCOUS], into[col.BREAKAWAY] = weight, e.viscous, e.breakaway
+    into[col.SCALE] = 0.0 if e.constant_curve else e.velocity_scale
     into[col.LOWEST] = lowest(side, e)
     into[col.KEPT : col.KEPT + 4] = math.nan
-    into[col.RIGID] = sum(a for k, a in zip(e.stiffness, e.share, strict=True) if math.isinf(k))
+    if isinstance(e, Bristle):
+        into[col.KIND], into[col.VARIES] = col.BENDS, 1.0
+        into[col.BRISTLE], into[col.LAG] = e.stiffness, e.damping / e.stiffness
+        return
+    into[col.KIND] = col.FOLLOWS if math.isinf(e.attraction) else col.RELAXES
+    into[col.ATTRACTION] = e.attraction
     into[col.VARIES] = 0.0 if e.constant_curve and math.isinf(e.attraction) else 1.0
+    rigid = sum(a for k, a in zip(e.stiffness, e.share, strict=True) if math.isinf(k))
+    if math.isinf(e.slope):
+        into[col.RIGID] = rigid
+    else:
+        into[col.STEEP], into[col.STEEPNESS], into[col.LAYER] = rigid, e.slope, layer_of(side, e)
+
+
+def torque_beyond(side: Side, e: Elements, v: float) -> float:
+    """How far the torque on the steep slope lies above that of sliding, N·m."""
+    s = e.breakaway
+    if not e.constant_curve:
+        assert side.model is not None
+        curve = curve_of(side).function
+        assert curve is not None
+        s = curve(v, side.model.parameters)
+    rigid = sum(a for k, a in zip(e.stiffness, e.share, strict=True) if math.isinf(k))
+    return (e.slope - e.viscous) * v - rigid * s
+
+
+def crosses_once(side: Side, e: Elements) -> bool:
+    """Whether a steep slope meets the sliding curve exactly once."""
+    scale = e.velocity_scale if e.velocity_scale > 0.0 else 1.0
+    beyond = [torque_beyond(side, e, scale * v) > 0.0 for v in np.geomspace(1e-9, 1e4, 400)]
+    return not beyond[0] and beyond[-1] and sum(a != b for a, b in pairwise(beyond)) == 1
+
+
+def layer_of(side: Side, e: Elements) -> float:
+    """Velocity at which a steep slope meets the sliding curve, rad/s."""
+    scale = e.velocity_scale if e.velocity_scale > 0.0 else 1.0
+    low, high = 1e-9 * scale, 1e4 * scale
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        if torque_beyond(side, e, middle) > 0.0:
+            high = middle
+        else:
+            low = middle
+    return high
 
 
 def curve_of(side: Side) -> Option:
@@ -236,7 +288,7 @@ def share_curve(one: Side, other: Side) -> bool:
     return curve is curve_of(other) and all(getattr(p, f) == getattr(q, f) for f in fields)
 
 
-def lowest(side: Side, e: Elements) -> float:
+def lowest(side: Side, e: Elements | Bristle) -> float:
     """A level just below the sliding curve, below which no element breaks away."""
     if e.constant_curve or side.model is None:
         return 0.999 * e.breakaway

@@ -1,0 +1,121 @@
+"""The motion over one stretch of the exact integrator: what is kept of it, and the state inside it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from stickslip.jit import kernel
+from stickslip.simulation._case import KI
+from stickslip.simulation._exact_flow import Cubic, Linear, flow, hermite, hermite_slope, moved
+from stickslip.simulation._exact_state import (
+    DS,
+    DS_END,
+    GOAL,
+    INTEGRAL,
+    LAG,
+    LIFT,
+    POSITION,
+    S_END,
+    SIDE_SIZE,
+    SLIPPING,
+    VARIES,
+    S,
+)
+
+# ---- entries of `stretch`: the motion over one accepted step -------------------------------------------------
+(
+    LENGTH, C0, C1, C2, C3, FREE_POSITION, FREE_VELOCITY, POSITION_MID, VELOCITY_MID, POSITION_END, VELOCITY_END,
+    R_MID, R_END, DR_END, GOAL_MID, RATE_MID, GOAL_END, RATE_END, INTEGRAL_END, AMPLITUDE, ERROR, ROUNDS,
+    POSITION_EVENT, VELOCITY_EVENT, STRETCH_SIZE,
+) = range(25)  # fmt: skip
+
+
+@kernel(exact=False, inline=True)
+def remember(
+    stretch: Any, c: Cubic, h: float, free_position: float, free_velocity: float, theta_mid: float, v_mid: float,
+    theta_end: float, v_end: float, rounds: int,
+) -> None:  # fmt: skip
+    """Keep the motion over the stretch."""
+    stretch[LENGTH] = h
+    stretch[C0] = c[0]
+    stretch[C1] = c[1]
+    stretch[C2] = c[2]
+    stretch[C3] = c[3]
+    stretch[FREE_POSITION] = free_position
+    stretch[FREE_VELOCITY] = free_velocity
+    stretch[POSITION_MID] = theta_mid
+    stretch[VELOCITY_MID] = v_mid
+    stretch[POSITION_END] = theta_end
+    stretch[VELOCITY_END] = v_end
+    stretch[ROUNDS] = rounds
+
+
+@kernel(exact=False)
+def free_amplitude(lin: Linear, stretch: Any) -> float:
+    """Amplitude of the ringing in this stretch, rad; 0 where nothing rings."""
+    if lin.discriminant <= 0.0:
+        return 0.0
+    u = stretch[FREE_VELOCITY] / lin.frequency
+    return math.sqrt(stretch[FREE_POSITION] * stretch[FREE_POSITION] + u * u)
+
+
+@kernel(exact=False)
+def cubic_of(stretch: Any) -> Cubic:
+    """The particular solution of the stretch."""
+    return stretch[C0], stretch[C1], stretch[C2], stretch[C3]
+
+
+@kernel(exact=False, inline=True)
+def state_at(lin: Linear, stretch: Any, x: float) -> tuple[float, float]:
+    """Position and velocity at x inside the stretch, exact for its forcing."""
+    return moved(cubic_of(stretch), flow(lin, x), x, stretch[FREE_POSITION], stretch[FREE_VELOCITY])
+
+
+@kernel(exact=False)
+def slip_force_at(sides: Any, stretch: Any, side: int, x: float) -> float:
+    """Slipping force of a side at x inside the stretch."""
+    if sides[side * SIDE_SIZE + VARIES] == 0.0 or sides[side * SIDE_SIZE + SLIPPING] == 0.0:
+        return sides[side * SIDE_SIZE + S]
+    y = x * (stretch[LENGTH] - x)
+    return sides[side * SIDE_SIZE + LIFT] * y * y + hermite(
+        sides[side * SIDE_SIZE + S],
+        sides[side * SIDE_SIZE + DS],
+        sides[side * SIDE_SIZE + S_END],
+        sides[side * SIDE_SIZE + DS_END],
+        stretch[LENGTH],
+        x,
+    )
+
+
+@kernel(exact=False)
+def slip_torque_at(sides: Any, stretch: Any, side: int, x: float) -> float:
+    """Torque of a side's slipping force at x inside the stretch: a bristle's damping adds to the force."""
+    force = slip_force_at(sides, stretch, side, x)
+    if sides[side * SIDE_SIZE + LAG] == 0.0 or sides[side * SIDE_SIZE + SLIPPING] == 0.0:
+        return force
+    y = x * (stretch[LENGTH] - x)
+    slope = 2.0 * sides[side * SIDE_SIZE + LIFT] * y * (stretch[LENGTH] - 2.0 * x) + hermite_slope(
+        sides[side * SIDE_SIZE + S],
+        sides[side * SIDE_SIZE + DS],
+        sides[side * SIDE_SIZE + S_END],
+        sides[side * SIDE_SIZE + DS_END],
+        stretch[LENGTH],
+        x,
+    )
+    return force + sides[side * SIDE_SIZE + LAG] * slope
+
+
+@kernel(exact=False)
+def integral_at(parameters: Any, loop: Any, stretch: Any, x: float) -> float:
+    """Integral of the position error at x inside the stretch, rad·s."""
+    if parameters[KI] == 0.0:
+        return 0.0
+    return hermite(
+        loop[INTEGRAL],
+        loop[GOAL] - loop[POSITION],
+        stretch[INTEGRAL_END],
+        stretch[GOAL_END] - stretch[POSITION_END],
+        stretch[LENGTH],
+        x,
+    )
