@@ -1,0 +1,236 @@
+"""Functions of the scalar subset in IEC 61131-3 structured text.
+
+Structured arguments are VAR_IN_OUT, so that functions change them in place as the definition does. What the
+norm's library lacks (expm1, hypot, copysign, ...) comes along as functions of its own.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from stickslip.errors import LawError
+from stickslip.export._analysis import Facts, analyse
+from stickslip.export._hoist import hoisted
+from stickslip.export._language import ADDITIVE, ATOM, Language
+from stickslip.subset import COUNT
+
+__all__ = ["HELPERS", "functions", "safe"]
+
+KEYWORDS = {
+    "action", "array", "at", "bool", "byte", "by", "case", "constant", "configuration", "date", "do", "dt", "dint", "else",
+    "elsif", "end", "exit", "false", "for", "from", "function", "if", "in", "initial_step", "int", "interval", "limit", "log",
+    "ln", "lreal", "mod", "mux", "not", "of", "on", "or", "priority", "program", "read_only", "real", "repeat", "resource",
+    "retain", "return", "sel", "single", "sint", "step", "string", "struct", "task", "then", "time", "to", "tod", "transition",
+    "true", "type", "uint", "until", "var", "while", "with", "word", "xor", "and", "abs", "min", "max", "move", "trunc",
+}  # fmt: skip
+MATH = {
+    "fabs": "ABS",
+    "exp": "EXP",
+    "log": "LN",
+    "sqrt": "SQRT",
+    "sin": "SIN",
+    "cos": "COS",
+    "tan": "TAN",
+    "atan": "ATAN",
+}
+HELPERS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
+    # Name to arguments and body; the body sets the function's own name, written @.
+    "expm1": (["x"], [
+        "u := EXP(x);", "IF u = 1.0 THEN", "    @ := x;", "ELSIF u - 1.0 = -1.0 THEN", "    @ := -1.0;", "ELSE",
+        "    @ := (u - 1.0) * x / LN(u);", "END_IF;"]),
+    "log1p": (["x"], [
+        "u := 1.0 + x;", "IF u = 1.0 THEN", "    @ := x;", "ELSE", "    @ := LN(u) * x / (u - 1.0);", "END_IF;"]),
+    "tanh": (["x"], [
+        "u := EXP(-2.0 * ABS(x));", "@ := (1.0 - u) / (1.0 + u);", "IF x < 0.0 THEN", "    @ := -@;", "END_IF;"]),
+    "hypot": (["x", "y"], ["@ := SQRT(x * x + y * y);"]),
+    "copysign": (["x", "y"], ["@ := ABS(x);", "IF y < 0.0 THEN", "    @ := -@;", "END_IF;"]),
+    "floor": (["x"], ["u := LINT_TO_LREAL(TRUNC_LINT(x));", "IF u > x THEN", "    u := u - 1.0;", "END_IF;", "@ := u;"]),
+}  # fmt: skip
+"""Kahan's expm1 and log1p, and what else the norm's library lacks."""
+
+
+def safe(name: str) -> str:
+    """A name that the norm does not reserve (it does not tell upper from lower case)."""
+    return f"{name}_" if name.lower() in KEYWORDS else name
+
+
+class _St(Language):
+    operators: ClassVar[dict[type[ast.AST], str]] = {
+        **Language.operators, ast.And: "AND", ast.Or: "OR", ast.Not: "NOT ", ast.NotEq: "<>", ast.Eq: "="
+    }  # fmt: skip
+
+    def __init__(
+        self, name: str, prefix: str, facts: Facts, known: Mapping[str, Facts], elements: int
+    ) -> None:
+        super().__init__(facts)
+        self.own = prefix + name
+        self.prefix = prefix
+        self.known = known
+        self.elements = elements
+        self.helpers: set[str] = set()
+
+    # ---- expressions ---------------------------------------------------------------------------------
+
+    def name(self, name: str) -> str:
+        return str(self.elements) if name == COUNT else safe(name)
+
+    def number(self, value: float) -> str:
+        if math.isinf(value):
+            return "1.0E308" if value > 0.0 else "-1.0E308"
+        text = repr(value)
+        mantissa, _, exponent = text.partition("e")
+        mantissa += "" if "." in mantissa else ".0"
+        return f"{mantissa}E{int(exponent)}" if exponent else mantissa
+
+    def as_real(self, node: ast.expr) -> str:
+        return f"INT_TO_LREAL({self.expression(node)})"
+
+    def field(self, node: ast.Attribute) -> str:
+        assert isinstance(node.value, ast.Name)
+        if node.value.id == "math":
+            return {"pi": self.number(math.pi), "inf": self.number(math.inf)}[node.attr]
+        return f"{safe(node.value.id)}.{safe(node.attr)}"
+
+    def element(self, node: ast.Subscript) -> str:
+        assert isinstance(node.value, ast.Attribute)
+        return f"{self.field(node.value)}[{self.expression(node.slice)}]"
+
+    def call(self, node: ast.Call) -> str:
+        if isinstance(node.func, ast.Attribute):
+            return self.library(node.func.attr, node.args)
+        assert isinstance(node.func, ast.Name)
+        name = node.func.id
+        if name == "abs":
+            return self.library("fabs", node.args)
+        if name in ("min", "max"):
+            return f"{name.upper()}({', '.join(self.real(a) for a in node.args)})"
+        if name == "float":
+            return self.real(node.args[0])
+        if name == "int":
+            return f"LREAL_TO_INT({self.helper('floor', node.args)})"
+        callee = self.known[name]
+        given = [
+            f"{safe(a)} := {safe(g.id) if a in callee.structures and isinstance(g, ast.Name) else self.real(g)}"
+            for g, a in zip(node.args, callee.arguments)
+        ]
+        return f"{self.prefix}{name}({', '.join(given)})"
+
+    def library(self, name: str, arguments: Sequence[ast.expr]) -> str:
+        """A mathematical function."""
+        if name == "pow":
+            return f"EXPT({', '.join(self.real(a) for a in arguments)})"
+        if name in HELPERS:
+            return self.helper(name, arguments)
+        if name not in MATH:
+            raise self.refused(ast.Name(name))
+        return f"{MATH[name]}({', '.join(self.real(a) for a in arguments)})"
+
+    def helper(self, name: str, arguments: Sequence[ast.expr]) -> str:
+        """One of the functions that come along."""
+        self.helpers.add(name)
+        given = [f"{a} := {self.real(x)}" for a, x in zip(HELPERS[name][0], arguments)]
+        return f"{self.prefix}_{name}({', '.join(given)})"
+
+    def power(self, node: ast.BinOp) -> str:
+        return self.library("pow", [node.left, node.right])
+
+    def choice(self, node: ast.IfExp) -> str:
+        # SEL evaluates both, which is harmless for arithmetic without a division.
+        if any(isinstance(n, (ast.Div, ast.Call)) for n in ast.walk(node)):
+            raise LawError(f"`{ast.unparse(node)}` has no translation; write it as an if statement")
+        return f"SEL({self.expression(node.test)}, {self.real(node.orelse)}, {self.real(node.body)})"
+
+    def written(self, node: ast.expr) -> tuple[str, int]:
+        # Two signs in a row (a - -b) are no structured text.
+        text, binds = super().written(node)
+        return (
+            (text, ADDITIVE)
+            if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
+            else (text, binds)
+        )
+
+    # ---- statements ----------------------------------------------------------------------------------
+
+    def declaration(self, name: str) -> list[str]:
+        zero = "0" if self.facts.kinds[name] == "int" else "0.0"
+        return [f"{safe(name)} := {zero};"]
+
+    def assignment(self, node: ast.Assign) -> list[str]:
+        target = node.targets[0]
+        whole = isinstance(target, ast.Name) and self.facts.kinds.get(target.id, "real") != "real"
+        value = self.expression(node.value) if whole else self.real(node.value)
+        return [f"{self.expression(target)} := {value};"]
+
+    def returning(self, node: ast.Return) -> list[str]:
+        if node.value is None:
+            return ["RETURN;"]
+        return [f"{self.own} := {self.real(node.value)};", "RETURN;"]
+
+    def call_statement(self, node: ast.Call) -> list[str]:
+        return [f"{self.call(node)};"]
+
+    def leave(self) -> str:
+        return "EXIT;"
+
+    def condition(self, node: ast.If, depth: int) -> list[str]:
+        pad = self.indent * depth
+        out = [f"{pad}IF {self.expression(node.test)} THEN", *self.block(node.body, depth + 1)]
+        if node.orelse:
+            out += [f"{pad}ELSE", *self.block(node.orelse, depth + 1)]
+        return [*out, f"{pad}END_IF;"]
+
+    def loop(self, node: ast.For, depth: int) -> list[str]:
+        assert isinstance(node.target, ast.Name)
+        assert isinstance(node.iter, ast.Call)
+        pad = self.indent * depth
+        first, last = (["0"] if len(node.iter.args) == 1 else []) + [
+            self.expression(a, ATOM) for a in node.iter.args
+        ]
+        head = f"{pad}FOR {safe(node.target.id)} := {first} TO {last} - 1 DO"
+        return [head, *self.block(node.body, depth + 1), f"{pad}END_FOR;"]
+
+
+def functions(
+    trees: Mapping[str, ast.FunctionDef], prefix: str, structures: Mapping[str, str], elements: int
+) -> list[tuple[str, str, list[str]]]:
+    """Name, docstring and lines of every function, helpers and callees first."""
+    trees = hoisted(trees)
+    known = analyse(trees)
+    out: list[tuple[str, str, list[str]]] = []
+    helpers: set[str] = set()
+    for name, tree in trees.items():
+        facts = known[name]
+        writer = _St(name, prefix, facts, known, elements)
+        body = writer.block(tree.body, 1)
+        if body and body[-1].strip() == "RETURN;" and len(body[-1]) - len(body[-1].lstrip()) == 4:
+            body.pop()  # the end returns by itself
+        helpers |= writer.helpers
+        head = [f"FUNCTION {prefix}{name} : {'LREAL' if facts.returns else 'BOOL'}"]
+        plain = [a for a in facts.arguments if structures.get(a) is None or a not in facts.structures]
+        shared = [a for a in facts.arguments if a not in plain]
+        head += section("VAR_INPUT", [f"{safe(a)} : LREAL;" for a in plain])
+        head += section("VAR_IN_OUT", [f"{safe(a)} : {prefix}_{structures[a]};" for a in shared])
+        types = {"real": "LREAL", "int": "INT", "bool": "BOOL"}
+        own = [n for n in facts.kinds if n not in facts.arguments]
+        head += section("VAR", [f"{safe(n)} : {types[facts.kinds[n]]};" for n in own])
+        out.append((name, ast.get_docstring(tree) or "", [*head, *(body or ["    ;"]), "END_FUNCTION"]))
+    return [(f"_{n}", n, helper_lines(prefix, n)) for n in HELPERS if n in helpers] + out
+
+
+def section(kind: str, lines: Sequence[str]) -> list[str]:
+    """A VAR section, if it has anything."""
+    return [kind, *(f"    {line}" for line in lines), "END_VAR"] if lines else []
+
+
+def helper_lines(prefix: str, name: str) -> list[str]:
+    """One of the functions that come along."""
+    arguments, body = HELPERS[name]
+    own = f"{prefix}_{name}"
+    lines = [f"    {line.replace('@', own)}" for line in body]
+    local = section("VAR", ["u : LREAL;"]) if any(re.search(r"\bu\b", line) for line in body) else []
+    return [f"FUNCTION {own} : LREAL", *section("VAR_INPUT", [f"{a} : LREAL;" for a in arguments]), *local, *lines,
+            "END_FUNCTION"]  # fmt: skip
