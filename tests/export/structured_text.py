@@ -47,7 +47,7 @@ TIMES: "*" | "/"
 TRUTH.2: /TRUE|FALSE/i
 NUMBER: /[0-9]+(\.[0-9]+)?([Ee][+-]?[0-9]+)?(?!\.\.)/
 INT: /[0-9]+/
-NAME: /(?!(?:END_|ELSE|ELSIF|THEN|DO|TO|OR|AND|NOT|RETURN|EXIT|IF|FOR|VAR|TYPE|FUNCTION|STRUCT)\b)(?!END_|VAR_)[A-Za-z_][A-Za-z0-9_]*/
+NAME: /(?!(?:ELSE|ELSIF|THEN|DO|TO|OR|AND|NOT|RETURN|EXIT|IF|FOR|VAR|TYPE|FUNCTION|STRUCT)\b)(?!END_|VAR_)[A-Z_a-z]\w*/
 COMMENT: /\(\*.*?\*\)/s
 %ignore COMMENT
 %ignore /\s+/

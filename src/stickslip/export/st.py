@@ -62,7 +62,8 @@ def _declared(fields: Sequence[Field], p: Any, elements: int) -> Iterable[str]:
         if p is not None:
             value = getattr(p, f.name)
             start = f" := [{', '.join(map(repr, value))}]" if f.per_element else f" := {value!r}"
-        yield f"{safe(f.name)} : {kind}{start.replace('e', 'E')}; (* {ascii_only(f.par.meaning)}, {ascii_only(f.par.unit)} *)"
+        meaning = ascii_only(f"{f.par.meaning}, {f.par.unit}")
+        yield f"{safe(f.name)} : {kind}{start.replace('e', 'E')}; (* {meaning} *)"
 
 
 def _cleared(fields: Sequence[Field], elements: int) -> Iterable[str]:
