@@ -7,6 +7,7 @@ import subprocess
 import numpy as np
 import pytest
 
+from laws import label, registered, variants
 from stickslip import plugins
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
@@ -25,8 +26,8 @@ from stickslip.spec import Surroundings
 COMPILERS = [c for c in ("gcc", "clang") if shutil.which(c)]
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="needs a C compiler")
 STEPS = 1_000_000
-LAWS = [plugins.law(name) for name in plugins.law_names()]
-every_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+LAWS = registered()
+every_law = pytest.mark.parametrize("law", LAWS, ids=label)
 every_compiler = pytest.mark.parametrize("compiler", COMPILERS)
 
 LOOP = """#include "x.h"
@@ -106,6 +107,14 @@ def test_double_gives_the_bits_of_python(law, compiler, tmp_path):
     expected = by_compiled_python(example(law), *steps)
     assert np.all(np.isfinite(expected))
     np.testing.assert_array_equal(out, expected)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", variants(), ids=label)
+def test_every_choice_gives_the_bits_of_python(law, tmp_path):
+    steps = random_steps(50_000, seed=8)
+    out = answers(built(Job(example(law), "x"), LOOP, tmp_path, COMPILERS[0]), *steps)
+    np.testing.assert_array_equal(out, by_compiled_python(example(law), *steps))
 
 
 @every_law

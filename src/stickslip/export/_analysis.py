@@ -7,13 +7,11 @@ indices and conditions.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from stickslip.subset import COUNT
-
-__all__ = ["Facts", "Kind", "analyse", "kind_of"]
+__all__ = ["Facts", "Kind", "analyse", "kind_of", "merged"]
 
 Kind = Literal["real", "int", "bool"]
 
@@ -30,7 +28,9 @@ class Facts:
     returns : bool
         Whether it returns a number.
     kinds : mapping
-        Every local name (loop counters included) to its type.
+        Every local name (loop counters included) and every count to its type.
+    counts : frozenset of str
+        Names that stand for the number of elements, of points, ... (``elements_``).
     declared : mapping
         id of a statement to the names that its assignment declares.
     opened : mapping
@@ -46,6 +46,7 @@ class Facts:
     arguments: tuple[str, ...]
     returns: bool
     kinds: Mapping[str, Kind]
+    counts: frozenset[str]
     declared: Mapping[int, tuple[str, ...]]
     opened: Mapping[int, tuple[str, ...]]
     structures: frozenset[str]
@@ -61,12 +62,28 @@ def analyse(functions: Mapping[str, ast.FunctionDef]) -> dict[str, Facts]:
     return known
 
 
+def merged(functions: Mapping[str, ast.FunctionDef]) -> dict[str, ast.FunctionDef]:
+    """Functions of which none says the same as another (the controller's law is the law's own step)."""
+    out: dict[str, ast.FunctionDef] = {}
+    first: dict[str, str] = {}
+    other: dict[str, str] = {}
+    for name, tree in functions.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                node.func.id = other.get(node.func.id, node.func.id)
+        text = ast.dump(tree.args) + "".join(map(ast.dump, tree.body))
+        other[name] = first.setdefault(text, name)
+        if other[name] == name:
+            out[name] = tree
+    return out
+
+
 def kind_of(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
     """The type of an expression."""
     if isinstance(node, ast.Constant):
         return "int" if isinstance(node.value, int) and not isinstance(node.value, bool) else "real"
     if isinstance(node, ast.Name):
-        return "int" if node.id == COUNT else kinds.get(node.id, "real")
+        return kinds.get(node.id, "real")
     if isinstance(node, (ast.Compare, ast.BoolOp)):
         return "bool"
     if isinstance(node, ast.UnaryOp):
@@ -84,26 +101,36 @@ def kind_of(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
 
 def _facts(tree: ast.FunctionDef, known: Mapping[str, Facts]) -> Facts:
     arguments = tuple(a.arg for a in tree.args.args)
-    kinds = _kinds(tree)
+    counts = _counts(tree, arguments)
+    kinds: dict[str, Kind] = {**_kinds(tree, counts), **dict.fromkeys(counts, "int")}
     declared: dict[int, tuple[str, ...]] = {}
     opened: dict[int, tuple[str, ...]] = {}
     for name in kinds:
-        if name not in arguments:
+        if name not in arguments and name not in counts:
             _place(name, tree.body, declared, opened)
     used = {n.id for statement in tree.body for n in ast.walk(statement) if isinstance(n, ast.Name)}
     returns = any(isinstance(n, ast.Return) and n.value is not None for n in ast.walk(tree))
     structures = frozenset(arguments) - _plain(tree, known)
     return Facts(
-        arguments, returns, kinds, declared, opened, structures, _writes(tree, known), frozenset(used)
+        arguments, returns, kinds, counts, declared, opened, structures, _writes(tree, known), frozenset(used)
     )
 
 
 # ---- types --------------------------------------------------------------------------------------------------
 
 
-def _kinds(tree: ast.FunctionDef) -> dict[str, Kind]:
+def _counts(tree: ast.FunctionDef, arguments: Sequence[str]) -> frozenset[str]:
+    """Names that are neither arguments nor locals nor called."""
+    names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
+    called = {id(n.func) for n in ast.walk(tree) if isinstance(n, ast.Call)}
+    local = {n.id for n in names if isinstance(n.ctx, ast.Store)}
+    free = {n.id for n in names if id(n) not in called} - local - {"math", *arguments}
+    return frozenset(free)
+
+
+def _kinds(tree: ast.FunctionDef, counts: Iterable[str]) -> dict[str, Kind]:
     """The type of every local name: whole only where every value it gets is whole."""
-    kinds: dict[str, Kind] = {}
+    kinds: dict[str, Kind] = dict.fromkeys(counts, "int")
     for node in ast.walk(tree):
         if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
             kinds[node.target.id] = "int"

@@ -15,10 +15,17 @@ from typing import ClassVar
 
 from stickslip.export._analysis import Facts, analyse
 from stickslip.export._language import ATOM, UNARY, Language
-from stickslip.subset import COUNT
 
 __all__ = ["Dialect", "function", "functions"]
 
+KEYWORDS = {
+    "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern",
+    "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed",
+    "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while", "bool",
+    "class", "new", "this", "template", "exp", "log", "pow", "floor", "ceil", "sqrt", "sin", "cos", "tan",
+    "fabs", "div", "abs", "y0", "y1", "j0", "j1", "gamma",
+}  # fmt: skip
+"""Words of C and C++, and names of the library, which a local name would hide."""
 MATH = {"fabs", "exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
         "floor", "ceil", "copysign", "pow", "hypot"}  # fmt: skip
 
@@ -46,10 +53,9 @@ class Dialect:
         """The type of a number."""
         return "float" if self.single else "double"
 
-    @property
-    def elements(self) -> str:
-        """The macro that holds the number of elements."""
-        return f"{self.prefix.upper()}_ELEMENTS"
+    def count(self, name: str) -> str:
+        """The macro that holds a number of elements: ``elements_`` is ``PREFIX_ELEMENTS``."""
+        return f"{self.prefix.upper()}_{name.strip('_').upper()}"
 
     def number(self, value: float) -> str:
         """A number with all its digits; a single one rounded by us, not by the compiler."""
@@ -78,7 +84,7 @@ class _C(Language):
     # ---- expressions ---------------------------------------------------------------------------------
 
     def name(self, name: str) -> str:
-        return self.dialect.elements if name == COUNT else name
+        return self.dialect.count(name) if name in self.facts.counts else safe(name)
 
     def number(self, value: float) -> str:
         return self.dialect.number(value)
@@ -143,7 +149,7 @@ class _C(Language):
 
     def declaration(self, name: str) -> list[str]:
         zero = "0" if self.facts.kinds[name] != "real" else self.number(0.0)
-        return [f"{self.type_of(name)} {name} = {zero};"]
+        return [f"{self.type_of(name)} {safe(name)} = {zero};"]
 
     def assignment(self, node: ast.Assign) -> list[str]:
         target = node.targets[0]
@@ -151,7 +157,7 @@ class _C(Language):
         whole = own and self.facts.kinds.get(target.id, "real") != "real"
         value = self.expression(node.value) if whole else self.real(node.value)
         if own and target.id in self.facts.declared.get(id(node), ()):
-            return [f"{self.type_of(target.id)} {target.id} = {value};"]
+            return [f"{self.type_of(target.id)} {safe(target.id)} = {value};"]
         return [f"{self.expression(target)} = {value};"]
 
     def returning(self, node: ast.Return) -> list[str]:
@@ -186,12 +192,17 @@ class _C(Language):
     def loop(self, node: ast.For, depth: int) -> list[str]:
         assert isinstance(node.target, ast.Name)
         assert isinstance(node.iter, ast.Call)
-        pad, i = self.indent * depth, node.target.id
+        pad, i = self.indent * depth, safe(node.target.id)
         first, last = (["0"] if len(node.iter.args) == 1 else []) + [
             self.expression(a) for a in node.iter.args
         ]
         head = f"for (int {i} = {first}; {i} < {last}; {i}++)"
         return [f"{pad}{head} {{", *self.block(node.body, depth + 1), f"{pad}}}"]
+
+
+def safe(name: str) -> str:
+    """A name that neither C nor its library uses."""
+    return f"{name}_" if name in KEYWORDS else name
 
 
 def head(name: str, facts: Facts, dialect: Dialect) -> str:
@@ -200,7 +211,7 @@ def head(name: str, facts: Facts, dialect: Dialect) -> str:
     for argument in facts.arguments:
         kind = dialect.structures.get(argument) if argument in facts.structures else None
         if kind is None:
-            given.append(f"{dialect.real} {argument}")
+            given.append(f"{dialect.real} {safe(argument)}")
         else:
             constant = "" if argument in facts.writes else "const "
             given.append(f"{constant}{dialect.prefix}_{kind} *{argument}")
@@ -213,7 +224,7 @@ def function(
     """The lines of one function; ``public`` ones are not static."""
     facts = known[name]
     out = [f"{'' if public else 'static '}{head(name, facts, dialect)}", "{"]
-    out += [f"    (void){a};" for a in facts.arguments if a not in facts.uses]
+    out += [f"    (void){safe(a)};" for a in facts.arguments if a not in facts.uses]
     out += _C(facts, dialect, known).block(tree.body, 1)
     return [*out, "}"]
 

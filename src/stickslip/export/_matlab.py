@@ -13,13 +13,17 @@ from typing import ClassVar
 from stickslip.export._analysis import Facts, analyse
 from stickslip.export._hoist import hoisted
 from stickslip.export._language import ATOM, Language
-from stickslip.subset import COUNT
 
 __all__ = ["HELPERS", "functions"]
 
 MATH = {"fabs": "abs", "pow": "power"} | {
     n: n for n in ("exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
                    "floor", "ceil", "hypot")
+}  # fmt: skip
+KEYWORDS = {
+    "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global",
+    "if", "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while", "do", "until",
+    "unwind_protect",
 }  # fmt: skip
 HELPERS = {
     "copysign_": """\
@@ -55,7 +59,7 @@ class _Matlab(Language):
     # ---- expressions ---------------------------------------------------------------------------------
 
     def name(self, name: str) -> str:
-        return "p.elements" if name == COUNT else name
+        return f"p.{name.strip('_')}" if name in self.facts.counts else safe(name)
 
     def number(self, value: float) -> str:
         if math.isinf(value):
@@ -160,8 +164,13 @@ class _Matlab(Language):
         first, last = (["0"] if len(node.iter.args) == 1 else []) + [
             self.expression(a) for a in node.iter.args
         ]
-        head = f"{pad}for {node.target.id} = {first}:({last} - 1)"
+        head = f"{pad}for {safe(node.target.id)} = {first}:({last} - 1)"
         return [head, *self.block(node.body, depth + 1), f"{pad}end"]
+
+
+def safe(name: str) -> str:
+    """A name that the language does not reserve."""
+    return f"{name}_" if name in KEYWORDS else name
 
 
 def local(name: str) -> str:

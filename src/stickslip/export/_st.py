@@ -16,7 +16,6 @@ from stickslip.errors import LawError
 from stickslip.export._analysis import Facts, analyse
 from stickslip.export._hoist import hoisted
 from stickslip.export._language import ADDITIVE, ATOM, Language
-from stickslip.subset import COUNT
 
 __all__ = ["HELPERS", "functions", "safe"]
 
@@ -59,19 +58,19 @@ class _St(Language):
     }  # fmt: skip
 
     def __init__(
-        self, name: str, prefix: str, facts: Facts, known: Mapping[str, Facts], elements: int
+        self, name: str, prefix: str, facts: Facts, known: Mapping[str, Facts], counts: Mapping[str, int]
     ) -> None:
         super().__init__(facts)
         self.own = prefix + name
         self.prefix = prefix
         self.known = known
-        self.elements = elements
+        self.counts = counts
         self.helpers: set[str] = set()
 
     # ---- expressions ---------------------------------------------------------------------------------
 
     def name(self, name: str) -> str:
-        return str(self.elements) if name == COUNT else safe(name)
+        return str(self.counts[name]) if name in self.facts.counts else safe(name)
 
     def number(self, value: float) -> str:
         if math.isinf(value):
@@ -190,7 +189,10 @@ class _St(Language):
 
 
 def functions(
-    trees: Mapping[str, ast.FunctionDef], prefix: str, structures: Mapping[str, str], elements: int
+    trees: Mapping[str, ast.FunctionDef],
+    prefix: str,
+    structures: Mapping[str, str],
+    counts: Mapping[str, int],
 ) -> list[tuple[str, str, list[str]]]:
     """Name, docstring and lines of every function, helpers and callees first."""
     trees = hoisted(trees)
@@ -199,7 +201,7 @@ def functions(
     helpers: set[str] = set()
     for name, tree in trees.items():
         facts = known[name]
-        writer = _St(name, prefix, facts, known, elements)
+        writer = _St(name, prefix, facts, known, counts)
         body = writer.block(tree.body, 1)
         if body and body[-1].strip() == "RETURN;" and len(body[-1]) - len(body[-1].lstrip()) == 4:
             body.pop()  # the end returns by itself

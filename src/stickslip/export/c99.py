@@ -16,11 +16,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from stickslip.control.sampled import Memory, Settings, sampled_by, settings
-from stickslip.export._analysis import analyse
+from stickslip.export._analysis import analyse, merged
 from stickslip.export._c import Dialect, functions, head
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import as_csv, golden
-from stickslip.export.job import Check, Export, Job
+from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
 from stickslip.spec import Field, Law, Surroundings, fields_of
 from stickslip.subset import Layout, law_layouts, named
@@ -50,10 +50,10 @@ def dialect_of(job: Job) -> Dialect:
 def translated(job: Job) -> dict[str, Any]:
     """The functions of the law, and of the controller where there is one, as trees of the subset."""
     law = job.model.law
-    entries = {"_step": law.step, **({"_steady": law.steady} if law.steady else {})}
+    # The public ones first: they have the right to their names.
+    entries = {**({"_steady": law.steady} if law.steady else {}), "_step": law.step}
     layouts = law_layouts(law)
     if job.controller is not None:
-        # The law's own step comes by the name under which the controller calls it.
         helper = job.controller.compensator
         entries["_sample"] = sampled_by(law if helper else None)
         layouts = {
@@ -61,7 +61,7 @@ def translated(job: Job) -> dict[str, Any]:
             "n": Layout.of(fields_of(Settings), counted=False),
             "m": Layout.of(fields_of(Memory), counted=False),
         }
-    return named(entries, layouts)
+    return merged(named(entries, layouts))
 
 
 def write(job: Job) -> Export:
@@ -76,7 +76,8 @@ def write(job: Job) -> Export:
     scale = float(max(abs(vectors.torque).max(), 1e-12))
     common: dict[str, Any] = {
         "x": job.name, "X": job.name.upper(), "title": ascii_only(law.title), "real": dialect.real,
-        "elements": law.elements_in(p), "source": ascii_only("; ".join(law.source)),
+        "counts": {dialect.count(n): size for n, size in counts_in(job.model).items()},
+        "source": ascii_only("; ".join(law.source)),
         "equation": textwrap.wrap(ascii_only(law.equation), 110, break_long_words=False),
         "surroundings": ", ".join(dialect.number(x) for x in Surroundings()),
         "controller": controller_of(job, dialect), "bound": SINGLE_BOUND if job.single else 0.0, "scale": repr(scale),
@@ -140,7 +141,7 @@ def structure(name: str, about: str, fields: Sequence[Field], dialect: Dialect) 
     """One structure; C has no empty ones."""
     lines = [
         {
-            "declared": f"{dialect.real} {f.name}{f'[{dialect.elements}]' if f.per_element else ''};",
+            "declared": f"{dialect.real} {f.name}{place_of(f, dialect)};",
             "meaning": ascii_only(f"{f.par.meaning}, {f.par.unit}"),
         }
         for f in fields
@@ -150,6 +151,11 @@ def structure(name: str, about: str, fields: Sequence[Field], dialect: Dialect) 
         "about": about,
         "fields": lines or [{"declared": "char none;", "meaning": "this law has none"}],
     }
+
+
+def place_of(f: Field, dialect: Dialect) -> str:
+    """The size of an array; nothing for a number."""
+    return f"[{dialect.count(f'{f.par.per}s_')}]" if f.per_element else ""
 
 
 def given(fields: Sequence[Field], values: Mapping[str, Any], owner: str, dialect: Dialect) -> Iterable[str]:
@@ -168,7 +174,7 @@ def cleared(law: Law, dialect: Dialect) -> Iterable[str]:
     zero = dialect.number(0.0)
     for f in law.state_fields:
         if f.per_element:
-            yield f"for (int i = 0; i < {dialect.elements}; i++) {{ z->{f.name}[i] = {zero}; }}"
+            yield f"for (int i = 0; i < {dialect.count(f'{f.par.per}s_')}; i++) {{ z->{f.name}[i] = {zero}; }}"
         else:
             yield f"z->{f.name} = {zero};"
     if not law.state_fields:

@@ -10,7 +10,7 @@ from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.model import Model
 
-__all__ = ["CannotCarry", "Check", "Export", "Job"]
+__all__ = ["CannotCarry", "Check", "Export", "Job", "counts_in"]
 
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")
 
@@ -49,6 +49,12 @@ class Job:
             raise InputError(
                 "a controller in continuous time cannot be exported; give it a sample_time greater than 0"
             )
+
+
+def counts_in(model: Model) -> dict[str, int]:
+    """The numbers of elements, of points, ..., by the names that translated functions use (``elements_``)."""
+    law, p = model.law, model.parameters
+    return {f"{f.par.per}s_": len(getattr(p, f.name)) for f in law.fields if f.per_element}
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from stickslip.export._matlab import HELPERS, functions, local
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import as_csv, golden
-from stickslip.export.job import Check, Export, Job
+from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
 from stickslip.spec import Surroundings
 from stickslip.subset import law_layouts, named
@@ -73,7 +73,8 @@ def _parameters(job: Job) -> Iterable[str]:
         value = getattr(p, f.name)
         shown = f"[{', '.join(map(repr, value))}]" if f.per_element else repr(value)
         yield f"    p.{f.name} = {shown};  % {f.par.meaning}, {ascii_only(f.par.unit)}"
-    yield f"    p.elements = {law.elements_in(p)};"
+    for name, size in counts_in(job.model).items():
+        yield f"    p.{name.strip('_')} = {size};"
     yield "end\n"
 
 

@@ -11,10 +11,10 @@ from tempfile import TemporaryDirectory
 
 from stickslip.export._text import render
 from stickslip.export.golden import as_csv, golden
-from stickslip.export.job import Check, Export, Job
+from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
-from stickslip.subset import COUNT, law_layouts, named
+from stickslip.subset import law_layouts, named
 
 __all__ = ["TARGET"]
 
@@ -24,14 +24,14 @@ def write(job: Job) -> Export:
     law, p = job.model.law, job.model.parameters
     trees = named({"step": law.step, **({"steady": law.steady} if law.steady else {})}, law_layouts(law))
     for tree in trees.values():
-        _count_by_constant(tree)
+        _count_by_constant(tree, counts_in(job.model))
         _indent_docstring(tree)
     text = render(
         "python.py.j2",
         x=job.name,
         law=law,
         source="; ".join(law.source),
-        elements=law.elements_in(p),
+        counts={constant(n): size for n, size in counts_in(job.model).items()},
         parameters=[*_assigned(law.fields, p)],
         states=[*_cleared(law.state_fields)],
         around=[f"{name}={value!r}" for name, value in Surroundings()._asdict().items()],
@@ -42,11 +42,16 @@ def write(job: Job) -> Export:
     return Export({**files, "README.md": render("python_readme.md.j2", x=job.name, law=law)})
 
 
-def _count_by_constant(tree: ast.FunctionDef) -> None:
-    """Call the number of elements by the name of the module's constant."""
+def constant(name: str) -> str:
+    """The module's constant for a count: ``elements_`` is ``ELEMENTS``."""
+    return name.strip("_").upper()
+
+
+def _count_by_constant(tree: ast.FunctionDef, counts: Iterable[str]) -> None:
+    """Call the numbers of elements by the names of the module's constants."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Name) and node.id == COUNT:
-            node.id = "ELEMENTS"
+        if isinstance(node, ast.Name) and node.id in counts:
+            node.id = constant(node.id)
 
 
 def _indent_docstring(tree: ast.FunctionDef) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 from stickslip.export._st import functions, safe
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import as_csv, golden
-from stickslip.export.job import Export, Job
+from stickslip.export.job import Export, Job, counts_in
 from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
@@ -26,7 +26,7 @@ def write(job: Job) -> Export:
     """One file with types, functions and the block; golden vectors; how to use it."""
     law, p, x = job.model.law, job.model.parameters, job.name
     elements = law.elements_in(p)
-    parts = functions(named({"_step": law.step}, law_layouts(law)), x, STRUCTURES, elements)
+    parts = functions(named({"_step": law.step}, law_layouts(law)), x, STRUCTURES, counts_in(job.model))
     around = [f"{safe(n)} : LREAL := {v!r};" for n, v in Surroundings()._asdict().items()]
     values: dict[str, Any] = {
         "x": x,
@@ -57,7 +57,8 @@ def write(job: Job) -> Export:
 def _declared(fields: Sequence[Field], p: Any, elements: int) -> Iterable[str]:
     """Fields of a structure with their meaning, and their values where there are any."""
     for f in fields:
-        kind = f"ARRAY[0..{elements - 1}] OF LREAL" if f.per_element else "LREAL"
+        size = len(getattr(p, f.name)) if p is not None and f.per_element else elements
+        kind = f"ARRAY[0..{size - 1}] OF LREAL" if f.per_element else "LREAL"
         start = ""
         if p is not None:
             value = getattr(p, f.name)
