@@ -51,6 +51,8 @@ class Loop(NamedTuple):
     plant_states: int
     damped: bool
     steep: bool
+    resolved: float
+    travel: float
     fine: float
     surroundings: Any
     motion: Any

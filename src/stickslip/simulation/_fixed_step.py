@@ -55,6 +55,7 @@ GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
 VELOCITY_ROUNDING = 1e-14  # rad/s, relative above 1 rad/s
 FINE = 0.1  # of the sliding curve's velocity scale, by which the velocity near rest may change in a step
 APPROACH = 0.9  # of the time to the zero of a steep compensator's velocity, in which it is approached
+UNSEEN = 0.003  # of the travel up to break-away, which a damped step near rest may hide
 LANDING, GROWTH = 1e-3, 4.0  # of a step: the first one after that zero, and the growth of those that follow
 
 
@@ -314,13 +315,29 @@ def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, 
 
 
 @kernel()
+def loses_motion(loop: Loop, a: Any, b: Any, h: float) -> bool:
+    """Whether a damped step from a to b near rest hides a motion that a bristle would remember.
+
+    The stages' velocities differ by what the step does not resolve; a contact that slides farther than its
+    travel up to break-away remembers nothing of it.
+    """
+    v0, v1 = a[VELOCITY], b[VELOCITY]
+    slides = v0 * v1 > 0.0 and min(abs(v0), abs(v1)) * h > loop.travel
+    return not slides and GAMMA * h * abs(v1 - loop.middle[VELOCITY]) > UNSEEN * loop.travel
+
+
+@kernel()
 def advance(loop: Loop, a: Any, b: Any, t: float, h: float, cap: float) -> tuple[float, bool]:
     """One step from a to b, at most h long, in motion at most `cap`.
 
     Returns the time taken (< 0: no solution) and whether an event ended the step.
     """
     if loop.damped:
-        return (h, False) if damped_step(loop, a, b, t, h) else (-1.0, False)
+        done = damped_step(loop, a, b, t, h)
+        if done and h > loop.resolved and loses_motion(loop, a, b, h):
+            h = loop.resolved
+            done = damped_step(loop, a, b, t, h)
+        return (h, False) if done else (-1.0, False)
     if a[VELOCITY] == 0.0 and a[LEAVING] == 0.0 and (loop.plant[HOLDING] != 0 or helper_jumps(loop)):
         side = departure(loop, a)
         if side == 0.0:

@@ -5,7 +5,8 @@ reversals, break-away and every kink of the reference, and short near rest, wher
 does not resolve the contact at rest, that is where ``dt`` times the slope of its torque against the velocity
 exceeds `RESOLVED` inertias (a spring k: omega dt > 2 with omega = sqrt(k / J)), the whole run uses an
 L-stable method of the same order instead, since the trapezoid would let a stuck contact ring without damping.
-That method does not cut its steps: what it does not resolve, it damps.
+What that method does not resolve, it damps; where it would so lose a motion near rest that the contact's bristles
+remember (a load applied at once, a reversal), it takes shorter steps until that motion has decayed.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from stickslip.simulation._case import (
     POSITION_LIMIT,
     SAMPLE_TIME,
     SOURCE,
+    STIFFNESS,
     STORM,
     STORM_EVENTS,
     STORM_TIME,
@@ -82,6 +84,8 @@ __all__ = ["can_run", "run"]
 
 RESOLVED = 2.0
 """dt * slope / J up to which the trapezoid runs; omega dt = 2 after `contact_slope` of a spring."""
+RINGING = 0.25
+"""omega dt of the steps that resolve a motion near rest which a longer, damped one would lose."""
 NOW, CAP = range(2)  # of the clock
 
 
@@ -138,6 +142,10 @@ def loop_of(case: Case, dt: float) -> Loop:
     n = case.numbers
     measured = n[SOURCE] == FROM_MEASUREMENT and n[SAMPLE_TIME] == 0.0
     help_slope = n[GAIN] * contact_slope(case.compensator, dt) if measured else 0.0
+    steep = bool(dt * help_slope > RESOLVED * n[INERTIA])
+    jumps = measured and case.compensator.pointers.holding != 0
+    # A feedback that jumps with the velocity chatters at rest: that would be resolved without end.
+    travel = math.inf if steep or jumps else travel_of(case)
     return Loop(
         n,
         case.plant.addresses,
@@ -150,7 +158,9 @@ def loop_of(case: Case, dt: float) -> Loop:
         np.array(settings(case.controller)),
         case.plant.state.size,
         bool(dt * contact_slope(case.plant, dt) > RESOLVED * n[INERTIA]),
-        bool(dt * help_slope > RESOLVED * n[INERTIA]),
+        steep,
+        RINGING * math.sqrt(n[INERTIA] / n[STIFFNESS]) if travel < math.inf else 0.0,
+        travel,
         velocity_scale(case),
         np.array(Surroundings()),
         np.zeros(3),
@@ -172,6 +182,14 @@ def contact_slope(side: Side, dt: float) -> float:
     tiny = 1e-12
     z = model.law.state(model.parameters)
     return abs(model.law.step(0.0, tiny, dt, z, model.parameters, Surroundings())) / tiny
+
+
+def travel_of(case: Case) -> float:
+    """Displacement of the plant's contact up to break-away, rad; infinite where it has no spring."""
+    model = case.plant.model
+    if model is None or model.law.steady is None or not model.law.state_fields:
+        return math.inf
+    return abs(model.law.steady(1e-9, model.parameters)) / case.numbers[STIFFNESS] or math.inf
 
 
 def velocity_scale(case: Case) -> float:
