@@ -48,6 +48,7 @@ __all__ = [
     "Elements",
     "Field",
     "Law",
+    "Memory",
     "Mode",
     "Option",
     "Par",
@@ -99,6 +100,10 @@ class Par:
 
 class Mode(Par):
     """A state that only switches: 0 sticks, +1 or -1 slips in that direction."""
+
+
+class Memory(Mode):
+    """A record of the past that only steps write: it has no rate, and no integrator corrects it."""
 
 
 class Surroundings(NamedTuple):

@@ -81,7 +81,9 @@ def test_description_is_complete(law):
         assert f.par.meaning, f.name
     assert law.step.__doc__
     assert (law.guards is None) == (law.switch is None)
-    assert any(isinstance(f.par, Mode) for f in law.state_fields) == (law.guards is not None)
+    assert (law.rate is not None and any(isinstance(f.par, Mode) for f in law.state_fields)) == (
+        law.guards is not None
+    )
 
 
 @every_law
@@ -134,6 +136,7 @@ def test_step_is_bounded_for_any_time_step(law, motion):
     torques, z = drive(law, p, motion)
     # A contact never gives more than its largest level, besides what is proportional to the velocity.
     level = max(getattr(p, name) for name in ("fs", "fc") if hasattr(p, name)) if hasattr(p, "fc") else 1.0
+    level += getattr(p, "fs_inf", 0.0)
     slope = sum(getattr(p, name, 0.0) for name in ("sigma1", "sigma2"))
     for torque, (v, _) in zip(torques, motion):
         assert math.isfinite(torque)
@@ -174,6 +177,8 @@ def test_odd(law, motion):
 @given(v=speeds)
 @settings(max_examples=60, deadline=None)
 def test_steady_value_is_reached(law, v):
+    if law.steady is None:
+        pytest.skip("the torque at constant velocity depends on the past")
     assume(abs(v) > 1e-5)
     p, z = example(law), None
     _, z = drive(law, p, [(v, 1e-9)])
@@ -195,7 +200,8 @@ def test_exact_at_constant_velocity(law, v, dt):
     one = law.step(v, v, dt, whole, p, U)
     law.step(v, v, 0.5 * dt, halves, p, U)
     two = law.step(v, v, 0.5 * dt, halves, p, U)
-    assert one == pytest.approx(two, rel=1e-9, abs=1e-12)
+    # Leuven's steps have no closed form: there they only agree as far as the steady value is reached.
+    assert one == pytest.approx(two, rel=1e-6 if law.name == "leuven" else 1e-9, abs=1e-12)
 
 
 @every_law

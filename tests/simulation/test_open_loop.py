@@ -28,9 +28,17 @@ MODELS = {
     "lugre": LUGRE,
     "coulomb": COULOMB,
     "stribeck": Model("stribeck", k=3.5e4, **CURVE),
+    "leuven_1.0": Model("leuven", k=[1e4, 7e3, 5e3, 3e3], w=[0.08375] * 4, sigma1=0.1, **CURVE),
+    "leuven_2.0": Model("leuven", k=[1e4, 7e3, 5e3, 3e3], w=[0.08375] * 4, sigma1=0.1, delta_i=2.0, **CURVE),
+    "armstrong": Model(
+        "armstrong", kt=2.5e4, fc=0.285, fs_inf=0.05, vs=0.01, tau=1e-3, gamma=0.1, sigma2=0.018
+    ),
     "dahl_1.0": Model("dahl", sigma0=3.5e4, fc=0.285),
     "dahl_1.5": Model("dahl", sigma0=3.5e4, fc=0.285, delta_d=1.5),
 }
+
+BY_STEPS = ("leuven_1.0", "leuven_2.0", "armstrong")
+"""Laws whose steps have no closed form: 1e-8 N·m, the table's own bound; all else 1e-9."""
 
 
 def swing(peak, frequency, **more):
@@ -50,8 +58,11 @@ MOTIONS = {
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_agrees_with_the_independent_table(motion, name, method):
+    if method == "rate" and MODELS[name].law.rate is None:
+        pytest.skip("a delay has no rate")
     record = respond(MODELS[name], MOTIONS[motion], TABLE[motion]["t"], method=method)
-    assert np.abs(record["friction_torque"] - TABLE[motion][name]).max() < 1e-9
+    room = 1e-8 if method == "step" and name in BY_STEPS else 1e-9
+    assert np.abs(record["friction_torque"] - TABLE[motion][name]).max() < room
 
 
 @pytest.mark.parametrize("method", ["rate", "step"])

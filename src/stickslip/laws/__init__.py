@@ -6,4 +6,4 @@ To add a law, write its file and add its name to this tuple.
 COMMON_CHOICES = ("_symmetry.SYMMETRY",)
 """Choices of every law, whether its file names them or not."""
 
-LAWS = ("coulomb", "stribeck", "dahl", "lugre", "maxwell_slip", "gms")
+LAWS = ("coulomb", "stribeck", "armstrong", "dahl", "lugre", "leuven", "maxwell_slip", "gms")
