@@ -190,8 +190,17 @@ def rows(delimiter: str, comma: bool = False) -> str:
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
 @pytest.mark.parametrize(
     ("delimiter", "comma"),
-    [(",", False), (";", False), (";", True), ("\t", False), ("\t", True), ("  ", False), ("  ", True), ("|", False)],
-)  # fmt: skip
+    [
+        (",", False),
+        (";", False),
+        (";", True),
+        ("\t", False),
+        ("\t", True),
+        ("  ", False),
+        ("  ", True),
+        ("|", False),
+    ],
+)
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 def test_dialects(tmp_path, delimiter, comma, encoding, newline):
     head = delimiter.join(("Zeit_s", "Winkel_°", "Drehmoment_Nm"))

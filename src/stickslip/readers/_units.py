@@ -112,11 +112,14 @@ NUMBER = re.compile(r"([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*\*?\s*(.+)")
 def parse_unit(text: str) -> Unit | None:
     """What a unit as written is in SI, or None where it is none.
 
-    A number may stand before it: "0.25 um" is a count of a quarter of a micrometre.
+    A number may stand before it, and a minus that turns the sign: "0.25 um" is a count of a quarter of a
+    micrometre, "-Nm" a torque that is positive the other way.
     """
     written = text.strip()
     if not written or len(written) > 40:
         return None
+    if written.startswith("-") and (turned := parse_unit(written[1:])) is not None:
+        return replace(turned, factor=-turned.factor)
     found = _plain(_normal(written))
     if found is None and (match := NUMBER.fullmatch(written)):
         inner = _plain(_normal(match[2]))

@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from stickslip.readers._choose import parse_mapping
 from stickslip.readers._convert import Drive
 from stickslip.readers._table import Table
 
-__all__ = ["Profile", "fingerprint", "folder", "load", "remembered", "save"]
+__all__ = ["Profile", "fingerprint", "folder", "load", "merged", "remembered", "save"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +84,16 @@ def load(path: Path) -> Profile:
                 values = {name: table.positive(name, "") for name in numbers}
                 values["side"] = table.choice("side", ("motor", "load"), "motor")
         return Profile(mapping, Drive(**values), sample_time)
+
+
+def merged(mapping: Sequence[str], drive: Drive, sample_time: float | None, kept: Profile | None) -> Profile:
+    """What is said now over what a profile says."""
+    before = kept or Profile({}, Drive())
+    numbers = {**before.drive.known(), **drive.known()}
+    if drive.side == "motor" and before.drive.side == "load":
+        numbers["side"] = "load"
+    period = sample_time if sample_time is not None else before.sample_time
+    return Profile({**before.mapping, **parse_mapping(mapping)}, Drive(**numbers), period)
 
 
 def save(profile: Profile, table: Table, path: Path | None = None) -> Path:

@@ -128,7 +128,7 @@ def record_of(
     kept = {k: v for k, v in profile.mapping.items() if k not in said} if profile else {}
     choices, findings = choose(table, {**kept, **said})
     choices = [_from_profile(c) if c.role in kept and c.source == "map" else c for c in choices]
-    settings = _merged(drive, profile.drive if profile else None)
+    settings = profiles.merged([], drive or Drive(), sample_time, profile).drive
     period = sample_time if sample_time is not None or profile is None else profile.sample_time
     return convert(table, choices, settings, period, [*table.findings, *findings])
 
@@ -143,10 +143,3 @@ def with_source(record: Record, path: Path) -> Record:
 
 def _from_profile(choice: Choice) -> Choice:
     return Choice(choice.role, choice.column, choice.unit, "profile", choice.side)
-
-
-def _merged(given: Drive | None, kept: Drive | None) -> Drive:
-    """What is given, else what the profile says."""
-    if given is None or kept is None:
-        return given or kept or Drive()
-    return Drive(**{**kept.known(), **given.known()})

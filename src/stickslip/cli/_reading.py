@@ -1,0 +1,128 @@
+"""What the verbs that read records share: the options that say how, and the profile that is kept."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from stickslip.readers import Drive
+    from stickslip.record import Record
+
+__all__ = ["Opened", "add_arguments", "open_record", "print_columns"]
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A record, the profile that was used, and the one that was written."""
+
+    record: Record
+    used: Path | None
+    written: Path | None
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """--map, --profile and the numbers that units need."""
+    group = parser.add_argument_group("reading")
+    group.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        metavar="CHANNEL=COLUMN[:UNIT]",
+        help=(
+            "which column is a channel, and its unit, such as position=q_deg:deg; @load behind it: on the "
+            "load's side of the gear; CHANNEL=none leaves it out; a unit may have a factor or a minus"
+        ),
+    )
+    group.add_argument(
+        "--profile",
+        type=Path,
+        metavar="FILE.toml",
+        help="where the mapping is kept (default: by the file's columns, in your configuration folder)",
+    )
+    group.add_argument(
+        "--sample-time", type=float, metavar="S", help="distance of the samples, for files without times"
+    )
+    for option, unit, what in (
+        ("--counts-per-rev", "N", "encoder counts a revolution"),
+        ("--rated-torque", "NM", "for torques in percent or per mille"),
+        ("--rated-current", "A", "for currents in percent or per mille"),
+        ("--torque-constant", "NM_PER_A", "torque = current x this"),
+        ("--gear-ratio", "N", "revolutions of the motor for one of the load"),
+    ):
+        group.add_argument(option, type=float, metavar=unit, help=what)
+    group.add_argument(
+        "--side", choices=("motor", "load"), help="side of the gear that the record is about (default motor)"
+    )
+
+
+def open_record(path: Path, args: argparse.Namespace) -> Opened:
+    """Read a file as the options say, with the profile of its layout; keep what `--map` and the others say.
+
+    Raises
+    ------
+    InputError
+        As `stickslip.readers.read`, but that ambiguous columns are left among the record's findings.
+    """
+    from stickslip.readers import profiles
+    from stickslip.readers.reading import open_table, record_of, with_source
+
+    table = open_table(path)
+    used = args.profile if args.profile and args.profile.exists() else profiles.remembered(table)
+    used = used if args.profile is None or used == args.profile else None
+    kept = profiles.load(used) if used else None
+    drive = _drive(args)
+    record = record_of(table, args.map, drive=drive, profile=kept, sample_time=args.sample_time)
+    written = None
+    if (
+        args.map
+        or drive.known() != {"side": "motor"}
+        or args.sample_time is not None
+        or (args.profile and not used)
+    ):
+        written = profiles.save(profiles.merged(args.map, drive, args.sample_time, kept), table, args.profile)
+    return Opened(with_source(record, path), used, written)
+
+
+def _drive(args: argparse.Namespace) -> Drive:
+    from stickslip.readers import Drive
+
+    names = ("counts_per_rev", "rated_torque", "rated_current", "torque_constant", "gear_ratio", "side")
+    return Drive(**{n: getattr(args, n) for n in names if getattr(args, n) is not None})
+
+
+def print_columns(opened: Opened) -> None:
+    """The table of channels, columns, units, and who says so."""
+    record = opened.record
+    reading: dict[str, Any] = record.meta["reading"]
+    sources = {
+        "map": "--map",
+        "profile": "profile",
+        "file": "unit in the file",
+        "name": "unit in the name",
+        "assumed": "unit assumed",
+    }
+    rows = [
+        (c["channel"], repr(c["column"]), c["unit"], sources[c["source"]], "; ".join(c.get("steps", [])))
+        for c in reading["columns"]
+    ]
+    rows += [
+        (channel, how, record.units[channel], "derived", "")
+        for channel, how in record.meta["derived"].items()
+    ]
+    head = ("channel", "column", "unit", "by", "")
+    widths = [max(len(r[i]) for r in [head, *rows]) for i in range(4)]
+    for line in (head, *rows):
+        print("  ".join(f"{cell:<{width}}" for cell, width in zip(line, [*widths, 0], strict=True)).rstrip())
+    rate = (
+        f", {len(record)} rows"
+        if len(record) < 2
+        else f", {len(record)} rows over {record.time[-1] - record.time[0]:.4g} s"
+    )
+    print(f"{reading['file']}: {reading['format']}{rate}")
+    if opened.used:
+        print(f"profile: {opened.used}")
+    if opened.written:
+        print(f"profile written: {opened.written} (the next file with these columns is read alike)")

@@ -1,0 +1,58 @@
+"""Check a record for everything that would spoil an identification, one line a finding.
+
+stickslip doctor log.csv
+stickslip doctor log.csv --map position=q_deg:deg --map torque=I_act:mA --torque-constant 0.05
+
+Errors make the record unusable (exit code 2), warnings make results doubtful, notes are good to know.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from stickslip.cli import _reading
+
+SUMMARY = "check a record before anything is identified from it"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """File, and how to read it."""
+    parser.add_argument("file", type=Path, metavar="LOG", help="CSV, MAT, HDF5, Parquet, NumPy, JSON, ...")
+    parser.add_argument(
+        "--stribeck-velocity", type=float, metavar="RAD_PER_S", help="whether the record has speeds near it"
+    )
+    parser.add_argument("--json", action="store_true", help="print columns and findings as JSON")
+    _reading.add_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the columns and the findings; 2 if there is an error."""
+    from stickslip.cli import _output
+    from stickslip.errors import InputError
+    from stickslip.identify.doctor import examine
+
+    if args.stribeck_velocity is not None and not 0.0 < args.stribeck_velocity < float("inf"):
+        raise InputError(f"--stribeck-velocity {args.stribeck_velocity:g} must be greater than 0")
+    opened = _reading.open_record(args.file, args)
+    diagnosis = examine(opened.record, stribeck_velocity=args.stribeck_velocity)
+    if args.json:
+        reading = {k: v for k, v in opened.record.meta["reading"].items() if k != "findings"}
+        _output.print_json(
+            {
+                **reading,
+                "derived": opened.record.meta["derived"],
+                "rows": len(opened.record),
+                "profile": str(opened.used) if opened.used else None,
+                "profile_written": str(opened.written) if opened.written else None,
+                "findings": [f.as_data() for f in diagnosis.findings],
+            }
+        )
+        return 2 if diagnosis.errors else 0
+    _reading.print_columns(opened)
+    print()
+    for finding in diagnosis.findings:
+        print(f"{finding.level:<8}{finding.code:<24}{finding.line()}")
+    counts = (len(diagnosis.errors), len(diagnosis.warnings))
+    print(f"{counts[0]} errors, {counts[1]} warnings")
+    return 2 if diagnosis.errors else 0

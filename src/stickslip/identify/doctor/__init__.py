@@ -1,0 +1,120 @@
+"""The doctor: what is wrong with a record, before anything is identified from it.
+
+`CHECKS` names every check; each yields findings and changes nothing. To add one, write a function of a `View` in the
+file of its family and add it to the tuple.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.finding import Finding, sorted_findings
+from stickslip.identify.doctor import excitation, physics, signals, timing, units
+from stickslip.identify.doctor._view import View
+from stickslip.record import Record
+
+__all__ = ["CHECKS", "Diagnosis", "examine"]
+
+CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
+    excitation.channels, signals.missing, timing.ascending, timing.sampling, timing.scale, units.assumed, units.counted,
+    units.degrees, units.velocity_scale, units.too_fast, units.torque_scale, signals.wrapped, signals.saturated,
+    signals.quantised, physics.sign, physics.skew, physics.gravity, excitation.moved,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What the doctor says of a record.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        Errors first; those of the reading included.
+    record : Record
+        The rows that can be used: times ascend, values are numbers. What was left out is among the findings.
+    """
+
+    findings: tuple[Finding, ...]
+    record: Record
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """What makes the record unusable."""
+        return tuple(f for f in self.findings if f.level == "error")
+
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """What makes a result doubtful."""
+        return tuple(f for f in self.findings if f.level == "warning")
+
+    def raise_for_errors(self, name: str = "the record") -> None:
+        """Refuse an unusable record.
+
+        Raises
+        ------
+        InputError
+            With the first error and the number of others.
+        """
+        if self.errors:
+            first, *others = self.errors
+            more = f" (and {len(others)} more errors: `stickslip doctor` lists them)" if others else ""
+            raise InputError(f"{name}: {first.line()}{more}")
+
+
+def examine(record: Record, *, stribeck_velocity: float | None = None) -> Diagnosis:
+    """Check a record for everything that would spoil an identification.
+
+    Parameters
+    ----------
+    record : Record
+        Measured or simulated; what was found while it was read (``meta["reading"]``) is taken over.
+    stribeck_velocity : float
+        rad/s (or m/s): whether the record has speeds near it. Without it, near a twentieth of the usual speed.
+    """
+    view = View(record)
+    reading = cast("Mapping[str, Any]", record.meta.get("reading", {}))
+    findings = [Finding.from_data(f) for f in reading.get("findings", [])]
+    for check in CHECKS:
+        findings += check(view)
+    if not any(f.code == "never-moved" for f in findings):
+        findings += excitation.reversed_and_slow(view, stribeck_velocity)
+    else:
+        # Noise has no sign, no delay and no speed.
+        vain = (
+            "torque-sign",
+            "time-skew",
+            "velocity-sign",
+            "velocity-mismatch",
+            "gravity",
+            "position-jump",
+            "offset",
+        )
+        findings = [f for f in findings if f.code not in vain]
+    kept, trimmed = _usable_rows(view)
+    return Diagnosis(tuple(sorted_findings([*findings, *trimmed])), kept)
+
+
+def _usable_rows(view: View) -> tuple[Record, list[Finding]]:
+    """The record without the rows that cannot be used, and the finding that lists them."""
+    record, keep = view.record, view.usable
+    if view.has("event"):
+        keep = keep | (record["event"] > 0.5)
+    out = np.flatnonzero(~keep)
+    if not out.size:
+        return record, []
+    listed = _ranges(out)
+    finding = Finding("warning", "trimmed", f"{out.size} of {len(record)} rows are left out: rows {listed}")
+    channels = {name: values[keep] for name, values in record.channels.items()}
+    return Record(record.time[keep], channels, record.units, {**record.meta, "trimmed": listed}), [finding]
+
+
+def _ranges(rows: Any) -> str:
+    """Row numbers from 1, runs as a-b."""
+    pieces = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    shown = [f"{p[0] + 1}" if p.size == 1 else f"{p[0] + 1}-{p[-1] + 1}" for p in pieces[:20]]
+    return ", ".join(shown) + (f" and {len(pieces) - 20} more runs" if len(pieces) > 20 else "")

@@ -1,0 +1,184 @@
+"""What the checks look at: the usable rows of a record, on an even grid, filtered without phase."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import shlex
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from stickslip.record import Record
+
+__all__ = ["Array", "Column", "Smooth", "View", "row", "step_of"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Mask = np.ndarray[Any, np.dtype[np.bool_]]
+
+MAIN = ("position", "velocity", "motor_torque", "friction_torque", "current")
+MAX_ROWS = 200_000
+"""Rows of the even grid: longer records are looked at more coarsely."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """How a channel was read: the column in the file, and whether anybody states its unit."""
+
+    name: str
+    unit: str
+    stated: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """Filtered signals on an even grid.
+
+    Attributes
+    ----------
+    period : float
+        s
+    position, velocity, acceleration, torque : array, shape (n,)
+        Zero-phase filtered alike; torque is empty where the record has none.
+    """
+
+    period: float
+    position: Array
+    velocity: Array
+    acceleration: Array
+    torque: Array
+
+    @cached_property
+    def fast(self) -> float:
+        """The speed that is exceeded 5 % of the time."""
+        return float(np.percentile(np.abs(self.velocity), 95)) if self.velocity.size else 0.0
+
+    @cached_property
+    def moving(self) -> Mask:
+        """Where the axis moves, mask: faster than a twentieth of `fast`."""
+        return np.asarray(np.abs(self.velocity) > 0.05 * self.fast)
+
+
+class View:
+    """A record as the checks see it."""
+
+    def __init__(self, record: Record) -> None:
+        self.record = record
+
+    @cached_property
+    def columns(self) -> dict[str, Column]:
+        """How every channel was read; a record that was not read from a file states its units."""
+        listed: list[dict[str, Any]] = self.record.meta.get("reading", {}).get("columns", [])
+        return {c["channel"]: Column(c["column"], c["unit"], c["source"] != "assumed") for c in listed}
+
+    def stated(self, channel: str) -> bool:
+        """Whether anybody states the channel's unit."""
+        return self.columns[channel].stated if channel in self.columns else True
+
+    def name(self, channel: str) -> str:
+        """The channel's column in the file, for a remedy."""
+        return self.columns[channel].name if channel in self.columns else channel
+
+    def mapped(self, channel: str, unit: str) -> str:
+        """The option that reads the channel in another unit; "-" turns the sign of the present one."""
+        if unit == "-":
+            unit = "-" + (
+                self.columns[channel].unit if channel in self.columns else self.record.units[channel]
+            )
+        return "--map " + shlex.quote(f"{channel}={self.name(channel)}:{unit}")
+
+    def has(self, channel: str) -> bool:
+        """Whether the record has the channel."""
+        return channel in self.record.channels
+
+    @cached_property
+    def torque_channel(self) -> str:
+        """What drives the axis: the motor's torque, a measured friction, or nothing."""
+        return next((c for c in ("motor_torque", "friction_torque") if self.has(c)), "")
+
+    @cached_property
+    def usable(self) -> Any:
+        """Rows whose time ascends and whose main channels are numbers, mask."""
+        time = self.record.time
+        good = np.isfinite(time)
+        for channel in MAIN:
+            if self.has(channel):
+                good &= np.isfinite(self.record[channel])
+        if self.has("event"):
+            good &= ~(self.record["event"] > 0.5)
+        safe = np.where(good, time, -math.inf)
+        before = np.maximum.accumulate(np.concatenate(([-math.inf], safe[:-1])))
+        return good & (time > before)
+
+    @cached_property
+    def time(self) -> Array:
+        """Usable times, s."""
+        return self.record.time[self.usable]
+
+    def values(self, channel: str) -> Array:
+        """Usable values of a channel."""
+        return self.record[channel][self.usable]
+
+    @cached_property
+    def period(self) -> float:
+        """The usual distance of two samples, s."""
+        return float(np.median(np.diff(self.time))) if self.time.size > 1 else math.nan
+
+    @cached_property
+    def smooth(self) -> Smooth | None:
+        """Filtered signals; None where there is too little to filter."""
+        if self.time.size < 30 or not (self.has("position") or self.has("velocity")):
+            return None
+        span = float(self.time[-1] - self.time[0])
+        count = min(round(span / self.period) + 1, MAX_ROWS)
+        if count < 30:
+            return None
+        grid = np.linspace(float(self.time[0]), float(self.time[-1]), count)
+        period = span / (count - 1)
+        signal: Any = importlib.import_module("scipy.signal")
+        sections = signal.butter(2, 0.08, output="sos")
+
+        def filtered(values: Array) -> Array:
+            return np.asarray(
+                signal.sosfiltfilt(sections, values, padlen=min(30, values.size - 1)), dtype=np.float64
+            )
+
+        def at_grid(channel: str) -> Array:
+            return np.interp(grid, self.time, self.values(channel))
+
+        with np.errstate(all="ignore"):
+            if self.has("position"):
+                raw = at_grid("position")
+                position = filtered(raw - raw[0]) + raw[0]
+                velocity = np.gradient(position, period)
+            else:
+                velocity = filtered(at_grid("velocity"))
+                position = np.cumsum(velocity) * period
+            torque = filtered(at_grid(self.torque_channel)) if self.torque_channel else np.empty(0)
+            out = Smooth(period, position, velocity, np.gradient(velocity, period), torque)
+        every = (out.position, out.velocity, out.acceleration, out.torque)
+        return out if all(np.isfinite(values).all() for values in every) else None
+
+
+def step_of(values: Array) -> float:
+    """The quantum of a signal: the step of which its changes are multiples; 0 where there is none."""
+    steps = np.abs(np.diff(values))
+    size = float(np.max(np.abs(values), initial=0.0))
+    real = steps[steps > 1e-9 * size]
+    if real.size < 10:
+        return 0.0
+    smallest = float(np.min(real))
+    # The mean over the steps of one quantum is sharper than the smallest step.
+    quantum = float(np.mean(real[real < 1.5 * smallest]))
+    off = np.abs(real / quantum - np.round(real / quantum))
+    few = float(np.median(real)) < 200.0 * quantum
+    return quantum if few and float(np.mean(off < 0.05)) > 0.98 else 0.0
+
+
+def row(index: int, view: View | None = None) -> str:
+    """Where a row is, counted from 1, with its time if that is known."""
+    if view is not None and math.isfinite(view.record.time[index]):
+        return f"row {index + 1}, t = {view.record.time[index]:.6g} s"
+    return f"row {index + 1}"

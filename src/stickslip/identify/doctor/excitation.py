@@ -1,0 +1,116 @@
+"""Whether the axis was moved enough for friction to show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from stickslip.finding import Finding
+from stickslip.identify.doctor._view import View, step_of
+
+__all__ = ["channels", "moved", "reversed_and_slow"]
+
+
+def channels(view: View) -> Iterator[Finding]:
+    """What no identification can do without."""
+    if not (view.has("position") or view.has("velocity")):
+        yield Finding(
+            "error",
+            "missing-column",
+            "there is neither position nor velocity",
+            remedy="say which column it is, such as --map position=COLUMN:deg",
+        )
+    if not view.torque_channel:
+        if view.has("current"):
+            yield Finding(
+                "error",
+                "missing-column",
+                "there is current but no torque",
+                remedy="give --torque-constant NM_PER_AMPERE",
+            )
+        else:
+            yield Finding(
+                "warning",
+                "missing-column",
+                "there is no torque, force or current: only a machine model can replace it",
+                remedy="if a column holds it, say --map torque=COLUMN:Nm",
+            )
+
+
+def moved(view: View) -> Iterator[Finding]:
+    """A motor that never moved; a torque that never changed."""
+    for channel in ("position", "velocity"):
+        if view.has(channel) and view.time.size >= 20:
+            if (still := _standing(view, channel)) is not None:
+                yield still
+            break
+    if view.torque_channel and view.time.size >= 20:
+        torque = view.values(view.torque_channel)
+        if np.ptp(torque) == 0.0:
+            yield Finding(
+                "error",
+                "no-torque",
+                f"{view.torque_channel} is {torque[0]:g} throughout",
+                remedy=f"check that {view.name(view.torque_channel)!r} was logged",
+            )
+
+
+def _standing(view: View, channel: str) -> Finding | None:
+    """The finding, if a position or velocity shows nothing but a flickering count or noise."""
+    values = view.values(channel)
+    span, unit = float(np.ptp(values)), view.record.units[channel]
+    remedy = "check the enable signal, the brake and the torque limit; break-away needs a larger torque"
+    steps = np.unique(np.abs(np.diff(values)))
+    smallest = float(steps[steps > 1e-12 * max(span, 1e-300)][0]) if np.any(steps > 0.0) else 0.0
+    if span == 0.0 or (span <= 2.01 * smallest and np.unique(values).size <= 3):
+        return Finding(
+            "error",
+            "never-moved",
+            f"{channel} stays within {span:.3g} {unit}: the axis never moved",
+            remedy=remedy,
+        )
+    if float(np.var(np.diff(values))) > 1.2 * float(np.var(values)) and step_of(values) < 0.1 * span:
+        message = (
+            f"{channel} is noise of {float(np.std(values)):.3g} {unit} about a fixed value: the axis never"
+            " moved"
+        )
+        return Finding("error", "never-moved", message, remedy=remedy)
+    return None
+
+
+def reversed_and_slow(view: View, stribeck_velocity: float | None = None) -> Iterator[Finding]:
+    """Reversals, a whole revolution, slow speeds."""
+    smooth = view.smooth
+    if smooth is None or smooth.fast <= 0.0:
+        return
+    unit = "rad" if view.record.units.get("position") == "rad" else "m"
+    direction = np.sign(smooth.velocity[smooth.moving])
+    if direction.size and np.all(direction == direction[0]):
+        yield Finding(
+            "warning",
+            "no-reversal",
+            "the axis never reverses: friction of one direction and hysteresis stay unknown",
+            remedy="add motion in the other direction",
+        )
+    travel = float(np.ptp(smooth.position))
+    if view.has("position") and view.record.units["position"] == "rad" and travel < 2.0 * math.pi:
+        message = (
+            f"the axis turns by {travel:.3g} rad, less than a revolution: what depends on the angle does not"
+            " average out"
+        )
+        yield Finding(
+            "warning", "less-than-a-revolution", message, remedy="turn at least once where the machine can"
+        )
+    speed = np.abs(smooth.velocity)
+    low, high = (0.005 * smooth.fast, 0.1 * smooth.fast)
+    if stribeck_velocity is not None:
+        low, high = stribeck_velocity / 3.0, 3.0 * stribeck_velocity
+    slow = float(np.mean((speed > low) & (speed < high)))
+    if slow < 0.01:
+        message = (
+            f"{100 * slow:.2g} % of the record lies between {low:.3g} and {high:.3g} {unit}/s: the Stribeck"
+            " velocity stays unknown"
+        )
+        yield Finding("warning", "no-slow-motion", message, remedy="add slow motion in both directions")

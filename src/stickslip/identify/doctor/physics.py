@@ -1,0 +1,153 @@
+"""Torque and motion together: J dv/dt = T - T_f must be able to hold, and friction must brake.
+
+A straight line in acceleration, direction and velocity, T = J a + T_c sign(v) + b v + T_0 (+ gravity), is fitted to
+the filtered record (inverse dynamics; Gautier and Khalil's regression for one axis): enough to see a sign, a delay
+and a load that depends on the position, whatever the law of friction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from stickslip.finding import Finding
+from stickslip.identify.doctor._view import Array, Smooth, View
+
+__all__ = ["gravity", "sign", "skew"]
+
+ROWS = 20_000
+"""Rows of a regression: more tell no more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A fitted line: inertia, Coulomb, viscous, constant, and what follows; the share of the variance explained."""
+
+    values: Array
+    explained: float
+    rest: float
+
+
+def sign(view: View) -> Iterator[Finding]:
+    """The work of friction over the record: it cannot be negative."""
+    smooth = _usable(view)
+    if smooth is None:
+        return
+    measured = view.torque_channel == "friction_torque"
+    fit = _fit(smooth, 0, measured=measured)
+    inertia, coulomb, viscous = (float(value) for value in fit.values[:3])
+    moving: Array = np.abs(smooth.velocity[smooth.moving])
+    braked = float(np.mean(coulomb * moving + viscous * moving**2))
+    exchanged = float(np.mean(np.abs(smooth.torque * smooth.velocity)))
+    if exchanged <= 0.0 or fit.explained < 0.2:
+        return
+    if braked < -0.1 * exchanged:
+        also = " and the inertia would be negative" if inertia < 0.0 and not measured else ""
+        message = f"friction would drive the axis: its work over the record is negative{also}"
+        channel = view.torque_channel
+        turned = view.mapped(channel, "-")
+        if measured:
+            message = (
+                "friction is negative where the velocity is positive: it is the force on the moving body"
+            )
+            yield Finding(
+                "warning",
+                "torque-sign",
+                message,
+                remedy=f"say {turned}: here friction opposes positive velocity",
+            )
+        else:
+            yield Finding(
+                "error", "torque-sign", message, remedy=f"say {turned}, if positive torque drives backwards"
+            )
+
+
+def skew(view: View) -> Iterator[Finding]:
+    """The delay between torque and motion at which they fit best."""
+    smooth = _usable(view)
+    if smooth is None or view.torque_channel != "motor_torque":
+        return
+    reach = int(min(max(0.03 / smooth.period, 10), 60, smooth.velocity.size // 8))
+    shifts = range(-reach, reach + 1)
+    rests = np.array([_fit(smooth, k).rest for k in shifts])
+    best = int(np.argmin(rests))
+    shift = best - reach
+    fit = _fit(smooth, shift)
+    if abs(shift) < 2 or best in (0, 2 * reach) or fit.explained < 0.8 or rests[reach] < 1.25 * rests[best]:
+        return
+    late = (
+        "torque comes after the motion it causes"
+        if shift > 0
+        else "motion comes later than the torque that causes it"
+    )
+    message = f"torque and motion fit best when shifted by {abs(shift) * smooth.period * 1e3:.3g} ms: {late}"
+    yield Finding("warning", "time-skew", message, remedy="shift the torque, or log both from one clock")
+
+
+def gravity(view: View) -> Iterator[Finding]:
+    """A mean torque that comes back with every turn: gravity; or a constant one."""
+    smooth = _usable(view)
+    if smooth is None or view.torque_channel != "motor_torque":
+        return
+    plain = _fit(smooth, 0)
+    size = float(np.std(smooth.torque))
+    if view.record.units.get("position") == "rad" and np.ptp(smooth.position) > 0.5 and size > 0.0:
+        full = _fit(smooth, 0, periodic=True)
+        amplitude = math.hypot(full.values[4], full.values[5])
+        if full.rest < 0.7 * plain.rest and 0.1 * size < amplitude < 20.0 * size and full.explained > 0.5:
+            unit = view.record.units["motor_torque"]
+            message = (
+                f"the mean torque depends on the angle: {amplitude:.3g} {unit} once a turn, as gravity does"
+            )
+            yield Finding(
+                "warning", "gravity", message, remedy="identify with gravity, or turn the axis upright"
+            )
+            return
+    offset, coulomb = plain.values[3], abs(plain.values[1])
+    if coulomb > 0.0 and abs(offset) > 0.3 * coulomb and plain.explained > 0.5:
+        unit = view.record.units["motor_torque"]
+        message = (
+            f"the torque has a constant part of {offset:.3g} {unit}, {100 * abs(offset) / coulomb:.0f} % of"
+            " Coulomb friction"
+        )
+        yield Finding(
+            "note",
+            "offset",
+            message,
+            remedy="a weight, a spring or an offset of the sensor; identify it along",
+        )
+
+
+def _usable(view: View) -> Smooth | None:
+    """The filtered record, where it has torque and moves."""
+    smooth = view.smooth
+    if smooth is None or not smooth.torque.size or smooth.fast <= 0.0:
+        return None
+    enough = np.count_nonzero(smooth.moving) >= 50 and float(np.std(smooth.torque)) > 0.0
+    return smooth if enough else None
+
+
+def _fit(smooth: Smooth, shift: int, *, periodic: bool = False, measured: bool = False) -> Fit:
+    """Least squares over the rows that move, with the torque taken `shift` samples later."""
+    count = smooth.velocity.size
+    edge = min(60, count // 8)
+    rows = np.flatnonzero(smooth.moving[edge : count - edge]) + edge
+    rows = rows[:: max(1, rows.size // ROWS)]
+    v = smooth.velocity[rows]
+    inertia = np.zeros_like(v) if measured else smooth.acceleration[rows]
+    parts = [inertia, np.sign(v), v, np.ones_like(v)]
+    if periodic:
+        parts += [np.sin(smooth.position[rows]), np.cos(smooth.position[rows])]
+    matrix: Array = np.stack(parts, axis=1)
+    size: Array = np.sqrt(np.mean(matrix**2, axis=0))
+    size[size == 0.0] = 1.0
+    torque = smooth.torque[rows + shift]
+    solved = cast("tuple[Array, ...]", np.linalg.lstsq(matrix / size, torque, rcond=1e-10))
+    values = solved[0]
+    rest = float(np.mean((torque - matrix @ (values / size)) ** 2))
+    spread = float(np.var(torque))
+    return Fit(values / size, 1.0 - rest / spread if spread > 0.0 else 0.0, rest)

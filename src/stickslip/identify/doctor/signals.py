@@ -1,0 +1,143 @@
+"""Each signal by itself: missing values, flat tops, steps of the encoder, wrapped angles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from stickslip.finding import Finding
+from stickslip.identify.doctor._view import Array, View, row, step_of
+
+__all__ = ["missing", "quantised", "saturated", "wrapped"]
+
+WINDOW = 0.1
+"""s: the window over which a slow speed is told from the counts it gives."""
+SLOW_ERROR = 0.05
+
+
+def missing(view: View) -> Iterator[Finding]:
+    """Values that are no numbers."""
+    for channel in ("time", *view.record.channels):
+        values = view.record[channel]
+        bad = np.flatnonzero(~np.isfinite(values))
+        if not bad.size:
+            continue
+        share = bad.size / values.size
+        where = row(int(bad[0]), view)
+        message = f"{channel} has {bad.size} missing or infinite values ({100 * share:.2g} %)"
+        if share > 0.2:
+            yield Finding(
+                "error", "nan", message, where, f"log it again, or leave it out with --map {channel}=none"
+            )
+        else:
+            yield Finding("warning", "nan", message, where, "these rows are left out")
+
+
+def saturated(view: View) -> Iterator[Finding]:
+    """Flat tops: a limit of the drive or of the converter is reached."""
+    for channel in ("motor_torque", "current", "voltage", "velocity"):
+        if not view.has(channel):
+            continue
+        values = view.values(channel)
+        tops = _flat_tops(values)
+        if tops is None:
+            continue
+        share, first, limits = tops
+        index = int(np.flatnonzero(view.usable)[first])
+        unit = view.record.units[channel]
+        yield Finding(
+            "warning",
+            "saturation",
+            f"{channel} sits at its limit of {limits} {unit} in {100 * share:.2g} % of the rows",
+            row(index, view),
+            "reduce the demand, or leave these rows out: what was cut off is lost",
+        )
+
+
+def _flat_tops(values: Array) -> tuple[float, int, str] | None:
+    """Share of rows at an extreme, the first, and the extremes; None where they are no flat tops."""
+    size = float(np.max(np.abs(values), initial=0.0))
+    if values.size < 50 or size <= 0.0:
+        return None
+    still = np.abs(np.diff(values)) <= 1e-9 * size
+    at_any = np.zeros(values.size, dtype=bool)
+    limits: list[float] = []
+    for extreme in (float(np.max(values)), float(np.min(values))):
+        at = np.abs(values - extreme) <= 1e-9 * size
+        runs = at[1:] & still
+        if _longest(runs) >= 4 and abs(extreme) > 0.2 * size and np.count_nonzero(at) >= 8:
+            at_any |= at
+            limits.append(extreme)
+    if not limits:
+        return None
+    # A commanded staircase or a coarse encoder stands still elsewhere, too.
+    elsewhere = still & ~at_any[1:]
+    if np.count_nonzero(elsewhere) > 0.2 * max(1, np.count_nonzero(~at_any)):
+        return None
+    said = " and ".join(f"{limit:.4g}" for limit in sorted(limits))
+    return float(np.mean(at_any)), int(np.flatnonzero(at_any)[0]), said
+
+
+def _longest(mask: Any) -> int:
+    """Length of the longest run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    return int(np.max(edges[1::2] - edges[::2], initial=0))
+
+
+def quantised(view: View) -> Iterator[Finding]:
+    """The step of the position and the lowest speed it supports."""
+    if not view.has("position") or view.smooth is None:
+        return
+    step = step_of(view.values("position"))
+    if step <= 0.0:
+        return
+    lowest = step / (WINDOW * SLOW_ERROR)
+    fast = view.smooth.fast
+    unit = view.record.units["position"]
+    message = (
+        f"position moves in steps of {step:.4g} {unit}; below {lowest:.3g} {unit}/s a speed told from"
+        f" {WINDOW:g} s of it is more than {100 * SLOW_ERROR:g} % uncertain"
+    )
+    if lowest > 0.3 * fast and fast > 0.0:
+        yield Finding(
+            "warning",
+            "quantisation",
+            f"{message}; most of the record is slower than {max(fast, lowest):.3g} {unit}/s",
+            remedy="use a finer encoder, or leave the slow part of the curve to faster motion",
+        )
+    else:
+        yield Finding("note", "quantisation", message)
+
+
+def wrapped(view: View) -> Iterator[Finding]:
+    """Jumps by a whole turn."""
+    if not view.has("position") or view.time.size < 30:
+        return
+    steps = np.diff(view.values("position"))
+    usual = float(np.percentile(np.abs(steps), 95))
+    jumps = np.flatnonzero(np.abs(steps) > max(20.0 * usual, 1e-12))
+    if not jumps.size:
+        return
+    index = int(np.flatnonzero(view.usable)[jumps[0] + 1])
+    size = float(np.median(np.abs(steps[jumps])))
+    unit = view.record.units["position"]
+    turn = next((t for t in (2.0 * math.pi, 360.0, 1.0, math.pi) if abs(size / t - 1.0) < 0.05), None)
+    if turn is not None or size > 0.8 * float(np.ptp(view.values("position"))):
+        yield Finding(
+            "error",
+            "position-wrap",
+            f"position jumps {jumps.size} times by {size:.4g} {unit}: it is counted within one turn",
+            row(index, view),
+            "log the position without overflow, or unwrap it",
+        )
+    else:
+        yield Finding(
+            "warning",
+            "position-jump",
+            f"position jumps {jumps.size} times by about {size:.4g} {unit}",
+            row(index, view),
+            "leave these rows out, or check the encoder",
+        )

@@ -1,0 +1,139 @@
+"""Time: backward, duplicate, with gaps, uneven, in another unit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from stickslip.finding import Finding
+from stickslip.identify.doctor._view import View, row
+
+__all__ = ["ascending", "sampling", "scale"]
+
+GAP = 5.0
+"""A gap is this many times the usual distance of samples."""
+UNEVEN = 0.2
+"""A distance is uneven when it differs from the usual one by this share."""
+JITTER = 0.02
+"""Width of the middle 90 % of the distances, over their median."""
+
+
+def ascending(view: View) -> Iterator[Finding]:
+    """Times that go back or stand still."""
+    time = view.record.time
+    if view.has("event"):
+        return  # a simulation writes an event before and after its jump
+    known = np.flatnonzero(np.isfinite(time))
+    steps = np.diff(time[known])
+    back = known[1:][steps < 0.0]
+    if back.size:
+        piece = (
+            "the file may hold several records one after another"
+            if back.size < 10
+            else "rows are out of order"
+        )
+        yield Finding(
+            "error",
+            "backward-time",
+            f"time goes back {back.size} times; {piece}",
+            row(int(back[0]), view),
+            "cut the file there, or sort it by time",
+        )
+    same = known[1:][steps == 0.0]
+    if same.size:
+        share = same.size / max(steps.size, 1)
+        message = f"{same.size} rows ({100 * share:.2g} %) have the time of the row before"
+        if share > 0.2:
+            remedy = "write the time with more digits, or give --sample-time SECONDS"
+            yield Finding(
+                "error",
+                "duplicate-time",
+                f"{message}: the clock is too coarse",
+                row(int(same[0]), view),
+                remedy,
+            )
+        else:
+            yield Finding(
+                "warning", "duplicate-time", message, row(int(same[0]), view), "the first of each is used"
+            )
+
+
+def sampling(view: View) -> Iterator[Finding]:
+    """Gaps, and uneven distances."""
+    time = view.time
+    if time.size < 20:
+        yield Finding(
+            "error", "too-short", f"the record has {time.size} usable rows", remedy="give at least 20"
+        )
+        return
+    steps = np.diff(time)
+    usual = view.period
+    gaps = np.flatnonzero(steps > GAP * usual)
+    rows = np.flatnonzero(view.usable)
+    if gaps.size and gaps.size < 0.05 * steps.size:
+        longest = int(gaps[np.argmax(steps[gaps])])
+        lost = float(np.sum(steps[gaps] - usual))
+        message = (
+            f"{gaps.size} gaps of more than {GAP:g} samples, {lost:.3g} s in all, "
+            f"the longest {steps[longest]:.3g} s"
+        )
+        yield Finding(
+            "warning",
+            "gap",
+            message,
+            row(int(rows[longest]), view),
+            "filters run across gaps: cut the record there",
+        )
+    # A run may end between two samples.
+    whole = steps[:-1] if steps[-1] < usual else steps
+    off = np.flatnonzero((np.abs(whole / usual - 1.0) > UNEVEN) & (whole <= GAP * usual))
+    low, high = np.percentile(whole[whole <= GAP * usual], [5, 95])
+    width = float(high - low) / usual
+    if off.size:
+        message = (
+            f"irregular sampling: {off.size} of {whole.size} distances differ from the usual"
+            f" {usual * 1e3:.4g} ms by more than {100 * UNEVEN:g} %; they lie between"
+            f" {np.min(whole) * 1e3:.3g} and {np.max(whole[whole <= GAP * usual]) * 1e3:.3g} ms"
+        )
+        yield Finding(
+            "warning",
+            "irregular-sampling",
+            message,
+            row(int(rows[off[0] + 1]), view),
+            "it is resampled evenly where a method filters; log with a fixed cycle if you can",
+        )
+    elif width > JITTER:
+        yield Finding(
+            "note",
+            "jitter",
+            f"jitter: samples are {low * 1e3:.4g} to {high * 1e3:.4g} ms apart (middle 90 %)",
+        )
+
+
+def scale(view: View) -> Iterator[Finding]:
+    """Milliseconds for seconds, and the reverse, by the distance of the samples."""
+    if view.time.size < 2:
+        return
+    period = view.period
+    if period >= 0.1 and not view.stated("time"):
+        yield Finding(
+            "error",
+            "time-unit",
+            f"samples are {period:g} apart and nobody states the unit: that is ms rather than s",
+            remedy=f"say {view.mapped('time', 'ms')}, or {view.mapped('time', 's')} if it is right",
+        )
+    elif period >= 0.1:
+        yield Finding(
+            "warning",
+            "slow-sampling",
+            f"samples are {period:g} s apart; friction changes faster",
+            remedy=f"log faster, or say {view.mapped('time', 'ms')} if the unit is wrong",
+        )
+    elif period < 5e-6:
+        yield Finding(
+            "warning",
+            "time-unit",
+            f"samples are {period:.3g} s apart, {1e-6 / period:.3g} MHz: the unit may be wrong",
+            remedy=f"say {view.mapped('time', 's')} if times are in seconds",
+        )

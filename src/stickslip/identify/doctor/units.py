@@ -1,0 +1,211 @@
+"""Units: what the numbers themselves say against the units they are taken to have."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from stickslip.finding import Finding
+from stickslip.identify.doctor._view import Array, View, step_of
+
+__all__ = ["assumed", "counted", "degrees", "too_fast", "torque_scale", "velocity_scale"]
+
+DEG, REV, RPM = math.pi / 180.0, 2.0 * math.pi, 2.0 * math.pi / 60.0
+POSITION = {"deg": DEG, "rev": REV, "mm": 1e-3, "um": 1e-6}
+VELOCITY = {"deg/s": DEG, "rpm": RPM, "rev/s": REV, "mm/s": 1e-3, "mm/min": 1e-3 / 60}
+TIME = {"ms": 1e-3, "us": 1e-6}
+LINEAR_ONLY = ("mm", "um", "mm/s", "mm/min")
+
+
+def assumed(view: View) -> Iterator[Finding]:
+    """Units that nobody states."""
+    main = ("time", "position", "velocity", "motor_torque", "friction_torque", "current")
+    quiet = [c for c in main if not view.stated(c)]
+    if quiet:
+        listed = ", ".join(f"{c} as {'s' if c == 'time' else view.record.units[c]}" for c in quiet)
+        channel = quiet[-1]
+        yield Finding(
+            "warning",
+            "assumed-unit",
+            f"the file states no units; taken were {listed}",
+            remedy=f"say them, such as {view.mapped(channel, 'UNIT')}",
+        )
+
+
+def counted(view: View) -> Iterator[Finding]:
+    """Whole numbers where an angle or a length is expected: counts."""
+    if not view.has("position"):
+        return
+    values = view.values("position")
+    if _whole(values) and np.ptp(values) >= 10.0:
+        level = "warning" if view.stated("position") else "error"
+        unit = view.record.units["position"]
+        message = (
+            f"every position is a whole number, from {np.min(values):.0f} to {np.max(values):.0f}: counts"
+            f" rather than {unit}"
+        )
+        yield Finding(
+            level,
+            "position-unit",
+            message,
+            remedy=f"say {view.mapped('position', 'counts')} --counts-per-rev N",
+        )
+
+
+def degrees(view: View) -> Iterator[Finding]:
+    """A resolution that divides 360 as an encoder does, and not a whole turn of 2 pi."""
+    if not view.has("position") or view.stated("position") or view.record.units["position"] != "rad":
+        return
+    step = step_of(view.values("position"))
+    if step > 0.0 and _counts_of_encoder(360.0 / step) and not _counts_of_encoder(2.0 * math.pi / step):
+        message = (
+            f"the position's step of {step:.6g} is a turn of 360 over {360.0 / step:.0f} counts: degrees"
+            " rather than rad"
+        )
+        yield Finding("error", "position-unit", message, remedy=f"say {view.mapped('position', 'deg')}")
+
+
+def velocity_scale(view: View) -> Iterator[Finding]:
+    """The velocity against the derivative of the position: another unit, another sign."""
+    smooth = view.smooth
+    if smooth is None or not (view.has("position") and view.has("velocity")) or smooth.fast <= 0.0:
+        return
+    grid = np.linspace(float(view.time[0]), float(view.time[-1]), smooth.velocity.size)
+    given: Array = np.interp(grid, view.time, view.values("velocity"))
+    size = float(np.sqrt(np.mean(given**2) * np.mean(smooth.velocity**2)))
+    if size <= 0.0:
+        return
+    alike = float(np.mean(given * smooth.velocity)) / size
+    ratio = math.copysign(math.sqrt(float(np.mean(given**2) / np.mean(smooth.velocity**2))), alike)
+    unit = view.record.units["velocity"]
+    if alike < -0.6:
+        yield Finding(
+            "error",
+            "velocity-sign",
+            "velocity is positive where the position falls",
+            remedy=(
+                f"say {view.mapped('velocity', '-')}, or say --map velocity=none to derive it from the"
+                " position"
+            ),
+        )
+    if abs(alike) < 0.6:
+        yield Finding(
+            "warning",
+            "velocity-mismatch",
+            f"velocity does not follow the position (correlation {alike:.2f})",
+            remedy="check that both belong to one axis; --map velocity=none derives it from the position",
+        )
+        return
+    if 0.8 < abs(ratio) < 1.25:
+        return
+    guesses = _explained(abs(ratio), view)
+    message = (
+        f"velocity is {abs(ratio):.4g} times the change of position per second, where both are taken in SI"
+        f" ({unit})"
+    )
+    if guesses:
+        yield Finding(
+            "error",
+            guesses[0][0],
+            f"{message}: {' or '.join(g[1] for g in guesses[:2])}",
+            remedy=f"say {guesses[0][2]}",
+        )
+    else:
+        yield Finding(
+            "error",
+            "velocity-mismatch",
+            message,
+            remedy="check both units and whether one is on the other side of a gear",
+        )
+
+
+def _explained(ratio: float, view: View) -> list[tuple[str, str, str]]:
+    """Units that explain a ratio, fewest first: code, in words, remedy."""
+    linear = view.record.units["position"] == "m"
+    found: list[tuple[float, str, str, str]] = []
+    options = itertools.product(
+        [("", 1.0), *POSITION.items()], [("", 1.0), *VELOCITY.items()], [("", 1.0), *TIME.items()]
+    )
+    for (q, by_q), (v, by_v), (t, by_t) in options:
+        changed = [(c, u) for c, u in (("position", q), ("velocity", v), ("time", t)) if u]
+        off = math.log(ratio / (by_q / (by_v * by_t)))
+        if (
+            not changed
+            or abs(off) > 0.03
+            or any((u in LINEAR_ONLY) != linear for _, u in changed if u not in TIME)
+        ):
+            continue
+        # A unit that somebody states is wrong less often.
+        cost = len(changed) + 0.5 * sum(view.stated(c) for c, _ in changed)
+        says = " and ".join(f"{c} in {u}" for c, u in changed)
+        remedy = " ".join(view.mapped(c, u) for c, u in changed)
+        found.append((cost, f"{changed[0][0]}-unit", says, remedy))
+    return [(code, says, remedy) for _, code, says, remedy in sorted(found, key=lambda f: f[0])]
+
+
+def too_fast(view: View) -> Iterator[Finding]:
+    """Speeds and torques that no axis has."""
+    smooth = view.smooth
+    if smooth is None or not view.has("position"):
+        return
+    angle = view.record.units["position"] == "rad"
+    doubtful, absurd = (1000.0, 10000.0) if angle else (20.0, 1000.0)
+    if smooth.fast > doubtful:
+        said = f"{smooth.fast / RPM:.3g} rpm" if angle else f"{smooth.fast:.3g} m/s"
+        level = "error" if smooth.fast > absurd and not view.stated("position") else "warning"
+        example = "deg" if angle else "mm"
+        yield Finding(
+            level,
+            "position-unit",
+            f"the axis would move at {said}; the unit of position or time may be wrong",
+            remedy=f"say {view.mapped('position', example)}, or the unit of time",
+        )
+
+
+def torque_scale(view: View) -> Iterator[Finding]:
+    """Whole numbers or tenths of percent where a torque is expected."""
+    if not view.has("motor_torque") or view.stated("motor_torque") or "motor_torque" not in view.columns:
+        return
+    values = view.values("motor_torque")
+    peak = float(np.max(np.abs(values), initial=0.0))
+    tenths = peak <= 500.0 and _whole(10.0 * values)
+    if peak > 20.0 and (_whole(values) or tenths):
+        kind = "whole numbers" if _whole(values) else "multiples of 0.1"
+        unit = "permille" if _whole(values) and peak > 100.0 else "percent"
+        message = (
+            f"torques are {kind} up to {peak:.6g}: a share of the rated torque (per mille, percent) or counts"
+            " rather than N·m"
+        )
+        yield Finding(
+            "error",
+            "torque-unit",
+            message,
+            remedy=(
+                f"say {view.mapped('motor_torque', unit)} --rated-torque TORQUE, or"
+                f" {view.mapped('motor_torque', 'Nm')} if it is right"
+            ),
+        )
+
+
+def _whole(values: Array) -> bool:
+    """Whether all of many different values are whole numbers."""
+    return bool(
+        values.size and np.unique(values[:5000]).size > 5 and np.all(np.abs(values - np.round(values)) < 1e-6)
+    )
+
+
+def _counts_of_encoder(count: float) -> bool:
+    """Whether a turn of so many steps is an encoder's: a power of two, or four times hundreds of lines."""
+    near = round(count)
+    if near < 100 or abs(count - near) > 2e-4 * near:
+        return False
+    return near & (near - 1) == 0 or (near % 400 == 0 and near <= 40000 and not _decimal(360.0 / near))
+
+
+def _decimal(step: float) -> bool:
+    """Whether a step is that of a number printed with few digits."""
+    exponent = math.floor(math.log10(step) + 1e-9)
+    return abs(step / 10.0**exponent - 1.0) < 1e-6
