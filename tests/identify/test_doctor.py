@@ -645,8 +645,8 @@ def test_the_tribometers_labels_are_right():
 
 def test_trimming_is_listed():
     table = made("turned")
-    record = Record(table["time"], {"position": put(table["position"], [4, 5, 6, 99], np.nan), "motor_torque": table["torque"]},
-                    {"position": "rad", "motor_torque": "N·m"})  # fmt: skip
+    spoiled = put(table["position"], [4, 5, 6, 99], np.nan)
+    record = Record(table["time"], {"position": spoiled, "motor_torque": table["torque"]}, UNITS)
     diagnosis = examine(record)
     assert len(diagnosis.record) == len(record) - 4
     assert np.isfinite(diagnosis.record["position"]).all()
