@@ -166,6 +166,7 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(5)
 
 
+UNITS = {"position": "rad", "motor_torque": "N·m"}
 DEG = 180.0 / np.pi
 HELD = dict[str, np.ndarray]
 # (what is wrong, how a good table is spoiled, names of the columns, the code that must be found, its level)
