@@ -12,7 +12,7 @@ from pages import GENERATED, ROOT, latex, number, table, write
 from stickslip import plugins
 from stickslip.model import Model
 from stickslip.report.law_pictures import draw_law
-from stickslip.spec import Field, Law
+from stickslip.spec import Field, Law, fields_of
 
 FOLDER = GENERATED / "laws"
 KNOWN = {"name", "title", "equation", "passive", "odd", "rate_independent"}
@@ -83,7 +83,7 @@ def parameters(fields: tuple[Field, ...]) -> str:
     rows = [
         (
             f"${latex(f.par.symbol)}$",
-            f"`{f.name}`" + (", one per element" if f.per_element else ""),
+            f"`{f.name}`" + (", a list" if f.per_element else ""),
             f.par.unit,
             f.par.bounds.replace("inf", "∞"),
             "" if f.par.default is None else number(f.par.default),
@@ -99,7 +99,7 @@ def states(fields: tuple[Field, ...]) -> str:
     rows = [
         (
             f"${latex(f.par.symbol)}$",
-            f"`{f.name}`" + (", one per element" if f.per_element else ""),
+            f"`{f.name}`" + (", a list" if f.per_element else ""),
             f.par.unit,
             f.par.meaning,
         )
@@ -109,17 +109,25 @@ def states(fields: tuple[Field, ...]) -> str:
 
 
 def choices(law: Law) -> str:
-    """What can be exchanged, and by what."""
-    rows = []
+    """What can be exchanged, by what, and the parameters that this brings along."""
+    rows, brought = [], []
     for choice in law.choices:
         for name, option in choice.options.items():
-            said = (option.function.__doc__ or "").strip().splitlines()[0].rstrip(".")
-            brings = ", ".join(f"`{n}`" for n in getattr(option.params, "_fields", ()))
+            said = (getattr(option.function, "__doc__", "") or choice.meaning).strip().splitlines()
             default = " (default)" if name == choice.default else ""
-            rows.append(
-                (f"`{choice.name}`", f"`{name}`{default}", f"`{said}`" if "=" in said else said, brings)
-            )
-    return table(["choice", "option", "what it is", "parameters it brings"], rows)
+            words = said[0].rstrip(".") if said else ""
+            rows.append((f"`{choice.name}`", f"`{name}`{default}", f"`{words}`" if "=" in words else words))
+            own = fields_of(option.params)
+            if own and name != choice.default:
+                brought.append(f'With `{choice.name} = "{name}"`:\n\n{parameters(own)}')
+            if option.doubles:
+                doubled = ", ".join(
+                    f"`{f.name}{option.doubles}`" for f in law.having(**{choice.name: name}).fields
+                    if not f.name.endswith(option.doubles) and f"{f.name}{option.doubles}" in
+                    {g.name for g in law.having(**{choice.name: name}).fields}
+                )  # fmt: skip
+                brought.append(f'With `{choice.name} = "{name}"`, for v < 0: {doubled}.')
+    return "\n\n".join([table(["choice", "option", "what it is"], rows), *brought])
 
 
 def passivity(law: Law) -> str:

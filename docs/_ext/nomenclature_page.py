@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pages import GENERATED, latex, table, write
 
 from stickslip import plugins
+from stickslip.spec import fields_of
 
 LOOP = (
     ("theta", "position of the axis", "rad", "position"),
@@ -62,7 +63,10 @@ def gathered(which: str) -> Iterator[tuple[str, str, str, str, str]]:
     rows: dict[tuple[str, str, str, str], list[str]] = {}
     for name in plugins.law_names():
         law = plugins.law(name)
-        for f in getattr(law, which):
+        optional = [f for c in law.choices for o in c.options.values() for f in fields_of(o.params)]
+        for f in (
+            {f.name: f for f in (*optional, *law.fields)}.values() if which == "fields" else law.state_fields
+        ):
             rows.setdefault((f.par.symbol, f.par.meaning, f.par.unit, f.name), []).append(name)
     for (symbol, meaning, unit, code), laws in sorted(rows.items(), key=lambda r: r[0][3]):
         links = ", ".join(f"[{name}](laws/{name}.md)" for name in laws)

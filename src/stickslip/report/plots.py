@@ -205,7 +205,8 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
     heading = textwrap.wrap(title, 64)
     lines = textwrap.wrap(message, 74, break_on_hyphens=False)
     head = 0.24 + 0.13 * (len(heading) + max(1, len(lines)))
-    total = head + height * len(panels) + (0.26 if common else 0.0) + 0.17 * rows
+    shared = len({p.x_label for p in panels if p.x_label}) == 1
+    total = head + height * len(panels) + (0.26 if common or shared else 0.0) + 0.17 * rows
     figure: Any = Figure(figsize=(WIDTH, total))
     FigureCanvasAgg(figure)
     figure.text(0.02, 1.0 - 0.07 / total, "\n".join(heading), va="top", fontsize=8.0, fontweight="bold")
@@ -213,7 +214,6 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
         0.02, 1.0 - (0.12 + 0.13 * len(heading)) / total, "\n".join(lines), va="top", fontsize=7.5, color="#444444"
     )  # fmt: skip
     axes: list[Any] = []
-    shared = len({p.x_label for p in panels if p.x_label}) == 1
     for i, panel in enumerate(panels):
         top = head + height * i
         # Fixed margins: matplotlib's layout engines take longer than the drawing.

@@ -1,0 +1,142 @@
+"""The phenomena of thesis 2.1 as properties, and the scripts that draw them."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from stickslip import Model, law, law_names
+
+FOLDER = Path(__file__).parents[2] / "examples" / "phenomena"
+SCRIPTS = sorted(p.stem for p in FOLDER.glob("[a-z]*.py"))
+
+
+def script(name: str) -> ModuleType:
+    """A script as a module."""
+    spec = importlib.util.spec_from_file_location(f"phenomenon_{name}", FOLDER / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_every_script_draws(name: str, tmp_path: Path) -> None:
+    script(name).main(tmp_path / name)
+    assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+    assert (tmp_path / f"{name}.svg").exists()
+
+
+# ---- break-away (2.1.1) ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["LUGRE", "GMS"])
+def test_breakaway_force_falls_with_the_rate_between_its_two_levels(name: str) -> None:
+    """Canudas de Wit et al. 1995: from near Fs at slow rates to near Fc at fast ones."""
+    example = script("breakaway")
+    found = [example.breakaway(example.pulled(getattr(example, name), rate)) for rate in (1.0, 5.0, 50.0)]
+    assert found == sorted(found, reverse=True)
+    assert 0.95 * 1.5 < found[0] <= 1.5 * 1.002
+    assert 1.0 <= found[-1] < 1.2
+
+
+# ---- pre-sliding (2.1.2) --------------------------------------------------------------------------------------
+
+
+def remembering() -> list[str]:
+    """Laws that declare non-local memory."""
+    return [name for name in law_names() if law(name).non_local_memory]
+
+
+@pytest.mark.parametrize("name", remembering())
+def test_inner_loops_close_where_a_law_declares_it(name: str) -> None:
+    example = script("presliding")
+    record = example.loop(Model(name, **law(name).example))
+    assert abs(example.gap(record)) < 5e-3 * np.ptp(record["friction_torque"])
+
+
+def test_lugre_does_not_close_its_inner_loop() -> None:
+    example = script("presliding")
+    record = example.loop(example.LUGRE)
+    assert abs(example.gap(record)) > 0.05 * np.ptp(record["friction_torque"])
+
+
+def test_the_outer_curve_is_resumed() -> None:
+    """After the interruption GMS goes on along the curve it would have followed without it."""
+    example = script("presliding")
+    interrupted = example.loop(example.GMS)
+    example.TURNS = [0.0, 25e-6, -25e-6, 25e-6]
+    plain = example.loop(example.GMS)
+    part = {}
+    for key, record in (("interrupted", interrupted), ("plain", plain)):
+        last = record.time > record.time[np.argmin(record["position"])]
+        part[key] = record["position"][last], record["friction_torque"][last]
+    grid = np.linspace(13e-6, 24e-6, 30)
+    x, torque = part["interrupted"]
+    back = x.size - 1 - int(np.argmax(x[::-1] < 12e-6))
+    gap = np.interp(grid, x[back:], torque[back:]) - np.interp(grid, *part["plain"])
+    assert np.max(np.abs(gap)) < 5e-3 * np.ptp(torque)
+
+
+def test_lugre_drifts_under_pulses_below_break_away_and_gms_does_not() -> None:
+    example = script("presliding")
+    lugre, gms = (example.drift(example.pulsed(model)) for model in (example.LUGRE, example.GMS))
+    assert lugre > 1e-6
+    assert abs(gms) < 1e-3 * lugre
+
+
+# ---- frictional lag (2.1.3) -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["LUGRE", "GMS"])
+def test_the_lag_widens_with_the_frequency(name: str) -> None:
+    example = script("frictional_lag")
+    widths = [example.width(example.swung(getattr(example, name), f)) for f in (0.2, 1.0, 5.0)]
+    assert widths == sorted(widths)
+    assert widths[0] > 0.0
+    assert widths[-1] > 5.0 * widths[0]
+
+
+def test_a_static_law_has_no_lag() -> None:
+    example = script("frictional_lag")
+    stribeck = Model("stribeck", **law("stribeck").example)
+    assert example.width(example.swung(stribeck, 5.0)) == pytest.approx(0.0, abs=1e-9)
+
+
+# ---- stick-slip (2.1.4) ---------------------------------------------------------------------------------------
+
+
+def test_the_dragged_mass_sticks_and_slips() -> None:
+    example = script("stick_slip")
+    record = example.dragged(40.0)
+    rests = example.rests(record)
+    assert len(rests) >= 5
+    # It lets go where the spring, slowly loaded, reaches the break-away force.
+    assert 0.97 * 1.5 < example.SPRING * example.SPEED * rests[0][1] <= 1.5 * 1.01
+    periods = np.diff([end for _, end in rests[:-1]])
+    assert np.ptp(periods) < 0.01 * periods.mean()
+
+
+def test_it_slides_steadily_where_friction_does_not_fall_with_speed() -> None:
+    example = script("stick_slip")
+    flat = Model("lugre", sigma0=1e5, sigma1=1e5**0.5, sigma2=0.4, fc=1.0, fs=1.0, vs=1e-3)
+    record = example.dragged(60.0, flat)
+    assert record["velocity"][record.time > 40.0] == pytest.approx(example.SPEED, rel=0.05)
+
+
+# ---- direction (2.1.7) ----------------------------------------------------------------------------------------
+
+
+def test_other_levels_for_the_other_direction_without_a_jump() -> None:
+    example = script("direction")
+    record = example.loop(example.OTHER)
+    torque = record["friction_torque"]
+    fastest = torque[[np.argmax(record["velocity"]), np.argmin(record["velocity"])]]
+    assert -fastest[1] / fastest[0] == pytest.approx(example.SHARE, rel=0.02)
+    assert np.max(np.abs(np.diff(torque))) < 0.05 * np.ptp(torque)
