@@ -15,6 +15,8 @@ Argument order, everywhere: velocity, time step, state ``z``, parameters ``p``, 
 ``steady(v, p)``                       torque at constant velocity; 0 at rest unless declared otherwise
 ``holding(direction, z, p, u)``        the largest torque a contact at rest withstands in that direction
                                        (laws whose torque jumps at zero velocity)
+``rest_band(p)``                       velocity below which a contact that withstands torque counts as at rest
+                                       (Karnopp)
 ``check(p)``                           a sentence that says what is wrong with the parameters, or ""
 ``modes(p)``                           the law as `Elements` that stick as springs and slip along one curve, or as
                                        a `Bristle` (what the exact integrator runs on), or None
@@ -115,6 +117,10 @@ class Surroundings(NamedTuple):
     """normal load over the load at which the parameters hold"""
     temperature: float = 20.0
     """degrees Celsius"""
+    time: float = 0.0
+    """s, since the start of the run"""
+    applied: float = 0.0
+    """torque applied to the contact from outside, N·m: what a contact at rest balances (thesis eq. 2.5)"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +229,8 @@ class Bristle:
 
 
 FUNCTIONS = (
-    "step", "rate", "guards", "switch", "steady", "holding", "check", "modes", "velocity_scale", "is_passive",
+    "step", "rate", "guards", "switch", "steady", "holding", "check", "modes", "velocity_scale", "rest_band",
+    "is_passive",
     "stored",
 )  # fmt: skip
 """A law's functions, all of which may call the chosen options."""
@@ -398,6 +405,7 @@ class Law(Described):
     modes: Callable[[Any], Elements | Bristle | None] | None = None
     stored: Callable[..., float] | None = None
     velocity_scale: Callable[[Any], float] | None = None
+    rest_band: Callable[[Any], float] | None = None
     choices: tuple[Choice, ...] = ()
     odd: bool = True
     passive: str = ""

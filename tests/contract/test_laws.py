@@ -252,10 +252,19 @@ def test_passive_from_rest(law, amplitude, frequency, drift):
         assert work >= -2e-3 * 0.335 * amplitude
 
 
+def remaining(law, reference):
+    """Share of LuGre's friction that a compensator with gain 0.8 leaves while the reference slides."""
+    lugre = plugins.law("lugre")
+    speeds = [float(v) for v in reference.sample(np.linspace(0.01, 3.99, 200))[:, 1]]
+    friction = np.array([lugre.steady(v, example(lugre)) for v in speeds])
+    helped = np.array([law.steady(v, example(law)) for v in speeds])
+    return float(np.sqrt(np.mean((friction - 0.8 * helped) ** 2) / np.mean(friction**2)))
+
+
 @every_law
 @pytest.mark.parametrize("helper", [Feedforward, Feedback])
 def test_compensates(law, helper):
-    """As a compensator it lowers the error of a plant with Coulomb friction and pre-sliding."""
+    """As a compensator it lowers the error of a plant with friction to what it leaves of the friction."""
     reference = Reference("sine", amplitude=0.5, frequency=0.25)
     axis = RigidAxis(3.8623e-4, Model("lugre", **plugins.law("lugre").example))
     gains = place("PD", 3.8623e-4, 10.0, 0.85)
@@ -263,7 +272,10 @@ def test_compensates(law, helper):
     helped = simulate(
         axis, Controller(gains, helper(Model(law, **law.example), gain=0.8)), reference, 4.0, tolerance=1e-7
     )
-    assert helped.meta["metrics"]["position_rms_rad"] < 0.5 * plain.meta["metrics"]["position_rms_rad"]
+    left = remaining(law, reference)
+    assert (
+        helped.meta["metrics"]["position_rms_rad"] < (left + 0.3) * plain.meta["metrics"]["position_rms_rad"]
+    )
 
 
 @every_law
@@ -278,5 +290,6 @@ def test_is_a_plant(law):
     )
     energy = record.meta["energy"]
     assert energy["friction_loss"] > 0.0
-    # Friction of about 0.3 N·m over 1 rad.
-    assert energy["friction_loss"] == pytest.approx(0.3, rel=0.3)
+    speeds = Reference("sine", amplitude=0.5, frequency=0.25).sample(np.linspace(0.0, 2.0, 2001))[:, 1]
+    powers = [float(v) * law.steady(float(v), example(law)) for v in speeds]
+    assert energy["friction_loss"] == pytest.approx(np.mean(powers) * 2.0, rel=0.3)

@@ -6,4 +6,17 @@ To add a law, write its file and add its name to this tuple.
 COMMON_CHOICES = ("_symmetry.SYMMETRY",)
 """Choices of every law, whether its file names them or not."""
 
-LAWS = ("coulomb", "stribeck", "armstrong", "dahl", "lugre", "leuven", "maxwell_slip", "gms")
+LAWS = (
+    "coulomb",
+    "viscous",
+    "static",
+    "stribeck_plain",
+    "stribeck",
+    "karnopp",
+    "armstrong",
+    "dahl",
+    "lugre",
+    "leuven",
+    "maxwell_slip",
+    "gms",
+)

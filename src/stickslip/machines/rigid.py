@@ -22,10 +22,16 @@ class RigidAxis:
         J, kg·m² (all that turns, seen at the motor).
     friction : Model
         The friction torque that opposes its motion.
+    load : float
+        Normal load on its contacts over the load at which the friction's parameters hold.
+    temperature : float
+        Of its contacts, °C. Both matter to friction with a dependence on them (`stickslip.laws.modulation`).
     """
 
     inertia: float
     friction: Model
+    load: float = 1.0
+    temperature: float = 20.0
 
     def __post_init__(self) -> None:
         value: Any = self.inertia
@@ -33,3 +39,7 @@ class RigidAxis:
             raise ParameterError(f"axis: inertia = {value!r} must be a number in kg·m²")
         if not math.isfinite(value) or value <= 0.0:
             raise ParameterError(f"axis: inertia = {value:g} kg·m² must be greater than 0")
+        if not (math.isfinite(self.load) and self.load >= 0.0):
+            raise ParameterError(f"axis: load = {self.load:g} must be a finite number of at least 0")
+        if not math.isfinite(self.temperature):
+            raise ParameterError(f"axis: temperature = {self.temperature:g} °C must be a finite number")

@@ -21,6 +21,7 @@ from stickslip.simulation._loop import (
     MOTOR_TORQUE,
     OMEGA_D,
     POSITION,
+    SEEN_VELOCITY,
     THETA_D,
     VELOCITY,
     calm_step,
@@ -142,9 +143,9 @@ def stiffness_limit(k: Any, end: Any, u: Any, tolerance: Any, fast: Any) -> tupl
 def note(w: Any, y: Any, nodes: Any, i: int) -> None:
     """Write the signals of the state whose rates were taken last into column i of the meter's nodes."""
     nodes[0, i] = w[THETA_D] - y[POSITION]
-    nodes[1, i] = w[OMEGA_D] - y[VELOCITY]
+    nodes[1, i] = w[OMEGA_D] - w[SEEN_VELOCITY]
     nodes[2, i] = y[POSITION]
-    nodes[3, i] = y[VELOCITY]
+    nodes[3, i] = w[SEEN_VELOCITY]
     nodes[4, i] = w[OMEGA_D]
     nodes[5, i] = w[MOTOR_TORQUE]
     nodes[6, i] = w[FRICTION_TORQUE]

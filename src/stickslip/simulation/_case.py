@@ -15,9 +15,10 @@ from stickslip.control.controller import Controller
 from stickslip.jit import LawPointers, compiled_law, compiled_profile, flat
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
+from stickslip.spec import Surroundings
 from stickslip.subset import Layout
 
-__all__ = ["COLUMNS", "UNITS", "Case", "Outcome", "Side", "lay_out"]
+__all__ = ["COLUMNS", "UNITS", "Case", "Outcome", "Side", "lay_out", "surroundings"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -38,8 +39,8 @@ DONE, DIVERGED, NOT_FINITE, STORM, NO_STEP, ROWS_FULL, TOO_STIFF = range(7)
 (
     INERTIA, KP, KI, KD, KR, TORQUE_LIMIT, DURATION, TOLERANCE, SOURCE, GAIN, FILTER, POSITION_0, VELOCITY_0,
     PLANT_SCALE, COMPENSATOR_SCALE, STIFFNESS, MAX_STEP, POSITION_LIMIT, VELOCITY_LIMIT, METERED, SAMPLE_TIME,
-    ENCODER, NUMBERS,
-) = range(23)  # fmt: skip
+    ENCODER, PLANT_BAND, LOAD, TEMPERATURE, NUMBERS,
+) = range(26)  # fmt: skip
 NO_COMPENSATOR, FROM_REFERENCE, FROM_MEASUREMENT = 0.0, 1.0, 2.0
 
 STORM_EVENTS, STORM_TIME = 4000, 5e-3
@@ -56,6 +57,12 @@ class Side:
     state: Array
     modes: np.ndarray[Any, np.dtype[np.bool_]]
     velocity_scale: float
+
+    @property
+    def rest_band(self) -> float:
+        """Velocity below which the law counts as at rest, rad/s."""
+        band = self.model.law.rest_band if self.model else None
+        return band(self.model.parameters) if self.model and band else 0.0
 
     @property
     def addresses(self) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -136,11 +143,14 @@ class Outcome:
     counts: dict[str, int]
 
 
+def surroundings(numbers: Array) -> Array:
+    """What the contacts of a case depend on, at the start of the run."""
+    return np.array(Surroundings(load=numbers[LOAD], temperature=numbers[TEMPERATURE]))
+
+
 def contact_stiffness(model: Model) -> float:
     """Slope of the torque over a displacement of 1e-9 rad from rest, N·m/rad; at least 1."""
     z = model.law.state(model.parameters)
-    from stickslip.spec import Surroundings
-
     torque = model.law.step(1e-9, 1e-9, 1.0, z, model.parameters, Surroundings())
     return max(1.0, abs(torque) / 1e-9) if model.law.state_fields else 1.0
 
@@ -175,6 +185,8 @@ def lay_out(
         numbers[FILTER] = 2.0 * math.pi * helper.filter_hz if helper.filter_hz else 0.0
     numbers[POSITION_0], numbers[VELOCITY_0] = initial
     numbers[PLANT_SCALE], numbers[COMPENSATOR_SCALE] = plant.velocity_scale, assist.velocity_scale
+    numbers[PLANT_BAND] = plant.rest_band
+    numbers[LOAD], numbers[TEMPERATURE] = axis.load, axis.temperature
     numbers[STIFFNESS] = contact_stiffness(axis.friction)
     numbers[POSITION_LIMIT], numbers[VELOCITY_LIMIT] = limits
     numbers[METERED] = 1.0 if metered else 0.0

@@ -19,6 +19,7 @@ from stickslip.simulation._case import (
     KI,
     KP,
     KR,
+    PLANT_BAND,
     SAMPLE_TIME,
     SOURCE,
     TORQUE_LIMIT,
@@ -27,12 +28,15 @@ from stickslip.simulation._case import (
 # ---- the state at one time: these entries, then the plant's state, then the compensator's -----------------
 (
     POSITION, VELOCITY, INTEGRAL, FILTERED, FILTER_RATE, POSITION_D, VELOCITY_D, LINEAR, HELP, MOTOR,
-    FRICTION, SIDE, LEAVING, HEAD,
-) = range(14)  # fmt: skip
+    FRICTION, SIDE, LEAVING, GATHERED, HEAD,
+) = range(15)  # fmt: skip
 # SIDE is the direction of motion, or at rest the one from which the axis came; LEAVING the one in which it is
-# about to go (0: none); HELP includes the gain.
+# about to go (0: none); HELP includes the gain. GATHERED is, at rest in a band of velocities (Karnopp), the momentum
+# gathered there over the inertia, rad/s.
 
 STEP, HOLDING = 0, 6  # places in `Side.addresses`
+TIME = 3  # place in the surroundings
+TINY = 1e-300
 NUDGE = 1e-11  # s, by which one-sided values of the reference lie inside the step
 
 
@@ -131,12 +135,16 @@ def plant_holds(loop: Loop, z: Any, side: float) -> float:
 
 
 @kernel()
-def helper_holds(loop: Loop, z: Any, side: float) -> float:
-    """Compensating torque of a law that jumps at zero, at rest on one side of it, N·m."""
-    return loop.numbers[GAIN] * side * call_holding(
-        loop.helper[HOLDING], side, pointer(z, HEAD + loop.plant_states), pointer(loop.helper_parameters, 0),
-        pointer(loop.surroundings, 0),
-    )  # fmt: skip
+def plant_slides(loop: Loop, z: Any, side: float) -> float:
+    """Friction torque of a law that jumps at zero as it sets off to one side, N·m."""
+    v = side * max(loop.numbers[PLANT_BAND], TINY)
+    return step_plant(loop, z, v, v, 0.0)
+
+
+@kernel()
+def helper_slides(loop: Loop, z: Any, side: float) -> float:
+    """Compensating torque of a law that jumps at zero, on one side of it, N·m."""
+    return step_helper(loop, z, side * TINY, side * TINY, 0.0)
 
 
 @kernel()
@@ -184,6 +192,7 @@ def look_ahead(loop: Loop, a: Any, t: float, h: float) -> None:
     call_profile(loop.profile, t + h - min(NUDGE, 0.5 * h), parameters, at)
     v1 = motion[1]
     call_profile(loop.profile, t + h, parameters, at)
+    loop.surroundings[TIME] = t + h
     ahead[POSITION_D] = motion[0]
     ahead[VELOCITY_D] = v1
     if n[SOURCE] == FROM_REFERENCE and n[SAMPLE_TIME] == 0.0:
@@ -197,6 +206,7 @@ def look_ahead(loop: Loop, a: Any, t: float, h: float) -> None:
 def restart(loop: Loop, z: Any, t: float) -> None:
     """Torques at t, seen from just after it: at the begin, and where the reference has a kink."""
     n, motion = loop.numbers, loop.motion
+    loop.surroundings[TIME] = t
     call_profile(loop.profile, t + NUDGE, pointer(loop.reference_parameters, 0), pointer(motion, 0))
     z[POSITION_D], z[VELOCITY_D] = motion[0] - NUDGE * motion[1], motion[1]
     if n[SAMPLE_TIME] == 0.0 and n[SOURCE] != 0.0:

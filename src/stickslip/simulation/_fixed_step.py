@@ -20,11 +20,20 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulation._case import FILTER, FROM_MEASUREMENT, FROM_REFERENCE, INERTIA, SAMPLE_TIME, SOURCE
+from stickslip.simulation._case import (
+    FILTER,
+    FROM_MEASUREMENT,
+    FROM_REFERENCE,
+    INERTIA,
+    PLANT_BAND,
+    SAMPLE_TIME,
+    SOURCE,
+)
 from stickslip.simulation._fixed_loop import (
     FILTER_RATE,
     FILTERED,
     FRICTION,
+    GATHERED,
     HEAD,
     HELP,
     HOLDING,
@@ -39,12 +48,13 @@ from stickslip.simulation._fixed_loop import (
     VELOCITY_D,
     Loop,
     copy,
-    helper_holds,
     helper_jumps,
+    helper_slides,
     limited,
     look_ahead,
     low_pass,
     plant_holds,
+    plant_slides,
     set_motor,
     sign,
     step_helper,
@@ -77,10 +87,10 @@ def close(loop: Loop, a: Any, b: Any, h: float, v1: float, side: float, w: float
     b[POSITION_D], b[VELOCITY_D] = ahead[POSITION_D], ahead[VELOCITY_D]
     error0, error1 = a[POSITION_D] - a[POSITION], b[POSITION_D] - b[POSITION]
     b[INTEGRAL] = a[INTEGRAL] + h * ((1.0 - w) * error0 + w * error1)
-    over = v1 * side <= 0.0 and side != 0.0
+    over = v1 * side <= n[PLANT_BAND] and side != 0.0
     b[FRICTION] = step_plant(loop, b, v0, v1, h)
     if over and loop.plant[HOLDING] != 0:
-        b[FRICTION] = plant_holds(loop, b, side)
+        b[FRICTION] = plant_slides(loop, b, side)
     if n[SAMPLE_TIME] == 0.0:
         if n[SOURCE] == FROM_REFERENCE:
             for i in range(HEAD + loop.plant_states, b.size):
@@ -94,7 +104,7 @@ def close(loop: Loop, a: Any, b: Any, h: float, v1: float, side: float, w: float
                 y0 = a[FILTERED] if w < 1.0 else y1
             b[HELP] = step_helper(loop, b, y0, y1, h)
             if over and helper_jumps(loop):
-                b[HELP] = helper_holds(loop, b, side)
+                b[HELP] = helper_slides(loop, b, side)
     set_motor(loop, b)
     return b[MOTOR] - b[FRICTION]
 
@@ -184,7 +194,7 @@ def drive(loop: Loop, z: Any, side: float) -> float:
     if loop.plant[HOLDING] != 0:
         friction = plant_holds(loop, z, side)
     if helper_jumps(loop):
-        motor = limited(loop.numbers, z[LINEAR] + helper_holds(loop, z, side))
+        motor = limited(loop.numbers, z[LINEAR] + helper_slides(loop, z, side))
     return motor - friction
 
 
@@ -208,9 +218,9 @@ def leave(loop: Loop, z: Any, side: float) -> None:
     """Let the axis leave rest towards `side`: the torques are those on that side of zero velocity."""
     z[LEAVING] = side
     if loop.plant[HOLDING] != 0:
-        z[FRICTION] = plant_holds(loop, z, side)
+        z[FRICTION] = plant_slides(loop, z, side)
     if helper_jumps(loop):
-        z[HELP] = helper_holds(loop, z, side)
+        z[HELP] = helper_slides(loop, z, side)
         set_motor(loop, z)
 
 
@@ -255,6 +265,57 @@ def rest_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> float:
 
 
 @kernel()
+def unbalanced(loop: Loop, z: Any) -> float:
+    """What the motor's torque exceeds the holding torque by, N·m; sets the friction torque of a contact at rest."""
+    direction = sign(z[MOTOR])
+    z[FRICTION] = direction * min(abs(z[MOTOR]), direction * plant_holds(loop, z, direction))
+    return z[MOTOR] - z[FRICTION]
+
+
+@kernel()
+def gather(loop: Loop, a: Any, b: Any, t: float, h: float, before: float) -> float:
+    """Rest in the band from a to b while the momentum gathers; how far its velocity lies above the band, rad/s."""
+    rest_for(loop, a, b, t, h)
+    push = 0.5 * h * (before + unbalanced(loop, b))
+    b[GATHERED] = a[GATHERED] + push / loop.numbers[INERTIA]
+    return abs(b[GATHERED]) - loop.numbers[PLANT_BAND]
+
+
+@kernel()
+def band_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, bool]:
+    """Rest in the band over h, or until the gathered momentum leaves it; the time taken, and whether it left."""
+    before = unbalanced(loop, a)
+    f_high = gather(loop, a, b, t, h, before)
+    if f_high <= 0.0:
+        return h, False
+    low, high = 0.0, h
+    f_low = min(abs(a[GATHERED]) - loop.numbers[PLANT_BAND], 0.0)
+    x = high
+    for i in range(60):
+        x = guess(low, f_low, high, f_high, i)
+        f = gather(loop, a, b, t, x, before)
+        if f < 0.0:
+            low, f_low, f_high = x, f, 0.5 * f_high
+        else:
+            high, f_high, f_low = x, f, 0.5 * f_low
+        if abs(f) <= VELOCITY_ROUNDING or high - low <= 1e-13 * h:
+            break
+    side = sign(b[GATHERED])
+    b[VELOCITY], b[GATHERED] = side * loop.numbers[PLANT_BAND], 0.0
+    set_motor(loop, b)
+    leave(loop, b, side)
+    return x, True
+
+
+@kernel()
+def enter_band(loop: Loop, b: Any, side: float) -> None:
+    """Come to rest in the band, at its edge; the velocity goes on as gathered momentum."""
+    b[VELOCITY], b[GATHERED], b[LEAVING] = 0.0, side * loop.numbers[PLANT_BAND], 0.0
+    set_motor(loop, b)
+    unbalanced(loop, b)
+
+
+@kernel()
 def near_rest(loop: Loop, v0: float, v1: float) -> float:
     """Factor by which a step shrinks so that the velocity near rest changes by little of the curve's scale.
 
@@ -282,20 +343,23 @@ def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, 
         look_ahead(loop, a, t, h)
         if not solve(loop, a, b, h, jumping, 0.5):
             return -1.0, False
-    if side == 0.0 or b[VELOCITY] * side > 0.0:
+    band = loop.numbers[PLANT_BAND]
+    if side == 0.0 or b[VELOCITY] * side > band:
         b[SIDE] = sign(b[VELOCITY])
         return h, False
-    if a[VELOCITY] == 0.0:  # it grazed: the drive to `side` fell again within the step
-        rest_for(loop, a, b, t, h)
-        return h, False
-    low, high, f_low, f_high = 0.0, h, side * a[VELOCITY], side * b[VELOCITY]
+    if a[VELOCITY] * side <= band:  # it grazed: the drive to `side` fell again within the step
+        rest_for(loop, a, b, t, h if band == 0.0 else 0.0)
+        if band > 0.0:
+            enter_band(loop, b, side)
+        return (h, False) if band == 0.0 else (0.0, True)
+    low, high, f_low, f_high = 0.0, h, side * a[VELOCITY] - band, side * b[VELOCITY] - band
     x = h
     for i in range(60):
         x = guess(low, f_low, high, f_high, i)
         look_ahead(loop, a, t, x)
         if not solve(loop, a, b, x, jumping, 0.5):
             return -1.0, False
-        f = side * b[VELOCITY]
+        f = side * b[VELOCITY] - band
         if f > 0.0:
             low, f_low, f_high = x, f, 0.5 * f_high
         else:
@@ -309,8 +373,10 @@ def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, 
         b[SIDE] = side
         return (x, False) if solved and side * b[VELOCITY] > 0.0 else (-1.0, False)
     look_ahead(loop, a, t, x)
-    close(loop, a, b, x, 0.0, jumping, 0.5)
+    close(loop, a, b, x, side * band, jumping, 0.5)
     b[SIDE] = side
+    if band > 0.0:
+        enter_band(loop, b, side)
     return x, True
 
 
@@ -338,6 +404,8 @@ def advance(loop: Loop, a: Any, b: Any, t: float, h: float, cap: float) -> tuple
             h = loop.resolved
             done = damped_step(loop, a, b, t, h)
         return (h, False) if done else (-1.0, False)
+    if loop.numbers[PLANT_BAND] > 0.0 and a[VELOCITY] == 0.0:
+        return band_step(loop, a, b, t, h)
     if a[VELOCITY] == 0.0 and a[LEAVING] == 0.0 and (loop.plant[HOLDING] != 0 or helper_jumps(loop)):
         side = departure(loop, a)
         if side == 0.0:

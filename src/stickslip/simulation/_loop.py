@@ -22,7 +22,16 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.jit import call_guards, call_holding, call_profile, call_rate, call_switch, kernel, pointer
+from stickslip.jit import (
+    call_guards,
+    call_holding,
+    call_profile,
+    call_rate,
+    call_step,
+    call_switch,
+    kernel,
+    pointer,
+)
 from stickslip.simulation._case import (
     COMPENSATOR_SCALE,
     FILTER,
@@ -36,28 +45,31 @@ from stickslip.simulation._case import (
     KR,
     NO_COMPENSATOR,
     NUMBERS,
+    PLANT_BAND,
     PLANT_SCALE,
     SOURCE,
     TORQUE_LIMIT,
     Case,
+    surroundings,
 )
-from stickslip.spec import Surroundings
 
 # ---- where things lie -------------------------------------------------------------------------------------------
 # The state vector; the laws' states follow.
 POSITION, VELOCITY, INTEGRAL, FILTER_1, FILTER_2, LAWS = range(6)
 # The workspace w: Case.numbers, then what is remembered, the reference, the torques (the demand is the motor
-# torque before its limit), the time for which the reference was taken, the surroundings,
+# torque before its limit), the time for which the reference was taken, the velocity that everyone sees (0 while the
+# axis is held), the surroundings,
 # and the parameters of plant, compensator and reference.
 (
     MOTION, SIGN, FILTERED_SIGN, REFERENCE_SIGN, SATURATED, THETA_D, OMEGA_D, ALPHA_D, MOTOR_TORQUE,
-    FRICTION_TORQUE, COMPENSATION_TORQUE, DEMAND, REFERENCE_TIME, SURROUNDINGS,
-) = range(NUMBERS, NUMBERS + 14)  # fmt: skip
-PLANT_PARAMETERS = SURROUNDINGS + 3
+    FRICTION_TORQUE, COMPENSATION_TORQUE, DEMAND, REFERENCE_TIME, SEEN_VELOCITY, SURROUNDINGS,
+) = range(NUMBERS, NUMBERS + 15)  # fmt: skip
+TIME = SURROUNDINGS + 3
+PLANT_PARAMETERS = SURROUNDINGS + 5
 # The integers a: addresses of the profile and of each law's functions, sizes and places, then which state
 # entries are modes.
 PROFILE, PLANT, COMPENSATOR = 0, 1, 8
-RATE, GUARDS, SWITCH, HOLDING = 1, 2, 3, 6
+STEP, RATE, GUARDS, SWITCH, HOLDING = 0, 1, 2, 3, 6
 PLANT_SIZE, LAWS_SIZE, COMPENSATOR_PARAMETERS, PROFILE_PARAMETERS, MODES = range(15, 20)
 # Events beside the laws' modes, after them in the array of event values.
 KINK, FILTER_KINK, RELEASE, LIMIT, EXTRA = range(5)
@@ -77,7 +89,7 @@ def arrays_of(case: Case) -> tuple[Any, Any]:
         [
             case.numbers,
             remembered,
-            np.array(Surroundings()),
+            surroundings(case.numbers),
             plant.parameters,
             helper.parameters,
             case.reference_parameters,
@@ -115,7 +127,8 @@ def compensator_velocity(a: Any, w: Any, y: Any) -> float:
         return one_sided(w[OMEGA_D], w[REFERENCE_SIGN])
     if filtered:
         return one_sided(y[FILTER_1], w[FILTERED_SIGN]) if jumps else y[FILTER_1]
-    return one_sided(y[VELOCITY], w[SIGN]) if jumps else y[VELOCITY]
+    v = 0.0 if is_held(a, w) else y[VELOCITY]
+    return one_sided(v, w[SIGN]) if jumps else v
 
 
 @kernel()
@@ -125,13 +138,26 @@ def is_held(a: Any, w: Any) -> bool:
 
 
 @kernel()
+def plant_holds(a: Any, w: Any, y: Any, direction: float) -> float:
+    """Largest torque that the plant's law withstands at rest, N·m."""
+    return call_holding(
+        a[PLANT + HOLDING],
+        direction,
+        pointer(y, LAWS),
+        pointer(w, PLANT_PARAMETERS),
+        pointer(w, SURROUNDINGS),
+    )
+
+
+@kernel()
 def rates(a: Any, w: Any, t: float, y: Any, k: Any, row: int) -> None:
     """Write the time derivative of y into row `row` of k, and the torques; thesis eqs. 3.1, 3.3, 3.11."""
     n = y.shape[0]
     compensator = LAWS + a[PLANT_SIZE]
     refer(a, w, t)
-    w[SURROUNDINGS] = y[POSITION]
-    v = y[VELOCITY]
+    w[SURROUNDINGS], w[TIME] = y[POSITION], t
+    v = 0.0 if is_held(a, w) else y[VELOCITY]
+    w[SEEN_VELOCITY] = v
     helped = 0.0
     if w[SOURCE] != NO_COMPENSATOR:
         seen = compensator_velocity(a, w, y)
@@ -153,10 +179,15 @@ def rates(a: Any, w: Any, t: float, y: Any, k: Any, row: int) -> None:
     motor = min(max(demand, -w[TORQUE_LIMIT]), w[TORQUE_LIMIT])
     if is_held(a, w):
         friction = motor
+        if w[PLANT_BAND] > 0.0:
+            friction = math.copysign(min(abs(motor), plant_holds(a, w, y, np.sign(motor))), motor)
         k[row, POSITION] = 0.0
-        k[row, VELOCITY] = 0.0
+        k[row, VELOCITY] = (motor - friction) / w[INERTIA]
     else:
-        seen = one_sided(v, w[MOTION]) if a[PLANT + HOLDING] != 0 else v
+        seen = v
+        if a[PLANT + HOLDING] != 0:
+            # A stage beyond the end of the motion sees the law as it is before.
+            seen = w[MOTION] * max(w[MOTION] * one_sided(v, w[MOTION]), w[PLANT_BAND])
         friction = call_rate(
             a[PLANT + RATE],
             seen,
@@ -177,21 +208,22 @@ def rates(a: Any, w: Any, t: float, y: Any, k: Any, row: int) -> None:
 @kernel()
 def held_limit(a: Any, w: Any, y: Any, direction: float) -> float:
     """Net torque that the axis at rest withstands, N·m: a feedback that jumps with the velocity reduces it."""
-    limit = call_holding(
-        a[PLANT + HOLDING],
-        direction,
-        pointer(y, LAWS),
-        pointer(w, PLANT_PARAMETERS),
-        pointer(w, SURROUNDINGS),
-    )
+    limit = plant_holds(a, w, y, direction)
     if w[SOURCE] == FROM_MEASUREMENT and w[FILTER] == 0.0 and a[COMPENSATOR + HOLDING] != 0:
         place = LAWS + a[PLANT_SIZE]
-        limit -= w[GAIN] * call_holding(
-            a[COMPENSATOR + HOLDING],
-            direction,
-            pointer(y, place),
-            pointer(w, a[COMPENSATOR_PARAMETERS]),
-            pointer(w, SURROUNDINGS),
+        # What it adds once the axis moves, which may be less than it would withstand at rest.
+        limit -= (
+            w[GAIN]
+            * direction
+            * call_step(
+                a[COMPENSATOR + STEP],
+                direction * TINY,
+                direction * TINY,
+                0.0,
+                pointer(y, place),
+                pointer(w, a[COMPENSATOR_PARAMETERS]),
+                pointer(w, SURROUNDINGS),
+            )
         )
     return limit
 
@@ -206,11 +238,15 @@ def events(a: Any, w: Any, t: float, y: Any, k: Any, row: int, g: Any) -> float:
     for i in range(laws + EXTRA):
         g[i] = -1.0
     v = y[VELOCITY]
-    w[SURROUNDINGS] = y[POSITION]
+    w[SURROUNDINGS], w[TIME] = y[POSITION], t
     if w[TORQUE_LIMIT] < np.inf or a[PLANT + HOLDING] != 0:
         rates(a, w, t, y, k, row)
         if is_held(a, w):
-            g[laws + RELEASE] = abs(w[MOTOR_TORQUE]) - held_limit(a, w, y, np.sign(w[MOTOR_TORQUE]))
+            if w[PLANT_BAND] > 0.0:
+                gathered = abs(v) - w[PLANT_BAND]
+                g[laws + RELEASE] = gathered if gathered != 0.0 else -TINY
+            else:
+                g[laws + RELEASE] = abs(w[MOTOR_TORQUE]) - held_limit(a, w, y, np.sign(w[MOTOR_TORQUE]))
         # At exactly the limit the mode is still the remembered one.
         beyond = (
             abs(w[DEMAND]) - w[TORQUE_LIMIT]
@@ -244,7 +280,8 @@ def events(a: Any, w: Any, t: float, y: Any, k: Any, row: int, g: Any) -> float:
     )
     if kinked and w[SIGN] != 0.0 and not is_held(a, w):
         # At exactly zero the side is still the remembered one.
-        g[laws + KINK] = -w[SIGN] * v if v != 0.0 else -TINY
+        below = w[PLANT_BAND] - w[SIGN] * v
+        g[laws + KINK] = below if below != 0.0 else -TINY
     if w[FILTERED_SIGN] != 0.0:
         g[laws + FILTER_KINK] = -w[FILTERED_SIGN] * y[FILTER_1] if y[FILTER_1] != 0.0 else -TINY
     largest = -1e9
@@ -289,7 +326,7 @@ def switch(a: Any, w: Any, t: float, y: Any, k: Any, row: int, g: Any) -> None:
         reverse(a, w, t, y, k, row)
     elif g[laws + RELEASE] >= 0.0:
         rates(a, w, t, y, k, row)
-        w[MOTION] = np.sign(w[MOTOR_TORQUE])
+        w[MOTION] = np.sign(w[MOTOR_TORQUE]) if w[PLANT_BAND] == 0.0 else np.sign(y[VELOCITY])
         w[SIGN] = w[MOTION]
 
 
@@ -299,9 +336,11 @@ def reverse(a: Any, w: Any, t: float, y: Any, k: Any, row: int) -> None:
     onward = -w[SIGN]
     if a[PLANT + HOLDING] != 0:
         # The applied torque is what is left without the jumps of plant and feedback at zero velocity.
-        y[VELOCITY] = 0.0
         w[MOTION] = 0.0
         w[SIGN] = 0.0
+        if w[PLANT_BAND] > 0.0:
+            return  # at rest to everyone; the velocity goes on as the momentum that is gathered
+        y[VELOCITY] = 0.0
         rates(a, w, t, y, k, row)
         applied = w[MOTOR_TORQUE]
         limit = held_limit(a, w, y, np.sign(applied))
@@ -325,7 +364,7 @@ def begin_side(a: Any, w: Any, t: float, soon: float, y: Any, k: Any, row: int) 
         ahead = w[OMEGA_D] if w[SOURCE] == FROM_REFERENCE else y[VELOCITY]
         w[FILTERED_SIGN] = np.sign(y[FILTER_1]) if y[FILTER_1] != 0.0 else np.sign(ahead)
     if w[SIGN] == 0.0:
-        if y[VELOCITY] != 0.0:
+        if abs(y[VELOCITY]) > w[PLANT_BAND]:
             w[SIGN] = np.sign(y[VELOCITY])
             w[MOTION] = w[SIGN]
         elif not is_held(a, w):

@@ -19,6 +19,7 @@ STEP, RATE, GUARDS, SWITCH = range(4)  # places in `Side.addresses`
 POSITION, VELOCITY, ACCELERATION = range(3)
 NUDGE = 1e-11  # s, by which one-sided values of the motion lie inside the stretch between two kinks
 FINE = 0.1  # of the law's velocity scale, by which the velocity near rest may change in a step
+POSITION_AT, TIME = 0, 3  # places in the surroundings
 SHORTEST = 1e-14  # s, relative above 1 s
 
 
@@ -46,7 +47,8 @@ def move(m: Motion, t: float) -> float:
     """Set the motion at t, seen from inside the stretch between two kinks; returns the velocity."""
     inside = min(max(t, m.between[0] + NUDGE), m.between[1] - NUDGE)
     call_profile(m.profile, inside, pointer(m.reference, 0), pointer(m.motion, 0))
-    m.surroundings[0] = m.motion[POSITION]
+    m.surroundings[POSITION_AT] = m.motion[POSITION]
+    m.surroundings[TIME] = t
     return m.motion[VELOCITY]
 
 

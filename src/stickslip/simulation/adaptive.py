@@ -63,6 +63,7 @@ from stickslip.simulation._loop import (
     MOTOR_TORQUE,
     OMEGA_D,
     POSITION,
+    SEEN_VELOCITY,
     THETA_D,
     VELOCITY,
     arrays_of,
@@ -165,7 +166,7 @@ def emit(a: Any, w: Any, t: float, y: Any, k: Any, rows: Any, n: int, event: flo
     rows[n, 1] = w[THETA_D]
     rows[n, 2] = w[OMEGA_D]
     rows[n, 3] = y[POSITION]
-    rows[n, 4] = y[VELOCITY]
+    rows[n, 4] = w[SEEN_VELOCITY]
     rows[n, 5] = w[MOTOR_TORQUE]
     rows[n, 6] = w[FRICTION_TORQUE]
     rows[n, 7] = w[COMPENSATION_TORQUE]

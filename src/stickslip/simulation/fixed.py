@@ -31,6 +31,7 @@ from stickslip.simulation._case import (
     METERED,
     NO_STEP,
     NOT_FINITE,
+    PLANT_BAND,
     PLANT_SCALE,
     POSITION_0,
     POSITION_LIMIT,
@@ -45,9 +46,11 @@ from stickslip.simulation._case import (
     Case,
     Outcome,
     Side,
+    surroundings,
 )
 from stickslip.simulation._fixed_loop import (
     FRICTION,
+    GATHERED,
     HEAD,
     HELP,
     MOTOR,
@@ -123,6 +126,8 @@ def run(case: Case, dt: float) -> Outcome:
     start[HEAD:] = np.concatenate([case.plant.state, case.compensator.state])
     start[POSITION], start[VELOCITY] = n[POSITION_0], n[VELOCITY_0]
     start[SIDE] = np.sign(start[VELOCITY])
+    if abs(start[VELOCITY]) < n[PLANT_BAND]:
+        start[VELOCITY], start[GATHERED] = 0.0, start[VELOCITY]
     memory = np.concatenate([np.zeros(MEMORY), case.compensator.state])
     accumulator = new_meter(float(n[DURATION]), settle_band_of(case.reference, float(n[DURATION])))
     turns = np.zeros((4096, 2))
@@ -162,7 +167,7 @@ def loop_of(case: Case, dt: float) -> Loop:
         RINGING * math.sqrt(n[INERTIA] / n[STIFFNESS]) if travel < math.inf else 0.0,
         travel,
         velocity_scale(case),
-        np.array(Surroundings()),
+        surroundings(case.numbers),
         np.zeros(3),
         np.zeros(size),
         np.zeros(size),

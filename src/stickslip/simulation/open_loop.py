@@ -31,6 +31,8 @@ def respond(
     slip_rule: str = "signed",
     method: str = "auto",
     tolerance: float = 1e-10,
+    surroundings: Surroundings | None = None,
+    applied: Sequence[float] | Array | None = None,
 ) -> Record:
     """Move a contact along a reference, from rest with all states zero at t = 0.
 
@@ -48,6 +50,10 @@ def respond(
         "auto" takes rates where the law gives them. A law without states is evaluated at the times.
     tolerance : float
         Error of a step relative to the largest value that each state has had.
+    surroundings : Surroundings, optional
+        Load and temperature; position and time are those of the motion.
+    applied : array, shape (n,), optional
+        Torque applied from outside at the times, N·m, which a contact at rest balances; for laws without states.
 
     Returns
     -------
@@ -57,7 +63,8 @@ def respond(
     Raises
     ------
     InputError
-        If the times do not ascend from 0 on, the tolerance is out of bounds, or the law gives no rates.
+        If the times do not ascend from 0 on, the tolerance is out of bounds, the law gives no rates, or a law with
+        states is given an applied torque.
     UnknownName
         If the method is unknown.
     StepFailure
@@ -73,10 +80,13 @@ def respond(
     bound = model.having(slip_rule=slip_rule)
     by_step = method == "step" or bound.law.rate is None
     motion = reference.sample(time)
+    around = surroundings or Surroundings()
     if not bound.law.state_fields:
-        torque = evaluated(bound, motion)
+        torque = evaluated(bound, motion, time, around, applied_torques(applied, time))
+    elif applied is not None:
+        raise InputError(f"law {bound.law.name!r} has states and needs no applied torque; leave it out")
     else:
-        torque = integrated(bound, reference, time, by_step, tolerance)
+        torque = integrated(bound, reference, time, by_step, tolerance, around)
     reached = torque.size
     record = Record(
         time[:reached],
@@ -101,16 +111,32 @@ def checked(times: Sequence[float] | Array) -> Array:
     return time
 
 
-def evaluated(model: Model, motion: Array) -> Array:
+def applied_torques(applied: Sequence[float] | Array | None, time: Array) -> Array:
+    """The applied torque at the times, N·m; 0 where none is given."""
+    if applied is None:
+        return np.zeros(time.size)
+    torques = np.asarray(applied, dtype=np.float64)
+    if torques.shape != time.shape or not np.all(np.isfinite(torques)):
+        raise InputError(
+            f"applied has shape {torques.shape}; give one finite torque (N·m) for each of the times"
+        )
+    return torques
+
+
+def evaluated(model: Model, motion: Array, time: Array, around: Surroundings, applied: Array) -> Array:
     """Torque of a law without states at every row of position, velocity and acceleration, N·m."""
     law, p = model.law, model.parameters
     z = law.state(p)
-    return np.array(
-        [law.step(v, v, 0.0, z, p, Surroundings(position=x)) for x, v, _ in motion], dtype=np.float64
-    )
+    torques: list[float] = []
+    for (x, v, _), t, torque in zip(motion.tolist(), time.tolist(), applied.tolist()):
+        u = around._replace(position=x, time=t, applied=torque)
+        torques.append(law.step(v, v, 0.0, z, p, u))
+    return np.array(torques, dtype=np.float64)
 
 
-def integrated(model: Model, reference: Reference, time: Array, by_step: bool, tolerance: float) -> Array:
+def integrated(
+    model: Model, reference: Reference, time: Array, by_step: bool, tolerance: float, around: Surroundings
+) -> Array:
     """Torque of a law with states at the times, N·m; shorter than they are where no step was found."""
     side = Side.of(model)
     kind = reference.kind
@@ -129,7 +155,7 @@ def integrated(model: Model, reference: Reference, time: Array, by_step: bool, t
         np.zeros(size),
         np.zeros(2),
         np.zeros(3),
-        np.array(Surroundings()),
+        np.array(around),
         np.zeros((7, size)),
         np.zeros(size),
         np.zeros(size),

@@ -177,7 +177,12 @@ def _law(table: Table, laws: Mapping[str, Law]) -> Law:
 def axis(table: Table, friction: Model) -> RigidAxis:
     """Read the machine."""
     with table, table.blamed():
-        return RigidAxis(table.positive("inertia", "kg·m²"), friction)
+        return RigidAxis(
+            table.positive("inertia", "kg·m²"),
+            friction,
+            table.number("load", "", 1.0, lower=0.0),
+            table.number("temperature", "°C", 20.0),
+        )
 
 
 # ---- references ------------------------------------------------------------------------------------------------
