@@ -45,6 +45,7 @@ from stickslip.simulation._exact_state import (
     HELD,
     INSIDE,
     INTEGRAL,
+    JUMPED,
     LAYER,
     LOOP_SIZE,
     POSITION,
@@ -236,6 +237,7 @@ def stand(parameters: Any, plan: Any, cells: Any, loop: Any) -> None:
 @kernel(exact=False)
 def start(parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, loop: Any, breaks: Any) -> None:
     """Stand at t = 0."""
+    loop[JUMPED] = 1.0
     loop[EDGE_LOW] = EDGE
     loop[EDGE_HIGH] = breaks[0] - EDGE
     loop[POSITION] = parameters[POSITION_0]
@@ -271,6 +273,7 @@ def pass_break(
 ) -> bool:  # fmt: skip
     """Stand on the other side of a break; returns whether the commanded torque jumps."""
     before = loop[R]
+    loop[JUMPED] = 1.0
     loop[TIME] = now
     loop[EDGE_LOW] = now + EDGE
     loop[EDGE_HIGH] = following - EDGE
@@ -356,6 +359,7 @@ def solve(
             measure(lin, parameters, plan, cells, sides, loop, stretch, h, acc, turns, nodes)
         if happens:
             count[EVENTS] += 1.0
+            loop[JUMPED] = 1.0
             theta = stretch[POSITION_EVENT]
             v = stretch[VELOCITY_EVENT]
             if full:

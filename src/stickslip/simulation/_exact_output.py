@@ -16,6 +16,7 @@ from stickslip.simulation._exact_state import (
     GRID_ROWS,
     GRID_WRITTEN,
     INTEGRAL,
+    JUMPED,
     LAG,
     POSITION,
     ROWS,
@@ -46,6 +47,8 @@ SHORTEST_WINDOW = 1e-10
 """Shorter stretches are left out of the metrics (s)."""
 
 
+FINEST_NODES = 0.03
+"""Half a window in radians (or e-folds) of the free motion, that need not be undercut."""
 UNSEEN = 1e-8
 """Free motion slower than this (rad/s) adds nothing to a metric; the nodes need not follow it."""
 
@@ -106,7 +109,7 @@ def put_row(
     row_at[8] = event
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def signals(
     parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, stretch: Any, x: float, theta: float, v: float
 ) -> tuple[float, float, float, float, float]:  # fmt: skip
@@ -173,33 +176,36 @@ def row_after(parameters: Any, plan: Any, sides: Any, loop: Any, count: Any, row
         put_row(rows, count, loop[TIME], goal, rate, theta, v, tm, tf, th, 1.0)
 
 
-@kernel(exact=False)
-def window_for(rate: float, speed: float) -> float:
-    """Longest window whose five nodes follow a free motion of that rate (1/s) and velocity (rad/s), s.
+@kernel(exact=False, inline=True)
+def windows_for(rate: float, speed: float, h: float) -> float:
+    """Windows whose five nodes follow a free motion of that rate (1/s) and velocity (rad/s) over h, at least 1.
 
     Boole's rule is wrong by about 2e-3 y^6 of the changing part for nodes y/2 of a radian apart.
     """
-    if speed < UNSEEN:
-        return MAX_WINDOW
-    y = max(0.03, min(1.0, 0.1 * (1e-2 / (speed + 1e-12)) ** (1.0 / 3.0)))
-    return min(MAX_WINDOW, 2.0 * y / (abs(rate) + 1e-9))
+    y = 0.5 * h * abs(rate)
+    # Most stretches are short; a root costs as much as the rest.
+    if speed < UNSEEN or y <= FINEST_NODES or (y <= 1.0 and y * y * y * speed <= 1e-5):
+        return 1.0
+    return y / max(FINEST_NODES, min(1.0, 0.1 * (1e-2 / speed) ** (1.0 / 3.0)))
 
 
-@kernel(exact=False)
-def window_of(lin: Linear, stretch: Any) -> float:
-    """Longest window whose five nodes follow the free motion, s."""
+@kernel(exact=False, inline=True)
+def windows_of(lin: Linear, stretch: Any, h: float) -> int:
+    """Windows in which the meter sees the first h of a stretch."""
     p = stretch[FREE_POSITION]
     q = stretch[FREE_VELOCITY]
     if lin.discriminant > 0.0:
         rate = max(lin.frequency, lin.decay)
-        return window_for(rate, abs(q) + rate * abs(p))
-    fast = -lin.decay - lin.frequency
-    slow = -lin.decay + lin.frequency
-    share = 0.5 / (lin.frequency + 1e-9)
-    return min(
-        window_for(fast, abs(fast * (q - slow * p)) * share),
-        window_for(slow, abs(slow * (q - fast * p)) * share),
-    )
+        most = windows_for(rate, abs(q) + rate * abs(p), h)
+    else:
+        fast = -lin.decay - lin.frequency
+        slow = -lin.decay + lin.frequency
+        share = 0.5 / (lin.frequency + 1e-9)
+        most = max(
+            windows_for(fast, abs(fast * (q - slow * p)) * share, h),
+            windows_for(slow, abs(slow * (q - fast * p)) * share, h),
+        )
+    return math.ceil(max(most, h / MAX_WINDOW) * (1.0 - 1e-9))
 
 
 @kernel(exact=False)
@@ -210,13 +216,15 @@ def measure(
     """Hand the first h of the stretch to the meter, in windows of five nodes."""
     if h < SHORTEST_WINDOW:
         return
-    windows = math.ceil(h / window_of(lin, stretch) * (1.0 - 1e-9))
+    windows = windows_of(lin, stretch, h)
     width = h / windows
     c = cubic_of(stretch)
     m = flow(lin, 0.25 * width)
     p = stretch[FREE_POSITION]
     q = stretch[FREE_VELOCITY]
-    fill(parameters, plan, cells, sides, loop, stretch, 0.0, loop[POSITION], loop[VELOCITY], nodes, 4)
+    if loop[JUMPED] > 0.0:
+        fill(parameters, plan, cells, sides, loop, stretch, 0.0, loop[POSITION], loop[VELOCITY], nodes, 4)
+        loop[JUMPED] = 0.0
     for w in range(windows):
         for j in range(8):
             nodes[j, 0] = nodes[j, 4]

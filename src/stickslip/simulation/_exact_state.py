@@ -40,10 +40,11 @@ SIDE_SIZE = KEPT + 4
 (
     TIME, POSITION, VELOCITY, SIGMA, HELD, INTEGRAL, ADDED, WATCHED, NONLINEAR, BASE,
     R, DR, GOAL, GOAL_RATE, EDGE_LOW, EDGE_HIGH, CELL, UNSEEN, SEEN_LENGTH, STORM_COUNT, STORM_SINCE, CALM,
-    BENT, EVEN_STIFFNESS, EVEN_DAMPING, EVEN_BASE, FLOOR, NARROW, PROFILE_OUT,
-) = range(29)  # fmt: skip
+    BENT, EVEN_STIFFNESS, EVEN_DAMPING, EVEN_BASE, FLOOR, NARROW, JUMPED, PROFILE_OUT,
+) = range(30)  # fmt: skip
 """BENT: a force changes the flow from step to step; EVEN_...: stiffness, damping and offset of all the others. FLOOR:
-least stiffness. NARROW: the velocity at which a steep layer begins, where the axis is outside."""
+least stiffness. NARROW: the velocity at which a steep layer begins, where the axis is outside. JUMPED: signals
+may differ from those at the end of the last stretch that was measured."""
 
 LOOP_SIZE = PROFILE_OUT + 3
 
@@ -255,7 +256,7 @@ def curve_slope(parameters: Any, plan: Any, sides: Any, side: int, v: float) -> 
     )
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def torques(
     parameters: Any, plan: Any, sides: Any, loop: Any, r: float, goal: float, rate: float, integral: float,
     theta: float, v: float, s_plant: float, s_helper: float,

@@ -72,7 +72,7 @@ def state_at(lin: Linear, stretch: Any, x: float) -> tuple[float, float]:
     return moved(cubic_of(stretch), flow(lin, x), x, stretch[FREE_POSITION], stretch[FREE_VELOCITY])
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def slip_force_at(sides: Any, stretch: Any, side: int, x: float) -> float:
     """Slipping force of a side at x inside the stretch."""
     if sides[side * SIDE_SIZE + VARIES] == 0.0 or sides[side * SIDE_SIZE + SLIPPING] == 0.0:
@@ -88,7 +88,7 @@ def slip_force_at(sides: Any, stretch: Any, side: int, x: float) -> float:
     )
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def slip_torque_at(sides: Any, stretch: Any, side: int, x: float) -> float:
     """Torque of a side's slipping force at x inside the stretch: a bristle's damping adds to the force."""
     force = slip_force_at(sides, stretch, side, x)
@@ -106,7 +106,7 @@ def slip_torque_at(sides: Any, stretch: Any, side: int, x: float) -> float:
     return force + sides[side * SIDE_SIZE + LAG] * slope
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def integral_at(parameters: Any, loop: Any, stretch: Any, x: float) -> float:
     """Integral of the position error at x inside the stretch, rad·s."""
     if parameters[KI] == 0.0:

@@ -254,7 +254,7 @@ def torque_beyond(side: Side, e: Elements, v: float) -> float:
 def crosses_once(side: Side, e: Elements) -> bool:
     """Whether a steep slope meets the sliding curve exactly once."""
     scale = e.velocity_scale if e.velocity_scale > 0.0 else 1.0
-    beyond = [torque_beyond(side, e, scale * v) > 0.0 for v in np.geomspace(1e-9, 1e4, 400)]
+    beyond = [torque_beyond(side, e, scale * v) > 0.0 for v in np.geomspace(1e-9, 1e4, 80)]
     return not beyond[0] and beyond[-1] and sum(a != b for a, b in pairwise(beyond)) == 1
 
 
