@@ -40,8 +40,9 @@ def control(c: Any, m: Any, reference: float, position: float, dt: float) -> flo
     """
     error = reference - position
     if m[STARTED] == 0.0:
-        m[LAST] = m[BEFORE_LAST] = position
-        m[LAST_REFERENCE], m[LAST_ERROR], m[STARTED] = reference, error, 1.0
+        # Before the first sample axis and reference moved at the velocity of the begin.
+        m[LAST], m[BEFORE_LAST] = position - c[START_VELOCITY] * dt, position - 2.0 * c[START_VELOCITY] * dt
+        m[LAST_REFERENCE], m[LAST_ERROR], m[STARTED] = reference - c[START_VELOCITY] * dt, error, 1.0
     if c[SPAN] == 2.0:
         velocity = 0.5 * (position - m[BEFORE_LAST]) / dt
     else:
@@ -126,3 +127,13 @@ def follow(
             return k + 1
     # The arrays are used here so that they outlive their addresses.
     return rows if states.size + trial.size + base.size >= 0 else 0
+
+
+@kernel()
+def respond(c: Any, signals: Any, out: Any) -> None:
+    """What the controller makes of a recorded position, sample by sample."""
+    m = np.zeros(MEMORY)
+    for k in range(signals.shape[0]):
+        before = min(k, signals.shape[0] - 2)
+        dt = signals[before + 1, TIME] - signals[before, TIME]
+        out[k] = command(c, m, signals, k, signals[k, POSITION], dt)

@@ -23,7 +23,7 @@ from stickslip.simulation import _driven_step as plant
 from stickslip.spec import Law, Surroundings
 from stickslip.subset import law_layouts, lower
 
-__all__ = ["COLUMNS", "Course", "Drive", "Harmonics", "Loop", "Mechanics", "drive_axis"]
+__all__ = ["COLUMNS", "Course", "Drive", "Harmonics", "Loop", "Mechanics", "control_signal", "drive_axis"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -233,6 +233,16 @@ def reads_load(law: Law) -> bool:
     translated = lower({f"_{name}_": function for name, function in functions.items()}, law_layouts(law))
     place = Surroundings._fields.index("load")
     return any(f"u[{place}]" in ast.unparse(function) for function in translated.values())
+
+
+def control_signal(
+    controller: Loop, time: Array, reference: Array, position: Array, gain: float = 1.0
+) -> Array:
+    """What a controller makes of a recorded reference and position at the record's times, shape (n,)."""
+    drive = Drive(time, reference, "feedback", controller, gain=gain, position=position)
+    out = np.zeros(time.size)
+    loop.respond(drive.numbers(), drive.signals(), out)
+    return out
 
 
 def drive_axis(mechanics: Mechanics, friction: Model, drive: Drive) -> Array:

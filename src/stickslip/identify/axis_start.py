@@ -1,0 +1,203 @@
+"""Where the search for a law's parameters starts, for any law: its example, carried over to this axis.
+
+A law's parameters are powers of torque, length and time; the example that every law brings is scaled by the torque,
+velocity and pre-sliding length of this axis (dimensional analysis), and its steady torque is then fitted to the
+friction curve that the inverse dynamics found. Nothing here knows a parameter by name.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError, ParameterError
+from stickslip.identify.optimum import descend
+from stickslip.identify.vector import Vector
+from stickslip.model import Model
+from stickslip.spec import Law
+
+__all__ = ["dimensions", "feasible", "frozen_by_default", "starts"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+LENGTHS = (1e-5, 1e-4, 1e-3)  # of the travel: pre-sliding lengths that are tried
+VELOCITIES = (0.03, 0.15)  # of the usual speed: Stribeck velocities that are tried
+ELEMENTS = 2  # of a law with elements; a record rarely determines more, and starting values may give more
+TIE = 0.3  # how strongly the steady fit holds on to the scaled example, in coordinates per relative torque
+
+
+def dimensions(unit: str) -> tuple[int, int, int]:
+    """Powers of torque, length and time in a unit: ``N·m·s/rad`` is (1, -1, 1).
+
+    Raises
+    ------
+    InputError
+        If the unit contains anything but N·m (N), rad (m) and s.
+    """
+    text = unit.replace("N·m", "N").replace("(", "").replace(")", "").strip()
+    powers = [0, 0, 0]
+    if text in ("", "-", "1"):
+        return 0, 0, 0
+    above, _, below = text.partition("/")
+    for part, sign in ((above, 1), (below, -1)):
+        for token in filter(None, re.split(r"[·*]", part)):
+            base, power = (token[:-1], 2) if token.endswith("²") else (token, 1)
+            if base == "1":
+                continue
+            place = {"N": 0, "rad": 1, "m": 1, "s": 2}.get(base)
+            if place is None:
+                raise InputError(f"unit {unit!r}: {base!r} is none of N·m, rad, s")
+            powers[place] += sign * power
+    return powers[0], powers[1], powers[2]
+
+
+def scaled(law: Law, torque: float, length: float, velocity: float) -> dict[str, Any]:
+    """The law's example with its units of torque, length and velocity multiplied by these factors."""
+    time = length / velocity
+    values: dict[str, Any] = {}
+    for f in law.fields:
+        if f.name not in law.example and f.par.default is None:
+            continue
+        value: Any = law.example.get(f.name, f.par.default)
+        if f.per_element:
+            value = list(value)[:ELEMENTS]
+            total = math.fsum(value)
+            value = [v / total for v in value] if f.par.shares else value
+        try:
+            t, x, s = dimensions(f.par.unit)
+        except InputError:
+            t, x, s = 0, 0, 0
+        factor = torque**t * length**x * time**s
+        values[f.name] = [factor * float(v) for v in value] if f.per_element else factor * float(value)
+        low, high = f.par.lower, f.par.upper
+        if not f.per_element:
+            values[f.name] = min(max(values[f.name], low), high)
+    return values
+
+
+def frozen_by_default(law: Law) -> list[str]:
+    """Shape factors that have a default value: they stay at it unless they are freed by name."""
+    return [
+        f.name for f in law.fields if f.par.default is not None and f.par.unit == "-" and not f.per_element
+    ]
+
+
+def feasible(law: Law, p: Any) -> Any | None:
+    """These parameters, or the nearest that the law accepts; None where none is known.
+
+    A static torque below the Coulomb torque is raised to it: the curve without a Stribeck effect.
+    """
+    if law.check is None or not law.check(p):
+        return p
+    if hasattr(p, "fs") and hasattr(p, "fc") and p.fs < p.fc:
+        raised = p._replace(fs=p.fc)
+        if not law.check(raised):
+            return raised
+    return None
+
+
+def starts(
+    law: Law, coulomb: float, viscous: float, speed: float, travel: float, known: dict[str, Any]
+) -> list[Model]:
+    """Models to start from: the example on this axis's scales, fitted to its friction curve.
+
+    Parameters
+    ----------
+    law : Law
+    coulomb, viscous : float
+        The friction curve that the inverse dynamics found, N·m and N·m·s/rad.
+    speed, travel : float
+        Usual (RMS) speed and range of the position, rad/s and rad.
+    known : mapping
+        Values that the user gave; they stay.
+    """
+    example = law.parameters(dict(law.example))
+    own_velocity = law.velocity_scale(example) if law.velocity_scale else 0.01
+    own_torque = level_of(law, example, own_velocity)
+    own_length = length_of(law, example, own_torque)
+    # Faster than the Stribeck velocities that are tried, so that what lies below them keeps the example's shape.
+    v = speed * np.array([-3.0, -2.0, -1.4, -1.0, -0.7, -0.5, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0])
+    curve = np.sign(v) * coulomb + viscous * v
+    out: list[Model] = []
+    lengths = LENGTHS if law.state_fields else LENGTHS[1:2]
+    velocities = VELOCITIES if law.velocity_scale else VELOCITIES[:1]
+    for part in lengths:
+        for share in velocities:
+            values = scaled(
+                law,
+                coulomb / own_torque,
+                part * travel / own_length,
+                share * speed / max(own_velocity, 1e-12),
+            )
+            values.update(known)
+            try:
+                model = Model(law, **values)
+                out.append(steady_fit(model, v, curve, list(known)) if law.steady else model)
+            except ParameterError:
+                continue
+    if not out:
+        raise InputError(f"{law.name}: its example cannot be carried over to this axis; give starting values")
+    return out
+
+
+def level_of(law: Law, p: Any, velocity: float) -> float:
+    """The torque at a slow steady motion, N·m."""
+    if law.steady is not None:
+        torque = abs(law.steady(3.0 * velocity, p))
+    else:
+        from stickslip.spec import Surroundings
+
+        z = law.state(p)
+        torque = 0.0
+        for _ in range(2000):
+            torque = abs(law.step(velocity, velocity, 1e-3, z, p, Surroundings()))
+    return torque if torque > 0.0 and math.isfinite(torque) else 1.0
+
+
+def length_of(law: Law, p: Any, torque: float) -> float:
+    """The displacement over which torque builds up from rest, rad: torque over the stiffness at rest."""
+    from stickslip.spec import Surroundings
+
+    if not law.state_fields:
+        return 1e-5
+    z = law.state(p)
+    force = abs(law.step(1e-9, 1e-9, 1.0, z, p, Surroundings()))
+    return torque * 1e-9 / force if force > 0.0 else 1e-5
+
+
+def steady_fit(model: Model, v: Array, curve: Array, held: Sequence[str]) -> Model:
+    """The model with its steady torque fitted to a curve; what the curve does not tell stays near where it was."""
+    law = model.law
+    names = [f.name for f in law.fields if not f.per_element and dimensions_or_none(f.par.unit)]
+    if law.steady is None or not names:
+        return model
+    frozen = [f.name for f in law.fields if f.name not in names or f.name in (*held, *frozen_by_default(law))]
+    vector = Vector(model, frozen=frozen)
+    if not vector.size:
+        return model
+    first, size = vector.start, float(np.max(np.abs(curve)))
+    steady = law.steady
+
+    def residuals(u: Array) -> Array:
+        p = feasible(law, vector.law_parameters(u))
+        if p is None:
+            return np.full(v.size + u.size, np.inf)
+        torque = np.array([steady(x, p) for x in v])
+        return np.concatenate([(torque - curve) / size, TIE / v.size * (u - first)])
+
+    best = descend(residuals, first, vector.lower, vector.upper, iterations=30, tolerance=1e-8)
+    p = feasible(law, vector.law_parameters(best.u))
+    return model if p is None else Model(law, **p._asdict())
+
+
+def dimensions_or_none(unit: str) -> bool:
+    """Whether a unit is one that the dimensional analysis reads."""
+    try:
+        dimensions(unit)
+    except InputError:
+        return False
+    return True
