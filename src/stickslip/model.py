@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 from stickslip import plugins
-from stickslip.errors import ParameterError, suggestion
+from stickslip.config import read_toml
+from stickslip.errors import InputError, ParameterError, suggestion
 from stickslip.spec import Law, ReferenceKind
 
-__all__ = ["Model", "Reference"]
+__all__ = ["MODEL_FORMAT", "Model", "Reference"]
+
+MODEL_FORMAT = "stickslip-model-1"
+"""What a file that `stickslip identify` wrote says it is."""
 
 
 class Model:
@@ -38,6 +44,34 @@ class Model:
         found = plugins.law(law) if isinstance(law, str) else plugins.completed(law)
         self.law: Law = found.having(**choices) if choices else found
         self.parameters: Any = self.law.parameters(parameters)
+
+    @classmethod
+    def from_file(cls, path: str | os.PathLike[str]) -> Model:
+        """Read the law that `stickslip identify` wrote to ``model.toml``.
+
+        Raises
+        ------
+        InputError
+            If there is no such file, or it is no such model.
+        """
+        file = Path(path)
+        table = read_toml(file)
+        if table.values.get("format") != MODEL_FORMAT:
+            raise InputError(
+                f"{file} is no model that `stickslip identify` wrote (format = {MODEL_FORMAT!r} is missing)"
+            )
+        name = table.text("law")
+        if name.endswith(".py"):
+            name = str(file.parent / name)
+        choices = dict(table.table("choices").values) if table.has("choices") else dict[str, Any]()
+        with table.blamed():
+            parameters = table.table("parameters")
+            values = parameters.rest()
+            known = {f.name for f in plugins.law(name).having(**choices).fields}
+            for key in values:
+                if key not in known:
+                    raise parameters.error(key, f"is no parameter of this law; {suggestion(key, known)}")
+            return cls(name, choices, **values)
 
     def having(self, **choices: str) -> Model:
         """This model under other options of its law; options that the law does not have are left out."""

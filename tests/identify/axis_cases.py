@@ -37,7 +37,7 @@ def model(name: str) -> Model:
 
 
 def wanted(time: Any, seed: int) -> Any:
-    """Sums of slow and fast sinusoids: many speeds, many reversals."""
+    """Sums of slow and fast sinusoids from rest: many speeds, many reversals."""
     rng = np.random.default_rng(seed)
     phase = rng.uniform(0.0, 2.0 * math.pi, 4)
     parts = ((0.6, 0.2), (0.5, 0.7), (0.2, 1.9), (0.05, 4.3))

@@ -19,6 +19,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.axis_trial import Trial
+from stickslip.identify.filters import decimated, low_pass, spectrum
 from stickslip.identify.profile import inverse_information, long_run
 from stickslip.machines.servo import ServoAxis
 
@@ -41,8 +42,8 @@ class InverseDynamics:
     Attributes
     ----------
     names, units : tuple of str
-        ``inertia``, ``fv``, ``fc``, ``offset``; per direction ``fv_plus``, ``fc_plus``, ``fv_minus``, ``fc_minus``; with
-        a pendulum ``gravity_sin``, ``gravity_cos``; with harmonics ``cos[i]``, ``sin[i]``.
+        ``inertia``, ``fv``, ``fc``, ``offset``; per direction ``fv_plus``, ``fc_plus``, ``fv_minus``, ``fc_minus``;
+        with a pendulum ``gravity_sin``, ``gravity_cos``; with harmonics ``cos[i]``, ``sin[i]``.
     values : array, shape (p,)
     std : array, shape (p,)
         Classic standard deviations, for independent residuals: what IDIM-LS publishes.
@@ -151,7 +152,7 @@ def inverse_dynamics(
         raise InputError(
             f"inverse dynamics: {what} in this motion; record both directions and several speeds"
         )
-    values, *_ = np.linalg.lstsq(w, y, rcond=None)
+    values: Array = np.linalg.lstsq(w, y, rcond=None)[0].astype(np.float64)
     residual = y - w @ values
     inverse, _ = inverse_information(w)
     variance = float(residual @ residual) / (y.size - len(names))
@@ -196,10 +197,8 @@ def uniform(trial: Trial) -> tuple[Array, Array, Array, float]:
 
 def white_noise(q: Array, rate: float) -> float:
     """Spectral density of the position's white part, rad²/Hz: the median over the upper 40 % of its spectrum."""
-    from scipy import signal
-
     length = int(min(q.size - 2, 1024))
-    f, power = signal.welch(np.diff(q, 2), rate, nperseg=length)
+    f, power = spectrum(np.diff(q, 2), rate, length)
     high = (f > 0.3 * rate) & (f < 0.49 * rate)
     # A second difference multiplies the spectrum of white noise by (2 - 2 cos)².
     return float(np.median(power[high] / (2.0 - 2.0 * np.cos(2.0 * math.pi * f[high] / rate)) ** 2))
@@ -207,20 +206,19 @@ def white_noise(q: Array, rate: float) -> float:
 
 def suitable_cutoff(trial: Trial) -> float:
     """Corner of the low-pass at which noise makes up `NOISE_SHARE` of the acceleration's power, within limits, Hz."""
-    from scipy import signal
-
     _, q, _, rate = uniform(trial)
     highest = min(HIGHEST_CUTOFF, CUTOFF_PER_RATE * rate)
     density = white_noise(q, rate)
-    for corner in highest * 0.9 ** np.arange(40):
-        b, a = signal.butter(4, corner, fs=rate)
-        filtered = signal.filtfilt(b, a, q)
+    corner = highest
+    for _ in range(40):
+        filtered = low_pass(q, corner, rate)
         power = float(np.var(np.gradient(np.gradient(filtered, 1.0 / rate), 1.0 / rate)))
         # Of the noise, the filters pass about the band below the corner.
         noise = density * (2.0 * math.pi) ** 4 * corner**5 / 5.0
         if noise <= NOISE_SHARE * power:
-            return float(corner)
-    return float(corner)
+            break
+        corner *= 0.9
+    return corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,8 +235,6 @@ class Columns:
 def _columns(
     trial: Trial, axis: ServoAxis, cutoff: float, per_direction: bool, harmonics: int, period: float
 ) -> Columns:
-    from scipy import signal
-
     t, q, u, rate = uniform(trial)
     dt = 1.0 / rate
     if q.size < 12 * math.ceil(rate / cutoff):
@@ -246,8 +242,7 @@ def _columns(
             f"{trial.name}: {q.size * dt:.3g} s are too short for a low-pass at {cutoff:.3g} Hz; give a longer record"
         )
     density = white_noise(q, rate)
-    b, a = signal.butter(4, cutoff, fs=rate)
-    q = signal.filtfilt(b, a, q)
+    q = low_pass(q, cutoff, rate)
     v = np.gradient(q, dt)
     acceleration = np.gradient(v, dt)
     gain, loss = axis.drive_gains(trial.quantity)
@@ -268,24 +263,14 @@ def _columns(
     edge = math.ceil(TAPER / cutoff * rate)
     floor = DEAD_ZONE * math.sqrt(density * (2.0 * math.pi) ** 2 * cutoff**3 / 3.0)
     sure = np.abs(v) >= floor
-    rows = np.interp(t, trial.time, trial.rows.astype(float)) > 0.5
+    rows = np.asarray(np.interp(t, trial.time, trial.rows.astype(float)) > 0.5, dtype=np.bool_)
     rows[:edge] = rows[v.size - edge :] = False
     keep = np.arange(0, v.size, factor)
     chosen = (rows & sure)[keep]
-    matrix = np.column_stack([_decimated(c, factor) for c in columns])[chosen]
+    matrix = np.column_stack([decimated(c, factor) for c in columns])[chosen]
     return Columns(
-        matrix, _decimated(torque, factor)[chosen], t[keep][chosen], v[keep][chosen], q[keep][chosen]
+        matrix, decimated(torque, factor)[chosen], t[keep][chosen], v[keep][chosen], q[keep][chosen]
     )
-
-
-def _decimated(x: Array, factor: int) -> Array:
-    """Every `factor`-th value behind a zero-phase Chebyshev low-pass at 0.8 of the new Nyquist frequency."""
-    from scipy import signal
-
-    if factor == 1:
-        return x
-    sos = signal.cheby1(4, 0.05, 0.8 / factor, output="sos")
-    return signal.sosfiltfilt(sos, x)[::factor]
 
 
 def _names(axis: ServoAxis, per_direction: bool, harmonics: int) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -26,8 +26,10 @@ __all__ = ["Extras", "OutputError", "output_error"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-ROUGH, TOLERANCE = 1e-3, 1e-5
+ROUGH, TOLERANCE = 1e-3, 1e-6
 """Relative decrease of the sum of squares at which a first and the last descent end."""
+DESCENTS = 2
+"""Of how many starts a rough descent is made."""
 REACH = 7.0
 """How far a logarithmic coordinate may go from its start: a factor of 1100."""
 
@@ -87,13 +89,22 @@ class OutputError:
             return replace(e, value=value, identified=False, verdict=why)
         return e
 
+    def _other(self, trials: Sequence[Trial]) -> Problem:
+        problem = self.problem
+        return Problem.of(
+            trials, problem.axis, problem.law, problem.vector, inertia=self.mechanics.inertia,
+            harmonic_period=problem.harmonic_period, max_step=problem.courses[0].drive.max_step,
+        )  # fmt: skip
+
+    def simulated(self, trials: Sequence[Trial]) -> list[Array]:
+        """Any records simulated with the fitted axis (`stickslip.simulation.driven.COLUMNS`)."""
+        runs = self._other(trials).simulated(self.fit.u)
+        assert runs is not None
+        return runs
+
     def held_out(self, trials: Sequence[Trial]) -> dict[str, float]:
         """The same errors on records (or rows) that were not fitted."""
-        other = Problem.of(
-            trials, self.problem.axis, self.problem.law, self.problem.vector, inertia=self.mechanics.inertia,
-            harmonic_period=self.problem.harmonic_period,
-        )  # fmt: skip
-        return errors_of(other, self.fit.u)
+        return errors_of(self._other(trials), self.fit.u)
 
 
 def output_error(
@@ -105,7 +116,7 @@ def output_error(
     free: Sequence[str] = (),
     frozen: Sequence[str] = (),
     values: Mapping[str, Any] | None = None,
-    extras: Extras = Extras(),  # noqa: B008 (frozen)
+    extras: Extras = Extras(),
     robust: bool = False,
     profiles: bool = False,
 ) -> OutputError:
@@ -144,7 +155,29 @@ def output_error(
         laid_out(trials, axis, law, first, model, given, free, frozen, extras)
         for model in starting_models(trials, law, first, given)
     ]
-    best: tuple[float, Problem, Array] | None = None
+    ranked = ranked_starts(trials, axis, law, candidates, extras, robust)
+    problem = ranked[0][1].resolved(ranked[0][2])
+    optima = [
+        descend(
+            problem.residuals, u, problem.vector.lower, problem.vector.upper, iterations=8, tolerance=ROUGH
+        )
+        for _, _, u in ranked[:DESCENTS]
+    ]
+    u = min(optima, key=lambda o: o.cost).u
+    for _ in range(2):
+        problem = problem.weighted(u).resolved(u)
+        u = descend(
+            problem.residuals, u, problem.vector.lower, problem.vector.upper, iterations=15, tolerance=ROUGH
+        ).u
+    return finished(problem.weighted(u), u, profiles)
+
+
+def ranked_starts(
+    trials: Sequence[Trial], axis: ServoAxis, law: Law, candidates: Sequence[tuple[Vector, float]], extras: Extras,
+    robust: bool,
+) -> list[tuple[float, Problem, Array]]:  # fmt: skip
+    """Sum of squares, problem and coordinates of every start that can be simulated, the best first."""
+    out: list[tuple[float, Problem, Array]] = []
     weights: Mapping[str, float] | None = None
     for vector, inertia in candidates:
         problem = Problem.of(
@@ -154,19 +187,13 @@ def output_error(
         weights = problem.weights
         r = problem.residuals(vector.start)
         cost = float(r @ r)
-        if math.isfinite(cost) and (best is None or cost < best[0]):
-            best = cost, problem, vector.start
-    if best is None:
+        if math.isfinite(cost):
+            out.append((cost, problem, vector.start))
+    if not out:
         raise InputError(
             f"{law.name}: no simulation from the starting values succeeds; give others by `values`"
         )
-    _, problem, u = best
-    for _ in range(2):
-        u = descend(
-            problem.residuals, u, problem.vector.lower, problem.vector.upper, iterations=20, tolerance=ROUGH
-        ).u
-        problem = problem.weighted(u)
-    return finished(problem, u, profiles)
+    return sorted(out, key=lambda found: found[0])
 
 
 def finished(problem: Problem, u: Array, profiles: bool) -> OutputError:
@@ -202,7 +229,7 @@ def errors_of(problem: Problem, u: Array) -> dict[str, float]:
     out: dict[str, float] = {}
     for place, name in enumerate(problem.signals):
         wrong = np.concatenate([m[:, place] for m in misfits])
-        right = np.concatenate([np.asarray(measured(t, name))[t.rows] for t in problem.trials])
+        right = np.concatenate([measured(t, name)[t.rows] for t in problem.trials])
         out[f"{name}_relative"] = float(np.linalg.norm(wrong) / np.linalg.norm(right))
         out[f"{name}_rms"] = float(np.sqrt(np.mean(wrong**2)))
         out[f"{name}_mean_absolute"] = float(np.mean(np.abs(wrong)))

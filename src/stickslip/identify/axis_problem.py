@@ -29,7 +29,11 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 OBSERVER_HZ = 1.0
 """Natural frequency of the observer on a record without a known controller."""
-MAX_STEP = 1e-3
+MAX_STEP = 1e-3  # s, where the search starts
+STEP_ERROR, HALVINGS = (
+    0.1,
+    2,
+)  # change of the misfits by half the step, in their weights; and how often it is halved
 SIGNALS = ("drive", "position")
 
 
@@ -109,7 +113,7 @@ class Problem:
     ) -> Problem:  # fmt: skip
         """Lay the records out; `inertia` sets the observer's stiffness where one is needed."""
         courses = tuple(Course(law, drive_of(t, inertia, max_step)) for t in trials)
-        signals = tuple(s for s in SIGNALS if all(measured(t, s) is not None for t in trials))
+        signals = tuple(s for s in SIGNALS if all(has(t, s) for t in trials))
         return Problem(
             tuple(trials),
             axis,
@@ -135,6 +139,20 @@ class Problem:
             spread = 1.4826 * float(np.median(np.abs(part - np.median(part))))
             weights[name] = max(spread, 0.3 * float(np.std(part)), 1e-300)
         return replace(self, weights=weights)
+
+    def resolved(self, u: Array) -> Problem:
+        """This problem with steps so short that half of them would change its misfits by little of their weights."""
+        problem = self
+        for _ in range(HALVINGS):
+            finer = replace(problem, courses=tuple(
+                Course(self.law, replace(c.drive, max_step=0.5 * min(c.drive.max_step, t.period)))
+                for c, t in zip(problem.courses, problem.trials, strict=True)
+            ))  # fmt: skip
+            change = finer.residuals(u) - problem.residuals(u)
+            if not np.sqrt(np.mean(change**2)) > STEP_ERROR:
+                return problem
+            problem = finer
+        return problem
 
     def mechanics(self, named: Mapping[str, float]) -> Mechanics:
         """The axis at named values."""
@@ -197,11 +215,14 @@ class Problem:
 PLACE = {"position": 0, "drive": 2}
 
 
-def measured(trial: Trial, signal: str) -> Array | None:
-    """The measured signal that a simulation is compared with; None where there is none."""
-    if signal == "position":
-        return trial.position
-    return trial.drive if trial.closed_loop else None
+def has(trial: Trial, signal: str) -> bool:
+    """Whether a simulation of this record can be compared with that signal."""
+    return signal == "position" or (trial.closed_loop and trial.drive is not None)
+
+
+def measured(trial: Trial, signal: str) -> Array:
+    """The measured signal that a simulation is compared with, shape (n,)."""
+    return trial.position if signal == "position" else trial.signal()
 
 
 def soft(r: Array) -> Array:
@@ -228,10 +249,8 @@ def drive_of(trial: Trial, inertia: float, max_step: float) -> Drive:
 
 def smooth(trial: Trial) -> Array:
     """The position behind a zero-phase low-pass at a tenth of the sample rate, at the record's times."""
-    from scipy import signal
-
     from stickslip.identify.axis_inverse import uniform
+    from stickslip.identify.filters import low_pass
 
     t, q, _, rate = uniform(trial)
-    b, a = signal.butter(2, 0.1 * rate, fs=rate)
-    return np.interp(trial.time, t, signal.filtfilt(b, a, q))
+    return np.interp(trial.time, t, low_pass(q, 0.1 * rate, rate, order=2))

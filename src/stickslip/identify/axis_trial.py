@@ -16,6 +16,7 @@ from stickslip.simulation.driven import Loop, control_signal
 __all__ = ["Trial", "trial_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 DRIVES = {
     "torque": "torque", "motor_torque": "torque", "current": "current", "torque_percent": "rated_torque",
@@ -63,7 +64,7 @@ class Trial:
     loop: Loop | None = None
     supply: Array | None = None
     gain: float = 1.0
-    used: Any = None
+    used: Mask | None = None
 
     def __post_init__(self) -> None:
         if self.time.size < FEWEST:
@@ -95,7 +96,7 @@ class Trial:
         return self.reference is not None and self.loop is not None
 
     @property
-    def rows(self) -> Any:
+    def rows(self) -> Mask:
         """Which rows the fit looks at."""
         return np.ones(self.time.size, dtype=np.bool_) if self.used is None else self.used
 
@@ -119,14 +120,16 @@ class Trial:
         return gain * supply * self.signal() - loss * velocity
 
     def start(self) -> tuple[float, float]:
-        """Position and velocity at the begin: a line through the first rows, at rest where it does not move."""
-        count = min(11, self.time.size)
+        """Position and velocity at the begin: a parabola through the first rows, at rest where it does not move."""
+        count = min(15, self.time.size)
         t, q = self.time[:count] - self.time[0], self.position[:count]
+        distinct = np.unique(q).size
         # At rest, or within one step of the encoder, a slope would be noise.
-        if np.unique(q).size <= 3:
+        if distinct <= 3:
             return float(np.median(q)), 0.0
-        slope, level = np.polynomial.polynomial.polyfit(t, q, 1)[::-1]
-        return float(level), float(slope)
+        powers = np.vander(t, 3 if distinct > 7 else 2, increasing=True)
+        line, *_ = np.linalg.lstsq(powers, q, rcond=None)
+        return float(line[0]), float(line[1])
 
     def split(self, share: float) -> tuple[Trial, Trial]:
         """This trial fitted on its first part, and the same trial looked at in the last `share` of its time."""

@@ -52,7 +52,8 @@ class Motor:
 
     def __post_init__(self) -> None:
         for name, unit in (
-            ("torque_constant", "N·m/A"), ("resistance", "ohm"), ("back_emf_constant", "V·s/rad"), ("rated_torque", "N·m")
+            ("torque_constant", "N·m/A"), ("resistance", "ohm"), ("back_emf_constant", "V·s/rad"),
+            ("rated_torque", "N·m"),
         ):  # fmt: skip
             if getattr(self, name) is not None:
                 positive("motor", name, getattr(self, name), unit)
@@ -114,7 +115,7 @@ class ServoAxis:
     position_side: str = "load"
     drive_side: str = "motor"
     gravity: str = "constant"
-    motor: Motor = Motor()  # noqa: RUF009 (frozen)
+    motor: Motor = Motor()
     drive_gain: float | None = None
     backlash: float = 0.0
 

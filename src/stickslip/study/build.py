@@ -136,6 +136,9 @@ def model(table: Table, laws: Mapping[str, Law], base: Model | None = None) -> M
         with table.table("scale") as factors:
             scale = {key: factors.number(key, "") for key in factors.values}
     with table.blamed():
+        if isinstance(table.values.get("law"), dict):
+            with table.table("law") as file:
+                base = Model.from_file(file.document.locate(file.text("model")))
         law = base.law if base else _law(table, laws)
         options = {c.name for c in law.choices}
         given = table.rest()

@@ -1,0 +1,297 @@
+"""A whole axis from any record: inertia, gravity or offset, and friction jointly.
+
+First the inverse dynamics (`stickslip.identify.axis_inverse`), then the output error of the simulated axis for one law
+or for several, among which the error on held-out data chooses (`stickslip.identify.axis_output`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip import plugins
+from stickslip.errors import InputError
+from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics
+from stickslip.identify.axis_output import Extras, OutputError, output_error
+from stickslip.identify.axis_problem import measured
+from stickslip.identify.axis_trial import Trial
+from stickslip.identify.estimate import Estimate, Identification
+from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
+from stickslip.spec import Law
+
+__all__ = ["AUTOMATIC", "Candidate", "identify_axis", "inverse_identification"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+AUTOMATIC = ("coulomb", "stribeck", "lugre")
+"""Laws among which the held-out error chooses where none is named."""
+HELD_OUT = 0.3
+"""Last part of every record that is held out where several laws are compared and no validation record is given."""
+BLOCKS = 20
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One law in the comparison.
+
+    Attributes
+    ----------
+    law : str
+    parameters : int
+        Free ones.
+    held_out : mapping of str to float
+        Errors on data that were not fitted.
+    score : array
+        Mean squared misfit of each block of held-out data, over weights common to all laws.
+    failure : str
+        Why it could not be fitted; empty otherwise.
+    """
+
+    law: str
+    parameters: int
+    held_out: Mapping[str, float]
+    score: Array
+    failure: str = ""
+
+
+def identify_axis(
+    trials: Sequence[Trial],
+    axis: ServoAxis,
+    laws: Sequence[str | Law] = AUTOMATIC,
+    *,
+    validation: Sequence[Trial] = (),
+    free: Sequence[str] = (),
+    frozen: Sequence[str] = (),
+    values: Mapping[str, Any] | None = None,
+    extras: Extras = Extras(),  # noqa: B008 (frozen)
+    per_direction: bool = False,
+    robust: bool = False,
+    profiles: bool = False,
+) -> Identification:
+    """Identify an axis by output error.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        Fitted together.
+    axis : ServoAxis
+    laws : sequence of str or Law
+        Names, paths of law files, or laws. Of several, the one with the fewest parameters is taken whose held-out
+        error lies within one standard error of the best (Hastie, Tibshirani and Friedman 2009, 7.10).
+    validation : sequence of Trial
+        Held out. Without any, and with several laws, the last 30 % of every record are held out for the choice,
+        and the chosen law is then fitted to all.
+    free, frozen, values, extras, robust, profiles
+        As in `stickslip.identify.axis_output.output_error`.
+    per_direction : bool
+        Whether the inverse dynamics reported beside it has friction of its own for each direction.
+
+    Returns
+    -------
+    Identification
+        ``details`` holds ``mechanics``, ``inverse`` (`InverseDynamics` or None), ``output`` (`OutputError`) and
+        ``candidates``.
+
+    Raises
+    ------
+    InputError
+        If the records do not allow it, or no law could be fitted.
+    """
+    if not laws:
+        raise InputError("no law to identify; name at least one")
+    found = [plugins.law(x) if isinstance(x, str) else x for x in laws]
+    options: dict[str, Any] = {
+        "free": free, "frozen": frozen, "values": values, "extras": extras, "robust": robust, "profiles": profiles
+    }  # fmt: skip
+    inverse, notes = first_look(trials, axis, extras, per_direction)
+    candidates: list[Candidate] = []
+    chosen = found[0]
+    if len(found) > 1:
+        pairs = [t.split(HELD_OUT) for t in trials]
+        fitted = list(trials) if validation else [a for a, _ in pairs]
+        held = list(validation) if validation else [b for _, b in pairs]
+        candidates = compared(fitted, held, axis, found, inverse, options)
+        chosen = found[chosen_of(candidates)]
+        notes = [*notes, sentence_on(candidates, chosen.name)]
+    result = output_error(trials, axis, chosen, inverse, **options)
+    return assembled(result, inverse, validation, candidates, notes)
+
+
+def first_look(
+    trials: Sequence[Trial], axis: ServoAxis, extras: Extras, per_direction: bool
+) -> tuple[InverseDynamics | None, list[str]]:
+    """The inverse dynamics, where the records allow one."""
+    try:
+        found = inverse_dynamics(
+            trials, axis, harmonics=extras.harmonics, harmonic_period=extras.harmonic_period
+        )
+    except InputError as error:
+        return None, [f"No inverse dynamics: {error}"]
+    notes: list[str] = []
+    if per_direction:
+        each = inverse_dynamics(trials, axis, per_direction=True, harmonics=extras.harmonics)
+        notes.append(
+            f"Per direction: Fc {each['fc_plus']:.4g} and {each['fc_minus']:.4g}, Fv {each['fv_plus']:.4g} and "
+            f"{each['fv_minus']:.4g}; relative error {100 * each.relative_error:.2f} % instead of "
+            f"{100 * found.relative_error:.2f} %."
+        )
+    return found, notes
+
+
+# ---- the choice among laws ------------------------------------------------------------------------------------
+
+
+def compared(
+    fitted: Sequence[Trial], held: Sequence[Trial], axis: ServoAxis, laws: Sequence[Law],
+    inverse: InverseDynamics | None, options: Mapping[str, Any],
+) -> list[Candidate]:  # fmt: skip
+    """Fit every law and look at what it says about the held-out data."""
+    out: list[Candidate] = []
+    weights: Mapping[str, float] | None = None
+    for law in laws:
+        own = dict(options)
+        names = {f.name for f in law.fields}
+        all_names = {f.name for x in laws for f in x.fields}
+        # A name that belongs to another of the laws is no mistake.
+        for key in ("free", "frozen"):
+            own[key] = [n for n in options[key] if n in names or n.partition("[")[0] not in all_names]
+        own["values"] = {
+            k: v
+            for k, v in dict[str, Any](options["values"] or {}).items()
+            if k in names or k not in all_names
+        }
+        try:
+            result = output_error(fitted, axis, law, inverse, **own)
+        except InputError as error:
+            out.append(Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), str(error)))
+            continue
+        weights = weights or result.problem.weights
+        misfits = misfits_on(result, held)
+        size = np.array([weights[s] for s in result.problem.signals])
+        squares = np.concatenate([np.sum((m / size) ** 2, axis=1) for m in misfits])
+        score = np.array([float(np.mean(part)) for part in np.array_split(squares, BLOCKS)])
+        out.append(Candidate(law.name, result.fit.vector.size, result.held_out(held), score))
+    if all(c.failure for c in out):
+        raise InputError("; ".join(c.failure for c in out))
+    return out
+
+
+def misfits_on(result: OutputError, held: Sequence[Trial]) -> list[Array]:
+    """Simulated minus measured signals of held-out records."""
+    runs = result.simulated(held)
+    return [
+        np.column_stack(
+            [run[:, {"position": 0, "drive": 2}[s]] - measured(t, s) for s in result.problem.signals]
+        )[t.rows]
+        for run, t in zip(runs, held, strict=True)
+    ]
+
+
+def chosen_of(candidates: Sequence[Candidate]) -> int:
+    """The simplest law within one standard error of the best."""
+    means = [float(np.mean(c.score)) for c in candidates]
+    best = int(np.nanargmin(means))
+    near = [best]
+    for i, c in enumerate(candidates):
+        if i == best or c.failure or not np.all(np.isfinite(c.score)):
+            continue
+        difference = c.score - candidates[best].score
+        error = float(np.std(difference, ddof=1)) / math.sqrt(difference.size)
+        if float(np.mean(difference)) <= error:
+            near.append(i)
+    return min(near, key=lambda i: (candidates[i].parameters, means[i]))
+
+
+def sentence_on(candidates: Sequence[Candidate], chosen: str) -> str:
+    """What the comparison showed."""
+    parts = [
+        f"{c.law} {'failed' if c.failure else f'{math.sqrt(float(np.mean(c.score))):.3g}'}"
+        for c in candidates
+    ]
+    return (
+        f"Law {chosen!r} is the simplest within one standard error of the lowest held-out misfit (in standard "
+        f"deviations: {', '.join(parts)})."
+    )
+
+
+# ---- the result ------------------------------------------------------------------------------------------------
+
+
+def assembled(
+    result: OutputError, inverse: InverseDynamics | None, validation: Sequence[Trial],
+    candidates: Sequence[Candidate], notes: Sequence[str],
+) -> Identification:  # fmt: skip
+    """Everything in one `Identification`."""
+    misfit = dict(result.errors)
+    if inverse is not None:
+        misfit["inverse_dynamics_relative"] = inverse.relative_error
+    if validation:
+        misfit |= {f"held_out_{k}": v for k, v in result.held_out(validation).items()}
+    missing = [e.name for e in result.estimates if not e.identified]
+    notes = list(notes)
+    if missing:
+        notes.append(f"Not identified: {', '.join(missing)}; their values are one choice among many.")
+    return Identification(
+        "axis",
+        result.model,
+        result.estimates,
+        result.fit.correlation,
+        misfit,
+        tuple(notes),
+        measure_next=advice(result),
+        details={
+            "mechanics": result.mechanics, "inverse": inverse, "output": result, "candidates": tuple(candidates),
+            "axis": result.problem.axis,
+        },
+    )  # fmt: skip
+
+
+def advice(result: OutputError) -> tuple[str, ...]:
+    """What to measure to settle what is not identified."""
+    missing = {e.name.partition("[")[0] for e in result.estimates if not e.identified}
+    out: list[str] = []
+    law = result.problem.law
+    units = {f.name: f.par.unit for f in law.fields}
+    if any(units.get(n) == "rad/s" for n in missing):
+        out.append(
+            "Record constant velocities below and around the Stribeck velocity, at least three of them."
+        )
+    stiff = {n for n in missing if units.get(n) == "N·m/rad" or n in ("sigma1", "k")}
+    if stiff:
+        out.append(
+            "Record slow reversals with a finer position sensor: the pre-sliding range was hardly seen."
+        )
+    if "inertia" in missing:
+        out.append("Record stronger accelerations.")
+    return tuple(out)
+
+
+def inverse_identification(found: InverseDynamics, axis: ServoAxis) -> Identification:
+    """The inverse dynamics as an `Identification`, its friction as the law ``coulomb``.
+
+    Per direction the law has the mean of both, and the estimates say what each is.
+    """
+    estimates: list[Estimate] = []
+    for name, unit, value, std in zip(found.names, found.units, found.values, found.robust_std, strict=True):
+        low, high = float(value - 1.96 * std), float(value + 1.96 * std)
+        signed = not name.startswith(("inertia", "fc", "fv"))
+        if signed:
+            good = 1.96 * std <= 0.05 * abs(found.coulomb)
+        else:
+            good = low > 0.0 and high <= 2.0 * low
+        why = "" if good else "its interval is too wide"
+        estimates.append(Estimate(name, unit, name, float(value), float(std), low, high, good, why))
+    std = np.sqrt(np.diag(found.covariance))
+    model = Model("coulomb", fc=max(found.coulomb, 0.0), sigma2=max(found.viscous, 0.0))
+    return Identification(
+        "inverse dynamics", model, tuple(estimates), found.covariance / np.outer(std, std),
+        {"inverse_dynamics_relative": found.relative_error},
+        (f"Position filtered at {found.cutoff:.4g} Hz, decimated to {found.band:.4g} Hz; intervals allow for the "
+         "correlation of the residuals.",),
+        details={"inverse": found, "axis": axis, "classic_std": dict(zip(found.names, found.std.tolist()))},
+    )  # fmt: skip

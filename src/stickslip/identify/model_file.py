@@ -1,0 +1,123 @@
+"""model.toml: an identified law with its axis, intervals, correlation, and where it comes from.
+
+`stickslip.model.Model.from_file` reads the law back; a study or simulation names it by
+``law = {model = "model.toml"}``. Numbers are in SI units; those of a linear axis in N and m.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.estimate import Estimate, Identification
+from stickslip.machines.servo import ServoAxis
+from stickslip.model import MODEL_FORMAT
+
+__all__ = ["model_data", "write_model"]
+
+
+def write_model(
+    path: str | os.PathLike[str],
+    found: Identification,
+    *,
+    data: Sequence[Mapping[str, Any]] = (),
+    law: str = "",
+) -> Path:
+    """Write an identified law.
+
+    Parameters
+    ----------
+    path : path
+        Of the file, usually ``model.toml``.
+    found : Identification
+    data : sequence of mapping
+        One per record: ``file``, ``sha256``, ``rows``, what is known.
+    law : str
+        How the law is found again if not by its name: the path of its file.
+
+    Raises
+    ------
+    InputError
+        If there is no law, or the file cannot be written.
+    """
+    import tomli_w
+
+    target = Path(path)
+    draft = target.with_name(target.name + ".part")
+    try:
+        with draft.open("wb") as file:
+            tomli_w.dump(model_data(found, data, _relative(law, target)), file)
+        os.replace(draft, target)
+    except OSError as error:
+        raise InputError(f"{target} cannot be written ({error.strerror}); give another path") from None
+    return target
+
+
+def _relative(law: str, target: Path) -> str:
+    """The path of a law's file as seen from the model's folder."""
+    if not law.endswith(".py"):
+        return law
+    return Path(os.path.relpath(Path(law).resolve(), target.resolve().parent)).as_posix()
+
+
+def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: str = "") -> dict[str, Any]:
+    """The content of the file as plain data."""
+    if found.model is None:
+        raise InputError(f"{found.method} yields no whole law, so there is no model to write")
+    axis: Any = found.details.get("axis")
+    plain = found.model.as_dict()
+    names = {f.name for f in found.model.law.fields}
+    choices = {k: v for k, v in plain.items() if k not in names and k != "law"}
+    out: dict[str, Any] = {
+        "format": MODEL_FORMAT,
+        "law": law or found.model.law.name,
+        "method": found.method,
+        "motion": axis.motion if isinstance(axis, ServoAxis) else "rotary",
+        "notes": list(found.notes),
+        "measure_next": list(found.measure_next),
+        "parameters": {k: v for k, v in plain.items() if k in names},
+    }
+    if choices:
+        out["choices"] = choices
+    mechanics: Any = found.details.get("mechanics")
+    if mechanics is not None:
+        out["axis"] = {
+            k: float(getattr(mechanics, k))
+            for k in ("inertia", "offset", "gravity", "gravity_angle", "drive_gain", "back_emf", "load_motor",
+                      "load_external", "backlash")
+        }  # fmt: skip
+    if isinstance(axis, ServoAxis):
+        out["axis"] = out.get("axis", {}) | {"seen_from": axis.seen_from, "gear_ratio": axis.gear_ratio}
+    out["misfit"] = {k: float(v) for k, v in found.misfit.items() if math.isfinite(v)}
+    out["estimates"] = [_estimate(e) for e in found.estimates]
+    out["correlation"] = {
+        "names": [e.name for e in found.estimates],
+        "matrix": np.where(np.isfinite(found.correlation), found.correlation, math.nan).round(6).tolist(),
+    }
+    out["data"] = [dict(d) for d in data]
+    out["versions"] = versions()
+    return out
+
+
+def _estimate(e: Estimate) -> dict[str, Any]:
+    """TOML has inf and nan, so that every number stays one."""
+    return {
+        "name": e.name, "unit": e.unit, "value": e.value, "std": e.std, "lower": e.lower, "upper": e.upper,
+        "identified": e.identified, **({"verdict": e.verdict} if e.verdict else {}),
+    }  # fmt: skip
+
+
+def versions() -> dict[str, str]:
+    """Versions of all that takes part in the numbers."""
+    import stickslip
+
+    found = {"stickslip": stickslip.__version__, "python": platform.python_version()}
+    return found | {n: importlib.metadata.version(n) for n in ("numpy", "scipy", "numba")}

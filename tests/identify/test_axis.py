@@ -1,0 +1,175 @@
+"""Identification of a whole axis from simulated closed-loop records with counted position and coloured noise."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import axis_cases as cases
+import numpy as np
+import pytest
+
+from stickslip import law_names
+from stickslip.errors import InputError, ParameterError
+from stickslip.identify.axis_inverse import correlation_lags, inverse_dynamics
+from stickslip.identify.axis_output import Extras, output_error
+from stickslip.identify.axis_start import dimensions, starts
+from stickslip.identify.axis_trial import Trial, trial_of
+from stickslip.machines.servo import Motor, ServoAxis
+from stickslip.plugins import law
+from stickslip.simulation.driven import Drive, Mechanics, drive_axis
+
+AXIS = ServoAxis(drive_side="load")
+
+
+@pytest.mark.parametrize("name", cases.LAWS)
+def test_known_axis_is_recovered(name: str) -> None:
+    trial = cases.trial(name, noise=2e-3)
+    found = output_error([trial], AXIS, law(name), inverse_dynamics([trial], AXIS))
+    named = found.fit.values
+    assert named["inertia"] == pytest.approx(cases.INERTIA, rel=0.03)
+    assert found.model.parameters.fc == pytest.approx(cases.FC, rel=0.02)
+    assert found.model.parameters.sigma2 == pytest.approx(cases.SIGMA2, rel=0.05)
+    assert named["offset"] == pytest.approx(0.03, abs=0.002)
+    assert found.fit.vector.names[0] == "inertia"
+    estimates = {e.name: e for e in found.estimates}
+    assert all(estimates[n].identified for n in ("inertia", "offset", "fc", "sigma2"))
+
+
+def test_what_never_moves_a_curve_is_not_called_identified() -> None:
+    # Without a Stribeck effect in the data, nothing says at which velocity it would end.
+    trial = cases.trial("coulomb")
+    found = output_error([trial], AXIS, law("lugre"), inverse_dynamics([trial], AXIS))
+    verdicts = {e.name: e.identified for e in found.estimates}
+    assert verdicts["fc"]
+    assert not verdicts["vs"]
+
+
+def test_irregular_records_are_used_as_they_are() -> None:
+    trial = cases.trial("coulomb", drift=0.4)
+    assert np.ptp(np.diff(trial.time)) > 5e-4
+    found = output_error([trial], AXIS, law("coulomb"), inverse_dynamics([trial], AXIS))
+    assert found.fit.values["inertia"] == pytest.approx(cases.INERTIA, rel=0.1)
+    assert found.fit.values["fc"] == pytest.approx(cases.FC, rel=0.03)
+
+
+def test_a_record_without_controller_is_followed_by_an_observer() -> None:
+    closed = cases.trial("coulomb", noise=2e-3)
+    trial = Trial("open", closed.time, closed.position, closed.drive)
+    found = output_error([trial], AXIS, law("coulomb"), inverse_dynamics([trial], AXIS))
+    assert found.problem.signals == ("position",)
+    assert found.fit.values["fc"] == pytest.approx(cases.FC, rel=0.03)
+    assert found.fit.values["sigma2"] == pytest.approx(cases.SIGMA2, rel=0.1)
+
+
+def test_frozen_values_stay_and_others_follow() -> None:
+    trial = cases.trial("coulomb")
+    first = inverse_dynamics([trial], AXIS)
+    found = output_error([trial], AXIS, law("coulomb"), first, frozen=["fc"], values={"fc": 0.25})
+    assert found.model.parameters.fc == 0.25
+    assert "fc" not in found.fit.vector.names
+
+
+def test_outliers_do_not_carry_a_robust_fit_away() -> None:
+    trial = cases.trial("coulomb", noise=2e-3)
+    position = trial.position.copy()
+    position[::97] += 0.05
+    spoiled = Trial("spoiled", trial.time, position, trial.drive, "torque", trial.reference, trial.loop)
+    first = inverse_dynamics([trial], AXIS)
+    found = output_error([spoiled], AXIS, law("coulomb"), first, robust=True)
+    assert found.fit.values["fc"] == pytest.approx(cases.FC, rel=0.02)
+
+
+def test_pendulum_and_cogging_are_separated_from_friction() -> None:
+    time = np.arange(0.0, 8.0, 1e-3)
+    torque = 0.3 * np.sin(2.0 * math.pi * 0.4 * time) + 0.35 * np.sin(2.0 * math.pi * 1.1 * time)
+    friction = cases.model("coulomb").scaled(fc=0.2)
+    out = drive_axis(
+        Mechanics(2e-3, gravity=0.2, gravity_angle=0.1), friction, Drive(time, torque, max_step=1e-4)
+    )
+    trial = Trial("pendulum", time, out[:, 0], torque)
+    axis = ServoAxis(drive_side="load", gravity="pendulum")
+    first = inverse_dynamics([trial], axis)
+    found = output_error([trial], axis, law("coulomb"), first, frozen=["offset"], values={"offset": 0.0})
+    assert found.fit.values["gravity"] == pytest.approx(0.2, rel=0.02)
+    assert found.fit.values["gravity_angle"] == pytest.approx(0.1, abs=0.02)
+    assert found.fit.values["inertia"] == pytest.approx(2e-3, rel=0.03)
+
+
+def test_held_out_rows_are_simulated_but_not_fitted() -> None:
+    early, late = cases.trial("coulomb").split(0.3)
+    assert early.rows.sum() + late.rows.sum() == early.time.size
+    found = output_error([early], AXIS, law("coulomb"), inverse_dynamics([early], AXIS))
+    held_out = found.held_out([late])
+    assert held_out["drive_relative"] == pytest.approx(found.errors["drive_relative"], rel=0.5)
+
+
+def test_a_law_of_ones_own_is_identified(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    block = next(b for b in re.findall(r"```python\n(.*?)```", text, re.DOTALL) if "LAW = Law(" in b)
+    (tmp_path / "own.py").write_text(block, encoding="utf-8")
+    trial = cases.trial("coulomb", noise=2e-3)
+    found = output_error([trial], AXIS, law(str(tmp_path / "own.py")), inverse_dynamics([trial], AXIS))
+    # Without viscous friction of its own the law takes the mean torque.
+    assert 0.28 < found.model.parameters.fc < 0.34
+
+
+@pytest.mark.parametrize("name", law_names())
+def test_every_law_can_be_started_on_any_axis(name: str) -> None:
+    found = law(name)
+    for model in starts(found, 20.0, 200.0, 0.1, 0.25, {}):
+        if found.steady is not None:
+            assert abs(found.steady(0.1, model.parameters)) == pytest.approx(20.0 + 200.0 * 0.1, rel=0.5)
+
+
+def test_units_are_read() -> None:
+    assert dimensions("N·m·s/rad") == (1, -1, 1)
+    assert dimensions("rad/s") == (0, 1, -1)
+    assert dimensions("N·m/(rad·s)") == (1, -1, -1)
+    assert dimensions("-") == (0, 0, 0)
+    with pytest.raises(InputError, match="'K'"):
+        dimensions("N·m/K")
+
+
+def test_correlation_of_a_residual_is_seen() -> None:
+    rng = np.random.default_rng(0)
+    white = rng.normal(size=20000)
+    slow = np.convolve(white, np.ones(50), "same")
+    assert correlation_lags(white) <= 4
+    assert 60 <= correlation_lags(slow) <= 300
+
+
+def test_gearing_and_motor_turn_signals_into_torque_at_one_side() -> None:
+    motor = Motor(torque_constant=0.05, resistance=2.0, rated_torque=0.4)
+    axis = ServoAxis(gear_ratio=10.0, position_side="motor", motor=motor)
+    assert axis.position_factor == pytest.approx(0.1)
+    assert axis.drive_gains("current") == (pytest.approx(0.5), 0.0)
+    assert axis.drive_gains("rated_torque") == (pytest.approx(0.04), 0.0)
+    assert axis.drive_gains("voltage") == (pytest.approx(0.25), pytest.approx(0.05**2 / 2.0 * 100.0))
+    with pytest.raises(ParameterError, match="torque_constant"):
+        ServoAxis().drive_gains("current")
+    with pytest.raises(ParameterError, match="seen_from"):
+        ServoAxis(seen_from="middle")
+
+
+def test_records_that_cannot_be_used_say_why() -> None:
+    record = cases.record("coulomb", seconds=1.0)
+    assert trial_of(record, AXIS).time.size == 1000
+    still = Trial("still", np.arange(1000) * 1e-3, np.zeros(1000), np.zeros(1000))
+    with pytest.raises(InputError, match=r"move|moves"):
+        inverse_dynamics([still], AXIS)
+    with pytest.raises(InputError, match="too few"):
+        Trial("short", np.arange(10.0), np.zeros(10), np.zeros(10))
+    with pytest.raises(InputError, match="row 3"):
+        Trial("nan", np.arange(100.0), np.where(np.arange(100) == 3, np.nan, 0.0), np.zeros(100))
+    with pytest.raises(InputError, match="does not ascend at row 5"):
+        Trial("back", np.where(np.arange(100) == 5, 0.0, np.arange(100.0)), np.zeros(100), np.zeros(100))
+
+
+def test_position_dependent_torque_is_found() -> None:
+    trial = cases.trial("coulomb", noise=2e-3)
+    first = inverse_dynamics([trial], AXIS, harmonics=1)
+    found = output_error([trial], AXIS, law("coulomb"), first, extras=Extras(harmonics=1))
+    # There is none: its amplitude is within what noise makes.
+    assert math.hypot(found.fit.values["cos[0]"], found.fit.values["sin[0]"]) < 0.05 * cases.FC
