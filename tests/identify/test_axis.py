@@ -37,6 +37,7 @@ def test_known_axis_is_recovered(name: str) -> None:
     assert all(estimates[n].identified for n in ("inertia", "offset", "fc", "sigma2"))
 
 
+@pytest.mark.slow
 def test_what_never_moves_a_curve_is_not_called_identified() -> None:
     # Without a Stribeck effect in the data, nothing says at which velocity it would end.
     trial = cases.trial("coulomb")
@@ -157,7 +158,7 @@ def test_records_that_cannot_be_used_say_why() -> None:
     record = cases.record("coulomb", seconds=1.0)
     assert trial_of(record, AXIS).time.size == 1000
     still = Trial("still", np.arange(1000) * 1e-3, np.zeros(1000), np.zeros(1000))
-    with pytest.raises(InputError, match=r"move|moves"):
+    with pytest.raises(InputError, match="nothing excites inertia, fv, fc"):
         inverse_dynamics([still], AXIS)
     with pytest.raises(InputError, match="too few"):
         Trial("short", np.arange(10.0), np.zeros(10), np.zeros(10))

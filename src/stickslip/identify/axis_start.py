@@ -80,10 +80,11 @@ def scaled(law: Law, torque: float, length: float, velocity: float) -> dict[str,
 
 
 def frozen_by_default(law: Law) -> list[str]:
-    """Shape factors that have a default value: they stay at it unless they are freed by name."""
+    """What stays at its value unless it is freed by name: shape factors that have a default, and shares (equal)."""
     return [
-        f.name for f in law.fields if f.par.default is not None and f.par.unit == "-" and not f.per_element
-    ]
+        f.name for f in law.fields
+        if f.par.shares or (f.par.default is not None and f.par.unit == "-" and not f.per_element)
+    ]  # fmt: skip
 
 
 def feasible(law: Law, p: Any) -> Any | None:
