@@ -1,0 +1,334 @@
+"""Honest intervals for an axis: what an observer must correct, whitened, and what the method itself gets wrong.
+
+The simulated axis is pulled towards the measured position by a spring and damper (an observer); the pull is the
+torque that the model lacks. Its spectrum is that of the disturbance, of the torque's noise and of the encoder, so
+that an autoregression of it gives the weights (prediction-error method: Ljung 1999, chapters 7 and 9). It needs no
+knowledge of the controller.
+
+The filter that makes a velocity of counted positions rounds the corners where a contact breaks away, which draws
+static and Coulomb torque down in proportion to its length. Two lengths, one twice the other, tell how much, and the
+estimate is extrapolated to none (Richardson). The intervals come from the same estimate on records whose truth is
+known: the fitted axis itself, moved as measured, with the encoder's counts and with the corrections again as noise,
+their signs drawn anew (dependent wild bootstrap: Shao 2010; Efron and Tibshirani 1993, chapter 6).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.noise import Noise
+from stickslip.identify.optimum import descend
+from stickslip.identify.profile import inverse_information
+from stickslip.identify.uncertainty import interval_of, verdict_on
+from stickslip.identify.vector import Vector
+from stickslip.simulation.driven import Course, Drive, Mechanics
+from stickslip.spec import Law
+
+__all__ = ["Motion", "PredictionError", "prediction_error"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+MakeMechanics = Callable[[Mapping[str, float]], Mechanics]
+
+BAND = 40.0
+"""Hz up to which corrections count, where the sample rate allows it."""
+SMOOTHING = (5.0, 2.5)
+"""Corners of the filters on position and torque, in bands: the sharper one, and that which tells its error."""
+STEPS = 5.0
+"""Simulated steps per period of that corner."""
+ORDER = 16
+"""Order of the autoregression."""
+MEMORY = 0.15
+"""s over which the bootstrap's signs stay alike."""
+EDGE = 0.15
+"""s at both ends that filters spoil."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A record of equally spaced samples.
+
+    Attributes
+    ----------
+    time, position, torque : array, shape (n,)
+        s, rad, N·m (m, N).
+    count : float
+        Resolution of the position, rad (m); 0 for none.
+    delay : float
+        s from a sample's time to the middle of the torque's action: half a sample for a command that is held.
+    """
+
+    time: Array
+    position: Array
+    torque: Array
+    count: float = 0.0
+    delay: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionError:
+    """What the method found.
+
+    Attributes
+    ----------
+    u : array, shape (p,)
+        Coordinates of the estimate, the method's own error taken off.
+    spread : array, shape (p, p)
+        Covariance of the coordinates.
+    bias : array, shape (p,)
+        The filter's error, taken off.
+    remaining : array, shape (p,)
+        Mean error of the imitated estimates.
+    estimates : tuple of Estimate
+    corrections : tuple of array
+        Per motion the torque that the model lacks, N·m, in the band.
+    """
+
+    vector: Vector
+    u: Array
+    spread: Array
+    bias: Array
+    remaining: Array
+    estimates: tuple[Estimate, ...]
+    corrections: tuple[Array, ...]
+
+
+# ---- one motion ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A motion behind the filter, its observer and the filter of its corrections."""
+
+    motion: Motion
+    course: Course
+    drive: Drive
+    low_pass: Any
+    stride: int
+    edge: int
+
+    def correction(self, mechanics: Mechanics, parameters: Any) -> Array:
+        """Torque that the model lacks, N·m, in the band, shape (m,)."""
+        from scipy import signal
+
+        raw = self.course.run(mechanics, parameters)[:, 3]
+        if not np.all(np.isfinite(raw)):
+            return np.full(raw[self.edge : -self.edge : self.stride].shape, math.nan)
+        return signal.sosfiltfilt(self.low_pass, raw)[self.edge : -self.edge : self.stride]
+
+
+def prepare(motion: Motion, law: Law, inertia: float, band: float, smoothing: float) -> Prepared:
+    """Filter position and torque alike, and lay the observer out."""
+    from scipy import signal
+
+    dt = float(np.median(np.diff(motion.time)))
+    rate = 1.0 / dt
+    corner = min(smoothing * band, 0.08 * smoothing * rate)
+    smooth = signal.butter(4, corner, fs=rate, output="sos")
+    q = signal.sosfiltfilt(smooth, motion.position)
+    torque = signal.sosfiltfilt(smooth, motion.torque)
+    v = np.gradient(q, dt)
+    skip = max(1, int(rate / (STEPS * SMOOTHING[0] / smoothing * corner)))
+    t = motion.time[::skip]
+    torque = np.interp(t - motion.delay, motion.time, torque)
+    omega = 2.0 * math.pi * band
+    q, v, step = q[::skip], v[::skip], skip * dt
+    drive = Drive(
+        t, torque, "linear", start=(float(q[0]), float(v[0])), position=q, velocity=v,
+        pull=(inertia * omega**2, 2.0 * inertia * omega), max_step=step,
+    )  # fmt: skip
+    low_pass = signal.butter(4, band, fs=1.0 / step, output="sos")
+    stride = max(1, int(1.0 / (3.0 * band * step)))
+    return Prepared(motion, Course(law, drive), drive, low_pass, stride, max(1, int(EDGE / step)))
+
+
+def imitation(
+    prepared: Prepared, law: Law, mechanics: Mechanics, parameters: Any, noise: Array
+) -> tuple[Motion, Array]:
+    """A record of the model itself that moves as the measured one, and the noise-free torque it needs.
+
+    The observer's pull is part of the torque that moves it: the motion is exactly the model's.
+    """
+    m = prepared.motion
+    pulled = Drive(
+        m.time, m.torque, "held", position=np.interp(m.time, prepared.drive.time, prepared.drive.position),
+        velocity=np.interp(m.time, prepared.drive.time, prepared.drive.velocity), pull=prepared.drive.pull,
+        start=prepared.drive.start, max_step=float(m.time[1] - m.time[0]),
+    )  # fmt: skip
+    out = Course(law, pulled).run(mechanics, parameters)
+    position = m.count * np.floor(out[:, 0] / m.count + 0.5) if m.count > 0.0 else out[:, 0]
+    needed = m.torque + out[:, 3]
+    return replace(m, position=position, torque=needed + noise, delay=0.5 * (m.time[1] - m.time[0])), out[:, 3]
+
+
+# ---- noise -----------------------------------------------------------------------------------------------------
+
+
+def autoregression(e: Sequence[Array], order: int) -> Array:
+    """Coefficients (1, a_1 ... a_p) of the filter that whitens the series: Yule and Walker's equations."""
+    from scipy import linalg
+
+    r = np.zeros(order + 1)
+    for x in e:
+        spectrum = np.abs(np.fft.rfft(x, 2 * x.size)) ** 2
+        r += np.fft.irfft(spectrum)[: order + 1]
+    r[0] *= 1.0 + 1e-8
+    return np.concatenate([[1.0], -linalg.solve_toeplitz(r[:order], r[1:])])
+
+
+def whitened(filter_: Array, e: Array) -> Array:
+    """The series behind the filter, without the values that its start spoils."""
+    from scipy import signal
+
+    return signal.lfilter(filter_, [1.0], e)[filter_.size - 1 :]
+
+
+def random_signs(rng: np.random.Generator, n: int, memory: float) -> Array:
+    """A smooth Gaussian series of unit variance that forgets within `memory` samples, shape (n,)."""
+    from scipy import ndimage
+
+    x = ndimage.gaussian_filter1d(rng.standard_normal(n), memory / 2.0, mode="wrap")
+    return x / math.sqrt(float(np.mean(x * x)))
+
+
+# ---- the method ------------------------------------------------------------------------------------------------
+
+
+def prediction_error(
+    motions: Sequence[Motion],
+    law: Law,
+    vector: Vector,
+    mechanics: MakeMechanics,
+    *,
+    inertia: float,
+    signed_scale: float | Mapping[str, float] = math.nan,
+    band: float = BAND,
+    draws: int = 12,
+    rounds: int = 3,
+    seed: int = 0,
+) -> PredictionError:
+    """Estimate mechanics and law from torque and motion, with intervals that hold for coloured noise.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+    law : Law
+    vector : Vector
+        Free and frozen parameters; the search starts at its values.
+    mechanics : callable
+        Makes the axis of all parameters by name.
+    inertia : float
+        About that of the axis, kg·m²: it sets the observer's stiffness.
+    signed_scale : float or mapping
+        As in `stickslip.identify.uncertainty.fit`.
+    band : float
+        Hz up to which corrections count.
+    draws : int
+        Imitated records for error and spread.
+    rounds : int
+        Times that weights and parameters are found in turn.
+    seed : int
+        Of the imitated noise.
+
+    Returns
+    -------
+    PredictionError
+
+    Raises
+    ------
+    InputError
+        If a motion is too short for the band, or the model gives no finite values at the start.
+    """
+    prepared, blurred = (
+        [prepare(checked(m, band), law, inertia, band, smoothing) for m in motions] for smoothing in SMOOTHING
+    )
+
+    def corrections(u: Array, records: Sequence[Prepared]) -> list[Array]:
+        parameters, axis = vector.law_parameters(u), mechanics(vector.named(u))
+        if vector.complaint(u):
+            return [np.full(r.drive.time[r.edge : -r.edge : r.stride].shape, math.nan) for r in records]
+        return [r.correction(axis, parameters) for r in records]
+
+    u, weights = vector.start, np.array([1.0, -0.9])
+    optimum = None
+    for turn in range(rounds):
+
+        def residuals(x: Array, weights: Array = weights) -> Array:
+            return np.concatenate([whitened(weights, e) for e in corrections(x, prepared)])
+
+        last = turn == rounds - 1
+        optimum = descend(
+            residuals, u, vector.lower, vector.upper, iterations=25, tolerance=1e-6 if last else 1e-3
+        )
+        u = optimum.u
+        if not last:
+            weights = autoregression(corrections(u, prepared), ORDER)
+    assert optimum is not None
+    inverse, seen = inverse_information(optimum.jacobian)
+    newton = -inverse @ optimum.jacobian.T
+
+    def step(records: Sequence[Prepared]) -> Array:
+        """How far these records would move the estimate: one step of Gauss and Newton."""
+        return newton @ np.concatenate([whitened(weights, e) for e in corrections(u, records)])
+
+    rng = np.random.default_rng(seed)
+    parameters, axis = vector.law_parameters(u), mechanics(vector.named(u))
+    lacking = [imitation(r, law, axis, parameters, np.zeros(r.motion.time.size))[1] for r in prepared]
+    errors: list[Array] = []
+    for _ in range(draws):
+        copies: list[Motion] = []
+        for r, missing in zip(prepared, lacking, strict=True):
+            dt = float(r.motion.time[1] - r.motion.time[0])
+            noise = missing * random_signs(rng, missing.size, MEMORY / dt)
+            copies.append(imitation(r, law, axis, parameters, noise)[0])
+        sharp, blunt = (step([prepare(m, law, inertia, band, s) for m in copies]) for s in SMOOTHING)
+        errors.append(2.0 * sharp - blunt)
+    found = np.array(errors)
+    bias = np.where(seen, step(blurred) - step(prepared), 0.0)
+    own = np.where(seen, found.mean(axis=0), 0.0)
+    spread = np.cov(found, rowvar=False).reshape(u.size, u.size) * (1.0 + 1.0 / draws)
+    spread[~seen, :] = spread[:, ~seen] = math.nan
+    better = np.clip(u - bias - own, vector.lower, vector.upper)
+    estimates = estimates_of(vector, better, spread, draws, signed_scale)
+    return PredictionError(vector, better, spread, bias, own, estimates, tuple(corrections(u, prepared)))
+
+
+def checked(motion: Motion, band: float) -> Motion:
+    """Refuse what the filters cannot work on."""
+    steps = np.diff(motion.time)
+    if motion.time.size < 200 or np.ptp(steps) > 1e-3 * float(np.median(steps)):
+        raise InputError(
+            f"{motion.time.size} samples between {steps.min():.3g} and {steps.max():.3g} s apart: this method needs at "
+            "least 200 that are equally spaced; resample the record"
+        )
+    if 1.0 / float(np.median(steps)) < 3.0 * band:
+        raise InputError(f"a band of {band:g} Hz needs a sample rate of {3.0 * band:g} Hz; give a lower band")
+    return motion
+
+
+def estimates_of(
+    vector: Vector, u: Array, spread: Array, draws: int, signed_scale: float | Mapping[str, float]
+) -> tuple[Estimate, ...]:
+    """Estimates with 95 % intervals from Student's quantile, in coordinates, and verdicts."""
+    from scipy import special
+
+    width = float(special.stdtrit(max(draws - 1, 1), 0.975))
+    values = vector.values(u)
+    noise = Noise(1.0, "residual", float(draws - 1))
+    change = vector.jacobian(u)
+    out: list[Estimate] = []
+    for k, p in enumerate(vector.free):
+        used = change[k] != 0.0
+        variance = float(change[k, used] @ spread[np.ix_(used, used)] @ change[k, used])
+        std = math.sqrt(variance) if variance >= 0.0 else math.inf
+        low, high = interval_of(p, float(values[k]), width * std, None)
+        scale = signed_scale.get(p.name, math.nan) if isinstance(signed_scale, Mapping) else signed_scale
+        why = verdict_on(p, float(values[k]), low, high, noise, scale)
+        out.append(Estimate(p.name, p.par.unit, p.par.symbol, float(values[k]), std, low, high, not why, why))
+    return tuple(out)
