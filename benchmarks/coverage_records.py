@@ -105,7 +105,12 @@ def make(seed: int, family: str = "") -> Case:
     family = family or FAMILIES[seed % len(FAMILIES)]
     inertia, fc = log_uniform(rng, 3e-4, 5e-3), log_uniform(rng, 0.1, 0.6)
     top, vs = log_uniform(rng, 4.0, 12.0), log_uniform(rng, 0.03, 0.3)
-    sliding = {"fs": fc * rng.uniform(1.15, 1.6), "fc": fc, "vs": vs, "sigma2": fc * rng.uniform(0.2, 1.0) / top}
+    sliding = {
+        "fs": fc * rng.uniform(1.15, 1.6),
+        "fc": fc,
+        "vs": vs,
+        "sigma2": fc * rng.uniform(0.2, 1.0) / top,
+    }
     offset = fc * rng.uniform(-0.1, 0.1)
     friction = law_of(rng, family, inertia, sliding)
     levels = np.geomspace(vs * log_uniform(rng, 0.15, 2.0), top, int(rng.integers(6, 10)))

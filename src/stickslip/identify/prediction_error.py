@@ -22,16 +22,16 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.axis_start import feasible
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.noise import Noise
 from stickslip.identify.optimum import descend
-from stickslip.identify.profile import inverse_information
 from stickslip.identify.uncertainty import interval_of, verdict_on
 from stickslip.identify.vector import Vector
 from stickslip.simulation.driven import Course, Drive, Mechanics
 from stickslip.spec import Law
 
-__all__ = ["Motion", "PredictionError", "prediction_error"]
+__all__ = ["Motion", "PredictionError", "explored", "prediction_error"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 MakeMechanics = Callable[[Mapping[str, float]], Mechanics]
@@ -44,8 +44,12 @@ STEPS = 5.0
 """Simulated steps per period of that corner."""
 ORDER = 16
 """Order of the autoregression."""
+FIRST = np.array([1.0, -0.9])
+"""The whitening filter before the corrections are known."""
 MEMORY = 0.15
 """s over which the bootstrap's signs stay alike."""
+REACH = 3.0
+"""Coordinates (factors of e) by which what the data leave open may lie elsewhere."""
 EDGE = 0.15
 """s at both ends that filters spoil."""
 
@@ -57,7 +61,7 @@ class Motion:
     Attributes
     ----------
     time, position, torque : array, shape (n,)
-        s, rad, N·m (m, N).
+        s, rad, N·m (m, N); a signal that the axis's ``drive_gain`` turns into torque will do.
     count : float
         Resolution of the position, rad (m); 0 for none.
     delay : float
@@ -163,8 +167,13 @@ def imitation(
     )  # fmt: skip
     out = Course(law, pulled).run(mechanics, parameters)
     position = m.count * np.floor(out[:, 0] / m.count + 0.5) if m.count > 0.0 else out[:, 0]
-    needed = m.torque + out[:, 3]
-    return replace(m, position=position, torque=needed + noise, delay=0.5 * (m.time[1] - m.time[0])), out[:, 3]
+    needed = m.torque + out[:, 3] / mechanics.drive_gain
+    return replace(
+        m,
+        position=position,
+        torque=needed + noise / mechanics.drive_gain,
+        delay=0.5 * (m.time[1] - m.time[0]),
+    ), out[:, 3]
 
 
 # ---- noise -----------------------------------------------------------------------------------------------------
@@ -207,6 +216,7 @@ def prediction_error(
     mechanics: MakeMechanics,
     *,
     inertia: float,
+    start: Array | None = None,
     signed_scale: float | Mapping[str, float] = math.nan,
     band: float = BAND,
     draws: int = 12,
@@ -225,6 +235,8 @@ def prediction_error(
         Makes the axis of all parameters by name.
     inertia : float
         About that of the axis, kg·m²: it sets the observer's stiffness.
+    start : array, shape (p,), optional
+        Coordinates at which the search starts.
     signed_scale : float or mapping
         As in `stickslip.identify.uncertainty.fit`.
     band : float
@@ -250,12 +262,9 @@ def prediction_error(
     )
 
     def corrections(u: Array, records: Sequence[Prepared]) -> list[Array]:
-        parameters, axis = vector.law_parameters(u), mechanics(vector.named(u))
-        if vector.complaint(u):
-            return [np.full(r.drive.time[r.edge : -r.edge : r.stride].shape, math.nan) for r in records]
-        return [r.correction(axis, parameters) for r in records]
+        return corrected(records, law, vector, mechanics, u)
 
-    u, weights = vector.start, np.array([1.0, -0.9])
+    u, weights = vector.start if start is None else start, FIRST
     optimum = None
     for turn in range(rounds):
 
@@ -270,7 +279,10 @@ def prediction_error(
         if not last:
             weights = autoregression(corrections(u, prepared), ORDER)
     assert optimum is not None
-    inverse, seen = inverse_information(optimum.jacobian)
+    # A coordinate that the data leave open is held within REACH of where it is, so that no step runs away with it.
+    variance = optimum.cost / max(optimum.residuals.size - u.size, 1)
+    ridge = variance / REACH**2
+    inverse = np.linalg.inv(optimum.jacobian.T @ optimum.jacobian + ridge * np.eye(u.size))
     newton = -inverse @ optimum.jacobian.T
 
     def step(records: Sequence[Prepared]) -> Array:
@@ -278,7 +290,7 @@ def prediction_error(
         return newton @ np.concatenate([whitened(weights, e) for e in corrections(u, records)])
 
     rng = np.random.default_rng(seed)
-    parameters, axis = vector.law_parameters(u), mechanics(vector.named(u))
+    parameters, axis = feasible(law, vector.law_parameters(u)), mechanics(vector.named(u))
     lacking = [imitation(r, law, axis, parameters, np.zeros(r.motion.time.size))[1] for r in prepared]
     errors: list[Array] = []
     for _ in range(draws):
@@ -290,13 +302,45 @@ def prediction_error(
         sharp, blunt = (step([prepare(m, law, inertia, band, s) for m in copies]) for s in SMOOTHING)
         errors.append(2.0 * sharp - blunt)
     found = np.array(errors)
-    bias = np.where(seen, step(blurred) - step(prepared), 0.0)
-    own = np.where(seen, found.mean(axis=0), 0.0)
+    bias = step(blurred) - step(prepared)
+    own = found.mean(axis=0)
     spread = np.cov(found, rowvar=False).reshape(u.size, u.size) * (1.0 + 1.0 / draws)
-    spread[~seen, :] = spread[:, ~seen] = math.nan
-    better = np.clip(u - bias - own, vector.lower, vector.upper)
+    spread = spread + ridge * variance * inverse @ inverse
+    # What is taken off is itself uncertain: half of the filter's error; of the imitations' all, for these follow
+    # the filtered motion and show only part of it, and half of it is taken off.
+    spread = spread + 0.25 * np.outer(bias, bias) + np.outer(own, own)
+    better = np.clip(u - bias - 0.5 * own, vector.lower, vector.upper)
     estimates = estimates_of(vector, better, spread, draws, signed_scale)
     return PredictionError(vector, better, spread, bias, own, estimates, tuple(corrections(u, prepared)))
+
+
+def corrected(
+    records: Sequence[Prepared], law: Law, vector: Vector, mechanics: MakeMechanics, u: Array
+) -> list[Array]:
+    """Torque that the model lacks on every record; not a number where the law refuses the parameters."""
+    parameters = feasible(law, vector.law_parameters(u))
+    if parameters is None:
+        return [np.full(r.drive.time[r.edge : -r.edge : r.stride].shape, math.nan) for r in records]
+    return [r.correction(mechanics(vector.named(u)), parameters) for r in records]
+
+
+def explored(
+    motions: Sequence[Motion], law: Law, vector: Vector, mechanics: MakeMechanics, *, inertia: float, band: float,
+    iterations: int,
+) -> tuple[Array, float]:  # fmt: skip
+    """Coordinates and sum of squares after a few steps from the vector's start: for choosing among starts."""
+    records = [prepare(checked(m, band), law, inertia, band, SMOOTHING[0]) for m in motions]
+
+    def residuals(u: Array) -> Array:
+        return np.concatenate([whitened(FIRST, e) for e in corrected(records, law, vector, mechanics, u)])
+
+    if iterations == 0:
+        r = residuals(vector.start)
+        return vector.start, float(r @ r)
+    found = descend(
+        residuals, vector.start, vector.lower, vector.upper, iterations=iterations, tolerance=1e-3
+    )
+    return found.u, found.cost
 
 
 def checked(motion: Motion, band: float) -> Motion:

@@ -1,0 +1,152 @@
+"""Coverage: do 95 % intervals contain the truth, and is what is called identified well determined?
+
+Simulated records (`coverage_records.py`) are identified by `axis_prediction` as if nothing but their law were known,
+and counted. Parallel over records.
+
+    python benchmarks/coverage.py [--records 200] [--first 0] [--jobs 2] [--short] [--rows FILE]
+
+Every bar is printed with PASS or FAIL: J, Fc, sigma2 identified in at least 95 % of the records; Fs and vs in every
+record with at least 3 levels below 2 vs; 95 % intervals that contain the truth 90 to 99 % of the time, for each
+parameter with at least 100 verdicts; upper/lower at most 2 (positive), half-width at most 5 % of Fc (signed). The
+coverage without the verdict is printed beside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+from coverage_records import make  # noqa: E402
+
+from stickslip.errors import StickslipError  # noqa: E402
+from stickslip.identify.axis_prediction import axis_prediction  # noqa: E402
+from stickslip.identify.axis_trial import trial_of  # noqa: E402
+from stickslip.machines.servo import ServoAxis  # noqa: E402
+
+ALWAYS = ("inertia", "fc", "sigma2")
+STRIBECK = ("fs", "vs")
+SLOW_LEVELS = 3
+ENOUGH = 100
+
+
+@dataclass(frozen=True)
+class Row:
+    """One parameter of one record."""
+
+    seed: int
+    family: str
+    slow_levels: int
+    name: str
+    truth: float
+    value: float
+    lower: float
+    upper: float
+    identified: bool
+    seconds: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether the interval contains the truth."""
+        return self.lower <= self.truth <= self.upper
+
+
+def study(seed: int) -> list[Row]:
+    """Identify the record of a seed; no rows where the package refuses it."""
+    case = make(seed)
+    axis = ServoAxis(drive_side="load")
+    begin = time.process_time()
+    try:
+        found = axis_prediction([trial_of(case.record, axis)], axis, case.model.law)
+    except StickslipError as error:
+        print(f"seed {seed} ({case.family}): {error}", file=sys.stderr)
+        return []
+    seconds = time.process_time() - begin
+    return [
+        Row(seed, case.family, case.slow_levels, e.name, case.truth[e.name], e.value, e.lower, e.upper,
+            e.identified, seconds)
+        for e in found.estimates if e.name in case.truth and "[" not in e.name
+    ]  # fmt: skip
+
+
+def verdict(name: str, good: bool, text: str) -> bool:
+    """Print a bar."""
+    print(f"  {'PASS' if good else 'FAIL'}  {name}: {text}")
+    return good
+
+
+def report(rows: Sequence[Row], records: int) -> bool:
+    """Print the counts; whether every bar is met."""
+    good = True
+    names = list(dict.fromkeys(r.name for r in rows))
+    print(f"\n{records} records, {len({r.seed for r in rows})} identified")
+    print(
+        f"{'parameter':10s} {'cases':>5s} {'called identified':>18s} {'covered of these':>17s} {'covered of all':>15s}"
+    )
+    for name in names:
+        mine = [r for r in rows if r.name == name]
+        called = [r for r in mine if r.identified]
+        within = sum(r.inside for r in called) / max(len(called), 1)
+        print(f"{name:10s} {len(mine):5d} {len(called):10d} = {len(called) / len(mine):4.0%} "
+              f"{within:17.1%} {sum(r.inside for r in mine) / len(mine):15.1%}")  # fmt: skip
+    print("\nbars")
+    for name in ALWAYS:
+        called = sum(r.identified for r in rows if r.name == name)
+        good &= verdict(f"{name} identified", called >= 0.95 * records, f"{called} of {records}")
+    for name in STRIBECK:
+        mine = [r for r in rows if r.name == name and r.slow_levels >= SLOW_LEVELS]
+        called = sum(r.identified for r in mine)
+        good &= verdict(
+            f"{name} identified with {SLOW_LEVELS} slow levels",
+            called == len(mine),
+            f"{called} of {len(mine)}",
+        )
+    for name in names:
+        called = [r for r in rows if r.name == name and r.identified]
+        if len(called) >= ENOUGH:
+            within = sum(r.inside for r in called) / len(called)
+            good &= verdict(f"{name} covered", 0.90 <= within <= 0.99, f"{within:.1%} of {len(called)}")
+    return good
+
+
+def main() -> int:
+    """Run the study; exit code 1 where a bar is missed and the run was a full one."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--records", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first record")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--short", action="store_true", help="20 records")
+    parser.add_argument("--rows", type=Path, help="write every row to this CSV file")
+    options = parser.parse_args()
+    count = 20 if options.short else options.records
+    rows: list[Row] = []
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for found in pool.map(study, range(options.first, options.first + count)):
+            rows += found
+            if options.rows and found:
+                fresh = not options.rows.exists()
+                with options.rows.open("a", newline="", encoding="utf-8") as file:
+                    out = csv.DictWriter(file, asdict(found[0]))
+                    if fresh:
+                        out.writeheader()
+                    out.writerows(asdict(r) for r in found)
+    good = report(rows, count)
+    seconds = {r.seed: r.seconds for r in rows}
+    print(f"\nCPU per record {sum(seconds.values()) / max(len(seconds), 1):.2f} s")
+    return 0 if good or count < ENOUGH else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
