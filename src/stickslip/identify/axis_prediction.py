@@ -33,7 +33,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 SLOWER = (0.02, 0.1, 0.5)
 """Parts of the usual speed at which a Stribeck effect is looked for."""
 WORSE = 1.1
-DESCENTS, STEPS = 4, 8
+DESCENTS, STEPS = 2, 6
 """Starts from which a few steps are taken, and how many."""
 LEVELS = 24
 """Groups of speeds, from slow to fast, in which friction is averaged to start from."""
