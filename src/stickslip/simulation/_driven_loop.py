@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulation._driven_step import BACKLASH, DRIVE_GAIN, Plant, advance
+from stickslip.simulation._driven_step import BACK_EMF, BACKLASH, DRIVE_GAIN, Plant, advance
 
 # ---- the drive's numbers ----------------------------------------------------------------------------------
 (
@@ -101,7 +101,10 @@ def follow(
     state[0], state[1] = c[START_POSITION], c[START_VELOCITY]
     y = state[0]
     rows = signals.shape[0]
+    loss = n[BACK_EMF]
     for k in range(rows):
+        # Without supply the winding is open: no current flows, so nothing is lost to it.
+        n[BACK_EMF] = loss if signals[k, SUPPLY] != 0.0 else 0.0
         out[k, OUT_POSITION], out[k, OUT_VELOCITY] = y, state[1]
         before = min(k, rows - 2)
         dt = signals[before + 1, TIME] - signals[before, TIME]

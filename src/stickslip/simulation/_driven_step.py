@@ -76,7 +76,7 @@ def load_of(n: Any, q: float, v: float, drive: float) -> float:
     if n[LOAD_MOTOR] == 0.0 and n[LOAD_EXTERNAL] == 0.0:
         return 1.0
     motor = drive - n[BACK_EMF] * v
-    return 1.0 + abs(n[LOAD_MOTOR] * motor - n[LOAD_EXTERNAL] * outer(n, q))
+    return 1.0 + abs(n[LOAD_MOTOR] * motor + n[LOAD_EXTERNAL] * outer(n, q))
 
 
 @kernel(inline=True)

@@ -66,9 +66,9 @@ class Mechanics:
     back_emf: float = 0.0
     """Torque lost per velocity in the drive, N·m·s/rad (kt ke / R of a motor under voltage)"""
     load_motor: float = 0.0
-    """Load on the contact per drive torque, 1/(N·m): load = 1 + |load_motor T_drive - load_external T_outer|"""
+    """Load on the contact per drive torque, 1/(N·m): load = 1 + |load_motor T_drive + load_external T_outer|"""
     load_external: float = 0.0
-    """Load on the contact per torque from outside (gravity, offset), 1/(N·m)"""
+    """Load on the contact per torque from outside (gravity, offset), 1/(N·m); it adds to the drive's, which holds it"""
     backlash: float = 0.0
     """Play between the moved mass and where its position is measured, rad"""
     harmonics: Harmonics = field(default_factory=Harmonics)
@@ -123,7 +123,8 @@ class Drive:
     kind : {"held", "linear", "feedback"}
     controller : Loop or None
     supply : array, shape (n,), or None
-        Factor on the drive's output, such as the supply voltage under a duty cycle.
+        Factor on the drive's output, such as the supply voltage under a duty cycle. Where it is 0, the winding is
+        open: no back-EMF either.
     start : (float, float)
         Position and velocity at the begin.
     gain : float

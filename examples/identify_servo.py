@@ -1,0 +1,95 @@
+"""A hobby servo that lifts a pendulum: DC motor, position controller and load-dependent friction from 12 records.
+
+    python examples/identify_servo.py [folder of the records]
+
+The records are those of the public xl330 set (Rhoban, "Better actuator models"): four motions at three gains of the
+firmware. Each is simulated as a whole: the firmware's loop volts = clip(gain kp (goal - position)), the motor
+T = kt/R volts - kt ke/R v, the pendulum m g l sin(q - q0), and friction that grows with the torque in the gearing.
+What is compared is the position alone. Then every gain is left out in turn and predicted from the others.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.axis_output import Extras, OutputError, output_error
+from stickslip.identify.axis_trial import Trial
+from stickslip.machines.servo import Motor, ServoAxis
+from stickslip.plugins import law
+from stickslip.simulation.driven import Loop
+
+SUPPLY = 7.4  # V
+COUNTS, DIVISOR, PWM_LIMIT = 4096.0, 256.0, 885.0
+"""Per turn; of the firmware's position gain (seen on the scope, "Better actuator models"); counts of a full duty."""
+VOLTS_PER_GAIN = SUPPLY * COUNTS / (2.0 * math.pi) / DIVISOR / PWM_LIMIT  # V/rad at kp = 1
+MOTOR = Motor(torque_constant=0.4, resistance=5.0)  # to start from
+MASS, LENGTH = 0.49, 0.1  # kg, m
+GRAVITY = MASS * 9.80665 * LENGTH
+LAWS = ("coulomb",)
+"""Friction grows with the load in each; a Stribeck effect can be tried by adding its name."""
+
+
+def trial(path: Path) -> Trial:
+    """One record: the loop is simulated, the drive is off where torque is disabled."""
+    data = json.loads(path.read_text(encoding="utf-8"))
+    column: dict[str, Any] = {
+        k: np.array([float(e[k]) for e in data["entries"]])
+        for k in ("timestamp", "position", "goal_position", "torque_enable")
+    }
+    loop = Loop(kp=VOLTS_PER_GAIN * data["kp"], limit=SUPPLY, period=1e-3)
+    return Trial(
+        path.stem, column["timestamp"], column["position"], None, "voltage", column["goal_position"], loop,
+        column["torque_enable"],
+    )  # fmt: skip
+
+
+def identify(trials: list[Trial], name: str) -> OutputError:
+    """Motor, controller gain, gravity's angle and friction, from positions alone."""
+    axis = ServoAxis(gravity="pendulum", motor=MOTOR, drive_side="load")
+    start: dict[str, dict[str, float]] = {
+        "coulomb": {"fc": 0.01, "sigma2": 0.005},
+        "stribeck": {"fc": 0.01, "fs": 0.015, "vs": 0.5, "k": 10.0, "sigma2": 0.005},
+    }
+    mechanics = {"inertia": MASS * LENGTH**2 + 0.002, "gravity": GRAVITY, "gravity_angle": 0.0,
+                 "load_motor": 10.0, "load_external": 10.0}  # fmt: skip
+    return output_error(
+        trials, axis, law(name), None, values={**mechanics, **start[name]}, robust=True, extras=Extras(load=True),
+        free=("drive_gain", "back_emf", "controller_gain"), frozen=("gravity", "offset"),
+    )  # fmt: skip
+
+
+def mean_absolute(found: OutputError, trials: list[Trial]) -> float:
+    """Mean over the records of the mean absolute position error, rad."""
+    return float(np.mean([found.held_out([t])["position_mean_absolute"] for t in trials]))
+
+
+def main() -> None:
+    """Fit all records, then leave one gain out at a time."""
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else f"{os.environ.get('STICKSLIP_DATA', '../shared/data')}/xl330_pendulum")
+    trials = [trial(p) for p in sorted(folder.glob("kp*.json"))]
+    gains = sorted({t.name.partition("_")[0] for t in trials})
+    for name in LAWS:
+        begin = time.process_time()
+        found = identify(trials, name)
+        print(f"{name}: mean absolute position error {mean_absolute(found, trials):.4f} rad on {len(trials)} records")
+        for e in found.estimates:
+            print(f"  {e.symbol:10s} {e.value:10.5g} [{e.lower:.4g}, {e.upper:.4g}] {e.unit} {e.verdict}")
+        errors: list[float] = []
+        for gain in gains:
+            others = [t for t in trials if not t.name.startswith(gain + "_")]
+            left_out = [t for t in trials if t.name.startswith(gain + "_")]
+            errors.append(mean_absolute(identify(others, name), left_out))
+        listing = ", ".join(f"{g} {e:.4f}" for g, e in zip(gains, errors, strict=True))
+        print(f"  leaving one gain out: {np.mean(errors):.4f} rad ({listing}); CPU {time.process_time() - begin:.1f} s")
+
+
+if __name__ == "__main__":
+    main()
