@@ -73,7 +73,8 @@ def mean_absolute(found: OutputError, trials: list[Trial]) -> float:
 
 def main() -> None:
     """Fit all records, then leave one gain out at a time."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else f"{os.environ.get('STICKSLIP_DATA', '../shared/data')}/xl330_pendulum")
+    data = os.environ.get("STICKSLIP_DATA", "../shared/data")
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else f"{data}/xl330_pendulum")
     trials = [trial(p) for p in sorted(folder.glob("kp*.json"))]
     gains = sorted({t.name.partition("_")[0] for t in trials})
     for name in LAWS:

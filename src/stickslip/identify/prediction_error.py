@@ -14,6 +14,7 @@ their signs drawn anew (dependent wild bootstrap: Shao 2010; Efron and Tibshiran
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -113,13 +114,15 @@ class Prepared:
     motion: Motion
     course: Course
     drive: Drive
+    position: Array
+    velocity: Array
     low_pass: Any
     stride: int
     edge: int
 
     def correction(self, mechanics: Mechanics, parameters: Any) -> Array:
         """Torque that the model lacks, N·m, in the band, shape (m,)."""
-        from scipy import signal
+        signal: Any = importlib.import_module("scipy.signal")  # it carries no types
 
         raw = self.course.run(mechanics, parameters)[:, 3]
         if not np.all(np.isfinite(raw)):
@@ -129,7 +132,7 @@ class Prepared:
 
 def prepare(motion: Motion, law: Law, inertia: float, band: float, smoothing: float) -> Prepared:
     """Filter position and torque alike, and lay the observer out."""
-    from scipy import signal
+    signal: Any = importlib.import_module("scipy.signal")  # it carries no types
 
     dt = float(np.median(np.diff(motion.time)))
     rate = 1.0 / dt
@@ -149,7 +152,7 @@ def prepare(motion: Motion, law: Law, inertia: float, band: float, smoothing: fl
     )  # fmt: skip
     low_pass = signal.butter(4, band, fs=1.0 / step, output="sos")
     stride = max(1, int(1.0 / (3.0 * band * step)))
-    return Prepared(motion, Course(law, drive), drive, low_pass, stride, max(1, int(EDGE / step)))
+    return Prepared(motion, Course(law, drive), drive, q, v, low_pass, stride, max(1, int(EDGE / step)))
 
 
 def imitation(
@@ -161,8 +164,8 @@ def imitation(
     """
     m = prepared.motion
     pulled = Drive(
-        m.time, m.torque, "held", position=np.interp(m.time, prepared.drive.time, prepared.drive.position),
-        velocity=np.interp(m.time, prepared.drive.time, prepared.drive.velocity), pull=prepared.drive.pull,
+        m.time, m.torque, "held", position=np.interp(m.time, prepared.drive.time, prepared.position),
+        velocity=np.interp(m.time, prepared.drive.time, prepared.velocity), pull=prepared.drive.pull,
         start=prepared.drive.start, max_step=float(m.time[1] - m.time[0]),
     )  # fmt: skip
     out = Course(law, pulled).run(mechanics, parameters)
@@ -181,7 +184,7 @@ def imitation(
 
 def autoregression(e: Sequence[Array], order: int) -> Array:
     """Coefficients (1, a_1 ... a_p) of the filter that whitens the series: Yule and Walker's equations."""
-    from scipy import linalg
+    linalg: Any = importlib.import_module("scipy.linalg")  # it carries no types
 
     r = np.zeros(order + 1)
     for x in e:
@@ -193,14 +196,14 @@ def autoregression(e: Sequence[Array], order: int) -> Array:
 
 def whitened(filter_: Array, e: Array) -> Array:
     """The series behind the filter, without the values that its start spoils."""
-    from scipy import signal
+    signal: Any = importlib.import_module("scipy.signal")  # it carries no types
 
     return signal.lfilter(filter_, [1.0], e)[filter_.size - 1 :]
 
 
 def random_signs(rng: np.random.Generator, n: int, memory: float) -> Array:
     """A smooth Gaussian series of unit variance that forgets within `memory` samples, shape (n,)."""
-    from scipy import ndimage
+    ndimage: Any = importlib.import_module("scipy.ndimage")  # it carries no types
 
     x = ndimage.gaussian_filter1d(rng.standard_normal(n), memory / 2.0, mode="wrap")
     return x / math.sqrt(float(np.mean(x * x)))
