@@ -28,7 +28,6 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 from coverage_records import make  # noqa: E402
-
 from stickslip.errors import StickslipError  # noqa: E402
 from stickslip.identify.axis_prediction import axis_prediction  # noqa: E402
 from stickslip.identify.axis_trial import trial_of  # noqa: E402

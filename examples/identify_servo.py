@@ -80,7 +80,9 @@ def main() -> None:
     for name in LAWS:
         begin = time.process_time()
         found = identify(trials, name)
-        print(f"{name}: mean absolute position error {mean_absolute(found, trials):.4f} rad on {len(trials)} records")
+        print(
+            f"{name}: mean absolute position error {mean_absolute(found, trials):.4f} rad on {len(trials)} records"
+        )
         for e in found.estimates:
             print(f"  {e.symbol:10s} {e.value:10.5g} [{e.lower:.4g}, {e.upper:.4g}] {e.unit} {e.verdict}")
         errors: list[float] = []
@@ -89,7 +91,9 @@ def main() -> None:
             left_out = [t for t in trials if t.name.startswith(gain + "_")]
             errors.append(mean_absolute(identify(others, name), left_out))
         listing = ", ".join(f"{g} {e:.4f}" for g, e in zip(gains, errors, strict=True))
-        print(f"  leaving one gain out: {np.mean(errors):.4f} rad ({listing}); CPU {time.process_time() - begin:.1f} s")
+        print(
+            f"  leaving one gain out: {np.mean(errors):.4f} rad ({listing}); CPU {time.process_time() - begin:.1f} s"
+        )
 
 
 if __name__ == "__main__":

@@ -138,12 +138,12 @@ def prepare(motion: Motion, law: Law, inertia: float, band: float, smoothing: fl
     rate = 1.0 / dt
     corner = min(smoothing * band, 0.08 * smoothing * rate)
     smooth = signal.butter(4, corner, fs=rate, output="sos")
-    q = signal.sosfiltfilt(smooth, motion.position)
-    torque = signal.sosfiltfilt(smooth, motion.torque)
+    q: Array = signal.sosfiltfilt(smooth, motion.position)
+    torque: Array = signal.sosfiltfilt(smooth, motion.torque)
     v = np.gradient(q, dt)
     skip = max(1, int(rate / (STEPS * SMOOTHING[0] / smoothing * corner)))
     t = motion.time[::skip]
-    torque = np.interp(t - motion.delay, motion.time, torque)
+    torque = np.asarray(np.interp(t - motion.delay, motion.time, torque), dtype=np.float64)
     omega = 2.0 * math.pi * band
     q, v, step = q[::skip], v[::skip], skip * dt
     drive = Drive(
@@ -205,7 +205,7 @@ def random_signs(rng: np.random.Generator, n: int, memory: float) -> Array:
     """A smooth Gaussian series of unit variance that forgets within `memory` samples, shape (n,)."""
     ndimage: Any = importlib.import_module("scipy.ndimage")  # it carries no types
 
-    x = ndimage.gaussian_filter1d(rng.standard_normal(n), memory / 2.0, mode="wrap")
+    x: Array = ndimage.gaussian_filter1d(rng.standard_normal(n), memory / 2.0, mode="wrap")
     return x / math.sqrt(float(np.mean(x * x)))
 
 

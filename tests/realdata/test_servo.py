@@ -1,0 +1,33 @@
+"""The xl330 servo: one load-dependent law, DC motor and firmware loop against measured positions."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DATA = Path(os.environ.get("STICKSLIP_DATA", ROOT / "../shared/data")) / "xl330_pendulum"
+
+pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no data at {DATA}")
+
+
+@pytest.fixture(scope="module")
+def example() -> Any:
+    spec = importlib.util.spec_from_file_location("identify_servo", ROOT / "examples" / "identify_servo.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+def test_position_error_with_one_law_for_all_records(example: Any) -> None:
+    trials = [example.trial(p) for p in sorted(DATA.glob("kp*.json"))]
+    assert len(trials) == 12
+    found = example.identify(trials, "coulomb")
+    assert example.mean_absolute(found, trials) <= 0.046
