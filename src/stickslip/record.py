@@ -87,7 +87,7 @@ class Record:
                 return cls(data["time"], channels, header["units"], header["meta"])
         except FileNotFoundError:
             raise InputError(f"no record at {path}; check the path") from None
-        except (ValueError, KeyError, OSError) as error:
+        except Exception as error:  # NumPy, zip, zlib and JSON each raise their own on a damaged file
             raise InputError(f"{path} is not a record of this package ({error})") from None
 
     def to_pandas(self) -> pandas.DataFrame:

@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from stickslip.errors import InputError
 from stickslip.readers import profiles
 from stickslip.readers._choose import Choice, choose, parse_mapping
@@ -18,7 +20,18 @@ from stickslip.record import Record
 
 __all__ = ["FORMATS", "formats", "open_table", "read", "record_of"]
 
-FORMATS = ("record_file", "mat", "hdf5", "parquet", "numpy_arrays", "json_samples", "csv_text")
+FORMATS = (
+    "record_file",
+    "mat",
+    "hdf5",
+    "parquet",
+    "numpy_arrays",
+    "mdf",
+    "tdms",
+    "rosbag",
+    "json_samples",
+    "csv_text",
+)
 """One file a format, asked in this order; text is last, since anything may be text."""
 
 
@@ -45,7 +58,8 @@ def open_table(path: str | os.PathLike[str]) -> Table:
         if found is None:
             titles = ", ".join(f.title for f in known)
             raise InputError(f"{source} is in no format that is known; formats are {titles}")
-        table = found.read(source)
+        with np.errstate(all="ignore"):
+            table = found.read(source)
     except FileNotFoundError:
         raise InputError(f"no file {source}; check the path") from None
     except (OSError, MemoryError) as error:
@@ -130,7 +144,9 @@ def record_of(
     choices = [_from_profile(c) if c.role in kept and c.source == "map" else c for c in choices]
     settings = profiles.merged([], drive or Drive(), sample_time, profile).drive
     period = sample_time if sample_time is not None or profile is None else profile.sample_time
-    return convert(table, choices, settings, period, [*table.findings, *findings])
+    # Damaged files hold numbers that overflow: they are infinite then, and the doctor finds them.
+    with np.errstate(all="ignore"):
+        return convert(table, choices, settings, period, [*table.findings, *findings])
 
 
 def with_source(record: Record, path: Path) -> Record:

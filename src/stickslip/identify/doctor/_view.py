@@ -13,7 +13,7 @@ import numpy as np
 
 from stickslip.record import Record
 
-__all__ = ["Array", "Column", "Smooth", "View", "row", "step_of"]
+__all__ = ["Array", "Column", "Smooth", "View", "is_number", "row", "step_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
@@ -61,6 +61,11 @@ class Smooth:
         return np.asarray(np.abs(self.velocity) > 0.05 * self.fast)
 
 
+def is_number(values: Array) -> Mask:
+    """Where values are finite, and not so large that their square overflows; mask."""
+    return np.asarray(np.abs(np.nan_to_num(values, nan=np.inf)) < 1e100)
+
+
 class View:
     """A record as the checks see it."""
 
@@ -102,10 +107,10 @@ class View:
     def usable(self) -> Any:
         """Rows whose time ascends and whose main channels are numbers, mask."""
         time = self.record.time
-        good = np.isfinite(time)
+        good = is_number(time)
         for channel in MAIN:
             if self.has(channel):
-                good &= np.isfinite(self.record[channel])
+                good &= is_number(self.record[channel])
         if self.has("event"):
             good &= ~(self.record["event"] > 0.5)
         safe = np.where(good, time, -math.inf)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import Array, View, row, step_of
+from stickslip.identify.doctor._view import Array, View, is_number, row, step_of
 
 __all__ = ["missing", "quantised", "saturated", "wrapped"]
 
@@ -22,7 +22,7 @@ def missing(view: View) -> Iterator[Finding]:
     """Values that are no numbers."""
     for channel in ("time", *view.record.channels):
         values = view.record[channel]
-        bad = np.flatnonzero(~np.isfinite(values))
+        bad = np.flatnonzero(~is_number(values))
         if not bad.size:
             continue
         share = bad.size / values.size

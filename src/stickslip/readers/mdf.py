@@ -1,0 +1,42 @@
+"""MDF 3 and 4, measurement and calibration tools' format, by asammdf (LGPL-3.0+, an extra: `stickslip[mdf]`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.readers._extra import needed
+from stickslip.readers._table import Column, Format, Table
+
+__all__ = ["FORMAT"]
+
+
+def recognise(head: bytes, path: Path) -> bool:
+    """The identification block."""
+    return head.startswith((b"MDF     ", b"UnFinMF "))
+
+
+def read(path: Path) -> Table:
+    """Every channel of numbers with its unit and the clock of its group."""
+    library = needed("asammdf", "mdf", "MDF files")
+    columns: list[Column] = []
+    try:
+        with library.MDF(str(path)) as file:
+            for signal in file.iter_channels():
+                values: Any = np.asarray(signal.samples)
+                if values.dtype.kind in "biuf" and values.ndim == 1 and values.size:
+                    clock = np.asarray(signal.timestamps, dtype=np.float64)
+                    columns.append(
+                        Column(str(signal.name), values.astype(np.float64), str(signal.unit or ""), clock)
+                    )
+    except Exception as error:  # asammdf raises several kinds on a damaged file
+        raise InputError(
+            f"{path} cannot be read as MDF ({type(error).__name__}: {error}); export it again"
+        ) from None
+    return Table("mdf", tuple(columns))
+
+
+FORMAT = Format("mdf", "MDF 3 and 4", (".mf4", ".mdf", ".dat"), recognise, read, extra="mdf")

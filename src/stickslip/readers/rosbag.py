@@ -1,0 +1,89 @@
+"""ROS bags: ROS 1 files, ROS 2 folders and single MCAP files, by rosbags (Apache-2.0, an extra: `stickslip[rosbag]`).
+
+Every numeric field of every topic becomes a column named TOPIC.FIELD; the elements of an array with names beside them,
+as in sensor_msgs/JointState, are named after them. Times are those of the message's header, else of its arrival.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.readers._extra import needed
+from stickslip.readers._table import Column, Format, Table
+
+__all__ = ["FORMAT"]
+
+MAX_ELEMENTS = 64
+
+
+def recognise(head: bytes, path: Path) -> bool:
+    """A folder with metadata.yaml, or the signature of ROS 1 or MCAP."""
+    return (path.is_dir() and (path / "metadata.yaml").is_file()) or head.startswith(
+        (b"#ROSBAG V", b"\x89MCAP0\r\n")
+    )
+
+
+def read(path: Path) -> Table:
+    """The numeric fields of every topic, with their clock."""
+    library = needed("rosbags.highlevel", "rosbag", "ROS bags")
+    stores = needed("rosbags.typesys", "rosbag", "ROS bags")
+    samples: dict[str, tuple[list[float], list[float]]] = {}
+    try:
+        store = stores.get_typestore(stores.Stores.LATEST)
+        with library.AnyReader([path], default_typestore=store) as reader:
+            for connection, stamp, raw in reader.messages():
+                message = reader.deserialize(raw, connection.msgtype)
+                time = _time(message, stamp)
+                for name, value in _fields(message, connection.topic).items():
+                    times, values = samples.setdefault(name, ([], []))
+                    times.append(time)
+                    values.append(value)
+    except Exception as error:  # rosbags raises several kinds on a damaged bag
+        raise InputError(
+            f"{path} cannot be read as a ROS bag ({type(error).__name__}: {error}); check that it is complete"
+        ) from None
+    columns = [
+        Column(name, np.array(values), "", np.array(times)) for name, (times, values) in samples.items()
+    ]
+    return Table("rosbag", tuple(columns))
+
+
+def _time(message: Any, stamp: int) -> float:
+    """The header's time in s, where it is set."""
+    header = getattr(getattr(message, "header", None), "stamp", None)
+    told = float(header.sec) + 1e-9 * float(header.nanosec) if header is not None else 0.0
+    return told if told > 0.0 else 1e-9 * stamp
+
+
+def _fields(message: Any, name: str, depth: int = 0) -> dict[str, float]:
+    """The numbers in a message by path."""
+    out: dict[str, float] = {}
+    fields: dict[str, Any] = getattr(message, "__dataclass_fields__", {})
+    labels: Any = getattr(message, "name", ())
+    for key in fields:
+        if key in ("header", "__msgtype__") or depth > 4:
+            continue
+        value: Any = getattr(message, key)
+        if isinstance(value, (bool, int, float, np.number)):
+            out[f"{name}.{key}"] = float(cast("Any", value))
+        elif isinstance(value, np.ndarray):
+            out |= _elements(cast("np.ndarray[Any, Any]", value), f"{name}.{key}", labels)
+        else:
+            out |= _fields(value, f"{name}.{key}", depth + 1)
+    return out
+
+
+def _elements(values: np.ndarray[Any, Any], name: str, labels: Any) -> dict[str, float]:
+    """The numbers of a short array, by label where there is one for each, else by index."""
+    if not 0 < values.size <= MAX_ELEMENTS or values.dtype.kind not in "biuf":
+        return {}
+    named = not isinstance(labels, str) and len(labels) == values.size
+    numbers = values.ravel().astype(float).tolist()
+    return {f"{name}.{labels[i]}" if named else f"{name}[{i}]": number for i, number in enumerate(numbers)}
+
+
+FORMAT = Format("rosbag", "ROS bag, MCAP", (".bag", ".mcap", ".db3"), recognise, read, extra="rosbag")

@@ -1,0 +1,52 @@
+"""TDMS, LabVIEW's format, by npTDMS (LGPL-3.0, an extra: `stickslip[tdms]`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.readers._extra import needed
+from stickslip.readers._table import Column, Format, Table
+
+__all__ = ["FORMAT"]
+
+
+def recognise(head: bytes, path: Path) -> bool:
+    """The tag of a segment."""
+    return head.startswith(b"TDSm")
+
+
+def read(path: Path) -> Table:
+    """Every channel of numbers, with its unit and, where it is a waveform, its clock."""
+    library = needed("nptdms", "tdms", "TDMS files")
+    columns: list[Column] = []
+    try:
+        for group in library.TdmsFile.read(path).groups():
+            for channel in group.channels():
+                values: Any = np.asarray(channel[:])
+                if values.dtype.kind in "biuf" and values.size:
+                    unit = str(channel.properties.get("unit_string", ""))
+                    columns.append(
+                        Column(
+                            str(channel.name), values.astype(np.float64), unit, _clock(channel, values.size)
+                        )
+                    )
+    except Exception as error:  # npTDMS raises several kinds on a damaged file
+        raise InputError(
+            f"{path} cannot be read as TDMS ({type(error).__name__}: {error}); export it again"
+        ) from None
+    return Table("tdms", tuple(columns))
+
+
+def _clock(channel: Any, count: int) -> Any:
+    """The times of a waveform in s from its start; None for plain data."""
+    step = channel.properties.get("wf_increment")
+    if step is None or not float(step) > 0.0:
+        return None
+    return float(channel.properties.get("wf_start_offset", 0.0)) + np.arange(count) * float(step)
+
+
+FORMAT = Format("tdms", "TDMS (LabVIEW)", (".tdms",), recognise, read, extra="tdms")
