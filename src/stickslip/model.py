@@ -83,6 +83,11 @@ class Model:
     def scaled(self, **factors: float) -> Model:
         """This model with some parameters multiplied, ``model.scaled(fs=1.1, fc=1.1)``.
 
+        Parameters
+        ----------
+        **factors : float
+            By the names of the parameters; one factor multiplies every element of a list.
+
         Raises
         ------
         ParameterError
@@ -142,8 +147,15 @@ class Reference:
     def table(
         cls, time: Sequence[float], position: Sequence[float], velocity: Sequence[float] | None = None
     ) -> Reference:
-        """A reference through points (s, rad); where no velocities (rad/s) are given, of a
-        cubic that does not overshoot the points and starts and ends at rest."""
+        """A reference through points.
+
+        Parameters
+        ----------
+        time, position : sequence of float, shape (n,)
+            s, ascending; rad.
+        velocity : sequence of float, shape (n,), optional
+            rad/s; if left out, of a cubic that does not overshoot the points and starts and ends at rest.
+        """
         if velocity is None:
             velocity = monotone_velocities(time, position)
         return cls("table", **{k: [float(x) for x in v] for k, v in
@@ -154,7 +166,7 @@ class Reference:
         return sorted(t for t in self.kind.breaks(self.parameters, duration) if 0.0 < t < duration)
 
     def sample(self, time: Sequence[float] | np.ndarray[Any, Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Position (rad), velocity (rad/s) and acceleration (rad/s²) at the times, shape (n, 3)."""
+        """Position (rad), velocity (rad/s) and acceleration (rad/s²), shape (n, 3), at each `time` (s)."""
         from types import SimpleNamespace
 
         out = SimpleNamespace(position=0.0, velocity=0.0, acceleration=0.0)

@@ -73,7 +73,7 @@ class Record:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Record:
-        """Read a record that `save` wrote.
+        """Read the record that `save` wrote to `path`.
 
         Raises
         ------

@@ -61,7 +61,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Par:
-    """What a number means: its unit, symbol, meaning and bounds.
+    """What a number means: its unit, symbol, meaning and bounds (``lower``, ``upper``, included).
 
     ``positive`` makes the lower bound 0, excluded. A parameter without ``default`` must be given. ``shares`` says
     that the values of all elements add up to 1, ``directional`` that the two directions of motion may have
@@ -101,7 +101,7 @@ class Par:
 
 
 class Mode(Par):
-    """A state that only switches: 0 sticks, +1 or -1 slips in that direction."""
+    """A state that only switches: 0 sticks, +1 or -1 slips in that direction. Its arguments are those of `Par`."""
 
 
 class Memory(Mode):
@@ -363,11 +363,17 @@ class Law(Described):
 
     Attributes
     ----------
-    name : str
-        The name by which people and files call it.
+    name, title : str
+        The name by which people and files call it; its name in words.
     Params : type
         A NamedTuple with ``Annotated[float, Par(...)]`` or, for a value per element,
         ``Annotated[tuple[float, ...], Par(...)]`` fields. Fields of the chosen options are added to them.
+    State : type or None
+        As ``Params``, for the internal state.
+    step, rate, guards, switch, steady, holding, check, modes, stored : callable or None
+        Its functions; only ``step`` must be there.
+    variants : dict
+        Laws that `having` has made of it; not for callers.
     equation, source : str
         Its equation in LaTeX; thesis equation numbers and keys of ``references.bib``.
     example : mapping
@@ -470,6 +476,11 @@ class Law(Described):
     def having(self, **names: str) -> Law:
         """Return this law with other options, ``law.having(slip_rule="literal")``.
 
+        Parameters
+        ----------
+        **names : str
+            Options by the names of the choices.
+
         Raises
         ------
         UnknownName
@@ -518,7 +529,7 @@ class Law(Described):
         return sum(n if f.per_element else 1 for f in self.state_fields)
 
     def pack_state(self, z: types.SimpleNamespace) -> list[float]:
-        """Return a state as the flat list that compiled functions read."""
+        """Return a state `z` as the flat list that compiled functions read."""
         flat = [getattr(z, f.name) for f in self.state_fields if not f.per_element]
         for f in self.state_fields:
             if f.per_element:

@@ -30,17 +30,17 @@ class Gains(NamedTuple):
 
 
 def pr(kp: float, kd: float) -> Gains:
-    """Proportional with rate feedback; thesis eq. 3.4."""
+    """Proportional with rate feedback: kp (N·m/rad) on the error, kd (N·m·s/rad) on the velocity; thesis eq. 3.4."""
     return Gains(kp=kp, kd=kd)
 
 
 def pd(kp: float, kd: float) -> Gains:
-    """Proportional with derivative; thesis eq. 3.5."""
+    """Proportional with derivative: kp (N·m/rad) and kd (N·m·s/rad) on the error; thesis eq. 3.5."""
     return Gains(kp=kp, kd=kd, kr=kd)
 
 
 def pid(kp: float, ki: float, kd: float) -> Gains:
-    """Proportional, integral and derivative; thesis eq. 3.11."""
+    """Proportional, integral, derivative: kp (N·m/rad), ki (N·m/(rad·s)), kd (N·m·s/rad); thesis eq. 3.11."""
     return Gains(kp=kp, ki=ki, kd=kd, kr=kd)
 
 

@@ -149,6 +149,12 @@ class Study:
 def load(study: str | Path, moved: Mapping[str, Path] | None = None) -> Study:
     """Read a study: the path of a TOML file, or the name of one that ships with the package ("thesis").
 
+    Parameters
+    ----------
+    study : str or Path
+    moved : mapping of str to Path, optional
+        Where files that the study refers to lie now, by the path as written.
+
     Raises
     ------
     ConfigError
@@ -195,7 +201,7 @@ def _without_doubles(
 
 
 def load_run(path: Path) -> PlannedRun:
-    """Read one run from a TOML file: [axis], [friction], [reference], [controller], perhaps [laws.*].
+    """Read one run from the TOML file at `path`: [axis], [friction], [reference], [controller], perhaps [laws.*].
 
     Raises
     ------

@@ -40,7 +40,7 @@ class Executed:
 
 
 def execute(planned: PlannedRun) -> Executed:
-    """Simulate one run that `PlannedRun.check` passes; one that ends early gives what was computed until then."""
+    """Simulate one `planned` run that its `check` passes; one that ends early gives what was computed until then."""
     n = planned.numerics
     start, failure = time.thread_time(), ""
     try:

@@ -16,6 +16,15 @@ class Feedback(Compensator):
 
     In continuous time the sign of the velocity is the exact limit: it changes where v passes through zero, and
     a feedback that cancels friction repels from there. With a sample time it is what the samples say.
+
+    Attributes
+    ----------
+    model : Model
+        The law and its parameters.
+    gain : float
+        Factor on the compensating torque; 1 cancels the whole model.
+    filter_hz : float or None
+        Corner of a second-order Butterworth low-pass on the velocity, Hz.
     """
 
     name: ClassVar[str] = "feedback"

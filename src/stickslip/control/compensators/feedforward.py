@@ -12,7 +12,17 @@ __all__ = ["Feedforward"]
 
 @dataclass(frozen=True)
 class Feedforward(Compensator):
-    """T_hat = gain * law(reference velocity). Its state depends on time alone."""
+    """T_hat = gain * law(reference velocity). Its state depends on time alone.
+
+    Attributes
+    ----------
+    model : Model
+        The law and its parameters.
+    gain : float
+        Factor on the compensating torque; 1 cancels the whole model.
+    filter_hz : float or None
+        Corner of a second-order Butterworth low-pass on the velocity, Hz.
+    """
 
     name: ClassVar[str] = "feedforward"
     prefix: ClassVar[str] = "FF"

@@ -1,0 +1,110 @@
+"""The documentation's sources: public parameters are documented, links are well formed, pages are there."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import stickslip
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+sys.path.insert(0, str(DOCS / "_ext"))
+
+from api_pages import FURTHER  # noqa: E402
+from sessions import blocks  # noqa: E402
+
+SHOWN = [("stickslip", name) for name in stickslip.__all__] + [
+    (module, name) for module, names in FURTHER.items() for name in names
+]
+PAGES = sorted(p for p in DOCS.rglob("*.md") if "_build" not in p.parts and "generated" not in p.parts)
+
+
+def public(module: str, name: str) -> Any:
+    return getattr(importlib.import_module(module), name)
+
+
+def callables(module: str, name: str) -> list[tuple[str, Any, str]]:
+    """A function, or a class and its public methods, each with the docstring that has to name its parameters."""
+    found = public(module, name)
+    if not inspect.isclass(found):
+        return [(name, found, inspect.getdoc(found) or "")]
+    # "Its arguments are those of `Par`."
+    named = [b for b in found.__mro__[1:] if f"`{b.__name__}`" in (found.__doc__ or "")]
+    said = "\n".join(inspect.getdoc(c) or "" for c in (found, *named))
+    out = [] if issubclass(found, Exception) else [(name, found, said)]
+    for key, member in vars(found).items():
+        member = getattr(member, "__func__", member)
+        if (
+            not key.startswith("_")
+            and inspect.isfunction(member)
+            and member.__module__.startswith("stickslip")
+        ):
+            out.append((f"{name}.{key}", member, (inspect.getdoc(member) or "") + said))
+    return out
+
+
+@pytest.mark.parametrize(("module", "name"), SHOWN, ids=lambda x: x)
+def test_every_public_parameter_is_named_in_its_docstring(module: str, name: str) -> None:
+    for label, found, said in callables(module, name):
+        assert said, f"{label} has no docstring"
+        annotated = " ".join(
+            f"{n} {h!r}" for n, h in getattr(found, "__annotations__", {}).items() if "Par(" in repr(h)
+        )
+        for parameter in inspect.signature(found).parameters.values():
+            if parameter.name in ("self", "cls") or parameter.name in annotated:
+                continue
+            assert re.search(rf"\b{re.escape(parameter.name)}\b", said), f"{label}: {parameter.name}"
+
+
+def test_the_test_above_can_fail() -> None:
+    def undocumented(velocity: float) -> None:
+        """Do something."""
+
+    assert not re.search(r"\bvelocity\b", inspect.getdoc(undocumented) or "")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(DOCS).as_posix())
+def test_links_are_well_formed_and_those_inside_exist(page: Path) -> None:
+    """What leads to a generated page is checked when the documentation is built (-n -W)."""
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if "://" in target:
+            assert re.fullmatch(r"https://[\w.-]+\.[a-z]{2,}(/[\w./#~%+=&?-]*)?", target), target
+        elif "generated/" not in target and not target.startswith("#"):
+            assert (page.parent / target.partition("#")[0]).exists(), f"{page.name}: {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(DOCS).as_posix())
+def test_pages_have_an_example_or_a_picture(page: Path) -> None:
+    """But for lists of pages, decisions and the bibliography."""
+    text = page.read_text(encoding="utf-8")
+    listing = (
+        "toctree" in text or "{include}" in text or "decisions" in page.parts or "bibliography" in page.stem
+    )
+    assert listing or page.stem == "metrics" or "![" in text or any(blocks(text))
+
+
+@pytest.mark.slow
+def test_the_tutorial_does_what_it_says(tmp_path: Path) -> None:
+    """As it is run when the documentation is built, in a folder of its own."""
+    command = [sys.executable, str(DOCS / "_ext" / "sessions.py"), str(DOCS / "tutorial.md"), str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in tmp_path.iterdir()} >= {"alone.svg", "helped.svg", "lugre.png", "helped.npz"}
+
+
+def test_a_page_that_shows_what_is_not_printed_is_refused(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("```python\nprint(1 + 1)\n```\n\n```text\n3\n```\n")
+    command = [sys.executable, str(DOCS / "_ext" / "sessions.py"), str(page), str(tmp_path / "run")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "prints\n2" in done.stderr
