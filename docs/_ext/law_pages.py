@@ -5,13 +5,19 @@ from __future__ import annotations
 import dataclasses
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from pages import GENERATED, ROOT, latex, number, table, write
 
 from stickslip import plugins
-from stickslip.model import Model
+from stickslip.control.controller import Controller
+from stickslip.control.linear import place
+from stickslip.errors import InputError
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model, Reference
 from stickslip.report.law_pictures import draw_law
+from stickslip.simulation.closed_loop import INTEGRATORS, integrator_for, prepare
 from stickslip.spec import Field, Law, fields_of
 
 FOLDER = GENERATED / "laws"
@@ -144,16 +150,24 @@ def declarations(law: Law) -> str:
         ("[passive](../../explanation/passivity.md)", passivity(law)),
         ("odd: the mirrored motion gives the mirrored torque", "yes" if law.odd else "no"),
         ("rate-independent: the torque depends on the path, not on its speed", yes(law.rate_independent)),
-        (
-            "integrators",
-            ", ".join(n for n, has in (("exact", law.modes), ("adaptive", law.rate), ("fixed", True)) if has),
-        ),
+        ("[integrators](../../howto/integrator.md) that take it as plant", ", ".join(integrators(law))),
     ]
     for f in dataclasses.fields(law):
         value = getattr(law, f.name)
         if f.name not in KNOWN and isinstance(value, (bool, str)):
             rows.append((f.name.replace("_", " "), yes(value) if isinstance(value, bool) else value))
     return table(["property", "value"], rows)
+
+
+def integrators(law: Law) -> Iterator[str]:
+    """Those that can run an axis with this friction."""
+    axis = RigidAxis(1e-3, Model(law, **law.example))
+    case = prepare(axis, Controller(place("PD", 1e-3, 10.0, 1.0)), Reference("ramp", velocity=1.0), 1.0)
+    for name in INTEGRATORS:
+        try:
+            yield integrator_for(case, name)[0]
+        except InputError:
+            continue
 
 
 def yes(value: bool) -> str:
