@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from pages import GENERATED, ROOT, write
+from pages import GENERATED, ROOT, prose, write
 
 FOLDER = GENERATED / "phenomena"
 SCRIPTS = ROOT / "examples" / "phenomena"
@@ -47,7 +47,7 @@ def section(script: Path) -> str:
     """Title and words are the script's docstring."""
     said = ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or script.stem
     title, _, words = said.partition("\n")
-    words = words.strip().replace("*", r"\*").replace("_", r"\_").replace("<", r"\<")
+    words = prose(words.strip())
     path = Path("../../../examples/phenomena") / script.name
     return f"""## {title.rstrip(".")}
 

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from pages import GENERATED, ROOT, latex, number, table, write
+from pages import GENERATED, ROOT, latex, number, prose, table, write
 
 from stickslip import plugins
 from stickslip.control.controller import Controller
@@ -81,7 +81,7 @@ def page(law: Law) -> str:
 def docstring(law: Law) -> str:
     """What the law's file says of itself, as Markdown."""
     text = sys.modules[law.Params.__module__].__doc__ or ""
-    return text.strip().replace("*", r"\*").replace("|", r"\|").replace("_", r"\_").replace("<", r"\<")
+    return prose(text.strip())
 
 
 def parameters(fields: tuple[Field, ...]) -> str:

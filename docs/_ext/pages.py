@@ -59,6 +59,13 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |" for row in lines)
 
 
+def prose(text: str) -> str:
+    """A docstring as Markdown: letters that mean something there are escaped, but for code between backticks."""
+    parts = text.split("`")
+    parts[::2] = [re.sub(r"([*_|<])", r"\\\1", part) for part in parts[::2]]
+    return "`".join(parts)
+
+
 def number(value: float) -> str:
     """A number as people write it."""
     return f"{value:.10g}"

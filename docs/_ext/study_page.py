@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 
-from pages import GENERATED, table, write
+from pages import GENERATED, prose, table, write
 
 from stickslip.report import draw
 from stickslip.study.result import StudyResult
@@ -43,9 +43,10 @@ Shown here: the nominal friction under the signed rule, run when this documentat
 {table}
 
 The error at rest is that of the second half of the run, when the step is over. Read three things from the table. PD
-alone does not move the axis. Feedforward of any law makes the errors along the sinusoids ten times smaller, whichever
-law it is; at rest it does nothing. Feedback is better by another order of magnitude where its law is the plant's (GMS),
-and hunts around the target with a law that is not: see the reversals, and
+alone hardly moves the axis. Feedforward makes the errors along the sinusoids ten and thirty times smaller, whichever
+law it is; at the step it helps only while the reference moves. Feedback is better by another factor of six with any
+law, and of sixty with GMS, which is the plant's kind; only that one comes to rest. The others hunt around the
+target: see the reversals, and
 [why](../../explanation/sign_in_feedback.md).
 
 ## Figures
@@ -59,7 +60,7 @@ def make() -> None:
     for figure in draw(result):
         if figure.number in FIGURES:
             picture = os.path.relpath(figure.stem.with_name(figure.stem.name + ".svg"), FOLDER)
-            caption = figure.caption.replace("*", r"\*").replace("_", r"\_")
+            caption = prose(figure.caption)
             parts.append(
                 f"```{{figure}} {picture}\n:alt: {figure.title}\n\n**{figure.title}.** {caption}\n```"
             )
