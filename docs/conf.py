@@ -52,5 +52,5 @@ numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
 bibtex_bibfiles = ["../src/stickslip/references.bib"]
-bibtex_default_style = "alpha"
+bibtex_default_style = "plain"
 bibtex_reference_style = "author_year"

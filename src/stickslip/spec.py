@@ -370,7 +370,7 @@ class Law(Described):
         ``Annotated[tuple[float, ...], Par(...)]`` fields. Fields of the chosen options are added to them.
     State : type or None
         As ``Params``, for the internal state.
-    step, rate, guards, switch, steady, holding, check, modes, stored : callable or None
+    step, rate, guards, switch, steady, holding, check, modes, stored, rest_band : callable or None
         Its functions; only ``step`` must be there.
     variants : dict
         Laws that `having` has made of it; not for callers.
