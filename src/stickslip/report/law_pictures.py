@@ -181,9 +181,9 @@ def draw_law(model: Model, *targets: Path) -> None:
     word = "torque" if torque == "N·m" else "force"
     chosen = ", ".join(f"{name} {option}" for name, option in model.law.chosen.items())
     panels = [
-        _sine_panel(slow_sine(model, scales), f"{word} ({torque})", f"{length}/s"),
-        _presliding_panel(*presliding(model, scales), f"{word} ({torque})", length),
-        _steps_panel(model, velocity_steps(model, scales), f"{word} ({torque})", f"{length}/s"),
+        _sine_panel(slow_sine(model, scales), (word, torque), f"{length}/s"),
+        _presliding_panel(*presliding(model, scales), (word, torque), length),
+        _steps_panel(model, velocity_steps(model, scales), (word, torque), f"{length}/s"),
     ]
     title = model.law.title + (f", {chosen}" if chosen else "")
     try:
@@ -204,7 +204,15 @@ def _described(model: Model) -> str:
     return ", ".join(words)
 
 
-def _sine_panel(answer: Response, label: str, unit: str) -> Panel:
+def _readable(answer: Response, label: tuple[str, str]) -> tuple[Response, float, str]:
+    """The answer with its torque in a unit that reads well, the factor, and the axis's label."""
+    factor, unit = scaled(float(np.max(np.abs(answer.torque))), label[1])
+    readable = Response(answer.time, answer.position, answer.velocity, factor * answer.torque)
+    return readable, factor, f"{label[0]} ({unit})"
+
+
+def _sine_panel(answer: Response, label: tuple[str, str], unit: str) -> Panel:
+    answer, _, y_label = _readable(answer, label)
     factor, unit = scaled(float(np.max(np.abs(answer.velocity))), unit)
     curves = [
         Curve(factor * part.velocity, part.torque, name, style)
@@ -213,7 +221,7 @@ def _sine_panel(answer: Response, label: str, unit: str) -> Panel:
             ("speed falling", FALLING, _where(answer, ~_gaining(answer))),
         )
     ]
-    return Panel(curves, label, f"velocity ({unit})", note="slow sine", legend="lower right")
+    return Panel(curves, y_label, f"velocity ({unit})", note="slow sine", legend="lower right")
 
 
 def _gaining(answer: Response) -> Any:
@@ -226,30 +234,33 @@ def _where(answer: Response, chosen: Any) -> Response:
     return Response(answer.time, answer.position, answer.velocity, np.where(wide, answer.torque, np.nan))
 
 
-def _presliding_panel(outer: Response, inner: Response, label: str, unit: str) -> Panel:
+def _presliding_panel(outer: Response, inner: Response, label: tuple[str, str], unit: str) -> Panel:
+    outer, times, y_label = _readable(outer, label)
     reach = float(np.max(np.abs(outer.position)))
     factor, unit = scaled(reach, unit)
     limits = (-1.1 * factor * reach, 1.9 * factor * reach)  # room for the names
     curves = [
         Curve(factor * outer.position, outer.torque, "outer loop", OUTER),
-        Curve(factor * inner.position, inner.torque, "inner loop", INNER),
+        Curve(factor * inner.position, times * inner.torque, "inner loop", INNER),
     ]
     note = "pre-sliding: slow motion, reversed inside a larger one"
-    return Panel(curves, label, f"position ({unit})", limits, note=note, legend="lower right")
+    return Panel(curves, y_label, f"position ({unit})", limits, note=note, legend="lower right")
 
 
 def _steps_panel(
-    model: Model, answered: tuple[Response, tuple[float, float, float]], label: str, unit: str
+    model: Model, answered: tuple[Response, tuple[float, float, float]], label: tuple[str, str], unit: str
 ) -> Panel:
-    answer, levels = answered
+    (answer, times, y_label), levels = _readable(answered[0], label), answered[1]
     factor, second = scaled(float(answer.time[-1]), "s")
-    curves = [Curve(factor * answer.time, answer.torque, "torque" if "torque" in label else "force", TORQUE)]
+    curves = [Curve(factor * answer.time, answer.torque, label[0], TORQUE)]
     if model.law.steady:
         steady = np.array([model.law.steady(v, model.parameters) for v in levels])
-        curves.append(Curve(factor * answer.time, np.repeat(steady, 800), "at constant velocity", STEADY))
+        curves.append(
+            Curve(factor * answer.time, times * np.repeat(steady, 800), "at constant velocity", STEADY)
+        )
     each, unit = scaled(levels[1], unit)
     words = ", ".join(f"{each * v:.3g}" for v in levels)
     note = f"from rest, steps in velocity: {words} {unit}"
     low, high = float(np.min(answer.torque)), float(np.max(answer.torque))
     limits = (min(0.0, 1.1 * low), max(0.0, 1.1 * high) or 1.0)
-    return Panel(curves, label, f"time ({second})", None, limits, note, legend="lower right")
+    return Panel(curves, y_label, f"time ({second})", None, limits, note, legend="lower right")
