@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.laws._curve import CURVE
+from stickslip.laws._curve import CURVE, extremes
 from stickslip.laws._curve import stribeck as sliding
 from stickslip.laws._curve import stribeck_scale as sliding_scale
 from stickslip.laws._stick import SLIP_RULE
@@ -62,6 +62,8 @@ def guards(v: float, z: Any, p: Any, u: Any, g: Any) -> None:
     for i in range(len(p.k)):
         if z.mode[i] == 0.0:
             g.mode[i] = load_of(direction, z.force[i]) / p.alpha[i] - s
+            if v == 0.0:
+                g.mode[i] = min(g.mode[i], -1e-300)
         else:
             g.mode[i] = -z.mode[i] * v
 
@@ -98,6 +100,8 @@ def advance(v0: float, v1: float, dt: float, z: Any, p: Any) -> None:
     it, and relaxes along the curve for the rest of the step.
     """
     vm = 0.5 * (v0 + v1)
+    if vm == 0.0:
+        return  # at rest every element holds, even one above a curve that rises with the velocity
     direction = 1.0
     if vm < 0.0:
         direction = -1.0
@@ -171,6 +175,12 @@ def modes(p: Any) -> Elements:
     return Elements(p.k, p.alpha, p.c, p.sigma2, sliding(0.0, p), sliding_scale(p))
 
 
+def is_passive(p: Any) -> bool:
+    """Whether a slipping element never gains: where s(v) rises as the axis slows down, F_i rises without work."""
+    low, high = extremes(sliding, p, sliding_scale(p))
+    return high - low <= 1e-12 * high
+
+
 LAW = Law(
     "gms",
     Params,
@@ -196,6 +206,7 @@ LAW = Law(
     check=check,
     modes=modes,
     choices=(CURVE, VISCOUS, SLIP_RULE),
-    passive="signed slip rule",
+    passive="signed slip rule and constant s(v); else each stop may give back up to (F_S^2 - F_C^2) / (2 k)",
+    is_passive=is_passive,
     non_local_memory=True,
 )

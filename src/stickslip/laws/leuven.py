@@ -5,6 +5,9 @@ dz/dt = v (1 - sign(r) |r|^delta_i) with r = F_h(z) sign(v) / s(v), F = F_h(z) +
 limits add up to the largest torque of s(v) or more, else the contact cannot reach it. Passive for
 sigma2 >= sigma1 ((sum W_i / F_C)^delta_i - 1): LuGre's condition, to which it comes down for delta_i = 1 and
 sum W_i = F_S.
+
+The hysteresis has non-local memory in z. In the position it has not: dz/dx = 1 -+ |F_h/s|^delta_i differs on the two
+branches of a loop, so that inner loops drift as LuGre's do, the less the larger delta_i.
 """
 
 from __future__ import annotations
@@ -223,5 +226,4 @@ LAW = Law(
     choices=(CURVE, VISCOUS),
     passive="sigma2 >= sigma1 ((sum w / fc)^delta_i - 1)",
     is_passive=is_passive,
-    non_local_memory=True,
 )
