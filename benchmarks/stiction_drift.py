@@ -59,10 +59,10 @@ def mujoco_position() -> float | None:
     except ImportError:
         return None
     p = CONTACT
-    lugre = f"{p['sigma0']:g} {p['sigma1']:g} {p['sigma2']:g} {p['fc']:g} {p['fs']:g} {p['vs']:g}"
+    lugre = f"{p['sigma0']:g} {p['sigma1']:g} {p['fc']:g} {p['fs']:g} {p['vs']:g}"
     text = f"""
     <mujoco><option timestep="{STEP}" gravity="0 0 0"/>
-    <worldbody><body><joint name="axis" type="hinge" axis="0 0 1"/>
+    <worldbody><body><joint name="axis" type="hinge" axis="0 0 1" damping="{p["sigma2"]}"/>
     <inertial pos="0 0 0" mass="1" diaginertia="{INERTIA} {INERTIA} {INERTIA}"/></body></worldbody>
     <actuator><dcmotor joint="axis" lugre="{lugre}"/></actuator></mujoco>"""
     try:

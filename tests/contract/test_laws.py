@@ -43,6 +43,12 @@ def example(law: Law):
     return law.parameters(dict(law.example))
 
 
+def steady_of(law: Law, v: float) -> float:
+    """Torque at constant velocity, N·m; where it depends on the past, after a short time at it."""
+    p = example(law)
+    return law.steady(v, p) if law.steady else law.step(v, v, 1.0, law.state(p), p, U)
+
+
 def drive(law, p, motion, z=None):
     """Torques along a motion of (end velocity, time step) from rest."""
     z = law.state(p) if z is None else z
@@ -257,7 +263,7 @@ def remaining(law, reference):
     lugre = plugins.law("lugre")
     speeds = [float(v) for v in reference.sample(np.linspace(0.01, 3.99, 200))[:, 1]]
     friction = np.array([lugre.steady(v, example(lugre)) for v in speeds])
-    helped = np.array([law.steady(v, example(law)) for v in speeds])
+    helped = np.array([steady_of(law, v) for v in speeds])
     return float(np.sqrt(np.mean((friction - 0.8 * helped) ** 2) / np.mean(friction**2)))
 
 
