@@ -64,7 +64,7 @@ def mujoco_position() -> float | None:
     <mujoco><option timestep="{STEP}" gravity="0 0 0"/>
     <worldbody><body><joint name="axis" type="hinge" axis="0 0 1" damping="{p["sigma2"]}"/>
     <inertial pos="0 0 0" mass="1" diaginertia="{INERTIA} {INERTIA} {INERTIA}"/></body></worldbody>
-    <actuator><dcmotor joint="axis" lugre="{lugre}"/></actuator></mujoco>"""
+    <actuator><dcmotor joint="axis" motorconst="1e-3" resistance="1" lugre="{lugre}"/></actuator></mujoco>"""
     try:
         model = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
