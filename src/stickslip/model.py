@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip import plugins
 from stickslip.config import read_toml
-from stickslip.errors import InputError, ParameterError, suggestion
+from stickslip.errors import ParameterError, suggestion
 from stickslip.spec import Law, ReferenceKind
 
 __all__ = ["MODEL_FORMAT", "Model", "Reference"]
@@ -47,7 +47,7 @@ class Model:
 
     @classmethod
     def from_file(cls, path: str | os.PathLike[str]) -> Model:
-        """Read the law that `stickslip identify` wrote to ``model.toml``.
+        """Read the law that `stickslip identify` wrote to ``model.toml``, or a person: ``law`` and ``[parameters]``.
 
         Raises
         ------
@@ -56,10 +56,8 @@ class Model:
         """
         file = Path(path)
         table = read_toml(file)
-        if table.values.get("format") != MODEL_FORMAT:
-            raise InputError(
-                f"{file} is no model that `stickslip identify` wrote (format = {MODEL_FORMAT!r} is missing)"
-            )
+        if table.values.get("format", MODEL_FORMAT) != MODEL_FORMAT:
+            raise table.error("format", f"is of another version; this one reads {MODEL_FORMAT!r}")
         name = table.text("law")
         if name.endswith(".py"):
             name = str(file.parent / name)

@@ -17,7 +17,7 @@ from stickslip.errors import InputError, StickslipError
 
 __all__ = ["VERBS", "main", "parser_of"]
 
-VERBS = ("study", "simulate", "doctor", "laws", "law", "cite", "rerun", "version")
+VERBS = ("study", "simulate", "doctor", "laws", "law", "cite", "rerun", "export", "version")
 
 
 class Parser(argparse.ArgumentParser):

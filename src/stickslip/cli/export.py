@@ -1,0 +1,122 @@
+"""Export a friction model to what another machine or simulator reads.
+
+stickslip export model.toml --to c99
+stickslip export model.toml --to c99 --single --out firmware --name axis1
+stickslip export run.toml --to c99 --controller      # the whole sampled controller of a `stickslip simulate` file
+
+model.toml is what identification writes; by hand it is `law = "lugre"` and a table [parameters]. `stickslip export
+--list` names the targets. With --check the export is tried in its own tool, where that is installed.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from stickslip.export.job import Export, Job
+    from stickslip.export.target import Target
+
+SUMMARY = "write a model as C, structured text, MATLAB, Python, ..."
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """File, target and what to write."""
+    parser.add_argument(
+        "file", type=Path, nargs="?", metavar="MODEL.toml", help="what `stickslip identify` wrote"
+    )
+    parser.add_argument("--to", metavar="TARGET", help="the target; --list names them")
+    parser.add_argument("--list", action="store_true", help="name the targets and exit")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder of the export (default: NAME-TARGET here)"
+    )
+    parser.add_argument("--name", help="prefix of every name in the target's language (default: the file's)")
+    parser.add_argument("--single", action="store_true", help="single precision, where the target has it")
+    parser.add_argument(
+        "--controller", action="store_true", help="the whole sampled controller of the file's [controller]"
+    )
+    parser.add_argument("--check", action="store_true", help="try the export in its own tool")
+    parser.add_argument("--json", action="store_true", help="print files, notes and check as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the files; 1 if the check fails."""
+    from stickslip.cli import _output
+    from stickslip.errors import InputError
+    from stickslip.export import TARGETS, target_named
+
+    if args.list:
+        for name in TARGETS:
+            print(f"{name:<10}{target_named(name).title}")
+        return 0
+    if args.file is None or args.to is None:
+        raise InputError(
+            "give a model and a target: `stickslip export model.toml --to c99` (--list names them)"
+        )
+    chosen = target_named(args.to)
+    if args.single and not chosen.precision:
+        raise InputError(f"--single: {chosen.name} has one precision; leave it out")
+    if args.controller and not chosen.controller:
+        raise InputError(f"--controller: {chosen.name} carries the law alone; leave it out, or take --to c99")
+    job = job_of(args)
+    export = chosen.write(job)
+    folder: Path = args.out or Path(f"{job.name}-{chosen.name}")
+    written = store(export, folder)
+    result = chosen.check(job, export) if args.check and chosen.check else None
+    if args.check and result is None:
+        print(f"check: {chosen.name} has no tool to run; its format is checked by our tests")
+    if args.json:
+        check = {"passed": result.passed, "text": result.text, **result.numbers} if result else None
+        _output.print_json(
+            {"target": chosen.name, "files": written, "notes": list(export.notes), "check": check}
+        )
+    else:
+        report(chosen, export, written)
+        if result:
+            print(f"check: {result.text}")
+    return 1 if result and result.passed is False else 0
+
+
+def job_of(args: argparse.Namespace) -> Job:
+    """The model of the file, or the model and controller of a file for `stickslip simulate`."""
+    import re
+
+    from stickslip.errors import InputError
+    from stickslip.export.job import Job
+    from stickslip.model import Model
+
+    name = args.name or re.sub(r"[^A-Za-z0-9_]+", "_", args.file.stem)
+    if not args.controller:
+        return Job(Model.from_file(args.file), name, None, args.single)
+    from stickslip.study.study import load_run
+
+    controller = load_run(args.file).control
+    if controller.compensator is None:
+        raise InputError(f"{args.file}: [controller] has no compensator; add one, or export the law alone")
+    return Job(controller.compensator.model, name, controller, args.single)
+
+
+def store(export: Export, folder: Path) -> list[str]:
+    """Write the files of an export; returns their paths."""
+    from stickslip.study.files import prepared_folder, unwritable
+
+    prepared_folder(folder)
+    written: list[str] = []
+    for name, content in export.files.items():
+        path = folder / name
+        try:
+            path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        except OSError as error:
+            raise unwritable(path, error) from None
+        written.append(str(path))
+    return written
+
+
+def report(chosen: Target, export: Export, written: list[str]) -> None:
+    """Say what was written."""
+    print(f"{chosen.title}:")
+    for path in written:
+        print(f"  {path}")
+    for note in export.notes:
+        print(f"note: {note}")
