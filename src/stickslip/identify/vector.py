@@ -229,11 +229,14 @@ class Vector:
 
     def _law_values(self, named: Mapping[str, float]) -> dict[str, Any]:
         assert self.base is not None
-        count = self.base.law.elements_in(self.base.parameters)
-        return {
-            f.name: tuple(named[f"{f.name}[{i}]"] for i in range(count)) if f.per_element else named[f.name]
-            for f in self.base.law.fields
-        }
+        values: dict[str, Any] = {}
+        for f in self.base.law.fields:
+            if f.per_element:
+                count = len(getattr(self.base.parameters, f.name))
+                values[f.name] = tuple(named[f"{f.name}[{i}]"] for i in range(count))
+            else:
+                values[f.name] = named[f.name]
+        return values
 
 
 def _parameters_of(model: Model | None) -> list[Parameter]:

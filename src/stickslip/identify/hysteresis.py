@@ -1,0 +1,261 @@
+"""A measured torque along a measured motion, fitted by any law; the choice among laws by errors on blocks left out.
+
+The offset that many records carry (gravity, a bias of the sensor) is fitted along. Errors are relative: root mean
+square of the error over that of the torque.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError, ParameterError
+from stickslip.identify.estimate import Identification, Picture, Trace
+from stickslip.identify.noise import Noise, as_noise
+from stickslip.identify.uncertainty import Fit, fit
+from stickslip.identify.vector import Parameter, Vector
+from stickslip.model import Model
+from stickslip.record import Record
+from stickslip.simulation.along import Along
+from stickslip.spec import Par
+
+__all__ = ["Loop", "choose_hysteresis", "correlation_lags", "identify_hysteresis"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Rows = np.ndarray[Any, np.dtype[np.intp]]
+
+OFFSET = Par("N·m", "T_0", "torque that acts besides friction")
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A motion and its torque.
+
+    Attributes
+    ----------
+    time, position, torque : array, shape (n,)
+        s, rad, N·m; the torque positive against positive velocity.
+    unit : (str, str)
+        Of position and torque.
+    velocity : array, shape (n,), optional
+        rad/s; without it the motion is uniform from sample to sample.
+    """
+
+    time: Array
+    position: Array
+    torque: Array
+    unit: tuple[str, str] = ("rad", "N·m")
+    velocity: Array | None = None
+
+    @classmethod
+    def of(cls, record: Record, torque: str = "friction_torque", velocity: str = "") -> Loop:
+        """The loop of a record's channels ``position`` and `torque`."""
+        unit = (record.units["position"], record.units[torque])
+        return cls(
+            record.time, record["position"], record[torque], unit, record[velocity] if velocity else None
+        )
+
+    @property
+    def work(self) -> float:
+        """Work done against the torque, J: positive for friction."""
+        middle = 0.5 * (self.torque[1:] + self.torque[:-1])
+        return float(np.sum((middle - float(np.mean(self.torque))) * np.diff(self.position)))
+
+    def righted(self) -> tuple[Loop, tuple[str, ...]]:
+        """This loop, or with the torque's sign changed where it would feed energy in; and a note that says so."""
+        if self.work >= 0.0:
+            return self, ()
+        note = "The torque does work with the motion, which friction cannot: its sign was changed."
+        return replace(self, torque=-self.torque), (note,)
+
+
+def fit_loop(
+    loop: Loop, template: Model, rows: Rows, *, frozen: Iterable[str] = (), noise: Noise | None = None,
+    offset: bool = True, starts: int | Array = 6, profiles: bool = True, reach: float = 1.5, lags: int = 0,
+) -> tuple[Fit, Along]:  # fmt: skip
+    """Fit a law's torque along the motion on some rows; it is simulated over all of them."""
+    along = Along(template.law, loop.time, loop.position, loop.velocity)
+    level = float(np.sqrt(np.mean(loop.torque[rows] ** 2)))
+    extra = (Parameter("offset", OFFSET, 0.0, offset, scale=level),)
+    if offset:
+        vector = Vector(template, frozen=frozen, extra=extra)
+    else:
+        vector = Vector(template, frozen=frozen)
+    idle = idle_parameters(along, vector, rows)
+    if idle:
+        vector = Vector(template, frozen=[*frozen, *idle], extra=extra if offset else ())
+    target = loop.torque[rows]
+
+    def residuals(u: Array) -> Array:
+        return curve_of(along, vector, u)[rows] - target
+
+    found = fit(
+        residuals, vector, noise=noise, size=float(np.max(np.abs(target))), signed_scale=level, starts=starts,
+        reach=reach, profiles=profiles, lags=lags, tolerance=1e-12 if noise is not None or lags else 1e-15,
+    )  # fmt: skip
+    return found, along
+
+
+def curve_of(along: Along, vector: Vector, u: Array) -> Array:
+    """The law's torque and the offset at every sample."""
+    named = vector.named(u)
+    return along.torque(vector.packed(u), vector.law_parameters(u)) + named.get("offset", 0.0)
+
+
+def idle_parameters(along: Along, vector: Vector, rows: Rows) -> list[str]:
+    """Free parameters that do not act on these rows at all."""
+    here = curve_of(along, vector, vector.start)[rows]
+    idle: list[str] = []
+    for p in vector.free:
+        if p.shares or p.name == "offset":
+            continue
+        values = {q.name: q.value for q in vector.free}
+        values[p.name] = p.value * 1.2 if p.value else 0.2 * p.scale
+        moved = curve_of(along, vector, vector.coordinates(values))[rows]
+        if float(np.max(np.abs(moved - here))) <= 1e-12 * float(np.max(np.abs(here)) + 1e-300):
+            idle.append(p.name)
+    return idle
+
+
+def identify_hysteresis(
+    loop: Loop,
+    template: Model,
+    *,
+    fitted: Sequence[int] | Rows | None = None,
+    frozen: Sequence[str] = (),
+    noise: Noise | float | None = None,
+    offset: bool = True,
+    starts: int = 6,
+) -> Identification:
+    """Fit any law to a torque along a motion.
+
+    Parameters
+    ----------
+    loop : Loop
+    template : Model
+        The law with its choices; its values are where the search starts.
+    fitted : sequence of int, optional
+        Rows to fit; all where not given. The others are the test: ``misfit["held_out_relative"]``.
+    frozen : sequence of str
+        Parameters that stay.
+    noise : Noise or float, optional
+        Standard deviation of a sample, N·m; else from the residual, with its correlation in time.
+    offset : bool
+        Whether a constant torque is fitted along.
+    starts : int
+        Starts of the search.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    InputError
+        If there are fewer rows than parameters.
+    """
+    straight, notes = loop.righted()
+    rows = np.arange(loop.time.size) if fitted is None else np.asarray(fitted, dtype=np.intp)
+    if rows.size < 10:
+        raise InputError(f"{rows.size} rows are too few to fit a loop; give at least 10")
+    known = as_noise(noise)
+    found, along = fit_loop(straight, template, rows, frozen=frozen, noise=known, offset=offset, starts=starts,
+                            profiles=False)  # fmt: skip
+    lags = 0 if known else correlation_lags(found.optimum.residuals)
+    found, along = fit_loop(straight, template, rows, frozen=frozen, noise=known, offset=offset,
+                            starts=found.u[None, :], lags=lags)  # fmt: skip
+    curve = curve_of(along, found.vector, found.u)
+    rest = np.setdiff1d(np.arange(loop.time.size), rows)
+    try:
+        model = found.vector.model(found.u)
+    except ParameterError as error:
+        model, notes = None, (*notes, f"The law refuses these values together: {error}.")
+    return Identification(
+        "hysteresis", model, found.estimates, found.correlation, loop_misfit(straight, curve, rows, rest, found),
+        notes, (), (loop_picture(straight, curve, rows, rest, template),),
+        {"curve": curve, "offset": found.values.get("offset", 0.0), "law": template.law.name,
+         "correlated_samples": lags},
+    )  # fmt: skip
+
+
+def relative_error(loop: Loop, curve: Array, rows: Rows) -> float:
+    """Root mean square of the error over that of the torque."""
+    return float(np.linalg.norm((curve - loop.torque)[rows]) / np.linalg.norm(loop.torque[rows]))
+
+
+def loop_misfit(loop: Loop, curve: Array, rows: Rows, rest: Rows, found: Fit) -> dict[str, float]:
+    """Errors on the rows fitted, and on those held out."""
+    out = {"rms_Nm": found.rms, "relative": relative_error(loop, curve, rows)}
+    if rest.size:
+        out["held_out_relative"] = relative_error(loop, curve, rest)
+    return out
+
+
+def correlation_lags(residuals: Array) -> int:
+    """Samples over which residuals are correlated: four times those until it has fallen to 1/e."""
+    r = residuals - np.mean(residuals)
+    total = float(r @ r)
+    lag = 1
+    while lag < r.size // 4 and float(r[lag:] @ r[:-lag]) > total / math.e:
+        lag += max(1, lag // 8)
+    return min(4 * lag, r.size // 4) if total > 0.0 else 0
+
+
+def choose_hysteresis(
+    loop: Loop, templates: Mapping[str, Model], *, fitted: Sequence[int] | Rows | None = None, blocks: int = 4,
+    starts: int = 6,
+) -> tuple[str, Identification, dict[str, dict[str, float]]]:  # fmt: skip
+    """Fit several laws and choose the one with the least error on blocks of the fitted rows left out in turn.
+
+    Returns
+    -------
+    name : str
+    result : Identification
+        Of the chosen law; ``details["comparison"]`` has all.
+    table : dict
+        Per law: parameters, relative (error on the fitted rows), cross_validated (on blocks left out).
+    """
+    straight, _ = loop.righted()
+    rows = np.arange(loop.time.size) if fitted is None else np.asarray(fitted, dtype=np.intp)
+    table: dict[str, dict[str, float]] = {}
+    for name, template in templates.items():
+        first, along = fit_loop(straight, template, rows, starts=starts, profiles=False)
+        squares: list[Array] = []
+        for block in np.array_split(rows, blocks):
+            kept = np.setdiff1d(rows, block)
+            part, _ = fit_loop(straight, template, kept, starts=_begin(first, template), profiles=False)
+            squares.append(((curve_of(along, part.vector, part.u) - straight.torque)[block]) ** 2)
+        size = float(np.mean(straight.torque[rows] ** 2))
+        table[name] = {
+            "parameters": float(first.vector.size),
+            "relative": relative_error(straight, curve_of(along, first.vector, first.u), rows),
+            "cross_validated": math.sqrt(float(np.mean(np.concatenate(squares))) / size),
+        }
+    chosen = min(table, key=lambda name: table[name]["cross_validated"])
+    result = identify_hysteresis(loop, templates[chosen], fitted=rows, starts=starts)
+    return chosen, replace(result, details={**result.details, "comparison": table}), table
+
+
+def _begin(found: Fit, template: Model) -> Array:
+    return found.u[None, :]
+
+
+def loop_picture(loop: Loop, curve: Array, rows: Rows, rest: Rows, template: Model) -> Picture:
+    """Torque over displacement: measured, and the law's (thesis figures 4.11, 4.35)."""
+    shown = rest if rest.size else rows
+    words = f"error {100.0 * relative_error(loop, curve, rows):.2g} % on the rows fitted"
+    if rest.size:
+        words += f", {100.0 * relative_error(loop, curve, rest):.2g} % on the rows held out (drawn)"
+    origin = float(np.mean(loop.position))
+    traces = (
+        Trace("measured", loop.position[shown] - origin, loop.torque[shown]),
+        Trace(template.law.title, loop.position[shown] - origin, curve[shown]),
+    )
+    return Picture(
+        "hysteresis", f"Hysteresis: {template.law.title}", words[0].upper() + words[1:],
+        f"displacement ({loop.unit[0]})", f"friction torque ({loop.unit[1]})", traces,
+    )  # fmt: skip

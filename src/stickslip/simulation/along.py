@@ -1,0 +1,79 @@
+"""Torque of any law along a measured motion: what hysteresis and lag in sliding are fitted to."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.jit import call_step, compiled_law, flat, kernel, pointer
+from stickslip.model import Model
+from stickslip.spec import Law, Surroundings
+
+__all__ = ["Along"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+@kernel()
+def follow(step: int, p: Any, u: Any, time: Any, x: Any, before: Any, after: Any, z: Any, out: Any) -> None:
+    """The law's steps from sample to sample; `before` and `after` are the velocities of each stretch."""
+    u[0] = x[0]
+    out[0] = call_step(step, before[0], before[0], 0.0, pointer(z, 0), pointer(p, 0), pointer(u, 0))
+    for i in range(1, time.size):
+        u[0] = x[i]
+        out[i] = call_step(
+            step, before[i - 1], after[i - 1], time[i] - time[i - 1],
+            pointer(z, 0), pointer(p, 0), pointer(u, 0),
+        )  # fmt: skip
+
+
+class Along:
+    """A law that is moved along samples, from rest with all states zero.
+
+    Parameters
+    ----------
+    law : Law
+    time : array, shape (n,)
+        s, ascending.
+    position : array, shape (n,)
+        rad. Without velocities the motion is taken as uniform from sample to sample, so that every displacement is
+        exact and the torque is that at the end of the stretch.
+    velocity : array, shape (n,), optional
+        rad/s; taken as linear from sample to sample.
+    """
+
+    def __init__(self, law: Law, time: Array, position: Array, velocity: Array | None = None) -> None:
+        if time.size < 2 or position.shape != time.shape:
+            raise InputError("a motion needs as many positions as times, at least two")
+        width = np.diff(time)
+        if np.any(width <= 0.0):
+            raise InputError("times must ascend strictly; merge samples of the same time")
+        mean = np.diff(position) / width
+        self._law, self._step = law, compiled_law(law).step
+        self._time, self._position = flat(time), flat(position)
+        self._before = flat(mean if velocity is None else velocity[:-1])
+        self._after = flat(mean if velocity is None else velocity[1:])
+
+    def torque(self, packed: Array, parameters: Any) -> Array:
+        """Torque at every sample, N·m, shape (n,).
+
+        Parameters
+        ----------
+        packed : array
+            The law's parameters as compiled functions read them.
+        parameters : NamedTuple
+            The same for the law's plain functions; only the number of elements is read.
+        """
+        state = flat(self._law.pack_state(self._law.state(parameters)))
+        out = np.empty(self._time.size)
+        follow(
+            self._step, flat(packed), np.array(Surroundings()), self._time, self._position, self._before,
+            self._after, state, out,
+        )  # fmt: skip
+        return out
+
+    def of(self, model: Model) -> Array:
+        """Torque of a model at every sample, N·m, shape (n,)."""
+        return self.torque(np.array(model.law.pack(model.parameters), dtype=np.float64), model.parameters)
