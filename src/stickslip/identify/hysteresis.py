@@ -23,7 +23,7 @@ from stickslip.record import Record
 from stickslip.simulation.along import Along
 from stickslip.spec import Par
 
-__all__ = ["Loop", "choose_hysteresis", "correlation_lags", "identify_hysteresis"]
+__all__ = ["Loop", "choose_hysteresis", "correlation_lags", "identify_hysteresis", "templates_for"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
@@ -76,6 +76,7 @@ class Loop:
 def fit_loop(
     loop: Loop, template: Model, rows: Rows, *, frozen: Iterable[str] = (), noise: Noise | None = None,
     offset: bool = True, starts: int | Array = 6, profiles: bool = True, reach: float = 1.5, lags: int = 0,
+    tolerance: float = 1e-12,
 ) -> tuple[Fit, Along]:  # fmt: skip
     """Fit a law's torque along the motion on some rows; it is simulated over all of them."""
     along = Along(template.law, loop.time, loop.position, loop.velocity)
@@ -95,7 +96,7 @@ def fit_loop(
 
     found = fit(
         residuals, vector, noise=noise, size=float(np.max(np.abs(target))), signed_scale=level, starts=starts,
-        reach=reach, profiles=profiles, lags=lags, tolerance=1e-12 if noise is not None or lags else 1e-15,
+        reach=reach, profiles=profiles, lags=lags, tolerance=tolerance,
     )  # fmt: skip
     return found, along
 
@@ -129,7 +130,8 @@ def identify_hysteresis(
     frozen: Sequence[str] = (),
     noise: Noise | float | None = None,
     offset: bool = True,
-    starts: int = 6,
+    starts: int = 3,
+    tolerance: float = 1e-8,
 ) -> Identification:
     """Fit any law to a torque along a motion.
 
@@ -148,6 +150,8 @@ def identify_hysteresis(
         Whether a constant torque is fitted along.
     starts : int
         Starts of the search.
+    tolerance : float
+        Relative decrease of the sum of squares at which a descent ends.
 
     Returns
     -------
@@ -160,16 +164,19 @@ def identify_hysteresis(
     """
     straight, notes = loop.righted()
     rows = np.arange(loop.time.size) if fitted is None else np.asarray(fitted, dtype=np.intp)
+    rows = after_transient(straight, rows)
     if rows.size < 10:
         raise InputError(f"{rows.size} rows are too few to fit a loop; give at least 10")
     known = as_noise(noise)
     found, along = fit_loop(straight, template, rows, frozen=frozen, noise=known, offset=offset, starts=starts,
-                            profiles=False)  # fmt: skip
+                            profiles=False, tolerance=tolerance)  # fmt: skip
     lags = 0 if known else correlation_lags(found.optimum.residuals)
     found, along = fit_loop(straight, template, rows, frozen=frozen, noise=known, offset=offset,
-                            starts=found.u[None, :], lags=lags)  # fmt: skip
+                            starts=found.u[None, :], lags=lags, tolerance=tolerance,
+                            profiles=False)  # fmt: skip
     curve = curve_of(along, found.vector, found.u)
-    rest = np.setdiff1d(np.arange(loop.time.size), rows)
+    rest = np.setdiff1d(np.arange(loop.time.size), rows if fitted is None else fitted)
+    rest = rest[rest > rows[0]]
     try:
         model = found.vector.model(found.u)
     except ParameterError as error:
@@ -180,6 +187,33 @@ def identify_hysteresis(
         {"curve": curve, "offset": found.values.get("offset", 0.0), "law": template.law.name,
          "correlated_samples": lags},
     )  # fmt: skip
+
+
+def turning_points(position: Array, part: float = 0.2) -> list[int]:
+    """Samples at which the motion turns, by at least `part` of its whole range."""
+    least = part * float(np.ptp(position))
+    turns: list[int] = []
+    far, direction = 0, 0.0
+    for i in range(1, position.size):
+        moved = float(position[i] - position[far])
+        if direction == 0.0:
+            if abs(moved) >= least:
+                direction, far = float(np.sign(moved)), i
+        elif moved * direction >= 0.0:
+            far = i
+        elif abs(moved) >= least:
+            turns.append(far)
+            direction, far = -direction, i
+    return turns
+
+
+def after_transient(loop: Loop, rows: Rows) -> Rows:
+    """The rows after the second turning point, where there are cycles enough: the first one is a transient.
+
+    It depends on the state in which the contact happened to be (thesis 4.3.1.1.3).
+    """
+    turns = turning_points(loop.position)
+    return rows[rows >= turns[1]] if len(turns) >= 6 else rows
 
 
 def relative_error(loop: Loop, curve: Array, rows: Rows) -> float:
@@ -207,7 +241,7 @@ def correlation_lags(residuals: Array) -> int:
 
 def choose_hysteresis(
     loop: Loop, templates: Mapping[str, Model], *, fitted: Sequence[int] | Rows | None = None, blocks: int = 4,
-    starts: int = 6,
+    starts: int = 3, tolerance: float = 1e-7,
 ) -> tuple[str, Identification, dict[str, dict[str, float]]]:  # fmt: skip
     """Fit several laws and choose the one with the least error on blocks of the fitted rows left out in turn.
 
@@ -221,13 +255,15 @@ def choose_hysteresis(
     """
     straight, _ = loop.righted()
     rows = np.arange(loop.time.size) if fitted is None else np.asarray(fitted, dtype=np.intp)
+    rows = after_transient(straight, rows)
     table: dict[str, dict[str, float]] = {}
     for name, template in templates.items():
-        first, along = fit_loop(straight, template, rows, starts=starts, profiles=False)
+        first, along = fit_loop(straight, template, rows, starts=starts, profiles=False, tolerance=tolerance)
         squares: list[Array] = []
         for block in np.array_split(rows, blocks):
             kept = np.setdiff1d(rows, block)
-            part, _ = fit_loop(straight, template, kept, starts=_begin(first, template), profiles=False)
+            part, _ = fit_loop(straight, template, kept, starts=first.u[None, :], profiles=False,
+                               tolerance=tolerance)  # fmt: skip
             squares.append(((curve_of(along, part.vector, part.u) - straight.torque)[block]) ** 2)
         size = float(np.mean(straight.torque[rows] ** 2))
         table[name] = {
@@ -240,8 +276,24 @@ def choose_hysteresis(
     return chosen, replace(result, details={**result.details, "comparison": table}), table
 
 
-def _begin(found: Fit, template: Model) -> Array:
-    return found.u[None, :]
+def templates_for(loop: Loop, rows: Rows) -> dict[str, Model]:
+    """Laws that describe a rate-independent loop, with starts read off the record.
+
+    Dahl (thesis eq. 2.7), Dahl with another level and shape for each direction, and Maxwell-slip with 4 elements
+    (eq. 2.15).
+    """
+    straight, _ = loop.righted()
+    level = float(np.quantile(np.abs(straight.torque[rows]), 0.95))
+    reach = 0.5 * float(np.ptp(straight.position[rows]))
+    stiffness = 2.0 * level / reach
+    slip = reach * np.array([0.2, 0.4, 0.6, 0.9])
+    one: dict[str, Any] = {"sigma0": stiffness, "fc": level, "delta_d": 0.5}
+    many: dict[str, Any] = {"k": (0.25 * level / slip).tolist(), "w": [0.25 * level] * 4}
+    return {
+        "Maxwell-slip, 4 elements": Model("maxwell_slip", {}, **many),
+        "Dahl": Model("dahl", {}, **one),
+        "Dahl, per direction": Model("dahl", {"symmetry": "asymmetric"}, **one),
+    }
 
 
 def loop_picture(loop: Loop, curve: Array, rows: Rows, rest: Rows, template: Model) -> Picture:

@@ -88,6 +88,8 @@ class Vector:
         are free but those in `frozen`.
     extra : sequence of Parameter
         Other numbers (inertia, offset); they come first.
+    limits : mapping of str to (float, float)
+        Tighter bounds of the search, by full name; what the law itself allows stays as it is.
     """
 
     def __init__(
@@ -96,9 +98,10 @@ class Vector:
         free: Iterable[str] | None = None,
         frozen: Iterable[str] = (),
         extra: Sequence[Parameter] = (),
+        limits: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         self.base = model
-        everything = [*extra, *_parameters_of(model)]
+        everything = [_limited(p, limits or {}) for p in [*extra, *_parameters_of(model)]]
         chosen = None if free is None else _matched(list(free), everything)
         held = _matched(list(frozen), everything)
         self.parameters: tuple[Parameter, ...] = tuple(
@@ -252,6 +255,15 @@ def _parameters_of(model: Model | None) -> list[Parameter]:
             name = f"{f.name}[{i}]" if f.per_element else f.name
             out.append(Parameter(name, f.par, float(number), True, shares, abs(float(number)) or 1.0))
     return out
+
+
+def _limited(parameter: Parameter, limits: Mapping[str, tuple[float, float]]) -> Parameter:
+    """The parameter with bounds as tight as asked for."""
+    if parameter.name not in limits:
+        return parameter
+    low, high = limits[parameter.name]
+    bounds = replace(parameter.par, lower=max(low, parameter.par.lower), upper=min(high, parameter.par.upper))
+    return replace(parameter, par=bounds)
 
 
 def _matched(wanted: list[str], parameters: Sequence[Parameter]) -> set[str]:

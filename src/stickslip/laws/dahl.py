@@ -26,7 +26,17 @@ class Params(NamedTuple):
     fc: Annotated[float, Par("N·m", "F_C", "Coulomb torque", positive=True, directional=True)]
     delta_d: Annotated[
         float,
-        Par("-", "delta_d", "shape factor of the stress-strain curve", lower=0.0, upper=20.0, default=1.0),
+        # It may differ by direction: at one force the slope is at most sigma0 while loading and at least sigma0
+        # while unloading whatever the shape, so that no loop gives energy back.
+        Par(
+            "-",
+            "delta_d",
+            "shape factor of the stress-strain curve",
+            lower=0.0,
+            upper=20.0,
+            default=1.0,
+            directional=True,
+        ),
     ]
 
 

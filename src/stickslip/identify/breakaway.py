@@ -1,0 +1,196 @@
+"""Break-away torque from slow torque ramps: thesis 4.3.1.1.1 and 4.3.2.1.1.
+
+The torque at which the velocity first exceeds a threshold, by angle and direction; its mean and spread; and whether it
+depends on the ramp rate (thesis 2.1.1: break-away falls as the torque rises faster).
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
+from stickslip.identify.segments import slope_of
+from stickslip.record import Record
+
+__all__ = ["Break", "find_breaks", "identify_breakaway"]
+
+WINDOW = 0.02
+"""s, over which a velocity is taken where the record has none."""
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+@dataclass(frozen=True, slots=True)
+class Break:
+    """One break-away: time (s), angle (rad), direction (+1, -1), torque (N·m, its size), ramp rate (N·m/s)."""
+
+    time: float
+    angle: float
+    direction: int
+    torque: float
+    rate: float
+
+
+def find_breaks(
+    record: Record, *, torque: str = "motor_torque", threshold: float = 0.01, rest: float = 0.05
+) -> tuple[Break, ...]:
+    """Find every transition from rest to motion.
+
+    Parameters
+    ----------
+    record : Record
+        Channels ``position``, the torque's, and ``velocity`` where there is one.
+    torque : str
+        Motor side or sensor side.
+    threshold : float
+        Velocity above which the axis moves, rad/s; at rest it stays below a fifth of it.
+    rest : float
+        Time that the axis must rest before, s.
+    """
+    time, position, load = record.time, record["position"], record[torque]
+    v = record["velocity"] if "velocity" in record.channels else slope_of(time, position, WINDOW)
+    found: list[Break] = []
+    quiet_since, ready = math.nan, False
+    for k in range(time.size):
+        i = k
+        if abs(v[i]) < 0.2 * threshold:
+            quiet_since = float(time[i]) if math.isnan(quiet_since) else quiet_since
+            ready = ready or float(time[i]) - quiet_since >= rest
+        elif abs(v[i]) > threshold:
+            if ready:
+                if "velocity" not in record.channels:
+                    i = departure(time, position, i, threshold)
+                rows = np.flatnonzero((time <= time[i]) & (time >= time[i] - rest))
+                width = float(time[rows[-1]] - time[rows[0]])
+                rate = float(load[rows[-1]] - load[rows[0]]) / width if width > 0.0 else math.nan
+                found.append(
+                    Break(
+                        float(time[i]), float(position[i]), int(np.sign(v[i])), abs(float(load[i])), abs(rate)
+                    )
+                )
+            quiet_since, ready = math.nan, False
+        else:
+            quiet_since = math.nan
+    return tuple(found)
+
+
+def departure(time: Array, position: Array, seen: int, threshold: float) -> int:
+    """The last sample at rest before a motion that the slope over a window has seen at a sample."""
+    near = np.flatnonzero(np.abs(time - time[seen]) <= WINDOW).tolist()
+    first, last = int(near[0]), int(near[-1]) + 1
+    for k in range(first, last):
+        if abs(float(position[k]) - float(position[first])) > 0.5 * threshold * WINDOW:
+            return max(k - 1, first)
+    return seen
+
+
+def identify_breakaway(
+    records: Record | Sequence[Record],
+    *,
+    torque: str = "motor_torque",
+    threshold: float = 0.01,
+    rest: float = 0.05,
+) -> Identification:
+    """Mean break-away torque of each direction, with its interval and spread.
+
+    Returns
+    -------
+    Identification
+        Estimates fs_positive, fs_negative (those directions that occur) and, with three ramp rates or more,
+        rate_effect: the change per tenfold ramp rate. ``details["breaks"]`` lists every break-away.
+
+    Raises
+    ------
+    InputError
+        If the axis never breaks away.
+    """
+    several = [records] if isinstance(records, Record) else list(records)
+    breaks = [b for r in several for b in find_breaks(r, torque=torque, threshold=threshold, rest=rest)]
+    if not breaks:
+        raise InputError(
+            f"the axis never breaks away: its velocity does not pass {threshold:g} rad/s from rest; ramp the "
+            "torque higher or lower the threshold"
+        )
+    estimates: list[Estimate] = []
+    misfit: dict[str, float] = {}
+    for direction, word in ((1, "positive"), (-1, "negative")):
+        values = np.array([b.torque for b in breaks if b.direction == direction])
+        if values.size:
+            estimates.append(mean_estimate(f"fs_{word}", values))
+            misfit[f"spread_{word}_Nm"] = float(np.std(values, ddof=1)) if values.size > 1 else math.nan
+    rate = rate_effect(breaks)
+    if rate is not None:
+        estimates.append(rate)
+    notes = [f"{len(breaks)} break-aways from channel {torque!r}, velocity threshold {threshold:g} rad/s."]
+    if rate is not None and (rate.lower > 0.0 or rate.upper < 0.0):
+        notes.append(f"Break-away depends on the ramp rate: {rate.value:.3g} N·m per tenfold rate.")
+    few = tuple(["Repeat the ramp at other angles; one break-away has no spread."] if len(breaks) < 3 else [])
+    return Identification(
+        "breakaway", None, tuple(estimates), np.eye(len(estimates)), misfit, tuple(notes), few,
+        (angle_picture(breaks, estimates),), {"breaks": breaks},
+    )  # fmt: skip
+
+
+def student(dof: int) -> float:
+    """97.5 % quantile of Student's distribution."""
+    special: Any = importlib.import_module("scipy.special")
+    return float(special.stdtrit(dof, 0.975))
+
+
+def mean_estimate(name: str, values: Array) -> Estimate:
+    """A mean with its Student interval."""
+    mean = float(np.mean(values))
+    if values.size < 2:
+        return Estimate(
+            name, "N·m", "F_S", mean, math.nan, 0.0, math.inf, False, "one break-away has no spread"
+        )
+    std = float(np.std(values, ddof=1)) / math.sqrt(values.size)
+    half = student(values.size - 1) * std
+    low, high = max(mean - half, 0.0), mean + half
+    why = "" if high <= 2.0 * low else "the break-aways scatter too much for their number"
+    return Estimate(name, "N·m", "F_S", mean, std, low, high, not why, why)
+
+
+def rate_effect(breaks: Sequence[Break]) -> Estimate | None:
+    """Change of the break-away torque per tenfold ramp rate, N·m; None with fewer than three rates."""
+    usable = [b for b in breaks if math.isfinite(b.rate) and b.rate > 0.0]
+    rates = np.log10(np.array([b.rate for b in usable]))
+    if len(usable) < 4 or float(np.ptp(rates)) < 0.3:
+        return None
+    sides = np.array([[b.direction > 0, b.direction < 0] for b in usable], dtype=np.float64)
+    matrix = np.column_stack([rates, sides[:, np.any(sides, axis=0)]])
+    values = np.array([b.torque for b in usable])
+    inverse: Any = np.linalg.pinv(matrix.T @ matrix)
+    solved: Any = inverse @ matrix.T @ values
+    dof = len(usable) - matrix.shape[1]
+    if dof < 1:
+        return None
+    std = math.sqrt(float(np.sum((matrix @ solved - values) ** 2)) / dof * float(inverse[0, 0]))
+    half = student(dof) * std
+    value = float(solved[0])
+    why = "" if half <= 0.05 * float(np.mean(values)) else "the break-aways scatter too much for their number"
+    return Estimate("rate_effect", "N·m", "dF_S", value, std, value - half, value + half, not why, why)
+
+
+def angle_picture(breaks: Sequence[Break], estimates: Sequence[Estimate]) -> Picture:
+    """Break-away torque over the angle (thesis figures 4.5, 4.27, 4.28)."""
+    traces: list[Trace] = []
+    for direction, kind, word in ((1, "points", "positive"), (-1, "open points", "negative")):
+        chosen = [b for b in breaks if b.direction == direction]
+        if chosen:
+            angle = np.degrees(np.array([b.angle for b in chosen]))
+            traces.append(Trace(f"{word} direction", angle, np.array([b.torque for b in chosen]), kind))
+    ends = np.degrees(np.array([min(b.angle for b in breaks), max(b.angle for b in breaks)]))
+    means = [e for e in estimates if e.name.startswith("fs_")]
+    for e in means:
+        traces.append(Trace(f"mean, {e.name[3:]}", ends, np.full(2, e.value)))
+    words = ", ".join(f"{e.name[3:]} {e.value:.4g} N·m" for e in means)
+    return Picture("breakaway", "Break-away torque", f"Mean: {words}", "angle (degrees)", "break-away torque (N·m)",
+                   tuple(traces))  # fmt: skip

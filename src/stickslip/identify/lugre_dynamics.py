@@ -1,0 +1,305 @@
+"""LuGre's sigma0 and sigma1 from an open-loop stick-slip response to a known torque.
+
+Thesis 3.1.3.2.3.1 and 4.3.1.1.4 fit the simulated position to the measured one. Where the law is not exactly the
+friction of the axis, gross sliding dominates that misfit by orders of magnitude and its minimum says nothing about the
+stiffness: for the thesis's own record (0.35 N·m at 1 Hz) it falls for ever with sigma0. So the parts of the record in
+which the axis sticks near zero load are compared for themselves, each relative to its first sample: there the
+displacement is the bristles' alone. Their slope, extrapolated to zero load, is the small-signal stiffness, which needs
+no law at all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
+from stickslip.identify.hysteresis import correlation_lags
+from stickslip.identify.noise import Noise, as_noise
+from stickslip.identify.uncertainty import Fit, fit
+from stickslip.identify.vector import Vector
+from stickslip.model import Model
+from stickslip.record import Record
+from stickslip.simulation.driven import Course, Drive, Mechanics
+
+__all__ = ["Response", "fit_position", "identify_lugre_dynamics", "small_signal_stiffness"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Rows = np.ndarray[Any, np.dtype[np.intp]]
+
+NEAR = 0.15
+"""Part of the static torque up to which the load counts as near zero: there LuGre and other laws have one slope."""
+SCAN = np.geomspace(0.02, 50.0, 18)
+"""Multiples of the small-signal stiffness at which the plain position misfit is looked at."""
+FINEST = 1e-4
+"""s, longest step of the simulation."""
+FLAT = 1.1
+"""Misfits within this factor are not told apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """An open-loop response.
+
+    Attributes
+    ----------
+    time, torque, position : array, shape (n,)
+        s, strictly ascending; motor torque in N·m, linear from sample to sample; rad.
+    """
+
+    time: Array
+    torque: Array
+    position: Array
+
+    def __post_init__(self) -> None:
+        if self.time.size < 20 or np.any(np.diff(self.time) <= 0.0):
+            raise InputError("an open-loop response needs at least 20 samples with strictly ascending times")
+        if not (self.torque.shape == self.position.shape == self.time.shape):
+            raise InputError("time, torque and position of a response must be equally long")
+
+    @classmethod
+    def of(cls, record: Record, torque: str = "motor_torque") -> Response:
+        """The channels of a record; of samples at the same time the first is kept."""
+        kept = np.concatenate([[True], np.diff(record.time) > 1e-9])
+        return cls(record.time[kept], record[torque][kept], record["position"][kept])
+
+
+def sticking_pieces(response: Response, fs: float, near: float = NEAR) -> list[Rows]:
+    """Runs of samples in which the load is near zero and the axis sticks, at least 4 samples each.
+
+    It sticks where the position changes by less than would a spring a hundred times softer than the softest the
+    record's own quiet parts show.
+    """
+    quiet = np.abs(response.torque) <= near * fs
+    rate = np.abs(np.gradient(response.position, response.time))
+    if not np.any(quiet):
+        return []
+    slow = rate <= 100.0 * float(np.quantile(rate[quiet], 0.25)) + 1e-12
+    rows = np.flatnonzero(quiet & slow)
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    return [r for r in runs if r.size >= 4]
+
+
+def small_signal_stiffness(response: Response, fs: float, noise: Noise | None = None) -> Estimate:
+    """Slope of the load over the displacement at zero load, from the parts in which the axis sticks, N·m/rad.
+
+    Every part has its own mean; the compliance is taken as constant plus a term linear in the load's size, so that
+    softening near break-away does not enter.
+    """
+    pieces = sticking_pieces(response, fs)
+    if not pieces:
+        raise InputError(
+            "the axis never sticks near zero torque; use a torque that starts from zero and is sampled faster"
+        )
+    rows = np.concatenate(pieces)
+    columns = [response.torque[rows], response.torque[rows] * np.abs(response.torque[rows])]
+    for piece in pieces:
+        columns.append(np.isin(rows, piece).astype(np.float64))
+    matrix = np.stack(columns, axis=1)
+    scale = np.linalg.norm(matrix, axis=0)
+    solved: Any = pseudo_inverse(matrix / scale) @ response.position[rows]
+    rest: Any = matrix / scale @ solved - response.position[rows]
+    dof = max(rows.size - matrix.shape[1], 1)
+    std = max(math.sqrt(float(rest @ rest) / dof), noise.std if noise else 0.0)
+    inverse: Any = pseudo_inverse((matrix / scale).T @ (matrix / scale))
+    compliance = float(solved[0] / scale[0])
+    spread = std * math.sqrt(float(inverse[0, 0])) / float(scale[0])
+    if compliance <= 0.0:
+        return Estimate("stiffness", "N·m/rad", "k_0", math.nan, math.nan, 0.0, math.inf, False,
+                        "the displacement does not follow the load: noise or quantisation hides it")  # fmt: skip
+    value = 1.0 / compliance
+    low = 1.0 / (compliance + 1.96 * spread)
+    high = 1.0 / (compliance - 1.96 * spread) if compliance > 1.96 * spread else math.inf
+    why = "" if high <= 2.0 * low else "the displacement near zero load is too small against the noise"
+    return Estimate("stiffness", "N·m/rad", "k_0", value, value**2 * spread, low, high, not why, why)
+
+
+def pseudo_inverse(matrix: Any) -> Any:
+    """numpy's, whose types leave the rest unknown."""
+    inverse: Any = np.linalg.pinv
+    return inverse(matrix)
+
+
+def lugre_vector(
+    sliding: Mapping[str, float], sigma0: float, sigma1: float, most: float = math.inf
+) -> Vector:
+    """LuGre with its sliding curve frozen, and sigma1 at most `most`."""
+    return Vector(
+        Model("lugre", {}, sigma0=sigma0, sigma1=sigma1, **sliding), free=["sigma0", "sigma1"],
+        limits={"sigma1": (0.0, most)},
+    )  # fmt: skip
+
+
+def course_of(response: Response, vector: Vector) -> Course:
+    """The axis under the record's torque, ready to be run with any sigma0, sigma1."""
+    assert vector.base is not None
+    step = float(np.median(np.diff(response.time)))
+    start = (float(response.position[0]), 0.0)
+    return Course(
+        vector.base.law,
+        Drive(response.time, response.torque, "linear", start=start, max_step=min(step, FINEST)),
+    )
+
+
+def fit_position(
+    response: Response, inertia: float, sliding: Mapping[str, float], *, sigma0: float, sigma1: float,
+    noise: Noise | float | None = None, profiles: bool = True,
+) -> Fit:  # fmt: skip
+    """Plain output error: least squares of the simulated position, all samples alike (thesis 3.1.3.2.3.1).
+
+    Right where the friction is LuGre's; where it is not, see `identify_lugre_dynamics`.
+    """
+    vector = lugre_vector(sliding, sigma0, sigma1)
+    course, mechanics = course_of(response, vector), Mechanics(inertia)
+
+    def residuals(u: Array) -> Array:
+        return course.run(mechanics, vector.law_parameters(u))[:, 0] - response.position
+
+    known, size = as_noise(noise), float(np.ptp(response.position))
+    first = fit(residuals, vector, noise=known, size=size, starts=1, profiles=False, tolerance=1e-10)
+    # What exceeds the noise is error of the model or the simulation, and correlated.
+    lags = correlation_lags(first.optimum.residuals) if known is None or first.rms > 1.1 * known.std else 0
+    return fit(
+        residuals, vector, noise=known, size=size, starts=first.u[None, :], profiles=profiles, lags=lags,
+        tolerance=1e-10,
+    )  # fmt: skip
+
+
+def identify_lugre_dynamics(
+    response: Response, inertia: float, sliding: Mapping[str, float], *, noise: Noise | float | None = None,
+) -> Identification:  # fmt: skip
+    """Find sigma0 and sigma1 from an open-loop stick-slip response, its pre-sliding parts weighted for themselves.
+
+    Parameters
+    ----------
+    response : Response
+    inertia : float
+        kg·m²
+    sliding : mapping of str to float
+        Parameters of the sliding curve (fs, fc, vs, delta_s, sigma2), identified before.
+    noise : Noise or float, optional
+        Standard deviation of a position, rad; else from the residual in the pre-sliding parts.
+
+    Returns
+    -------
+    Identification
+        Estimates sigma0, sigma1 and stiffness (small-signal, without a law). ``details["scan"]`` holds the plain
+        position misfit over sigma0, and ``details["plain_determines_sigma0"]`` whether that has a minimum worth
+        the name.
+
+    Raises
+    ------
+    InputError
+        If the axis never sticks near zero torque.
+    """
+    known = as_noise(noise)
+    stiffness = small_signal_stiffness(response, sliding["fs"], known)
+    begin = stiffness.value if math.isfinite(stiffness.value) else 1e4
+    # Beyond critical damping bristles would be no springs; this record could not tell.
+    critical = 2.0 * math.sqrt(begin * inertia)
+    vector = lugre_vector(sliding, begin, 0.1 * critical, critical)
+    course, mechanics = course_of(response, vector), Mechanics(inertia)
+    pieces = sticking_pieces(response, sliding["fs"])
+
+    def bristles(position: Array) -> Array:
+        return np.concatenate([position[p] - np.mean(position[p]) for p in pieces])
+
+    wanted = bristles(response.position)
+
+    def residuals(u: Array) -> Array:
+        return bristles(course.run(mechanics, vector.law_parameters(u))[:, 0]) - wanted
+
+    found = fit(residuals, vector, noise=known, size=float(np.max(np.abs(wanted))), starts=1, tolerance=1e-10)
+    scan = plain_scan(response, course, mechanics, vector, found)
+    decides, sentence = plain_verdict(scan, found.values["sigma0"])
+    simulated = course.run(mechanics, vector.law_parameters(found.u))[:, 0]
+    notes = [sentence]
+    if any(e.name == "sigma1" and not e.identified for e in found.estimates):
+        notes.append(
+            "sigma1 is not determined by this record: near zero load its torque is a tiny part of the spring's."
+        )
+    if not found.noise.known:
+        notes.append("The noise of the position is unknown; give it, or nothing can be called identified.")
+    next_steps = (
+        ()
+        if decides
+        else ("Measure small loops of torque over displacement below break-away for the stiffness.",)
+    )
+    correlation = np.full((3, 3), math.nan)
+    correlation[:2, :2], correlation[2, 2] = found.correlation, 1.0
+    return Identification(
+        "lugre_dynamics", vector.model(found.u), (*found.estimates, stiffness), correlation,
+        {
+            "presliding_rms_rad": found.rms,
+            "position_rms_rad": float(np.sqrt(np.mean((simulated - response.position) ** 2))),
+        },
+        tuple(notes), next_steps,
+        (response_picture(response, simulated), scan_picture(scan, found.values["sigma0"])),
+        {"scan": scan, "plain_determines_sigma0": decides, "pieces": len(pieces)},
+    )  # fmt: skip
+
+
+def plain_scan(response: Response, course: Course, mechanics: Mechanics, vector: Vector, found: Fit) -> Array:
+    """sigma0 (N·m/rad) and the root mean square position error (rad) there, shape (m, 2)."""
+    rows: list[tuple[float, float]] = []
+    for factor in SCAN:
+        values = dict(found.values, sigma0=found.values["sigma0"] * float(factor))
+        position = course.run(mechanics, vector.law_parameters(vector.coordinates(values)))[:, 0]
+        rows.append((values["sigma0"], float(np.sqrt(np.mean((position - response.position) ** 2)))))
+    return np.array(rows)
+
+
+def plain_verdict(scan: Array, sigma0: float) -> tuple[bool, str]:
+    """Whether the plain misfit has a minimum at the pre-sliding stiffness, and the sentence that says so."""
+    finite = scan[np.isfinite(scan[:, 1])]
+    best = int(np.argmin(finite[:, 1]))
+    near = finite[finite[:, 1] <= FLAT * finite[best, 1], 0]
+    at_edge = best in (0, finite.shape[0] - 1)
+    if at_edge:
+        side = "grows" if best else "shrinks"
+        return False, (
+            "Plain least squares on the position does not determine sigma0 and sigma1: the misfit falls as "
+            f"sigma0 {side}, to {finite[best, 1]:.3g} rad at {finite[best, 0]:.3g} N·m/rad, the last value "
+            "tried. Gross sliding dominates it; sigma0 comes from the pre-sliding parts, weighted for themselves."
+        )
+    if not (near[0] <= sigma0 <= near[-1]) or near[-1] > 2.0 * near[0]:
+        return False, (
+            "Plain least squares on the position does not determine sigma0 and sigma1: misfits within 10 % of "
+            f"the least reach from sigma0 = {near[0]:.3g} to {near[-1]:.3g} N·m/rad; "
+            f"the pre-sliding parts say {sigma0:.3g}."
+        )
+    return (
+        True,
+        "Plain least squares on the position has its minimum at the stiffness of the pre-sliding parts too.",
+    )
+
+
+# ---- pictures ------------------------------------------------------------------------------------------------
+
+
+def response_picture(response: Response, simulated: Array) -> Picture:
+    """Measured and simulated position (thesis figures 3.12, 4.13, 4.37)."""
+    error = float(np.sqrt(np.mean((simulated - response.position) ** 2)))
+    traces = (Trace("measured", response.time, response.position), Trace("LuGre", response.time, simulated))
+    return Picture(
+        "lugre-response", "Open-loop response", f"Root mean square difference {1e3 * error:.3g} mrad", "time (s)",
+        "position (rad)", traces,
+    )  # fmt: skip
+
+
+def scan_picture(scan: Array, sigma0: float) -> Picture:
+    """The plain position misfit over sigma0, and the stiffness of the pre-sliding parts."""
+    traces = (
+        Trace("position misfit", scan[:, 0], scan[:, 1]),
+        Trace("pre-sliding parts", np.array([sigma0]), np.array([math.nan]), "vertical"),
+    )
+    return Picture(
+        "lugre-misfit", "What the whole position says about the stiffness",
+        "A curve without a minimum near the vertical line does not determine sigma0",
+        "sigma0 (N·m/rad)", "RMS position misfit (rad)", traces, "log",
+    )  # fmt: skip

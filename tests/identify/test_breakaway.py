@@ -1,0 +1,64 @@
+"""Break-away torque from ramps."""
+
+import numpy as np
+import pytest
+
+from stickslip import Record
+from stickslip.errors import InputError
+from stickslip.identify.breakaway import find_breaks, identify_breakaway
+
+
+def ramps(rates: list[float], rng: np.random.Generator, per_decade: float = 0.0) -> Record:
+    """A contact that breaks at 0.3 + 0.02 sin(angle) N·m, other in the negative direction, ten degrees apart."""
+    step = 2e-3
+    position, torque = [], []
+    angle = 0.0
+    for k, rate in enumerate(rates):
+        side = 1.0 if k % 4 < 2 else -1.0
+        limit = (0.3 if side > 0.0 else 0.26) + 0.02 * np.sin(angle) + per_decade * np.log10(rate)
+        load = np.arange(0.0, limit + rate * step, rate * step)
+        moved = np.radians(10.0) * np.clip(np.arange(60) / 50.0, 0.0, 1.0)
+        position += [*np.full(load.size, angle), *(angle + side * moved)]
+        torque += [*(side * load), *np.full(60, side * load[-1])]
+        angle += side * np.radians(10.0)
+        position += [angle] * 100
+        torque += [0.0] * 100
+    x = np.array(position) * 1.0
+    channels = {"position": x + rng.normal(0.0, 1e-7, x.size), "motor_torque": np.array(torque)}
+    return Record(step * np.arange(x.size), channels, {"position": "rad", "motor_torque": "N·m"})
+
+
+def test_every_break_is_found_with_its_angle_direction_and_rate() -> None:
+    breaks = find_breaks(ramps([0.1] * 36, np.random.default_rng(0)))
+    assert len(breaks) == 36
+    assert [b.direction for b in breaks] == [1, 1, -1, -1] * 9
+    assert np.degrees([b.angle for b in breaks[:4]]) == pytest.approx([0.0, 10.0, 20.0, 10.0], abs=0.2)
+    truth = [(0.3 if b.direction > 0 else 0.26) + 0.02 * np.sin(b.angle) for b in breaks]
+    assert [b.torque for b in breaks] == pytest.approx(truth, abs=1e-3)
+    assert [b.rate for b in breaks] == pytest.approx([0.1] * 36, rel=0.05)
+
+
+def test_mean_interval_and_spread_per_direction() -> None:
+    result = identify_breakaway(ramps([0.1] * 36, np.random.default_rng(0)))
+    assert result["fs_positive"].value == pytest.approx(0.3 + 0.01 * np.sin(np.radians(10.0)), abs=1e-3)
+    assert result["fs_negative"].value == pytest.approx(0.26 + 0.005, abs=1e-3)
+    assert result["fs_positive"].lower < result["fs_positive"].value < result["fs_positive"].upper
+    assert result.not_identified == ()
+    assert [t.kind for t in result.pictures[0].traces[:2]] == ["points", "open points"]
+
+
+def test_dependence_on_the_ramp_rate_is_found() -> None:
+    rates = list(np.random.default_rng(3).choice([0.02, 0.05, 0.2, 0.5], 40))
+    result = identify_breakaway(ramps(rates, np.random.default_rng(1), per_decade=-0.06))
+    assert result["rate_effect"].lower < -0.06 < result["rate_effect"].upper < 0.0
+    flat = identify_breakaway(ramps(rates, np.random.default_rng(2)))
+    assert not any("depends on the ramp rate" in note for note in flat.notes)
+
+
+def test_an_axis_that_never_moves_is_one_clear_error() -> None:
+    time = np.linspace(0.0, 1.0, 300)
+    still = Record(
+        time, {"position": 0.0 * time, "motor_torque": time}, {"position": "rad", "motor_torque": "N·m"}
+    )
+    with pytest.raises(InputError, match="never breaks away"):
+        identify_breakaway(still)
