@@ -67,11 +67,11 @@ def test_a_record_without_drive_is_refused(generator: Any) -> None:
 
 @pytest.mark.slow
 def test_short_coverage_study(generator: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    spec = importlib.util.spec_from_file_location("coverage_study", BENCHMARKS / "coverage.py")
+    spec = importlib.util.spec_from_file_location("interval_coverage", BENCHMARKS / "interval_coverage.py")
     assert spec is not None
     assert spec.loader is not None
     coverage = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "coverage_study", coverage)
+    monkeypatch.setitem(sys.modules, "interval_coverage", coverage)
     spec.loader.exec_module(coverage)
     rows = [r for seed in (0, 1, 4, 5, 9, 10, 14, 15) for r in coverage.study(seed)]
     for name in coverage.ALWAYS:

@@ -3,7 +3,7 @@
 Simulated records (`coverage_records.py`) are identified by `axis_prediction` as if nothing but their law were known,
 and counted. Parallel over records.
 
-    python benchmarks/coverage.py [--records 200] [--first 0] [--jobs 2] [--short] [--rows FILE]
+    python benchmarks/interval_coverage.py [--records 200] [--first 0] [--jobs 2] [--short] [--rows FILE]
 
 Every bar is printed with PASS or FAIL: J, Fc, sigma2 identified in at least 95 % of the records; Fs and vs in every
 record with at least 3 levels below 2 vs; 95 % intervals that contain the truth 90 to 99 % of the time, for each
