@@ -17,7 +17,9 @@ from stickslip.errors import InputError, StickslipError
 
 __all__ = ["VERBS", "main", "parser_of"]
 
-VERBS = ("study", "simulate", "doctor", "laws", "law", "cite", "rerun", "export", "version")
+VERBS = (
+    "study", "simulate", "identify", "doctor", "laws", "law", "cite", "rerun", "export", "version"
+)  # fmt: skip
 
 
 class Parser(argparse.ArgumentParser):

@@ -281,7 +281,7 @@ def inverse_identification(found: InverseDynamics, axis: ServoAxis) -> Identific
         low, high = float(value - 1.96 * std), float(value + 1.96 * std)
         signed = not name.startswith(("inertia", "fc", "fv"))
         if signed:
-            good = 1.96 * std <= 0.05 * abs(found.coulomb)
+            good = bool(1.96 * std <= 0.05 * abs(found.coulomb))
         else:
             good = low > 0.0 and high <= 2.0 * low
         why = "" if good else "its interval is too wide"

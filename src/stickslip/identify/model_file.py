@@ -110,8 +110,8 @@ def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: st
 def _estimate(e: Estimate) -> dict[str, Any]:
     """TOML has inf and nan, so that every number stays one."""
     return {
-        "name": e.name, "unit": e.unit, "value": e.value, "std": e.std, "lower": e.lower, "upper": e.upper,
-        "identified": e.identified, **({"verdict": e.verdict} if e.verdict else {}),
+        "name": e.name, "unit": e.unit, "value": float(e.value), "std": float(e.std), "lower": float(e.lower),
+        "upper": float(e.upper), "identified": bool(e.identified), **({"verdict": e.verdict} if e.verdict else {}),
     }  # fmt: skip
 
 

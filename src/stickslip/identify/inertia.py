@@ -1,0 +1,218 @@
+"""Inertia from the frequency response of the open loop (thesis 4.2).
+
+The axis is taken as inertia with effective viscous friction, V(s)/T(s) = 1 / (J s + b). Responses are averaged over
+Hann windows: H1 = S_xy / S_xx (noise on the position), H2 = S_yy / S_yx (noise on the torque), coherence their ratio
+(Bendat and Piersol 2010). The impedance j omega / (motion per torque) = b + j omega J is linear in both unknowns; it is
+fitted on a stated band, weighted by the coherence. Where friction matters the response depends on the amplitude, so
+records of several amplitudes are compared: b falls as the amplitude grows, J stays. The torque is taken as held from
+sample to sample; without that, half a sample of delay would add b dt/2 to the inertia.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.axis_inverse import uniform
+from stickslip.identify.axis_trial import Trial
+from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
+from stickslip.identify.filters import cross_spectrum, spectrum
+from stickslip.machines.servo import ServoAxis
+
+__all__ = ["Response", "frequency_response", "inertia"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Complex = np.ndarray[Any, np.dtype[np.complex128]]
+
+BAND = (0.4, 25.0)  # Hz, of the fit in the thesis
+PEAK = 2.0  # factor over the rigid axis's response that makes a resonance
+COHERENT = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Frequency response of one record: position over torque.
+
+    Attributes
+    ----------
+    name : str
+    amplitude : float
+        Standard deviation of the torque, N·m.
+    frequency : array, shape (n,)
+        Hz, without 0.
+    h1, h2 : array of complex, shape (n,)
+        rad/(N·m).
+    coherence : array, shape (n,)
+    windows : int
+        How many windows do not overlap: what the averages rest on.
+    """
+
+    name: str
+    amplitude: float
+    frequency: Array
+    h1: Complex
+    h2: Complex
+    coherence: Array
+    windows: int
+
+
+def frequency_response(trial: Trial, axis: ServoAxis, *, lowest: float = BAND[0]) -> Response:
+    """Position over torque of one record; windows are 4 periods of the lowest frequency long.
+
+    Raises
+    ------
+    InputError
+        If the record has fewer than two such windows, or no torque.
+    """
+    t, q, u, rate = uniform(trial)
+    length = math.ceil(4.0 * rate / lowest)
+    if q.size < 2 * length:
+        raise InputError(
+            f"{trial.name}: {q.size / rate:.3g} s hold fewer than two windows of {length / rate:.3g} s; give a longer "
+            "record or a higher lowest frequency"
+        )
+    gain, _ = axis.drive_gains(trial.quantity)
+    supply = 1.0 if trial.supply is None else np.interp(t, trial.time, trial.supply)
+    torque = gain * supply * u
+    if not np.std(torque) > 0.0:
+        raise InputError(f"{trial.name}: the torque never changes; excite the axis")
+    # The position wanders; its difference does not, and leaks less. Central, so that it keeps its phase.
+    speed = np.gradient(q, 1.0 / rate)
+    f, sxx = spectrum(torque, rate, length)
+    _, syy = spectrum(speed, rate, length)
+    sxy = cross_spectrum(torque, speed, rate, length)
+    keep = (f > 0.0) & (f < 0.4 * rate)
+    # What the central difference does to s: sin(omega dt) / dt in place of omega.
+    s = 1j * np.sin(2.0 * math.pi * f[keep] / rate) * rate
+    turn = 1j * 2.0 * math.pi * f[keep] / rate
+    held = (1.0 - np.exp(-turn)) / turn
+    h1 = sxy[keep] / sxx[keep] / s / held
+    h2 = syy[keep] / np.conj(sxy[keep]) / s / held
+    coherence = np.abs(sxy[keep]) ** 2 / (sxx[keep] * syy[keep])
+    return Response(
+        trial.name, float(np.std(torque)), f[keep], h1.astype(np.complex128), h2.astype(np.complex128), coherence,
+        q.size // length,
+    )  # fmt: skip
+
+
+def inertia(
+    trials: Sequence[Trial], axis: ServoAxis, *, band: tuple[float, float] = BAND, estimator: str = "h1"
+) -> Identification:
+    """Inertia and effective viscous friction from open-loop records of one or several amplitudes.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        With the torque that excited them (random, or a sweep).
+    axis : ServoAxis
+    band : (float, float)
+        Where the rigid axis is fitted, Hz.
+    estimator : {"h1", "h2"}
+
+    Returns
+    -------
+    Identification
+        ``inertia``, and ``viscous[i]`` per record. ``details`` holds ``responses`` and ``resonances`` (Hz).
+
+    Raises
+    ------
+    InputError
+        If there is no coherent response in the band.
+    """
+    if not trials:
+        raise InputError("no record; give at least one")
+    if estimator not in ("h1", "h2"):
+        raise InputError(f"estimator = {estimator!r} must be 'h1' or 'h2'")
+    if not 0.0 < band[0] < band[1]:
+        raise InputError(f"band = {band} must be two ascending frequencies in Hz")
+    responses = [frequency_response(t, axis, lowest=band[0]) for t in trials]
+    rows: list[Array] = []
+    sides: list[Array] = []
+    weights: list[Array] = []
+    for place, r in enumerate(responses):
+        inside = (r.frequency >= band[0]) & (r.frequency <= band[1]) & (r.coherence >= COHERENT)
+        if inside.sum() < 3:
+            raise InputError(
+                f"{r.name}: the coherence exceeds {COHERENT} at fewer than 3 frequencies in {band[0]:g} to "
+                f"{band[1]:g} Hz; excite the axis more there"
+            )
+        omega = 2.0 * math.pi * r.frequency[inside]
+        h = (r.h1 if estimator == "h1" else r.h2)[inside]
+        g = r.coherence[inside]
+        impedance = 1.0 / (1j * omega * h)
+        # Standard deviation of a response from its coherence: Bendat and Piersol 2010, eq. 9.90.
+        spread = np.abs(impedance) * np.sqrt(np.maximum(1.0 - g, 1e-6) / (2.0 * g * r.windows))
+        real, imaginary = np.zeros((omega.size, 1 + len(trials))), np.zeros((omega.size, 1 + len(trials)))
+        real[:, 1 + place], imaginary[:, 0] = 1.0, omega
+        rows += [real, imaginary]
+        sides += [impedance.real, impedance.imag]
+        weights += [1.0 / spread, 1.0 / spread]
+    w = np.concatenate(weights)
+    a, y = np.concatenate(rows) * w[:, None], np.concatenate(sides) * w
+    solution: Array = np.linalg.lstsq(a, y, rcond=None)[0].astype(np.float64)
+    residual = y - a @ solution
+    # A Hann window spreads each line over its neighbours: half of them count as independent.
+    level = max(1.0, float(residual @ residual) / max(y.size - solution.size, 1))
+    covariance: Array = (2.0 * level * np.linalg.inv(a.T @ a)).astype(np.float64)
+    return _result(responses, solution, covariance, axis, band, estimator)
+
+
+def _result(
+    responses: Sequence[Response], solution: Array, covariance: Array, axis: ServoAxis, band: tuple[float, float],
+    estimator: str,
+) -> Identification:  # fmt: skip
+    std = np.sqrt(np.diag(covariance))
+    names = [("inertia", axis.unit("kg·m²"), "J")]
+    names += [(f"viscous[{i}]", axis.unit("N·m·s/rad"), "b") for i in range(len(responses))]
+    estimates: list[Estimate] = []
+    for (name, unit, symbol), value, s in zip(names, solution, std, strict=True):
+        low, high = float(value - 1.96 * s), float(value + 1.96 * s)
+        good = low > 0.0 and high <= 2.0 * low
+        why = "" if good else "the data do not tell it from 0" if low <= 0.0 else "its interval is too wide"
+        estimates.append(Estimate(name, unit, symbol, float(value), float(s), low, high, good, why))
+    resonances = sorted(
+        {round(f, 2) for r in responses for f in resonances_of(r, float(solution[0]), band[1])}
+    )
+    notes = [f"Rigid axis fitted from {band[0]:g} to {band[1]:g} Hz with {estimator.upper()}."]
+    if resonances:
+        notes.append(f"Resonances at {', '.join(f'{f:g}' for f in resonances)} Hz.")
+    if len(responses) == 1:
+        notes.append("One amplitude only: effective viscous friction depends on it; record another.")
+    return Identification(
+        "inertia", None, tuple(estimates), covariance / np.outer(std, std),
+        {"lowest_coherence": float(min(r.coherence.min() for r in responses))}, tuple(notes),
+        pictures=(_picture(responses, solution, axis),),
+        details={"responses": tuple(responses), "resonances": tuple(resonances), "axis": axis, "band": band},
+    )  # fmt: skip
+
+
+def resonances_of(response: Response, inertia: float, above: float) -> list[float]:
+    """Frequencies above the band where the response peaks over the rigid axis's, Hz."""
+    f = response.frequency
+    over = np.abs(response.h1) * inertia * (2.0 * math.pi * f) ** 2
+    out: list[float] = []
+    for i in range(1, f.size - 1):
+        near = over[max(0, i - 5) : i + 6]
+        if f[i] > above and over[i] > PEAK and over[i] == near.max() and response.coherence[i] >= COHERENT:
+            out.append(float(f[i]))
+    return out
+
+
+def _picture(responses: Sequence[Response], solution: Array, axis: ServoAxis) -> Picture:
+    decibel = [
+        Trace(f"{r.amplitude:.3g} {axis.unit('N·m')} RMS", r.frequency, 20.0 * np.log10(np.abs(r.h1)))
+        for r in responses
+    ]
+    f = responses[0].frequency
+    s = 2j * math.pi * f
+    rigid = 1.0 / (solution[0] * s**2 + solution[1] * s)
+    return Picture(
+        "inertia", "Frequency response", "The rigid axis explains the response below its resonances",
+        "frequency in Hz", f"position over torque in dB ({axis.unit('rad')}/({axis.unit('N·m')}))",
+        (*decibel, Trace("rigid axis", f, 20.0 * np.log10(np.abs(rigid)), "dashes")), "log",
+    )  # fmt: skip
