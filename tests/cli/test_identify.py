@@ -11,6 +11,7 @@ import pytest
 
 from stickslip import Model
 from stickslip.cli import main
+from stickslip.errors import InputError
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "identify"))
 import axis_cases as cases
@@ -87,7 +88,8 @@ def test_bad_input_is_one_line(
 def test_a_file_that_is_no_model_is_refused(tmp_path: Path) -> None:
     other = tmp_path / "other.toml"
     other.write_text('law = "coulomb"\n', encoding="utf-8")
-    from stickslip.errors import InputError
-
-    with pytest.raises(InputError, match="stickslip identify"):
+    with pytest.raises(InputError, match="parameters is missing"):
+        Model.from_file(other)
+    other.write_text('format = "stickslip-model-9"\nlaw = "coulomb"\n', encoding="utf-8")
+    with pytest.raises(InputError, match="another version"):
         Model.from_file(other)
