@@ -48,6 +48,8 @@ class Candidate:
         Errors on data that were not fitted.
     score : array
         Mean squared misfit of each block of held-out data, over weights common to all laws.
+    start : mapping
+        The values fitted: where the fit to all data starts.
     failure : str
         Why it could not be fitted; empty otherwise.
     """
@@ -56,6 +58,7 @@ class Candidate:
     parameters: int
     held_out: Mapping[str, float]
     score: Array
+    start: Mapping[str, Any]
     failure: str = ""
 
 
@@ -116,7 +119,9 @@ def identify_axis(
         fitted = list(trials) if validation else [a for a, _ in pairs]
         held = list(validation) if validation else [b for _, b in pairs]
         candidates = compared(fitted, held, axis, found, inverse, options)
-        chosen = found[chosen_of(candidates)]
+        place = chosen_of(candidates)
+        chosen = found[place]
+        options["values"] = candidates[place].start
         notes = [*notes, sentence_on(candidates, chosen.name)]
     result = output_error(trials, axis, chosen, inverse, **options)
     return assembled(result, inverse, validation, candidates, notes)
@@ -168,17 +173,30 @@ def compared(
         try:
             result = output_error(fitted, axis, law, inverse, **own)
         except InputError as error:
-            out.append(Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), str(error)))
+            out.append(Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), {}, str(error)))
             continue
         weights = weights or result.problem.weights
         misfits = misfits_on(result, held)
         size = np.array([weights[s] for s in result.problem.signals])
         squares = np.concatenate([np.sum((m / size) ** 2, axis=1) for m in misfits])
         score = np.array([float(np.mean(part)) for part in np.array_split(squares, BLOCKS)])
-        out.append(Candidate(law.name, result.fit.vector.size, result.held_out(held), score))
+        out.append(
+            Candidate(law.name, result.fit.vector.size, result.held_out(held), score, fitted_values(result))
+        )
     if all(c.failure for c in out):
         raise InputError("; ".join(c.failure for c in out))
     return out
+
+
+def fitted_values(result: OutputError) -> dict[str, Any]:
+    """Every value of a fit, those of elements as lists."""
+    plain = {
+        k: v
+        for k, v in result.fit.values.items()
+        if "[" not in k or k.startswith(("cos", "sin", "friction_"))
+    }
+    law = result.model.as_dict()
+    return plain | {f.name: law[f.name] for f in result.problem.law.fields}
 
 
 def misfits_on(result: OutputError, held: Sequence[Trial]) -> list[Array]:
