@@ -162,6 +162,8 @@ class Option:
         Functions that take the place of the law's own of that name, and call those as ``inner_step`` and so on.
     keeps_elements : bool
         Whether the law still is what its ``modes`` say.
+    reads_surroundings : bool
+        Whether the torque depends on position, load, temperature or time.
     """
 
     function: Callable[..., float] | None = None
@@ -173,6 +175,7 @@ class Option:
     doubles: str = ""
     wraps: Mapping[str, Callable[..., Any]] = field(default_factory=dict[str, Any])
     keeps_elements: bool = True
+    reads_surroundings: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -472,6 +475,11 @@ class Law(Described):
     def option(self, choice: Choice) -> Option:
         """The option in force for `choice`."""
         return choice.options[self.chosen.get(choice.name, choice.default)]
+
+    @property
+    def reads_surroundings(self) -> bool:
+        """Whether the torque depends on position, load, temperature or time."""
+        return any(self.option(choice).reads_surroundings for choice in self.choices)
 
     def having(self, **names: str) -> Law:
         """Return this law with other options, ``law.having(slip_rule="literal")``.

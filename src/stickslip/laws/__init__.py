@@ -3,7 +3,13 @@
 To add a law, write its file and add its name to this tuple.
 """
 
-COMMON_CHOICES = ("_symmetry.SYMMETRY",)
+COMMON_CHOICES = (
+    "_symmetry.SYMMETRY",
+    "modulation.POSITION",
+    "modulation.LOAD",
+    "modulation.TEMPERATURE",
+    "modulation.TIME",
+)
 """Choices of every law, whether its file names them or not."""
 
 LAWS = (

@@ -39,7 +39,7 @@ from stickslip.simulation._case import (
 from stickslip.simulation._exact_kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, LONGEST_STEP, solve
 from stickslip.simulation._forcing import NO_CELLS, feedforward
 from stickslip.simulation._meter import SIZE, close_standstill, new_meter, settle_band_of
-from stickslip.spec import Bristle, Elements, Option
+from stickslip.spec import Bristle, Elements, Law, Option
 
 __all__ = ["Prepared", "can_run", "prepare", "run"]
 
@@ -66,6 +66,9 @@ def can_run(case: Case) -> str:
         return "the exact integrator needs a controller without a torque limit"
     if controller.gains.kp == 0.0 and case.plant.model is not None and case.plant.model.law.state_fields:
         return "the exact integrator needs a proportional gain: sliding freely, it would take minute steps"
+    for side in (case.plant, case.compensator):
+        if side.model is not None and side.model.law.reads_surroundings:
+            return f"law {side.model.law.name!r} depends on its surroundings ({modulations(side.model.law)})"
     helper = controller.compensator
     if helper is not None and helper.filter_hz is not None:
         return "the exact integrator needs a compensator without a velocity filter"
@@ -80,6 +83,12 @@ def can_run(case: Case) -> str:
     if isinstance(plant, Elements) and math.isfinite(plant.slope):
         return "the exact integrator cannot take the plant: it creeps on its steep slope instead of resting"
     return ""
+
+
+def modulations(law: Law) -> str:
+    """The options that make the law depend on its surroundings, for people."""
+    named = [f"{c.name} = {law.chosen[c.name]}" for c in law.choices if law.option(c).reads_surroundings]
+    return ", ".join(named)
 
 
 def _complaint(side: Side) -> str:
