@@ -112,13 +112,17 @@ def batch(law: Law, p, velocity, dt):
 
 
 def level_of(law: Law, p) -> float:
-    """A torque that the law's own part cannot exceed at the given parameters, from its parameters in N·m."""
+    """A torque that the law's own part cannot exceed at the given parameters, from its parameters in N·m.
+
+    A dependence on the surroundings multiplies it by its factor.
+    """
     total = 0.0
     for f in law.fields:
         if f.par.unit == "N·m":
             value = getattr(p, f.name)
             total += math.fsum(map(abs, value)) if f.per_element else abs(value)
-    return total
+    dependences = [law.option(c) for c in law.choices if law.option(c).reads_surroundings]
+    return total * math.prod(option.function(p, U) for option in dependences)
 
 
 @every_variant
@@ -165,7 +169,9 @@ def test_compiled_is_plain_python_bit_for_bit(law):
 
 
 def without_viscosity(law: Law):
-    """The example without what is proportional to the velocity."""
+    """The example without its viscous part, unless the law is nothing else."""
+    if law.name == "viscous":
+        return example(law)
     values = dict(law.example)
     for f in law.fields:
         if f.name.startswith(("sigma2", "fv2")):

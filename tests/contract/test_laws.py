@@ -297,5 +297,5 @@ def test_is_a_plant(law):
     energy = record.meta["energy"]
     assert energy["friction_loss"] > 0.0
     speeds = Reference("sine", amplitude=0.5, frequency=0.25).sample(np.linspace(0.0, 2.0, 2001))[:, 1]
-    powers = [float(v) * law.steady(float(v), example(law)) for v in speeds]
+    powers = [float(v) * steady_of(law, float(v)) for v in speeds]
     assert energy["friction_loss"] == pytest.approx(np.mean(powers) * 2.0, rel=0.3)

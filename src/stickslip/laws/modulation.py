@@ -60,10 +60,13 @@ class Thermal(NamedTuple):
     """How friction follows the temperature."""
 
     temperature_coefficient: Annotated[
-        float, Par("1/K", "kappa", "relative change per kelvin", lower=-1.0, upper=1.0)
+        float, Par("1/K", "kappa", "relative change per kelvin", lower=-0.1, upper=0.1)
     ]
     reference_temperature: Annotated[
-        float, Par("°C", "T_0", "temperature at which the parameters hold", lower=-273.15, default=20.0)
+        float,
+        Par(
+            "°C", "T_0", "temperature at which the parameters hold", lower=-273.15, upper=1000.0, default=20.0
+        ),
     ]
 
 

@@ -75,6 +75,7 @@ LAW = Law(
     stored=stored,
     check=check,
     passive="always",
+    rate_independent=True,
     continuous=False,
     choices=(VISCOUS,),
 )
