@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from stickslip import Model
@@ -93,3 +95,91 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path) -> None:
     other.write_text('format = "stickslip-model-9"\nlaw = "coulomb"\n', encoding="utf-8")
     with pytest.raises(InputError, match="another version"):
         Model.from_file(other)
+
+
+def test_a_folder_gets_model_and_report(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "friction"
+    assert main(["identify", str(log), "--inverse", "--out", str(out), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert Path(printed["report_file"]) == out / "report.html"
+    assert "less-than-a-revolution" in [f["code"] for f in printed["findings"]["log.csv"]]
+    html = (out / "report.html").read_text(encoding="utf-8")
+    assert "less-than-a-revolution" in html
+    for name in ("position", "velocity", "time"):
+        assert f'id="residual-torque-over-{name}"' in html
+    # It needs nothing but itself.
+    assert not re.search(r"""(src|href)=["'](?!data:|#)""", html)
+    assert "url(" not in html
+
+
+def test_a_frozen_value_stays(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    extra = ["--law", "coulomb", "--loop", LOOP, "--freeze", "sigma2=0.02", "--no-report", "--json"]
+    assert main(["identify", str(log), "--out", str(tmp_path / "m.toml"), *extra]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["model"]["sigma2"] == 0.02
+    assert "sigma2" not in [e["name"] for e in printed["estimates"]]
+    assert not (tmp_path / "m.html").exists()
+
+
+@pytest.fixture(scope="module")
+def steps(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Constant velocities in both directions, each for some revolutions, with noise: fs 0.4, fc 0.3, vs 0.1."""
+    rng = np.random.default_rng(2)
+    speeds = [s * v for v in (0.5, 0.02, 0.05, 0.1, 0.2, 0.4, 1.0, 3.0) for s in (1.0, -1.0)]
+    lasts = [max(8.0, 14.0 / abs(v)) if abs(v) > 0.3 else 20.0 for v in speeds]
+    dt = 0.01
+    v = np.concatenate([np.full(round(t / dt), s) for t, s in zip(lasts, speeds, strict=True)])
+    friction = np.sign(v) * (0.3 + 0.1 * np.exp(-((v / 0.1) ** 2))) + 0.02 * v
+    table = np.column_stack([
+        dt * np.arange(v.size), dt * np.cumsum(v), friction + 2e-3 * rng.standard_normal(v.size)
+    ])  # fmt: skip
+    path = tmp_path_factory.mktemp("sliding") / "steps.csv"
+    np.savetxt(
+        path, table, delimiter=",", comments="", header="time [s],position [rad],motor_torque [N·m]", encoding="utf-8",
+        fmt="%.7f",
+    )  # fmt: skip
+    return path
+
+
+def test_a_sliding_curve(steps: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = [
+        "--method",
+        "sliding",
+        "--law",
+        "stribeck",
+        "--freeze",
+        "delta_s=2",
+        "--out",
+        str(tmp_path),
+        "--json",
+    ]
+    assert main(["identify", str(steps), *options]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    found = {e["name"]: e for e in printed["estimates"]}
+    for name, truth in (("fc", 0.3), ("sigma2", 0.02), ("vs", 0.1)):
+        assert found[name]["lower"] <= truth <= found[name]["upper"]
+        assert found[name]["value"] == pytest.approx(truth, rel=0.1)
+    assert 'id="sliding"' in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert Model.from_file(tmp_path / "model.toml").parameters.delta_s == 2.0
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        (["--method", "presliding"], "--method sliding"),
+        (["--method", "lugre"], "inertia"),
+        (["--method", "attraction"], "--method presliding"),
+        (["--method", "sliding", "--torque", "sensor"], "motor_torque"),
+        (["--method", "sliding", "--hold-out", "x.csv"], "--hold-out"),
+        (["--noise", "0"], "greater than 0"),
+    ],
+)
+def test_what_a_method_lacks_is_one_line(
+    steps: Path, tmp_path: Path, extra: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", str(steps), "--out", str(tmp_path), *extra]) == 2
+    complaint = capsys.readouterr().err.strip().splitlines()[-1]
+    assert message in complaint
+    assert "Traceback" not in complaint

@@ -1,44 +1,85 @@
-"""Identify an axis from its records: inertia, offset or gravity, and a friction law, with intervals and verdicts.
+"""Identify an axis or its friction from records: numbers with intervals, a verdict on each, a model and a report.
 
 stickslip identify log.csv
 stickslip identify log.mat --drive-gain 35.15 --loop kp=38996,kd=243.45,limit=10,span=2 --law coulomb --law lugre
-stickslip identify a.csv b.csv --validation c.csv --law my_law.py --out model.toml
+stickslip identify a.csv b.csv --hold-out c.csv --law my_law.py --out friction
+stickslip identify steps.csv --method sliding --law stribeck --noise 1e-4
 
-The records are checked first (`stickslip doctor`); an error stops. Of several laws the error on held-out data chooses.
-With --loop and a reference in the record the closed loop is simulated, otherwise the recorded drive. The law is
-written to model.toml, which `law = {model = "model.toml"}` names in a study or simulation.
+The records are checked first (`stickslip doctor`); an error stops. Methods: `axis` (inertia, offset or gravity and
+friction jointly, from any motion), `sliding` (constant velocities), `breakaway` (torque ramps), `presliding` and
+`attraction` (GMS), `lugre` (sigma0, sigma1), `inertia` (frequency response). Of several laws the error on data left
+out chooses. With --loop and a reference in the record the closed loop is simulated, otherwise the recorded drive.
+--out names a folder for model.toml and report.html, or the model's file with the report beside it; `law = {model =
+"model.toml"}` names the model in a study or simulation.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip.cli import _reading
+from stickslip.cli._methods import METHODS, all_laws, law_file, values
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from stickslip.identify.axis_trial import Trial
-    from stickslip.identify.estimate import Identification
+    from stickslip.identify.estimate import Estimate, Identification
     from stickslip.machines.servo import ServoAxis
     from stickslip.record import Record
+    from stickslip.report.identified import Source
     from stickslip.simulation.driven import Loop
 
-SUMMARY = "identify inertia and a friction law from records; writes model.toml"
+SUMMARY = "identify inertia and a friction law from records; writes model.toml and report.html"
 LOOP_NAMES = ("kp", "ki", "kd", "kr", "limit", "period", "count", "span")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Files, axis, laws, and how to read."""
+    """Files, method, axis, laws, and how to read."""
     parser.add_argument("files", nargs="+", type=Path, metavar="LOG", help="records, fitted together")
     parser.add_argument(
-        "--validation", action="append", default=[], type=Path, metavar="LOG", help="held out"
+        "--method", choices=("axis", "inertia", *METHODS), default="axis", help="default axis"
     )
     parser.add_argument(
-        "--law", action="append", default=[], metavar="LAW", help="a law's name or file; repeatable"
+        "--hold-out", "--validation", dest="validation", action="append", default=[], type=Path, metavar="LOG",
+        help="not fitted, judges the result (axis)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--law", action="append", default=[], metavar="LAW", help="a law's name or file, or all; repeatable"
     )
+    parser.add_argument(
+        "--noise", type=float, metavar="X", help="standard deviation of what is fitted: N·m, or rad (lugre)"
+    )
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="a starting value")
+    parser.add_argument(
+        "--freeze", action="append", default=[], metavar="NAME[=VALUE]", help="keep at its value"
+    )
+    parser.add_argument(
+        "--free", action="append", default=[], metavar="NAME[=VALUE]", help="fit what usually stays"
+    )
+    parser.add_argument(
+        "--model", type=Path, metavar="MODEL.toml", help="what an earlier identification found"
+    )
+    parser.add_argument("--torque", metavar="CHANNEL", help="motor_torque, sensor_torque, ... (not axis)")
+    parser.add_argument("--elements", type=int, default=0, metavar="N", help="of GMS (presliding; 0: chosen)")
+    _axis_arguments(parser.add_argument_group("axis"))
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("model.toml"),
+        metavar="DIR",
+        help="folder, or FILE.toml (model.toml)",
+    )
+    parser.add_argument("--no-report", action="store_true", help="write no report.html")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    _reading.add_arguments(parser)
+
+
+def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[reportPrivateUsage]
+    """What only the method `axis` (and `inertia`) looks at."""
     parser.add_argument("--inverse", action="store_true", help="linear least squares only, no simulation")
     parser.add_argument("--per-direction", action="store_true", help="friction per direction (linear part)")
     parser.add_argument("--pendulum", action="store_true", help="gravity m g l sin(q - q0)")
@@ -47,62 +88,128 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--resistance", type=float, metavar="OHM", help="of the motor, where a voltage drives it"
     )
     parser.add_argument("--loop", metavar="kp=..,kd=..", help=f"sampled controller: {', '.join(LOOP_NAMES)}")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="a starting value")
-    parser.add_argument("--freeze", action="append", default=[], metavar="NAME", help="keep at its value")
-    parser.add_argument("--free", action="append", default=[], metavar="NAME", help="fit what usually stays")
     parser.add_argument("--harmonics", type=int, default=0, metavar="N", help="of a torque over the position")
     parser.add_argument(
         "--load", action="store_true", help="friction that grows with the load of the gearing"
     )
     parser.add_argument("--robust", action="store_true", help="outliers count linearly")
-    parser.add_argument("--out", type=Path, default=Path("model.toml"), metavar="FILE.toml")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    _reading.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print estimates and verdicts, write the model."""
+    """Print estimates and verdicts, write the model and the report."""
     from stickslip.cli import _output
-    from stickslip.errors import InputError
-    from stickslip.identify.axis import AUTOMATIC, identify_axis, inverse_identification
-    from stickslip.identify.axis_inverse import inverse_dynamics
-    from stickslip.identify.axis_output import Extras
-    from stickslip.identify.model_file import write_model
 
-    if args.harmonics < 0:
-        raise InputError(f"--harmonics {args.harmonics} must be 0 or more")
-    records = [checked(path, args) for path in (*args.files, *args.validation)]
-    axis = axis_of(records[0], args)
-    trials = [trial(r, axis, args) for r in records]
-    fitted, held = trials[: len(args.files)], trials[len(args.files) :]
-    laws: list[str] = args.law or list(AUTOMATIC)
-    if args.inverse:
-        found = inverse_identification(
-            inverse_dynamics(fitted, axis, per_direction=args.per_direction, harmonics=args.harmonics), axis
-        )
-        laws = []
-    else:
-        found = identify_axis(
-            fitted, axis, laws, validation=held, free=args.free, frozen=args.freeze, values=values(args.set),
-            extras=Extras(harmonics=args.harmonics, load=args.load), per_direction=args.per_direction,
-            robust=args.robust,
-        )  # fmt: skip
-    data = [source_of(r) for r in records]
-    path = write_model(args.out, found, data=data, law=path_of(found, laws))
+    sane(args)
+    model_file, report_file = places(args.out)
+    sources = [checked(path, args) for path in args.files]
+    sources += [checked(path, args, held_out=True) for path in args.validation]
+    if args.law == ["all"]:
+        args.law = all_laws()
+    _output.say(f"method {args.method}, {sum(len(s.record) for s in sources)} samples")
+    found = identified(sources, args)
+    made = written(found, sources, args, model_file, report_file)
     if args.json:
-        _output.print_json({**found.as_dict(), "data": data, "model_file": str(path)})
+        data = [s.about for s in sources]
+        findings = {s.name: [f.as_data() for f in s.findings] for s in sources}
+        _output.print_json(
+            {**found.as_dict(), "data": data, "findings": findings, **{k: str(v) for k, v in made.items()}}
+        )
     else:
         show(found)
-        print(f"model: {path}")
+        for what, path in made.items():
+            print(f"{what.partition('_')[0]}: {path}")
     return 0
 
 
-def checked(path: Path, args: argparse.Namespace) -> Record:
-    """Read a record and let the doctor look at it; warnings go to stderr."""
-    import sys
+def sane(args: argparse.Namespace) -> None:
+    """Refuse numbers that mean nothing."""
+    import math
 
     from stickslip.errors import InputError
+
+    if args.harmonics < 0:
+        raise InputError(f"--harmonics {args.harmonics} must be 0 or more")
+    if args.elements < 0:
+        raise InputError(f"--elements {args.elements} must be 0 or more")
+    if args.noise is not None and not (math.isfinite(args.noise) and args.noise > 0.0):
+        raise InputError(f"--noise {args.noise:g} must be greater than 0")
+    if args.validation and args.method != "axis":
+        raise InputError(f"--hold-out is for --method axis; --method {args.method} has none")
+
+
+def places(out: Path) -> tuple[Path, Path]:
+    """The files of model and report; the folder is made."""
+    from stickslip.study.files import prepared_folder
+
+    if out.suffix == ".toml":
+        prepared_folder(out.parent)
+        name = "report.html" if out.name == "model.toml" else f"{out.stem}.html"
+        return out, out.parent / name
+    prepared_folder(out)
+    return out / "model.toml", out / "report.html"
+
+
+def identified(sources: Sequence[Source], args: argparse.Namespace) -> Identification:
+    """The method's result, with the doctor's findings."""
+    from dataclasses import replace
+
+    records = [s.record for s in sources]
+    if args.method in METHODS:
+        found = METHODS[args.method](records, args)
+    else:
+        found = whole_axis(records, args)
+    return replace(found, findings=tuple(f for s in sources for f in s.findings))
+
+
+def whole_axis(records: Sequence[Record], args: argparse.Namespace) -> Identification:
+    """The methods `axis` and `inertia`."""
+    from stickslip.identify.axis import AUTOMATIC, identify_axis, inverse_identification
+    from stickslip.identify.axis_inverse import inverse_dynamics
+    from stickslip.identify.axis_output import Extras
+
+    axis = axis_of(records[0], args)
+    trials = [trial(r, axis, args) for r in records]
+    fitted, held = trials[: len(args.files)], trials[len(args.files) :]
+    if args.method == "inertia":
+        from stickslip.identify.inertia import inertia
+
+        return inertia(fitted, axis)
+    if args.inverse:
+        return inverse_identification(
+            inverse_dynamics(fitted, axis, per_direction=args.per_direction, harmonics=args.harmonics), axis
+        )
+    given = values([p for p in (*args.set, *args.freeze, *args.free) if p in args.set or "=" in p])
+    return identify_axis(
+        fitted, axis, args.law or list(AUTOMATIC), validation=held, free=[n.partition("=")[0] for n in args.free],
+        frozen=[n.partition("=")[0] for n in args.freeze], values=given,
+        extras=Extras(harmonics=args.harmonics, load=args.load), per_direction=args.per_direction,
+        robust=args.robust,
+    )  # fmt: skip
+
+
+def written(
+    found: Identification, sources: Sequence[Source], args: argparse.Namespace, model_file: Path, report_file: Path
+) -> dict[str, Path]:  # fmt: skip
+    """Write the model (where there is a whole law) and the report."""
+    from stickslip.identify.model_file import versions, write_model
+
+    made: dict[str, Path] = {}
+    if found.model is not None:
+        laws: list[str] = [] if args.inverse else args.law
+        data = [s.about for s in sources]
+        made["model_file"] = write_model(model_file, found, data=data, law=law_file(found, laws))
+    if not args.no_report:
+        from stickslip.report.identified import write_identification
+
+        made["report_file"] = write_identification(report_file, found, sources, versions=versions())
+    return made
+
+
+def checked(path: Path, args: argparse.Namespace, held_out: bool = False) -> Source:
+    """Read a record and let the doctor look at it; warnings go to stderr."""
+    from stickslip.errors import InputError
     from stickslip.identify.doctor import examine
+    from stickslip.report.identified import Source
 
     record = _reading.open_record(path, args).record
     diagnosis = examine(record)
@@ -110,7 +217,7 @@ def checked(path: Path, args: argparse.Namespace) -> Record:
         raise InputError(f"{path}: {diagnosis.errors[0].line()}; see `stickslip doctor {path}`")
     for finding in diagnosis.warnings:
         print(f"stickslip: {path}: {finding.line()}", file=sys.stderr)
-    return record
+    return Source(path.name, record, diagnosis.findings, source_of(record), held_out)
 
 
 def axis_of(record: Record, args: argparse.Namespace) -> ServoAxis:
@@ -145,30 +252,6 @@ def loop_of(text: str) -> Loop:
     return Loop(velocity_span=span, **given)
 
 
-def values(pairs: list[str]) -> dict[str, float]:
-    """Read NAME=VALUE."""
-    from stickslip.errors import InputError
-
-    out: dict[str, float] = {}
-    for pair in pairs:
-        name, equals, number = pair.partition("=")
-        try:
-            out[name.strip()] = float(number)
-        except ValueError:
-            equals = ""
-        if not equals:
-            raise InputError(f"{pair!r} must be NAME=VALUE with a number in SI units")
-    return out
-
-
-def path_of(found: Identification, laws: Sequence[str]) -> str:
-    """The file of the law that was taken, if it came from one."""
-    from stickslip import plugins
-
-    assert found.model is not None
-    return next((x for x in laws if x.endswith(".py") and plugins.law(x).name == found.model.law.name), "")
-
-
 def source_of(record: Record) -> dict[str, Any]:
     """File, hash and size of a record."""
     reading: dict[str, Any] = record.meta.get("reading", {})
@@ -177,13 +260,29 @@ def source_of(record: Record) -> dict[str, Any]:
 
 def show(found: Identification) -> None:
     """Estimates with 95 % intervals, misfits, what is not identified and what to measure."""
-    assert found.model is not None
-    print(f"{found.method}: law {found.model.law.name!r}\n")
+    law = f": law {found.model.law.name!r}" if found.model else ""
+    print(f"{found.method.replace('_', ' ')}{law}\n")
+    width = max(16, *(len(e.name) + 2 for e in found.estimates)) if found.estimates else 16
     for e in found.estimates:
-        verdict = "" if e.identified else f"  not identified: {e.verdict}"
-        print(f"{e.name:<16}{e.value:>12.5g}  [{e.lower:.5g}, {e.upper:.5g}] {e.unit}{verdict}")
+        print(f"{e.name:<{width}}{e.value:>12.5g}  {interval(e):<26} {e.unit:<11} {verdict(e)}".rstrip())
     print()
     for name, number in found.misfit.items():
         print(f"{name:<32}{number:>12.5g}")
-    for sentence in (*found.notes, *found.measure_next):
+    for sentence in found.notes:
         print(sentence)
+    for sentence in found.measure_next:
+        print(f"measure next: {sentence}")
+
+
+def interval(e: Estimate) -> str:
+    """The 95 % interval."""
+    import math
+
+    if math.isnan(e.lower) or math.isnan(e.upper):
+        return "[unknown]"
+    return f"[{e.lower:.5g}, {e.upper:.5g}]"
+
+
+def verdict(e: Estimate) -> str:
+    """Identified, or why not."""
+    return "identified" if e.identified else f"not identified{': ' if e.verdict else ''}{e.verdict}"

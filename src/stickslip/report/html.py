@@ -16,7 +16,7 @@ from stickslip.report._view import StudyView, is_thesis
 from stickslip.report.captions import case_message, figure_of_merit, ranking
 from stickslip.report.figures import COMMON, Figure
 
-__all__ = ["render"]
+__all__ = ["image", "render"]
 
 MARKS = {True: ("yes", "holds"), False: ("no", "does not hold"), None: ("open", "not run")}
 
@@ -159,9 +159,14 @@ def _parts(view: StudyView, figures: Sequence[Figure]) -> list[dict[str, Any]]:
 
 
 def _embedded(figure: Figure) -> dict[str, Any]:
-    """A figure for the template: the smaller of its two files, as a data URI, and its size in points."""
-    svg = figure.stem.with_name(figure.stem.name + ".svg")
-    png = figure.stem.with_name(figure.stem.name + ".png")
+    """A figure for the template, with its files inside."""
+    return {"id": figure.id, "title": figure.title, "caption": figure.caption, **image(figure.stem)}
+
+
+def image(stem: Path) -> dict[str, Any]:
+    """The smaller of a figure's two files (`stem`.svg and .png) as a data URI, and its size in points."""
+    svg = stem.with_name(stem.name + ".svg")
+    png = stem.with_name(stem.name + ".png")
     head = svg.read_text(encoding="utf-8")[:2000]
     size = re.search(r'width="([\d.]+)pt" height="([\d.]+)pt"', head) or re.search(
         r'viewBox="0 0 ([\d.]+) ([\d.]+)"', head
@@ -169,7 +174,6 @@ def _embedded(figure: Figure) -> dict[str, Any]:
     width, height = (float(x) for x in size.groups()) if size else (317.0, 317.0)
     data, kind = _smaller(svg, png)
     return {
-        "id": figure.id, "title": figure.title, "caption": figure.caption,
         "source": f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}",
         "width": round(width * 2), "height": round(height * 2),
     }  # fmt: skip

@@ -62,6 +62,8 @@ def _curve(trace: Trace, x_factor: float, y_factor: float, styles: Iterator[tupl
         style = plots.Style("#D55E00", "", 1.1)
     elif trace.kind == "faint":
         style = plots.Style("#E69F00", "-", 0.5)
+    elif trace.kind == "band":
+        style = plots.Style("#56B4E9", "-", 0.6)
     elif trace.kind == "vertical":
         style = plots.Style("#D55E00", (0, (1.5, 1)), 1.3)
     elif not trace.label:

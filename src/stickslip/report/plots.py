@@ -245,6 +245,14 @@ def _line(axes: Any, curve: Curve) -> None:
     else:
         if curve.kind == "band" and curve.y2 is not None:
             axes.fill_between(curve.x, curve.y, curve.y2, color=style.colour, alpha=0.25, linewidth=0.0)
+            axes.plot(
+                curve.x,
+                curve.y2,
+                color=style.colour,
+                linestyle=style.dashes,
+                linewidth=style.width,
+                label="_",
+            )
         axes.plot(
             curve.x, curve.y, color=style.colour, linestyle=style.dashes, linewidth=style.width, label=label,
             marker=style.marker, markersize=3.5,

@@ -1,0 +1,105 @@
+"""Parameters drawn from what an identification says of them: bands around curves, plants that may be the true one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import ParameterError
+from stickslip.identify.estimate import Estimate
+from stickslip.model import Model
+from stickslip.simulation.steady import Steady
+
+__all__ = ["curve_band", "draw_models", "draw_values", "sliding_torque"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+WIDEST = math.log(3.0)
+"""Largest standard deviation of the logarithm of a positive parameter: the data say no more than its order."""
+PER_STD = 3.92
+"""Width of a 95 % interval in standard deviations."""
+
+
+def draw_values(estimates: Sequence[Estimate], correlation: Array, count: int, seed: int = 0) -> Array:
+    """Draw values of all estimates, shape (count, n); those without a spread stay at their value.
+
+    Positive ones are drawn log-normally, with the standard deviation that their 95 % interval has.
+    """
+    n = len(estimates)
+    known = np.where(np.isfinite(correlation), correlation, np.eye(n)) if correlation.size else np.eye(n)
+    known = 0.5 * (known + known.T)
+    level, vectors = np.linalg.eigh(known)
+    z: Array = np.random.default_rng(seed).standard_normal((count, n))
+    z = z * np.sqrt(np.maximum(level, 0.0)) @ vectors.T
+    out = np.empty((count, n))
+    for i, e in enumerate(estimates):
+        if e.value > 0.0 and e.lower > 0.0:
+            spread = log_spread(e)
+            out[:, i] = e.value * np.exp(spread * z[:, i])
+        else:
+            out[:, i] = e.value + (e.std if math.isfinite(e.std) else 0.0) * z[:, i]
+    return out
+
+
+def log_spread(e: Estimate) -> float:
+    """Standard deviation of the logarithm of a positive parameter."""
+    if math.isfinite(e.upper):
+        return min(math.log(e.upper / e.lower) / PER_STD, WIDEST)
+    return min(e.std / e.value, WIDEST) if math.isfinite(e.std) else WIDEST
+
+
+def draw_models(
+    model: Model, estimates: Sequence[Estimate], correlation: Array, count: int, seed: int = 0
+) -> list[tuple[Model, Mapping[str, float]]]:
+    """Laws whose parameters are drawn, each with all drawn values by name.
+
+    Draws that the law refuses are left out; an element ``k[1]`` of a list is put in its place.
+    """
+    names = [e.name for e in estimates]
+    out: list[tuple[Model, Mapping[str, float]]] = []
+    for row in draw_values(estimates, correlation, count, seed):
+        named = dict(zip(names, (float(x) for x in row), strict=True))
+        try:
+            out.append((with_values(model, named), named))
+        except ParameterError:
+            continue
+    return out
+
+
+def with_values(model: Model, named: Mapping[str, float]) -> Model:
+    """The model with other values of those parameters that are its own."""
+    values: dict[str, Any] = {
+        k: list(v) if isinstance(v, tuple) else v  # type: ignore[reportUnknownArgumentType]
+        for k, v in model.parameters._asdict().items()
+    }
+    lists = {k for k, v in values.items() if isinstance(v, list)}
+    for name, value in named.items():
+        whole, _, place = name.partition("[")
+        if whole in lists and place:
+            values[whole][int(place.rstrip("]"))] = value
+        elif name in values:
+            values[name] = value
+    if "alpha" in lists:
+        # Shares add up to 1.
+        total = sum(values["alpha"])
+        values["alpha"] = [a / total for a in values["alpha"]]
+    return Model(model.law, **values)
+
+
+def sliding_torque(model: Model, velocity: Array) -> Array:
+    """Torque at constant velocities (break-away at 0, towards the positive side), N·m, shape (n,)."""
+    side = np.where(velocity < 0.0, -1.0, 1.0)
+    return Steady(model.law, velocity, side).torque(np.asarray(model.law.pack(model.parameters), np.float64))
+
+
+def curve_band(
+    model: Model, estimates: Sequence[Estimate], correlation: Array, velocity: Array, count: int = 200, seed: int = 0
+) -> Array:  # fmt: skip
+    """Torque at constant velocities of drawn laws, shape (draws, velocities): percentiles of it make a band."""
+    steady = Steady(model.law, velocity, np.where(velocity < 0.0, -1.0, 1.0))
+    drawn = draw_models(model, estimates, correlation, count, seed)
+    curves = [steady.torque(np.asarray(m.law.pack(m.parameters), np.float64)) for m, _ in drawn]
+    return np.array(curves) if curves else np.full((1, velocity.size), np.nan)

@@ -1,0 +1,227 @@
+"""Pictures of an axis: the records, their simulation beside them, residuals, and the sliding curve with its band."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.axis_inverse import InverseDynamics
+from stickslip.identify.axis_output import OutputError
+from stickslip.identify.axis_problem import PLACE, measured
+from stickslip.identify.draws import curve_band, sliding_torque
+from stickslip.identify.estimate import Identification, Picture, Trace
+from stickslip.record import Record
+from stickslip.report.plots import envelope
+
+__all__ = ["data_pictures", "pictures_of"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+BINS, FEWEST = 60, 5
+SHOWN = 4
+"""Records that are drawn one by one; the residuals hold all of them."""
+QUANTITIES = {"torque": "N·m", "current": "A", "rated_torque": "%", "voltage": "V"}
+
+
+def data_pictures(records: Sequence[Record]) -> tuple[Picture, ...]:
+    """Position and drive signal of the first records over time."""
+    out: list[Picture] = []
+    for place, record in enumerate(records[:SHOWN]):
+        name = str(record.meta.get("reading", {}).get("file", f"record {place + 1}"))
+        for channel in ("position", "torque", "motor_torque", "current", "voltage"):
+            if channel not in record.channels or not np.any(np.isfinite(record[channel])):
+                continue
+            traces = [over_time("measured", record.time, record[channel])]
+            if channel == "position" and "position_reference" in record.channels:
+                traces = [
+                    over_time("measured", record.time, record[channel]),
+                    over_time("reference", record.time, record["position_reference"]),
+                ]
+            seconds = float(record.time[-1] - record.time[0])
+            out.append(Picture(
+                f"data-{place + 1}-{channel}", f"{name}: {channel.replace('_', ' ')}",
+                f"{len(record)} samples over {seconds:.3g} s", "time (s)",
+                f"{channel.replace('_', ' ')} ({record.units[channel]})", tuple(traces),
+            ))  # fmt: skip
+    return tuple(out)
+
+
+def over_time(label: str, time: Array, signal: Array) -> Trace:
+    """A signal thinned to what a picture can show."""
+    good = np.isfinite(signal)
+    x, y = envelope(time[good], signal[good])
+    return Trace(label, x, y)
+
+
+def pictures_of(found: Identification) -> tuple[Picture, ...]:
+    """The method's own pictures, and what the report adds for a whole axis and for a law with intervals."""
+    output, inverse = found.details.get("output"), found.details.get("inverse")
+    out = list(found.pictures)
+    if isinstance(output, OutputError):
+        out += [*fits(output), *output_residuals(output)]
+    elif isinstance(inverse, InverseDynamics):
+        out += inverse_pictures(inverse, str(getattr(found.details.get("axis"), "motion", "rotary")))
+    if found.model is not None and found.model.law.steady and "axis" in found.details:
+        band = curve_picture(found, fastest(output, inverse))
+        out += [band] if band else []
+    return tuple(out)
+
+
+def fastest(output: Any, inverse: Any) -> float:
+    """The greatest speed that the records reached, rad/s."""
+    if isinstance(inverse, InverseDynamics):
+        return float(np.max(np.abs(inverse.velocity)))
+    runs = output.problem.simulated(output.fit.u)
+    return max(float(np.nanmax(np.abs(run[:, 1]))) for run in runs)
+
+
+# ---- what was measured and what the fitted axis does ------------------------------------------------------------
+
+
+def fits(output: OutputError) -> list[Picture]:
+    """Measured and simulated signals of the first records over time."""
+    out: list[Picture] = []
+    problem = output.problem
+    runs = problem.simulated(output.fit.u) or []
+    for place, (run, trial) in enumerate(zip(runs[:SHOWN], problem.trials[:SHOWN], strict=True)):
+        for signal in problem.signals:
+            seen, simulated = measured(trial, signal), run[:, PLACE[signal]]
+            off = float(np.sqrt(np.mean((simulated - seen)[trial.rows] ** 2)))
+            unit = unit_of(output, signal)
+            out.append(Picture(
+                f"fit-{place + 1}-{signal}", f"{trial.name}: {signal}, measured and simulated",
+                f"Root mean square of the difference: {off:.3g} {unit}", "time (s)", f"{signal} ({unit})",
+                (over_time("measured", trial.time, seen), over_time("simulated", trial.time, simulated)),
+            ))  # fmt: skip
+    return out
+
+
+def output_residuals(output: OutputError) -> list[Picture]:
+    """Residuals of every signal over position, velocity and time."""
+    problem = output.problem
+    runs = problem.simulated(output.fit.u) or []
+    position = np.concatenate([t.position[t.rows] for t in problem.trials])
+    velocity = np.concatenate([run[:, 1][t.rows] for run, t in zip(runs, problem.trials, strict=True)])
+    time = np.concatenate([(t.time - t.time[0])[t.rows] for t in problem.trials])
+    out: list[Picture] = []
+    axis = problem.axis
+    for signal in problem.signals:
+        rest = np.concatenate([
+            (run[:, PLACE[signal]] - measured(t, signal))[t.rows] for run, t in zip(runs, problem.trials, strict=True)
+        ])  # fmt: skip
+        label = f"simulated minus measured {signal} ({unit_of(output, signal)})"
+        out += residuals(
+            signal, label, rest, position, velocity, time, axis.unit("rad"), axis.unit("rad/s"),
+        )  # fmt: skip
+    return out
+
+
+def unit_of(output: OutputError, signal: str) -> str:
+    """Unit of a signal of the axis."""
+    axis = output.problem.axis
+    if signal == "position":
+        return axis.unit("rad")
+    return axis.unit(QUANTITIES[output.problem.trials[0].quantity])
+
+
+def inverse_pictures(inverse: InverseDynamics, motion: str) -> list[Picture]:
+    """Torque, measured and explained, and what it leaves."""
+    unit, angle, speed = ("N", "m", "m/s") if motion == "linear" else ("N·m", "rad", "rad/s")
+    told = inverse.torque - inverse.residual
+    # Several records follow each other, each with times of its own.
+    row = np.arange(inverse.time.size, dtype=np.float64)
+    steady = bool(np.all(np.diff(inverse.time) > 0.0))
+    x, label = (inverse.time, "time (s)") if steady else (row, "sample (-)")
+    first = Picture(
+        "inverse-torque", "Inverse dynamics: torque, measured and explained",
+        f"Relative error {100.0 * inverse.relative_error:.3g} %, below {inverse.band:.3g} Hz", label,
+        f"torque ({unit})", (over_time("measured", x, inverse.torque), over_time("explained", x, told)),
+    )  # fmt: skip
+    wanted = f"explained minus measured torque ({unit})"
+    return [first, *residuals("torque", wanted, -inverse.residual, inverse.position, inverse.velocity, inverse.time,
+                              angle, speed)]  # fmt: skip
+
+
+# ---- residuals ----------------------------------------------------------------------------------------------------
+
+
+def residuals(
+    signal: str, label: str, rest: Array, position: Array, velocity: Array, time: Array, angle: str, speed: str
+) -> list[Picture]:  # fmt: skip
+    """Mean and the middle 90 % of a residual in bins of position, velocity and time."""
+    rms = float(np.sqrt(np.mean(rest**2)))
+    out: list[Picture] = []
+    for name, x, x_label in (
+        ("position", position, f"position ({angle})"), ("velocity", velocity, f"velocity ({speed})"),
+        ("time", time, "time (s)"),
+    ):  # fmt: skip
+        centre, low, mean, high = binned(x, rest)
+        if centre.size < 2:
+            continue
+        # What a trend over x explains of the residual: where it is large the model lacks a dependence on x.
+        share = float(np.var(np.interp(x, centre, mean)) / max(np.var(rest), 1e-300))
+        word = f"a mean over {name} explains {100.0 * min(share, 1.0):.0f} % of its variance"
+        traces = (
+            Trace("middle 90 %", centre, low, "band", high), Trace("mean", centre, mean),
+            Trace("", centre[[0, -1]], np.zeros(2)),
+        )  # fmt: skip
+        out.append(Picture(
+            f"residual-{signal}-over-{name}", f"Residual of the {signal} over {name}",
+            f"Root mean square {rms:.3g}; {word}", x_label, label, traces,
+        ))  # fmt: skip
+    return out
+
+
+def binned(x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+    """Centres of equal bins of x that hold enough samples, and there the 5 %, mean and 95 % of y."""
+    good = np.isfinite(x) & np.isfinite(y)
+    x, y = x[good], y[good]
+    if x.size == 0 or np.ptp(x) == 0.0:
+        none = np.zeros(0)
+        return none, none, none, none
+    group = np.minimum((BINS * (x - x.min()) / np.ptp(x)).astype(np.int64), BINS - 1)
+    order = np.argsort(group, kind="stable")
+    parts = np.split(order, np.searchsorted(group[order], np.arange(1, BINS)))
+    rows = [p for p in parts if p.size >= FEWEST]
+    columns = [
+        (float(np.mean(x[p])), *np.percentile(y[p], [5.0, 95.0]).tolist(), float(np.mean(y[p]))) for p in rows
+    ]
+    table = np.array(columns).reshape(-1, 4)
+    return table[:, 0], table[:, 1], table[:, 3], table[:, 2]
+
+
+# ---- the law ------------------------------------------------------------------------------------------------------
+
+
+def curve_picture(found: Identification, top: float) -> Picture | None:
+    """The law at constant velocity with its 95 % band."""
+    assert found.model is not None
+    if not (math.isfinite(top) and top > 0.0):
+        return None
+    own = [e for e in found.estimates if e.name.partition("[")[0] in {f.name for f in found.model.law.fields}]
+    if not own:
+        return None
+    places = [i for i, e in enumerate(found.estimates) if e in own]
+    grid = np.geomspace(1e-3 * top, top, 150)
+    known = found.correlation[np.ix_(places, places)]
+    best = [side * sliding_torque(found.model, side * grid) for side in (1.0, -1.0)]
+    same = bool(np.allclose(*best, rtol=1e-6))
+    traces: list[Trace] = []
+    for side, curve in zip((1.0, -1.0), best[:1] if same else best, strict=False):
+        word = "" if same else f", v {'>' if side > 0.0 else '<'} 0"
+        low, high = np.nanpercentile(
+            side * curve_band(found.model, own, known, side * grid), [2.5, 97.5], axis=0
+        )
+        traces += [Trace(f"95 % band{word}", grid, low, "band", high), Trace(f"best fit{word}", grid, curve)]
+    unit = getattr(found.details["axis"], "unit", str)
+    unsure = ", ".join(e.name for e in own if not e.identified)
+    message = f"Not identified: {unsure}." if unsure else "Every parameter of the law is identified."
+    return Picture(
+        "sliding-curve", f"Friction at constant velocity: {found.model.law.title or found.model.law.name}",
+        f"{message} The band holds 95 % of the laws that the data allow.", f"velocity ({unit('rad/s')})",
+        f"friction torque ({unit('N·m')})",
+        tuple(traces), "log",
+    )  # fmt: skip

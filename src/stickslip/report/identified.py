@@ -1,0 +1,225 @@
+"""The report of an identification: one HTML file that needs nothing but itself."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from stickslip.errors import InputError
+from stickslip.finding import Finding
+from stickslip.identify.estimate import Estimate, Identification, Picture
+from stickslip.record import Record
+from stickslip.report.axis_pictures import data_pictures, pictures_of
+from stickslip.report.html import image
+from stickslip.report.identification import draw_picture
+
+__all__ = ["Source", "comparison_of", "number", "write_identification"]
+
+LABELS = {
+    "parameters": ("free parameters", "", 1.0),
+    "held_out": ("held-out misfit", "standard deviations", 1.0),
+    "rms_Nm": ("residual", "N·m, RMS", 1.0),
+    "cross_validated_Nm": ("left-out error", "N·m, RMS", 1.0),
+    "aicc": ("AICc", "", 1.0),
+    "bic": ("BIC", "", 1.0),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """One record as the report shows it: name, what the check found in it, and where it comes from."""
+
+    name: str
+    record: Record
+    findings: Sequence[Finding] = ()
+    about: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    held_out: bool = False
+
+
+def write_identification(
+    path: str | os.PathLike[str], found: Identification, sources: Sequence[Source], *, title: str = "",
+    versions: Mapping[str, str] | None = None,
+) -> Path:  # fmt: skip
+    """Write the report of an identification.
+
+    Parameters
+    ----------
+    path : path
+        Of the HTML file.
+    found : Identification
+    sources : sequence of Source
+        The records with what the doctor found.
+    title : str
+    versions : mapping
+        Of what took part.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    target = Path(path)
+    html = rendered(found, sources, title, versions or {})
+    draft = target.with_name(target.name + ".part")
+    try:
+        draft.write_text(html, encoding="utf-8")
+        os.replace(draft, target)
+    except OSError as error:
+        raise InputError(
+            f"{target} cannot be written ({error.strerror}); choose another place with --out"
+        ) from None
+    return target
+
+
+def rendered(
+    found: Identification, sources: Sequence[Source], title: str, versions: Mapping[str, str]
+) -> str:
+    """The HTML."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("stickslip.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+    )  # fmt: skip
+    pictures = pictures_of(found)
+    rest = [p for p in pictures if p.name.startswith("residual-") or p.name.endswith("-residuals")]
+    law = found.model.law if found.model else None
+    method = found.method.replace("_", " ")
+    columns, rows = comparison_of(found)
+    with tempfile.TemporaryDirectory() as folder:
+        parts = {
+            "data": figures(data_pictures([s.record for s in sources]), Path(folder)),
+            "fits": figures([p for p in pictures if p not in rest], Path(folder)),
+            "residuals": figures(rest, Path(folder)),
+        }
+    return environment.get_template("identification.html").render(
+        title=title or f"Friction identified: {sources[0].name if sources else method}",
+        ran=ran(found, sources, versions),
+        law=f"{law.title or law.name}" if law else "",
+        tally=tally(found, sources),
+        estimates=[shown(e) for e in found.estimates],
+        missing=[e for e in found.estimates if not e.identified],
+        measure_next=found.measure_next,
+        notes=found.notes,
+        misfit=[(k, number(float(v))) for k, v in found.misfit.items()],
+        sources=[source(s) for s in sources],
+        columns=columns, rows=rows, parts=parts,
+        correlation=correlation(found),
+        result=json.dumps(found.as_dict(), indent=1, default=str, ensure_ascii=False),
+    )  # fmt: skip
+
+
+def ran(found: Identification, sources: Sequence[Source], versions: Mapping[str, str]) -> str:
+    """What was done, in a line."""
+    rows = sum(len(s.record) for s in sources)
+    words = (
+        f"Method {found.method.replace('_', ' ')} on {len(sources)} record{'s' if len(sources) != 1 else ''}"
+    )
+    named = ", ".join(f"{k} {v}" for k, v in versions.items())
+    return f"{words} with {rows} samples. {named}".strip()
+
+
+def tally(found: Identification, sources: Sequence[Source]) -> list[dict[str, Any]]:
+    """Numbers that say at a glance how it went."""
+    good = sum(e.identified for e in found.estimates)
+    warnings = sum(f.level == "warning" for s in sources for f in s.findings)
+    out: list[dict[str, Any]] = [
+        {"count": f"{good} of {len(found.estimates)}", "words": "numbers identified"},
+        {"count": str(warnings), "words": "warnings about the records"},
+    ]
+    for name, words in (
+        ("position_relative", "position error of the simulation"),
+        ("drive_relative", "drive error of the simulation"),
+        ("inverse_dynamics_relative", "torque error of the inverse dynamics"),
+    ):
+        if name in found.misfit:
+            out.append({"count": f"{100.0 * float(found.misfit[name]):.3g} %", "words": words})
+    return out
+
+
+def number(value: float) -> str:
+    """A number for people."""
+    if not math.isfinite(value):
+        return "no limit" if math.isinf(value) else "unknown"
+    return f"{value:.4g}"
+
+
+def interval(e: Estimate) -> str:
+    """The 95 % interval in words."""
+    if math.isnan(e.lower) or math.isnan(e.upper):
+        return "unknown"
+    return f"{number(e.lower)} to {number(e.upper)}"
+
+
+def shown(e: Estimate) -> dict[str, Any]:
+    """An estimate as a row."""
+    return {
+        "name": e.name, "unit": e.unit, "value": number(e.value), "interval": interval(e), "good": e.identified,
+        "verdict": e.verdict,
+    }  # fmt: skip
+
+
+def source(s: Source) -> dict[str, Any]:
+    """A record as the report lists it."""
+    seconds = float(s.record.time[-1] - s.record.time[0]) if len(s.record) else 0.0
+    reading: Mapping[str, Any] = s.record.meta.get("reading", {})
+    channels = ", ".join(
+        f"{c['channel']} from {c['column']!r} ({c['unit']})" for c in reading.get("columns", [])
+    )
+    return {
+        "name": s.name, "what": "held out" if s.held_out else "fitted", "rows": len(s.record),
+        "seconds": f"{seconds:.4g}", "channels": channels, "sha256": str(s.about.get("sha256", ""))[:16],
+        "findings": [{"level": f.level, "code": f.code, "line": f.line()} for f in s.findings],
+    }  # fmt: skip
+
+
+def comparison_of(found: Identification) -> tuple[list[str], list[dict[str, Any]]]:
+    """Columns and rows of the comparison of laws; empty where one alone was tried."""
+    rows: list[dict[str, Any]] = []
+    chosen = found.model.law.name if found.model else ""
+    for c in found.details.get("candidates", ()):
+        blocks: list[float] = [] if c.failure else list(c.score)
+        score = math.sqrt(math.fsum(blocks) / len(blocks)) if blocks else math.nan
+        cells: dict[str, float] = {"parameters": float(c.parameters), "held_out": score}
+        rows.append({"law": c.law, "chosen": c.law == chosen, "failure": c.failure, "cells": cells})
+    table: dict[str, dict[str, float]] = found.details.get("comparison", {})
+    picked = found.details.get("chosen", chosen)
+    for name, cells in table.items():
+        rows.append({"law": name, "chosen": name == picked, "failure": "", "cells": cells})
+    keys = list(dict.fromkeys(k for row in rows for k in row["cells"]))
+    columns = [f"{LABELS[k][0]}{f' ({LABELS[k][1]})' if LABELS[k][1] else ''}" for k in keys]
+    out = [{**row, "cells": [number(row["cells"].get(k, math.nan)) for k in keys]} for row in rows]
+    return columns, out
+
+
+def correlation(found: Identification) -> dict[str, Any]:
+    """Names and rows of the correlation, those beyond 0.9 marked."""
+    names = [e.name for e in found.estimates]
+    if len(names) < 2 or found.correlation.shape != (len(names), len(names)):
+        return {"names": [], "rows": []}
+    rows = [
+        {"name": n, "cells": [
+            {"text": f"{c:.2f}" if math.isfinite(c) else "-", "strong": i != j and math.isfinite(c) and abs(c) > 0.9}
+            for j, c in enumerate(row)
+        ]}
+        for i, (n, row) in enumerate(zip(names, found.correlation.tolist(), strict=True))
+    ]  # fmt: skip
+    return {"names": names, "rows": rows}
+
+
+def figures(pictures: Sequence[Picture], folder: Path) -> list[dict[str, Any]]:
+    """Draw pictures and embed them."""
+    out: list[dict[str, Any]] = []
+    for p in pictures:
+        stem = draw_picture(p, folder).with_suffix("")
+        out.append({"id": p.name, "title": p.title, "caption": p.message, **image(stem)})
+    return out
