@@ -40,6 +40,17 @@ def write_mat5(path: Path) -> None:
     )
 
 
+def write_mat4(path: Path) -> None:
+    units = {"t": T, "position_deg": Q, "velocity_deg_s": V, "torque_mNm": M}
+    scipy.io.savemat(path, units, format="4")
+
+
+def write_mat7(path: Path) -> None:
+    """Compressed, as MATLAB's default is; signals in a structure of structures with cells."""
+    signals = [{"Name": n, "Data": v, "unit": u} for n, v, u in zip(NAMES, DATA.values(), UNITS)]
+    scipy.io.savemat(path, {"log": {"signals": np.array(signals, dtype=object)}}, do_compression=True)
+
+
 def write_mat73(path: Path) -> None:
     """As MATLAB writes it: a user block that says what it is, datasets transposed, text as numbers."""
     with h5py.File(path, "w", userblock_size=512) as file:
@@ -100,6 +111,8 @@ WRITERS = [
     ("a.csv", write_csv),
     ("a.mat", write_mat5),
     ("b.mat", write_mat73),
+    ("c.mat", write_mat4),
+    ("d.mat", write_mat7),
     ("a.h5", write_hdf5),
     ("a.parquet", write_parquet),
     ("a.npz", write_npz),

@@ -1,4 +1,8 @@
-"""HDF5: every numeric dataset; units from its attribute `unit` or `units`."""
+"""HDF5: every numeric dataset; units from its attribute `unit` or `units`.
+
+The file is read in a process of its own: on damaged files the HDF5 library (seen with 2.0) can crash, or step for ever
+through a heap of texts, and no check before it short of a second HDF5 library rules that out.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +14,16 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.readers import _guard
 from stickslip.readers._flatten import table_of
 from stickslip.readers._table import Column, Format, Table
 
 __all__ = ["FORMAT", "read_tree"]
 
 UNIT_KEYS = ("unit", "units", "Unit", "Units")
-MAX_DATASETS = 2000
+MAX_ITEMS = 4000
+PATIENCE = 20.0
+"""s until reading is given up, and as much again for every 200 MB."""
 
 
 def recognise(head: bytes, path: Path) -> bool:
@@ -31,6 +38,16 @@ def read(path: Path) -> Table:
 
 def read_tree(path: Path, format_name: str, matlab: bool) -> Table:
     """Read the groups of an HDF5 file; `matlab` says that strings are stored as numbers."""
+    limit = PATIENCE * (1.0 + path.stat().st_size / 200e6)
+    try:
+        return _guard.call(_read_here, path, format_name, matlab, limit=limit)
+    except _guard.Died as error:
+        raise InputError(
+            f"{path} is damaged: the HDF5 library {error}; check that it is complete, or export it again"
+        ) from None
+
+
+def _read_here(path: Path, format_name: str, matlab: bool) -> Table:
     h5py: Any = importlib.import_module("h5py")
     units: dict[str, str] = {}
     try:
@@ -57,15 +74,15 @@ def _group(
         # A broken link is no reason to give up the rest.
         item = group.get(key, None)
         name = f"{path}.{key}" if path else str(key)
+        count[0] += 1
+        if count[0] > MAX_ITEMS:
+            raise InputError(
+                f"{group.file.filename} has more than {MAX_ITEMS} groups and datasets; export the signals you need"
+            )
         if isinstance(item, h5py.Group):
             if name.count(".") <= 12:
                 out[str(key)] = _group(h5py, item, name, units, matlab, count)
         elif isinstance(item, h5py.Dataset):
-            count[0] += 1
-            if count[0] > MAX_DATASETS:
-                raise InputError(
-                    f"the file has more than {MAX_DATASETS} datasets; export the signals you need"
-                )
             out[str(key)] = _dataset(h5py, item, matlab)
             if unit := next((_text(item.attrs[k]) for k in UNIT_KEYS if k in item.attrs), ""):
                 units[name] = unit

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.readers import hdf5
+from stickslip.readers import _mat_check, hdf5
 from stickslip.readers._flatten import table_of
 from stickslip.readers._table import Format, Table
 
@@ -32,6 +32,10 @@ def read(path: Path) -> Table:
         return hdf5.read_tree(path, "mat", matlab=True)
     loadmat: Any = importlib.import_module("scipy.io").loadmat
     try:
+        if (
+            0 not in head[:4]
+        ):  # version 4 has no text at its beginning, and SciPy reads it without compiled code
+            _mat_check.check(path.read_bytes())
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             variables = cast("Mapping[str, Any]", loadmat(path, simplify_cells=True))
