@@ -43,7 +43,7 @@ argument: NAME ":=" expression -> named_argument | expression -> plain_argument
 
 COMPARE: "<=" | ">=" | "<>" | "<" | ">" | "="
 SIGN: "+" | "-"
-TIMES: "*" | "/"
+TIMES: "*" | "/" | /MOD\b/i
 TRUTH.2: /TRUE|FALSE/i
 NUMBER: /[0-9]+(\.[0-9]+)?([Ee][+-]?[0-9]+)?(?!\.\.)/
 INT: /[0-9]+/
@@ -56,6 +56,10 @@ LIBRARY = {
     "abs": abs, "exp": math.exp, "ln": math.log, "sqrt": math.sqrt, "sin": math.sin, "cos": math.cos, "tan": math.tan,
     "atan": math.atan, "expt": math.pow, "min": min, "max": max, "sel": lambda c, a, b: b if c else a,
     "int_to_lreal": float, "lint_to_lreal": float, "trunc_lint": math.trunc, "lreal_to_int": int,
+}  # fmt: skip
+ARITHMETIC = {
+    "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b, "/": lambda a, b: a / b,
+    "MOD": math.fmod,
 }  # fmt: skip
 COMPARISONS = {
     "<": lambda a, b: a < b, ">": lambda a, b: a > b, "<=": lambda a, b: a <= b, ">=": lambda a, b: a >= b,
@@ -185,7 +189,7 @@ class Program:
         out = self.value(c[0], v)
         for sign, operand in zip(c[1::2], c[2::2]):
             right = self.value(operand, v)
-            out = {"+": out + right, "-": out - right, "*": out * right}[sign] if sign != "/" else out / right
+            out = ARITHMETIC[sign.upper()](out, right)
         return out
 
     def token(self, node, v):

@@ -90,7 +90,7 @@ def kind_of(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
         return "bool" if isinstance(node.op, ast.Not) else kind_of(node.operand, kinds)
     if isinstance(node, ast.BinOp):
         both = {kind_of(node.left, kinds), kind_of(node.right, kinds)}
-        whole = both == {"int"} and isinstance(node.op, (ast.Add, ast.Sub, ast.Mult))
+        whole = both == {"int"} and isinstance(node.op, (ast.Add, ast.Sub, ast.Mult, ast.Mod))
         return "int" if whole else "real"
     if isinstance(node, ast.IfExp):
         return "int" if {kind_of(node.body, kinds), kind_of(node.orelse, kinds)} == {"int"} else "real"

@@ -16,7 +16,7 @@ from typing import ClassVar
 from stickslip.export._analysis import Facts, analyse
 from stickslip.export._language import ATOM, UNARY, Language
 
-__all__ = ["Dialect", "function", "functions"]
+__all__ = ["Dialect", "function", "functions", "head", "safe"]
 
 KEYWORDS = {
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern",
@@ -96,7 +96,7 @@ class _C(Language):
         assert isinstance(node.value, ast.Name)
         if node.value.id == "math":
             return {"pi": self.number(math.pi), "inf": self.number(math.inf)}[node.attr]
-        return f"{node.value.id}->{node.attr}"
+        return f"{node.value.id}->{safe(node.attr)}"
 
     def element(self, node: ast.Subscript) -> str:
         assert isinstance(node.value, ast.Attribute)

@@ -137,6 +137,9 @@ class Language(ABC):
         """Arithmetic of two operands, in the order in which Python does it."""
         if isinstance(node.op, ast.Pow):
             return self.power(node), self.binds_power()
+        if isinstance(node.op, ast.Mod) and self.kind(node) == "int":
+            # Of counters, which are never negative: there all languages agree.
+            return self.remainder(self.expression(node.left, UNARY), self.expression(node.right, UNARY))
         if type(node.op) not in (ast.Add, ast.Sub, ast.Mult, ast.Div):
             raise self.refused(node)
         binds = ADDITIVE if isinstance(node.op, (ast.Add, ast.Sub)) else MULTIPLICATIVE
@@ -146,6 +149,10 @@ class Language(ABC):
             f"{write(node.left, binds)} {self.operators[type(node.op)]} {write(node.right, binds + 1)}",
             binds,
         )
+
+    def remainder(self, left: str, right: str) -> tuple[str, int]:
+        """The remainder of two whole numbers."""
+        return f"{left} % {right}", MULTIPLICATIVE
 
     def comparison(self, node: ast.Compare) -> tuple[str, int]:
         """A comparison; a chain is the conjunction of its links."""

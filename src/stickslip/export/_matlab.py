@@ -14,7 +14,7 @@ from stickslip.export._analysis import Facts, analyse
 from stickslip.export._hoist import hoisted
 from stickslip.export._language import ATOM, Language
 
-__all__ = ["HELPERS", "functions"]
+__all__ = ["HELPERS", "functions", "local", "safe"]
 
 MATH = {"fabs": "abs", "pow": "power"} | {
     n: n for n in ("exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
@@ -73,7 +73,7 @@ class _Matlab(Language):
         assert isinstance(node.value, ast.Name)
         if node.value.id == "math":
             return {"pi": "pi", "inf": "Inf"}[node.attr]
-        return f"{node.value.id}.{node.attr}"
+        return f"{node.value.id}.{safe(node.attr)}"
 
     def element(self, node: ast.Subscript) -> str:
         assert isinstance(node.value, ast.Attribute)
@@ -106,6 +106,9 @@ class _Matlab(Language):
 
     def power(self, node: ast.BinOp) -> str:
         return f"power({self.expression(node.left)}, {self.expression(node.right)})"
+
+    def remainder(self, left: str, right: str) -> tuple[str, int]:
+        return f"mod({left}, {right})", ATOM
 
     def choice(self, node: ast.IfExp) -> str:
         return f"choose_({self.expression(node.test)}, {self.expression(node.body)}, {self.expression(node.orelse)})"

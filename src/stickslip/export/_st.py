@@ -15,7 +15,7 @@ from typing import ClassVar
 from stickslip.errors import LawError
 from stickslip.export._analysis import Facts, analyse
 from stickslip.export._hoist import hoisted
-from stickslip.export._language import ADDITIVE, ATOM, Language
+from stickslip.export._language import ADDITIVE, ATOM, MULTIPLICATIVE, Language
 
 __all__ = ["HELPERS", "functions", "safe"]
 
@@ -131,6 +131,9 @@ class _St(Language):
 
     def power(self, node: ast.BinOp) -> str:
         return self.library("pow", [node.left, node.right])
+
+    def remainder(self, left: str, right: str) -> tuple[str, int]:
+        return f"{left} MOD {right}", MULTIPLICATIVE
 
     def choice(self, node: ast.IfExp) -> str:
         # SEL evaluates both, which is harmless for arithmetic without a division.

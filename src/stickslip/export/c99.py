@@ -17,7 +17,7 @@ from typing import Any
 
 from stickslip.control.sampled import Memory, Settings, sampled_by, settings
 from stickslip.export._analysis import analyse, merged
-from stickslip.export._c import Dialect, functions, head
+from stickslip.export._c import Dialect, functions, head, safe
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import as_csv, golden
 from stickslip.export.job import Check, Export, Job, counts_in
@@ -27,8 +27,9 @@ from stickslip.subset import Layout, law_layouts, named
 
 __all__ = ["SINGLE_BOUND", "TARGET", "dialect_of", "translated", "write"]
 
-SINGLE_BOUND = 2e-3
-"""Largest error of single precision, as a share of the largest torque of the golden vectors."""
+SINGLE_BOUND = 1e-2
+"""Largest error of single precision, as a share of the largest torque: where a contact breaks away a step sooner or
+later by rounding, it is the fall of the torque in that step."""
 
 STRUCTURES = {
     "z": "state", "dz": "state", "g": "state", "p": "parameters", "u": "surroundings", "n": "settings", "m": "memory",
@@ -37,6 +38,8 @@ SURROUNDINGS = {
     "position": "position, rad",
     "load": "normal load over the one of the parameters, -",
     "temperature": "temperature, degC",
+    "time": "time since the start, s",
+    "applied": "torque applied to the contact from outside, N*m",
 }
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-builtin", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion",
          "-Wdouble-promotion", "-Werror")  # fmt: skip
@@ -141,7 +144,7 @@ def structure(name: str, about: str, fields: Sequence[Field], dialect: Dialect) 
     """One structure; C has no empty ones."""
     lines = [
         {
-            "declared": f"{dialect.real} {f.name}{place_of(f, dialect)};",
+            "declared": f"{dialect.real} {safe(f.name)}{place_of(f, dialect)};",
             "meaning": ascii_only(f"{f.par.meaning}, {f.par.unit}"),
         }
         for f in fields
@@ -164,7 +167,7 @@ def given(fields: Sequence[Field], values: Mapping[str, Any], owner: str, dialec
         numbers = values[f.name] if f.per_element else [values[f.name]]
         for i, x in enumerate(numbers):
             place = f"[{i}]" if f.per_element else ""
-            yield f"{owner}->{f.name}{place} = {dialect.number(float(x))};"
+            yield f"{owner}->{safe(f.name)}{place} = {dialect.number(float(x))};"
     if not fields:
         yield f"{owner}->none = 0;"
 
@@ -174,9 +177,9 @@ def cleared(law: Law, dialect: Dialect) -> Iterable[str]:
     zero = dialect.number(0.0)
     for f in law.state_fields:
         if f.per_element:
-            yield f"for (int i = 0; i < {dialect.count(f'{f.par.per}s_')}; i++) {{ z->{f.name}[i] = {zero}; }}"
+            yield f"for (int i = 0; i < {dialect.count(f'{f.par.per}s_')}; i++) {{ z->{safe(f.name)}[i] = {zero}; }}"
         else:
-            yield f"z->{f.name} = {zero};"
+            yield f"z->{safe(f.name)} = {zero};"
     if not law.state_fields:
         yield "z->none = 0;"
 

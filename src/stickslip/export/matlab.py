@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from stickslip.export._matlab import HELPERS, functions, local
+from stickslip.export._matlab import HELPERS, functions, local, safe
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import as_csv, golden
 from stickslip.export.job import Check, Export, Job, counts_in
@@ -72,7 +72,7 @@ def _parameters(job: Job) -> Iterable[str]:
     for f in law.fields:
         value = getattr(p, f.name)
         shown = f"[{', '.join(map(repr, value))}]" if f.per_element else repr(value)
-        yield f"    p.{f.name} = {shown};  % {f.par.meaning}, {ascii_only(f.par.unit)}"
+        yield f"    p.{safe(f.name)} = {shown};  % {f.par.meaning}, {ascii_only(f.par.unit)}"
     for name, size in counts_in(job.model).items():
         yield f"    p.{name.strip('_')} = {size};"
     yield "end\n"
@@ -85,7 +85,7 @@ def _reset(job: Job) -> Iterable[str]:
     yield "    z = struct();"
     for f in law.state_fields:
         size = f"zeros(1, {law.elements_in(job.model.parameters)})" if f.per_element else "0.0"
-        yield f"    z.{f.name} = {size};  % {f.par.meaning}, {ascii_only(f.par.unit)}"
+        yield f"    z.{safe(f.name)} = {size};  % {f.par.meaning}, {ascii_only(f.par.unit)}"
     yield "end\n"
 
 
