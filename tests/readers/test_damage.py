@@ -14,7 +14,7 @@ import pytest
 import scipy.io
 
 from stickslip.errors import InputError
-from stickslip.readers import _guard, _mat_check, hdf5, open_table
+from stickslip.readers import _guard, _mat_check, open_table
 
 
 def saved(path: Path, **variables: object) -> bytearray:
@@ -101,7 +101,7 @@ def test_an_hdf5_file_that_hangs_the_library_is_given_up(tmp_path, monkeypatch):
     # The first object becomes free space of 0 bytes: the library walks on by 0 for ever.
     struct.pack_into("<HHIQ", data, heap + 16, 0, 0, 0, 0)
     path.write_bytes(data)
-    monkeypatch.setattr(hdf5, "PATIENCE", 2.0)
+    monkeypatch.setattr(_guard, "PATIENCE", 2.0)
     start = time.monotonic()
     with pytest.raises(InputError, match=r"a\.h5 is damaged|a\.h5 cannot be read"):
         open_table(path)

@@ -10,15 +10,23 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
-__all__ = ["Died", "call"]
+__all__ = ["Died", "call", "patience"]
 
 T = TypeVar("T")
+PATIENCE = 20.0
+"""s until reading a file is given up, and as much again for every 200 MB."""
 
 
 class Died(Exception):
     """How the process ended without an answer."""
+
+
+def patience(path: Path) -> float:
+    """How long reading a file may take, s."""
+    return PATIENCE * (1.0 + path.stat().st_size / 200e6)
 
 
 def call(function: Callable[..., T], *arguments: Any, limit: float) -> T:

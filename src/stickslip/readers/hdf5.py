@@ -22,8 +22,6 @@ __all__ = ["FORMAT", "read_tree"]
 
 UNIT_KEYS = ("unit", "units", "Unit", "Units")
 MAX_ITEMS = 4000
-PATIENCE = 20.0
-"""s until reading is given up, and as much again for every 200 MB."""
 
 
 def recognise(head: bytes, path: Path) -> bool:
@@ -38,9 +36,8 @@ def read(path: Path) -> Table:
 
 def read_tree(path: Path, format_name: str, matlab: bool) -> Table:
     """Read the groups of an HDF5 file; `matlab` says that strings are stored as numbers."""
-    limit = PATIENCE * (1.0 + path.stat().st_size / 200e6)
     try:
-        return _guard.call(_read_here, path, format_name, matlab, limit=limit)
+        return _guard.call(_read_here, path, format_name, matlab, limit=_guard.patience(path))
     except _guard.Died as error:
         raise InputError(
             f"{path} is damaged: the HDF5 library {error}; check that it is complete, or export it again"

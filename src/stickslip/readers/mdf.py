@@ -1,4 +1,8 @@
-"""MDF 3 and 4, measurement and calibration tools' format, by asammdf (LGPL-3.0+, an extra: `stickslip[mdf]`)."""
+"""MDF 3 and 4, measurement and calibration tools' format, by asammdf (LGPL-3.0+, an extra: `stickslip[mdf]`).
+
+Read in a process of its own: asammdf is partly compiled, and what it leaves of a damaged file complains later, when
+Python tidies up, in the midst of something else.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.readers import _guard
 from stickslip.readers._extra import needed
 from stickslip.readers._table import Column, Format, Table
 
@@ -21,6 +26,14 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """Every channel of numbers with its unit and the clock of its group."""
+    needed("asammdf", "mdf", "MDF files")
+    try:
+        return _guard.call(_read_here, path, limit=_guard.patience(path))
+    except _guard.Died as error:
+        raise InputError(f"{path} is damaged: asammdf {error}; export it again") from None
+
+
+def _read_here(path: Path) -> Table:
     library = needed("asammdf", "mdf", "MDF files")
     columns: list[Column] = []
     try:
