@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from stickslip import Controller, Model, Record, Reference, RigidAxis, place, si
 from stickslip.cli import main
 from stickslip.errors import InputError
 from stickslip.identify.doctor import examine
-from stickslip.readers import read
+from stickslip.readers import Drive, read
 
 DATA = Path(os.environ.get("STICKSLIP_DATA", Path(__file__).parents[3] / "shared" / "data"))
 INERTIA = 1e-3
@@ -664,6 +665,19 @@ def test_raise_for_errors_names_the_first():
         InputError, match=r"log.csv: friction would drive the axis.*--map 'motor_torque=motor_torque:-N·m'"
     ):
         examine(record).raise_for_errors("log.csv")
+
+
+def test_the_remedy_of_a_turned_current_works(tmp_path):
+    """The torque has no column of its own then: the remedy names the current's."""
+    table = made("turned")
+    log = write(
+        tmp_path / "a.csv", with_(table, torque=-20.0 * table["torque"]), HEADER | {"torque": "I_q [A]"}
+    )
+    drive = Drive(torque_constant=0.05)
+    (finding,) = examine(read(log, drive=drive)).errors
+    (said,) = re.findall(r"--map '(.*?)'", finding.remedy)
+    assert said == "current=I_q [A]:-A"
+    assert examine(read(log, [said], drive=drive)).errors == ()
 
 
 def test_a_slow_speed_can_be_asked_for():

@@ -88,6 +88,9 @@ class View:
 
     def mapped(self, channel: str, unit: str) -> str:
         """The option that reads the channel in another unit; "-" turns the sign of the present one."""
+        # A torque that was computed from the current has no column of its own.
+        if channel == "motor_torque" and channel not in self.columns and "current" in self.columns:
+            channel = "current"
         if unit == "-":
             unit = "-" + (
                 self.columns[channel].unit if channel in self.columns else self.record.units[channel]
