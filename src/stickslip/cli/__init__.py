@@ -18,7 +18,8 @@ from stickslip.errors import InputError, StickslipError
 __all__ = ["VERBS", "main", "parser_of"]
 
 VERBS = (
-    "study", "simulate", "identify", "doctor", "laws", "law", "cite", "rerun", "export", "version"
+    "study", "simulate", "identify", "doctor", "compare", "recommend", "demo",
+    "laws", "law", "cite", "rerun", "export", "version"
 )  # fmt: skip
 
 

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.report import plots
 
-__all__ = ["draw_identification", "draw_picture"]
+__all__ = ["draw_identification", "draw_picture", "draw_picture_to"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -34,15 +35,33 @@ def draw_identification(result: Identification, folder: Path) -> tuple[Path, ...
 def draw_picture(picture: Picture, folder: Path) -> Path:
     """Draw one picture into `folder` as SVG and PNG; returns the PNG."""
     stem = folder / picture.name
+    plots.draw(stem, picture.title, picture.message, [_panel(picture)], 2.7)
+    return stem.with_name(stem.name + ".png")
+
+
+def draw_picture_to(picture: Picture, target: Path) -> Path:
+    """Draw one picture into a file whose suffix says the format (.png, .svg, .pdf).
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    try:
+        plots.save([target], picture.title, picture.message, [_panel(picture)], 2.7)
+    except OSError as error:
+        raise InputError(f"{target} cannot be written ({error.strerror}); give another path") from None
+    return target
+
+
+def _panel(picture: Picture) -> plots.Panel:
     styles = iter(zip(LINES, DASHES, strict=True))
     x_factor, x_label = _readable(picture.x_label, [t.x for t in picture.traces])
     if picture.x_scale == "log":
         x_factor, x_label = 1.0, picture.x_label
     y_factor, y_label = _readable(picture.y_label, [t.y for t in picture.traces if t.kind != "vertical"])
     curves = [_curve(trace, x_factor, y_factor, styles) for trace in picture.traces]
-    panel = plots.Panel(curves, y_label, x_label, x_scale=picture.x_scale)
-    plots.draw(stem, picture.title, picture.message, [panel], 2.7)
-    return stem.with_name(stem.name + ".png")
+    return plots.Panel(curves, y_label, x_label, x_scale=picture.x_scale)
 
 
 def _readable(label: str, values: Sequence[Array]) -> tuple[float, str]:

@@ -1,0 +1,76 @@
+"""The whole way on a record that ships with the package: doctor, identify, recommend.
+
+stickslip demo --out demo
+
+The record is simulated (a servo axis with Stribeck friction in a 1 kHz position loop, with noise on the torque and a
+16-bit encoder; `tools/make_demo.py` in the sources makes it), so that what is found can be compared with what is true.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+SUMMARY = "the whole way, from a log to a recommendation, on a simulated record that ships with the package"
+LOOP = "kp=8,kd=0.08,kr=0.08,limit=3"
+TRUTH = (
+    "inertia 4e-4 kg·m², offset 0.03 N·m, fc 0.285 N·m, fs 0.335 N·m, vs 0.1 rad/s, sigma2 0.018 N·m·s/rad"
+)
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Where to write."""
+    parser.add_argument(
+        "--out", type=Path, default=Path("stickslip-demo"), metavar="DIR", help="default stickslip-demo"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the three verbs, each with its command."""
+    import shutil
+    from importlib.resources import as_file, files
+
+    from stickslip.errors import InputError
+    from stickslip.study.files import prepared_folder
+
+    prepared_folder(args.out)
+    log: Path = args.out / "demo.csv"
+    try:
+        with as_file(files("stickslip") / "demo.csv") as shipped:
+            shutil.copyfile(shipped, log)
+    except OSError as error:
+        raise InputError(
+            f"{log} cannot be written ({error.strerror}); give another folder with --out"
+        ) from None
+    print("A simulated record: a servo axis with Stribeck friction, noise on its torque, a 16-bit encoder.")
+    print(f"True are: {TRUTH}.")
+    model = str(args.out / "model.toml")
+    for words in (
+        ["doctor", str(log)],
+        [
+            "identify",
+            str(log),
+            "--law",
+            "coulomb",
+            "--law",
+            "stribeck",
+            "--loop",
+            LOOP,
+            "--out",
+            str(args.out),
+        ],
+        ["recommend", model, "--bandwidth", "20", "--counts-per-rev", "65536", "--torque-limit", "3"],
+    ):
+        print(f"\n$ stickslip {' '.join(words)}", flush=True)
+        if code := step(words):
+            return code
+    return 0
+
+
+def step(words: list[str]) -> int:
+    """One verb, its errors passed on."""
+    from stickslip.cli import parser_of
+
+    args = parser_of(words[:1]).parse_args(words)
+    code: int = args.run(args)
+    return code

@@ -1,0 +1,94 @@
+"""From an identified model to a setting that is safe to switch on.
+
+stickslip recommend model.toml --bandwidth 15 --sample-time 0.001 --counts-per-rev 65536 --torque-limit 2
+
+Simulates the linear controller alone (PD by pole placement) and every candidate (law, feedforward or feedback, gain) on
+the best estimate and on axes drawn from the model's intervals, along a slow sinusoid and to a stop, sampled as in the
+drive. Recommended is what limit-cycles on none of them and leaves the least error on the worst.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from stickslip.identify.recommend import Recommendation
+
+SUMMARY = "which compensator to switch on: law, structure, gain, and what to expect"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Model, drive, motion."""
+    parser.add_argument("model", type=Path, metavar="MODEL.toml", help="what `stickslip identify` wrote")
+    for option, default, unit, what in (
+        ("--bandwidth", 10.0, "HZ", "of the position loop"),
+        ("--damping", 1.0, "D", "of its poles"),
+        ("--sample-time", 1e-3, "S", "of the drive"),
+        ("--counts-per-rev", 0.0, "N", "of the encoder; 0: exact"),
+        ("--torque-limit", math.inf, "NM", "of the drive"),
+        ("--amplitude", 0.1, "RAD", "of the slow sinusoid and the way to the stop (m of a linear axis)"),
+        ("--frequency", 0.5, "HZ", "of the slow sinusoid"),
+    ):
+        parser.add_argument(
+            option, type=float, default=default, metavar=unit, help=f"{what} (default {default:g})"
+        )
+    parser.add_argument(
+        "--inertia", type=float, metavar="KGM2", help="where the model has none, or another one"
+    )
+    parser.add_argument(
+        "--axes", type=int, default=6, metavar="N", help="drawn from the intervals (default 6)"
+    )
+    parser.add_argument("--json", action="store_true", help="print the result as JSON, all candidates too")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the recommendation."""
+    from stickslip.cli import _output
+    from stickslip.errors import InputError
+    from stickslip.identify.identified_file import read_identified
+    from stickslip.identify.recommend import Drive, recommend
+
+    if args.axes < 0:
+        raise InputError(f"--axes {args.axes} must be 0 or more")
+    found = read_identified(args.model)
+    drive = Drive(
+        args.bandwidth, args.damping, args.sample_time, args.counts_per_rev, args.torque_limit, args.amplitude,
+        args.frequency,
+    )  # fmt: skip
+    with _output.progress_bar("simulating") as progress:
+        result = recommend(found, drive, inertia=args.inertia, axes=args.axes, progress=progress)
+    if args.json:
+        _output.print_json(result.as_dict())
+    else:
+        show(result, found.unit("rad"), found.unit("rad/s"))
+    return 0
+
+
+def show(result: Recommendation, angle: str, speed: str) -> None:
+    """The setting, what to expect, and what was tried."""
+    print(f"{'law':<16}{'structure':<13}{'gain':>5}  {'error left':>10}  {'worst':>7}  safe")
+    for c in result.candidates:
+        mark = "<- " if c == result.chosen else ""
+        why = "yes" if not c.unsafe else f"no: {', '.join(c.unsafe)}"
+        print(
+            f"{c.law:<16}{c.kind:<13}{c.gain:>5.3g}  {100 * c.errors[0]:>8.1f} %  {100 * c.worst:>5.1f} %  {mark}{why}"
+        )
+    print()
+    print(f"linear controller: kp {result.gains['kp']:.5g}, kd {result.gains['kd']:.5g}; RMS error alone "
+          f"{result.linear_error:.3g} {angle}")  # fmt: skip
+    c = result.chosen
+    if c and result.model:
+        print(f"switch on:         {c.kind} of {result.model!r}, gain {c.gain:g}")
+        low, high = 1.0 - c.worst, 1.0 - min(c.errors)
+        print(
+            f"error reduction:   {100 * low:.0f} to {100 * high:.0f} % on {result.axes} axes within the intervals"
+        )
+        edge = "none found up to 1.5" if math.isinf(result.margin) else f"{result.margin:.3g}"
+        print(f"margin of gain:    {edge}")
+        print(f"lead:              {result.lead:.4g} s")
+        print(f"deadband:          {result.deadband:.4g} {speed}")
+    for note in result.notes:
+        print(note)

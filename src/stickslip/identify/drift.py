@@ -1,0 +1,246 @@
+"""Has the friction changed? Two identified models compared, with what each leaves open."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.draws import curve_band, sliding_torque
+from stickslip.identify.estimate import Estimate, Picture, Trace
+from stickslip.identify.identified_file import Identified, covariance
+
+__all__ = ["Change", "Comparison", "compare_models"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+DRAWS = 400
+
+
+@dataclass(frozen=True)
+class Change:
+    """One parameter in both models; ``p`` is the chance of such a difference without a change, after Holm."""
+
+    name: str
+    unit: str
+    first: float
+    second: float
+    lower: float
+    upper: float
+    p: float
+
+    @property
+    def changed(self) -> bool:
+        """At the 5 % level of all parameters together."""
+        return self.p < 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """The result.
+
+    Attributes
+    ----------
+    changes : tuple of Change
+        Parameters that both models identified.
+    p : float
+        Of the joint test on those of the law (chi-square); not a number where there are none in common.
+    velocity, difference, band : array, shape (n,)
+        Second curve minus first, and the half-width that holds 95 % of the whole curves.
+    changed : bool
+        Either test says so.
+    notes : tuple of str
+    picture : Picture
+    """
+
+    changes: tuple[Change, ...]
+    p: float
+    velocity: Array
+    difference: Array
+    band: Array
+    changed: bool
+    notes: tuple[str, ...]
+    picture: Picture
+
+    @property
+    def largest(self) -> float:
+        """The greatest difference of the curves over its band; above 1 the curve has changed."""
+        return float(np.max(np.abs(self.difference) / self.band))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "changed": self.changed, "p": self.p, "curve_difference_over_band": self.largest,
+            "parameters": [{**asdict(c), "changed": c.changed} for c in self.changes],
+            "curve": {
+                "velocity": self.velocity.tolist(), "difference": self.difference.tolist(), "band": self.band.tolist()
+            },
+            "notes": list(self.notes),
+        }  # fmt: skip
+
+
+def compare_models(
+    first: Identified, second: Identified, *, top: float | None = None, level: float = 0.05
+) -> Comparison:
+    """Test whether friction differs between two identifications on different records.
+
+    Parameters
+    ----------
+    first, second : Identified
+        The curves are compared whatever the laws are; parameters only of one law.
+    top : float, optional
+        Highest velocity of the curves, rad/s; otherwise 30 times the law's own velocity, or 1 rad/s.
+    level : float
+        Of both tests together: each has half of it.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        If a file has no estimates, or the axes move differently.
+    """
+    for x in (first, second):
+        if not x.estimates:
+            raise InputError(
+                f"{x.path} has no intervals; only what `stickslip identify` wrote can be compared"
+            )
+    if first.motion != second.motion:
+        raise InputError(f"{first.path} is a {first.motion} axis and {second.path} a {second.motion} one")
+    changes, p, notes = compared_parameters(first, second)
+    hashes = {str(d.get("sha256", "")) for d in first.data} & {str(d.get("sha256", "")) for d in second.data}
+    if hashes - {""}:
+        notes.append(
+            "Both come from a record in common: their errors are not independent, and the test is too mild."
+        )
+    velocity = grid_of(first, second, top)
+    difference, band, sides = compared_curves(first, second, velocity, 1.0 - 0.5 * level)
+    changed = bool(np.any(np.abs(difference) > band)) or p < 0.5 * level
+    return Comparison(changes, p, velocity, difference, band, changed, tuple(notes),
+                      picture_of(first, velocity, sides, changed, (first, second)))  # fmt: skip
+
+
+def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Change, ...], float, list[str]]:
+    """Each difference with its interval and chance, and the joint chance."""
+    special: Any = importlib.import_module("scipy.special")
+    if first.model.law.name != second.model.law.name:
+        words = f"The laws differ ({first.model.law.name}, {second.model.law.name}): only the curves are compared."
+        return (), math.nan, [words]
+    names = [
+        e.name
+        for e in first.estimates
+        if e.identified and e.name in {x.name for x in second.estimates if x.identified}
+    ]
+    if not names:
+        return (), math.nan, ["No parameter is identified in both models."]
+    a, ca = chosen(first, names)
+    b, cb = chosen(second, names)
+    logs = [min(x.lower, y.lower, x.value, y.value) > 0.0 for x, y in zip(a, b, strict=True)]
+    total = covariance(a, ca, logs) + covariance(b, cb, logs)
+    step = np.array([
+        math.log(y.value / x.value) if log else y.value - x.value for x, y, log in zip(a, b, logs, strict=True)
+    ])  # fmt: skip
+    std = np.sqrt(np.diag(total))
+    chance = np.array([math.erfc(abs(s) / d / math.sqrt(2.0)) for s, d in zip(step, std, strict=True)])
+    chance = holm(chance)
+    # Inertia and offset are no friction: they are shown, but do not decide.
+    own = {f.name for f in first.model.law.fields}
+    rows = [i for i, n in enumerate(names) if n.partition("[")[0] in own]
+    joint = math.nan
+    if rows:
+        part = total[np.ix_(rows, rows)]
+        statistic = float(step[rows] @ np.linalg.pinv(part, hermitian=True) @ step[rows])
+        joint = float(special.gammaincc(0.5 * len(rows), 0.5 * statistic))
+    changes: list[Change] = []
+    for x, y, log, s, d, p in zip(a, b, logs, step, std, chance, strict=True):
+        low, high = float(s - 1.96 * d), float(s + 1.96 * d)
+        if log:
+            low, high = x.value * math.expm1(low), x.value * math.expm1(high)
+        changes.append(Change(x.name, x.unit, x.value, y.value, low, high, float(p)))
+    left = sorted({e.name for e in (*first.estimates, *second.estimates)} - set(names))
+    notes = [f"Not compared, since not identified in both: {', '.join(left)}."] if left else []
+    return tuple(changes), joint, notes
+
+
+def chosen(model: Identified, names: Sequence[str]) -> tuple[tuple[Estimate, ...], Array]:
+    """Some estimates and their correlation."""
+    places = [next(i for i, e in enumerate(model.estimates) if e.name == n) for n in names]
+    return tuple(model.estimates[i] for i in places), model.correlation[np.ix_(places, places)]
+
+
+def holm(p: Array) -> Array:
+    """Chances corrected for the number of tests (Holm 1979)."""
+    order = np.argsort(p)
+    factors = np.arange(p.size, 0, -1)
+    out = np.empty(p.size)
+    out[order] = np.minimum(np.maximum.accumulate(p[order] * factors), 1.0)
+    return out
+
+
+def grid_of(first: Identified, second: Identified, top: float | None) -> Array:
+    """Velocities of both directions."""
+    if top is None:
+        own = [
+            float(m.model.law.velocity_scale(m.model.parameters))
+            for m in (first, second)
+            if m.model.law.velocity_scale
+        ]
+        top = 30.0 * max(own) if own else 1.0
+    if not (math.isfinite(top) and top > 0.0):
+        raise InputError(f"the highest velocity {top:g} must be greater than 0")
+    half = np.geomspace(0.003 * top, top, 60)
+    return np.concatenate([-half[::-1], half])
+
+
+def compared_curves(
+    first: Identified, second: Identified, velocity: Array, inside: float
+) -> tuple[Array, Array, list[tuple[Array, Array]]]:  # fmt: skip
+    """Difference of the curves, the half-width that holds that part of whole curves, and each curve's own draws.
+
+    The half-width is a multiple of the standard deviation at every velocity, the same multiple at all of them, so
+    that it holds for the curve as a whole.
+    """
+    sides: list[tuple[Array, Array]] = []
+    rest = np.zeros((1, velocity.size))
+    count = DRAWS
+    for seed, model in enumerate((first, second)):
+        best = sliding_torque(model.model, velocity)
+        drawn = curve_band(model.model, *model.law_estimates, velocity, DRAWS, seed)
+        sides.append((best, drawn))
+        count = min(count, drawn.shape[0])
+    if count < 20:
+        raise InputError(
+            "the laws refuse nearly all parameters inside the intervals; identify them from more data"
+        )
+    rest = (sides[1][1][:count] - sides[1][0]) - (sides[0][1][:count] - sides[0][0])
+    spread = np.sqrt(np.mean(rest**2, axis=0))
+    spread = np.maximum(spread, 1e-12 * float(np.max(np.abs(sides[0][0]))))
+    factor = float(np.quantile(np.max(np.abs(rest) / spread, axis=1), inside))
+    return sides[1][0] - sides[0][0], factor * spread, sides
+
+
+def picture_of(
+    model: Identified, velocity: Array, sides: Sequence[tuple[Array, Array]], changed: bool,
+    both: tuple[Identified, Identified],
+) -> Picture:  # fmt: skip
+    """Both curves with their bands, motion in the positive direction."""
+    rows = velocity > 0.0
+    names = [m.path.name for m in both]
+    labels = names if names[0] != names[1] else [str(m.path) for m in both]
+    traces: list[Trace] = []
+    for (best, drawn), label in zip(sides, labels, strict=True):
+        low, high = np.percentile(drawn[:, rows], [2.5, 97.5], axis=0)
+        traces += [Trace("" if traces else "95 % bands", velocity[rows], low, "band", high)]
+        traces += [Trace(label, velocity[rows], best[rows])]
+    message = "The friction has changed." if changed else "No change that the intervals do not explain."
+    return Picture(
+        "comparison", "Friction at constant velocity", message, f"velocity ({model.unit('rad/s')})",
+        f"friction torque ({model.unit('N·m')})", tuple(traces), "log",
+    )  # fmt: skip

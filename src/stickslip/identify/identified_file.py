@@ -1,0 +1,102 @@
+"""What a model.toml says besides the law: estimates, correlation, axis, and the records it comes from."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.config import read_toml
+from stickslip.errors import InputError
+from stickslip.identify.estimate import Estimate
+from stickslip.model import Model
+
+__all__ = ["Identified", "read_identified"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """An identified law as its file holds it.
+
+    Attributes
+    ----------
+    path : Path
+    model : Model
+    estimates : tuple of Estimate
+        Empty in a file that a person wrote.
+    correlation : array, shape (n, n)
+    axis : mapping
+        ``inertia`` and the like where the method found them.
+    motion : str
+        "rotary" or "linear".
+    data : tuple of mapping
+        ``file``, ``sha256``, ``rows`` of every record.
+    """
+
+    path: Path
+    model: Model
+    estimates: tuple[Estimate, ...]
+    correlation: Array
+    axis: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    motion: str = "rotary"
+    data: tuple[Mapping[str, Any], ...] = ()
+
+    def unit(self, angular: str) -> str:
+        """A unit of the angular system in the axis's own."""
+        if self.motion == "rotary":
+            return angular
+        return angular.replace("kg·m²", "kg").replace("N·m", "N").replace("rad", "m")
+
+    @property
+    def law_estimates(self) -> tuple[tuple[Estimate, ...], Array]:
+        """The estimates that are the law's own, and their correlation."""
+        names = {f.name for f in self.model.law.fields}
+        places = [i for i, e in enumerate(self.estimates) if e.name.partition("[")[0] in names]
+        return tuple(self.estimates[i] for i in places), self.correlation[np.ix_(places, places)]
+
+
+def read_identified(path: str | os.PathLike[str]) -> Identified:
+    """Read what `stickslip.identify.model_file.write_model` wrote.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is no model, or its tables are damaged.
+    """
+    file = Path(path)
+    model = Model.from_file(file)
+    content = read_toml(file).values
+    try:
+        estimates = tuple(
+            Estimate(
+                str(e["name"]), str(e["unit"]), str(e["name"]), float(e["value"]), float(e["std"]), float(e["lower"]),
+                float(e["upper"]), bool(e["identified"]), str(e.get("verdict", "")),
+            )
+            for e in content.get("estimates", [])
+        )  # fmt: skip
+        matrix = np.array(content.get("correlation", {}).get("matrix", []), dtype=np.float64)
+        matrix = matrix.reshape(len(estimates), len(estimates))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"{file}: its estimates cannot be read ({error}); identify the axis again") from None
+    return Identified(
+        file, model, estimates, np.where(np.isfinite(matrix), matrix, np.eye(len(estimates))),
+        dict(content.get("axis", {})), str(content.get("motion", "rotary")), tuple(content.get("data", [])),
+    )  # fmt: skip
+
+
+def covariance(estimates: tuple[Estimate, ...], correlation: Array, logarithmic: list[bool]) -> Array:
+    """Covariance of the estimates, of the logarithms of those that are said to be."""
+    from stickslip.identify.draws import log_spread
+
+    std = np.array([
+        log_spread(e) if log else (e.std if math.isfinite(e.std) else (e.upper - e.lower) / 3.92)
+        for e, log in zip(estimates, logarithmic, strict=True)
+    ])  # fmt: skip
+    return std[:, None] * correlation * std[None, :]

@@ -1,0 +1,142 @@
+"""From a model to decisions: stickslip compare, recommend, demo."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+
+from stickslip import Model
+from stickslip.cli import main
+from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.model_file import write_model
+
+STRIBECK = {"k": 50.0, "fs": 0.335, "fc": 0.285, "vs": 0.1, "sigma2": 0.018}
+UNITS = {"k": "N·m·s/rad", "fs": "N·m", "fc": "N·m", "vs": "rad/s", "sigma2": "N·m·s/rad"}
+
+
+def written(path: Path, relative: float = 0.01, law: str = "stribeck", **values: float) -> Path:
+    """A model whose estimates have that relative standard deviation."""
+    found = {k: v for k, v in {**STRIBECK, **values}.items() if law == "stribeck" or k in ("fc", "sigma2")}
+    estimates = tuple(
+        Estimate(n, UNITS[n], n, v, relative * v, v * np.exp(-1.96 * relative), v * np.exp(1.96 * relative), True)
+        for n, v in found.items()
+    )  # fmt: skip
+    result = Identification("axis", Model(law, **found), estimates, np.eye(len(estimates)), {})
+    write_model(path, result, data=[{"file": path.name, "sha256": path.name, "rows": 9}])
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    content["axis"] = {"inertia": 4e-4}
+    path.write_text(tomli_w.dumps(content), encoding="utf-8")
+    return path
+
+
+def compared(first: Path, second: Path, capsys: pytest.CaptureFixture[str], *options: str) -> dict[str, Any]:
+    assert main(["compare", str(first), str(second), "--json", *options]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_friction_that_changed_is_told_from_one_that_did_not(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before, after = written(tmp_path / "a.toml"), written(tmp_path / "b.toml", fc=0.285 * 1.1)
+    same = written(tmp_path / "c.toml", fc=0.285 * 1.01)
+    result = compared(before, after, capsys, "--plot", str(tmp_path / "d.png"))
+    assert result["changed"]
+    assert [c["name"] for c in result["parameters"] if c["changed"]] == ["fc"]
+    assert result["curve_difference_over_band"] > 1.0
+    assert (tmp_path / "d.png").stat().st_size > 1000
+    assert not compared(before, same, capsys)["changed"]
+
+
+def test_false_alarms_are_as_rare_as_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Estimates drawn with exactly their standard deviation: the level of the test is 5 %."""
+    rng = np.random.default_rng(5)
+    files = [
+        written(tmp_path / f"{i}.toml", 0.02, **{n: v * float(np.exp(0.02 * rng.standard_normal()))
+                for n, v in STRIBECK.items()})
+        for i in range(120)
+    ]  # fmt: skip
+    alarms = sum(compared(a, b, capsys)["changed"] for a, b in zip(files[::2], files[1::2], strict=True))
+    assert alarms <= 8  # of 60; more than 8 at 5 % each has a chance below 0.4 %
+
+
+def test_models_of_different_laws_are_compared_by_their_curves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = written(tmp_path / "a.toml"), written(tmp_path / "b.toml", law="coulomb")
+    result = compared(first, second, capsys)
+    assert result["parameters"] == []
+    assert result["changed"]  # Coulomb's law has no Stribeck effect
+    assert main(["compare", str(first), str(second)]) == 0
+    assert "only the curves" in capsys.readouterr().out
+
+
+def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = written(tmp_path / "m.toml", 0.03)
+    options = ["--bandwidth", "20", "--counts-per-rev", "65536", "--torque-limit", "3", "--axes", "3"]
+    assert main(["recommend", str(model), *options, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    chosen = result["chosen"]
+    assert chosen["unsafe"] == []
+    assert len(chosen["errors"]) == result["axes"] == 4
+    assert max(chosen["errors"]) < 0.2
+    assert chosen["gain"] <= 1.0
+    # Feedback that cancels everything hunts (thesis 3.2.3), and is found to.
+    full = [c for c in result["candidates"] if (c["kind"], c["gain"]) == ("feedback", 1.0)]
+    assert any(c["unsafe"] for c in full)
+    assert main(["recommend", str(model), *options]) == 0
+    assert "switch on:" in capsys.readouterr().out
+
+
+def test_where_the_model_is_unsure_less_is_promised(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept: list[float] = []
+    for relative in (0.01, 0.15):
+        model = written(tmp_path / "m.toml", relative)
+        assert main(["recommend", str(model), "--bandwidth", "20", "--axes", "4", "--json"]) == 0
+        chosen = json.loads(capsys.readouterr().out)["chosen"]
+        kept.append(max(chosen["errors"]) if chosen else 1.0)
+    assert kept[1] > 1.5 * kept[0]
+
+
+def test_the_demo_goes_the_whole_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
+    shown = capsys.readouterr().out
+    assert "simulated" in shown.splitlines()[0]
+    for verb in ("doctor", "identify", "recommend"):
+        assert f"$ stickslip {verb}" in shown
+    model = Model.from_file(tmp_path / "demo" / "model.toml")
+    assert model.parameters.fc == pytest.approx(0.285, rel=0.02)
+    assert (tmp_path / "demo" / "report.html").stat().st_size > 50_000
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["compare", "none.toml", "none.toml"], "no file"),
+        (["compare", "plain.toml", "plain.toml"], "no intervals"),
+        (["recommend", "plain.toml"], "--inertia"),
+        (["recommend", "plain.toml", "--inertia", "4e-4", "--bandwidth", "0"], "bandwidth"),
+        (["recommend", "plain.toml", "--inertia", "4e-4", "--bandwidth", "900"], "sample rate"),
+        (["recommend", "plain.toml", "--axes", "-1"], "--axes"),
+    ],
+)
+def test_bad_input_is_one_line(
+    tmp_path: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    Path("plain.toml").write_text(
+        'law = "coulomb"\n[parameters]\nfc = 0.3\nsigma2 = 0.01\n', encoding="utf-8"
+    )
+    assert main(words) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1
+    assert message in lines[0]
