@@ -2,7 +2,7 @@
 
 0.01 kg·m² under half of the Coulomb torque (sigma0 1e5, sigma1 10), applied at once and held for 10 s, against a
 tight-tolerance solution of the same equations. ``python benchmarks/stiction_drift.py``; MuJoCo (3.5 or later, its
-`dcmotor` actuator has LuGre friction) is optional: ``pip install mujoco``.
+`dcmotor` actuator has LuGre friction) is optional: ``pip install 'stickslip[benchmarks]'``.
 """
 
 from __future__ import annotations

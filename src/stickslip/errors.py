@@ -1,4 +1,4 @@
-"""What can go wrong, and who is meant by it.
+"""What can go wrong, and who is meant by it::
 
 StickslipError                    everything this package raises on purpose
 ├── InputError                    the user can mend it; the command line prints one line and exits with 2

@@ -52,3 +52,27 @@ def test_adaptive_and_fixed_integrators_agree(delta_i):
         paths.append(np.interp(grid, run.time, run["position"]))
     assert np.ptp(paths[0]) > 0.2
     assert np.abs(paths[0] - paths[1]).max() < 5e-6
+
+
+def test_weaker_elements_for_the_other_direction_make_no_jump():
+    """An element that comes back above its new limit keeps its torque; steps and rates agree on it."""
+    weak = {"w_negative": [0.06] * 4, "fs_negative": 0.24, "fc_negative": 0.2}
+    model = Model(
+        "leuven",
+        {"symmetry": "asymmetric"},
+        k=[1e4, 7e3, 5e3, 3e3],
+        w=[0.08375] * 4,
+        sigma1=0.1,
+        **CURVE,
+        **weak,
+    )
+    motion = Reference("harmonic", amplitude=2e-3, frequency=0.5)
+    times = np.linspace(0.0, 4.0, 8001)
+    by_rate, by_step = (respond(model, motion, times, method=m) for m in ("rate", "step"))
+    rates = by_rate["friction_torque"]
+    np.testing.assert_allclose(rates, by_step["friction_torque"], atol=1e-6)
+    # The bristle moves by at most 1 + 0.335 / 0.2 of the travel; damping gives less than a millinewton metre.
+    assert np.all(np.abs(np.diff(rates)) < 2.7 * 25e3 * np.abs(np.diff(by_rate["position"])) + 1e-3)
+    assert rates[-1] > 0.285
+    fastest = rates[5000:7000].min()
+    assert -0.2402 < fastest < -0.2

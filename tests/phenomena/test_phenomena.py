@@ -144,6 +144,52 @@ def test_it_slides_steadily_where_friction_does_not_fall_with_speed() -> None:
     assert record["velocity"][record.time > 40.0] == pytest.approx(example.SPEED, rel=0.05)
 
 
+# ---- time (2.1.5) and position (2.1.6) ------------------------------------------------------------------------
+
+
+def declared() -> list[str]:
+    """Laws that have a torque while they slide at one speed."""
+    return [name for name in law_names() if law(name).steady is not None]
+
+
+@pytest.mark.parametrize("name", declared())
+def test_the_ripple_of_any_law_is_found_in_its_torque(name: str) -> None:
+    """Its harmonics, and no other; the mean over a revolution is the steady torque without it."""
+    example = script("position")
+    model = example.rippling(name)
+    there, back = (example.turned(model, speed) for speed in (example.SPEED, -example.SPEED))
+    for record, speed in ((there, example.SPEED), (back, -example.SPEED)):
+        for periods in range(1, 9):
+            expected = example.HARMONICS.get(periods, 0.0)
+            assert example.harmonic(record, periods) == pytest.approx(expected, abs=1e-3)
+        plain = model.law.steady(speed, model.parameters)
+        assert record["friction_torque"].mean() == pytest.approx(plain, rel=1e-3)
+
+
+def test_the_ripple_stays_in_its_place_at_any_speed_from_either_side() -> None:
+    example = script("position")
+    places = []
+    for speed in (0.02, example.SPEED, -example.SPEED, 2.0):
+        record = example.turned(example.rippling("gms"), speed)
+        places.append(record["position"][np.argmax(np.abs(record["friction_torque"]))])
+    assert np.ptp(places) <= 2.0 * 2.0 * np.pi / 720.0
+
+
+@pytest.mark.parametrize("name", ["coulomb", "lugre", "gms"])
+def test_friction_settles_with_its_time_constant(name: str) -> None:
+    """Each period of the swing repeats the one without the change, times what is left of it."""
+    example = script("time_dependence")
+    changing = example.swung(example.warming(name))
+    constant = example.swung(Model(name, **law(name).example))
+    left = example.factor(constant.time)
+    assert left[[0, -1]] == pytest.approx([1.0, 0.7], abs=0.01)
+    gap = changing["friction_torque"] - left * constant["friction_torque"]
+    assert np.max(np.abs(gap)) < 1e-6 * np.ptp(constant["friction_torque"])
+    last = np.max(changing["friction_torque"][-example.SAMPLES :])
+    second = np.max(changing["friction_torque"][example.SAMPLES : 2 * example.SAMPLES])
+    assert 1.0 + example.DRIFT < last / second < 1.0 + 0.8 * example.DRIFT
+
+
 # ---- direction (2.1.7) ----------------------------------------------------------------------------------------
 
 

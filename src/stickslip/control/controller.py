@@ -22,7 +22,7 @@ class Controller:
         Of the linear part (`stickslip.control.linear`).
     compensator : Compensator or None
     torque_limit : float
-        |T_m| never exceeds it, N·m; infinite for none.
+        The size of T_m never exceeds it, N·m; infinite for none.
     sample_time : float
         0 acts in continuous time; otherwise the controller acts every `sample_time` s, holds its output, and
         takes the velocity as the difference of two measured positions.

@@ -18,7 +18,7 @@ from stickslip.errors import InputError, ParameterError
 from stickslip.identify.optimum import descend
 from stickslip.identify.vector import Vector
 from stickslip.model import Model
-from stickslip.spec import Law
+from stickslip.spec import Field, Law
 
 __all__ = ["dimensions", "feasible", "frozen_by_default", "starts"]
 
@@ -64,9 +64,7 @@ def scaled(law: Law, torque: float, length: float, velocity: float) -> dict[str,
             continue
         value: Any = law.example.get(f.name, f.par.default)
         if f.per_element:
-            value = list(value)[:ELEMENTS]
-            total = math.fsum(value)
-            value = [v / total for v in value] if f.par.shares else value
+            value = fewer(f, list(value))
         try:
             t, x, s = dimensions(f.par.unit)
         except InputError:
@@ -77,6 +75,15 @@ def scaled(law: Law, torque: float, length: float, velocity: float) -> dict[str,
         if not f.per_element:
             values[f.name] = min(max(values[f.name], low), high)
     return values
+
+
+def fewer(f: Field, values: list[float]) -> list[float]:
+    """The first elements; their shares add up to 1, and the torques they carry to as much as all did."""
+    kept = values[:ELEMENTS]
+    if not (f.par.shares or (f.par.per == "element" and f.par.unit == "N·m")):
+        return kept
+    share = (1.0 if f.par.shares else math.fsum(values)) / math.fsum(kept)
+    return [share * v for v in kept]
 
 
 def frozen_by_default(law: Law) -> list[str]:
@@ -90,15 +97,18 @@ def frozen_by_default(law: Law) -> list[str]:
 def feasible(law: Law, p: Any) -> Any | None:
     """These parameters, or the nearest that the law accepts; None where none is known.
 
-    A static torque below the Coulomb torque is raised to it: the curve without a Stribeck effect.
+    A static torque below the Coulomb torque is raised to it: the curve without a Stribeck effect. Limits of elements
+    that together stay below the static torque (Leuven) are raised to it in proportion.
     """
     if law.check is None or not law.check(p):
         return p
-    if hasattr(p, "fs") and hasattr(p, "fc") and p.fs < p.fc:
-        raised = p._replace(fs=p.fc)
-        if not law.check(raised):
-            return raised
-    return None
+    if not (hasattr(p, "fs") and hasattr(p, "fc")):
+        return None
+    raised = p._replace(fs=max(p.fs, p.fc))
+    if hasattr(p, "w") and math.fsum(p.w) < raised.fs:
+        share = raised.fs / math.fsum(p.w)
+        raised = raised._replace(w=tuple(share * w for w in p.w))
+    return None if law.check(raised) else raised
 
 
 def starts(

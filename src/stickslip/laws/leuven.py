@@ -33,7 +33,10 @@ class Params(NamedTuple):
     """Parameters besides the sliding curve's."""
 
     k: Annotated[tuple[float, ...], Par("N·m/rad", "k_i", "stiffness of element i", positive=True)]
-    w: Annotated[tuple[float, ...], Par("N·m", "W_i", "torque at which element i slips", positive=True)]
+    w: Annotated[
+        tuple[float, ...],
+        Par("N·m", "W_i", "torque at which element i slips", positive=True, directional=True),
+    ]
     delta_i: Annotated[
         float, Par("-", "delta_i", "shape factor of the bristle's rate", lower=1.0, upper=20.0, default=1.0)
     ]
@@ -56,11 +59,21 @@ def elements_torque(z: Any, p: Any) -> float:
     return total
 
 
+def highest(i: int, z: Any, p: Any) -> float:
+    """Where element i stops rising, N·m. What it brought from a direction with a higher limit, it keeps at first."""
+    return max(p.w[i], z.force[i])
+
+
+def lowest(i: int, z: Any, p: Any) -> float:
+    """Where element i stops falling, N·m."""
+    return min(-p.w[i], z.force[i])
+
+
 def torque_after(travel: float, z: Any, p: Any) -> float:
     """F_h after the bristle has moved by `travel`, rad, N·m; thesis eq. 2.14."""
     total = 0.0
     for i in range(len(p.k)):
-        total += min(max(z.force[i] + p.k[i] * travel, -p.w[i]), p.w[i])
+        total += min(max(z.force[i] + p.k[i] * travel, lowest(i, z, p)), highest(i, z, p))
     return total
 
 
@@ -145,11 +158,11 @@ def advance(v0: float, v1: float, dt: float, z: Any, p: Any) -> None:
     for i in range(len(p.k)):
         force = z.force[i] + p.k[i] * travel
         z.mode[i] = 0.0
-        if force >= p.w[i]:
-            force = p.w[i]
+        if force >= highest(i, z, p):
+            force = highest(i, z, p)
             z.mode[i] = 1.0
-        elif force <= -p.w[i]:
-            force = -p.w[i]
+        elif force <= lowest(i, z, p):
+            force = lowest(i, z, p)
             z.mode[i] = -1.0
         z.force[i] = force
     z.direction = direction_of(v0 + v1)
