@@ -292,7 +292,7 @@ class _Translator(ast.NodeTransformer):
             return node
         value = self.scope.get(node.id)
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return ast.copy_location(ast.Constant(float(value)), node)
+            return ast.copy_location(ast.Constant(value), node)
         raise self.refuse(
             node, f"the name {node.id!r}", "use an argument, a local name or a numeric constant"
         )

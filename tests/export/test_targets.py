@@ -1,16 +1,19 @@
 """One suite over every pair of law and target: it writes, says what it cannot carry, and passes its own check."""
 
 import importlib
+from pathlib import Path
 
 import pytest
 
 from laws import farthest, label, registered
+from stickslip import plugins
 from stickslip.export import TARGETS
 from stickslip.export.job import CannotCarry, Job
 from stickslip.model import Model
 
 ALL = {name: importlib.import_module(f"stickslip.export.{name}").TARGET for name in TARGETS}
-LAWS = [*registered(), *(farthest(law) for law in registered() if law.choices)]
+ODD = plugins.law(str(Path(__file__).with_name("odd_names.py")))
+LAWS = [ODD, *registered(), *(farthest(law) for law in registered() if law.choices)]
 
 
 def job(law, **more):
@@ -40,7 +43,7 @@ def test_a_law_leaves_or_is_refused_with_what_is_lost(target, law):
 def test_a_targets_check_fails_on_a_wrong_export(target, monkeypatch):
     if target.check is None:
         pytest.skip("nothing to run")
-    right, other = job(LAWS[0]), Model(LAWS[0], **{k: 1.1 * v for k, v in LAWS[0].example.items()})
+    right, other = job(ODD), Model(ODD, **{k: 1.1 * v for k, v in ODD.example.items()})
     export = target.write(right)
     wrong = target.write(Job(other, right.name))
     mixed = {

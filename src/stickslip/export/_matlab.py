@@ -188,11 +188,9 @@ def functions(trees: Mapping[str, ast.FunctionDef]) -> list[tuple[str, str, list
     out: list[tuple[str, str, list[str]]] = []
     for name, tree in trees.items():
         facts = known[name]
-        outputs = [
-            *(["torque_"] if facts.returns else []),
-            *(a for a in facts.arguments if a in facts.writes),
-        ]
-        head = f"function [{', '.join(outputs)}] = {local(name)}({', '.join(facts.arguments)})"
+        changed = [safe(a) for a in facts.arguments if a in facts.writes]
+        outputs = [*(["torque_"] if facts.returns else []), *changed]
+        head = f"function [{', '.join(outputs)}] = {local(name)}({', '.join(map(safe, facts.arguments))})"
         lines = [head, *_Matlab(facts, known).block(tree.body, 1), "end"]
         out.append((name, ast.get_docstring(tree) or "", lines))
     return out

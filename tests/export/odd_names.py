@@ -1,0 +1,30 @@
+"""A law whose names are words of other languages, and whose loop counts to a constant of its file."""
+
+from typing import Annotated, NamedTuple
+
+from stickslip.spec import Law, Par
+
+PIECES = 3
+
+
+class Params(NamedTuple):
+    register: Annotated[float, Par("N·m·s/rad", "b", "slope", positive=True)]
+
+
+def torque(end, double, p):
+    total = 0.0
+    for default in range(PIECES):
+        total += p.register * end / PIECES + 0.0 * default * double
+    return total
+
+
+def step(v0, v1, dt, z, p, u):
+    return torque(v1, v0, p)
+
+
+def steady(v, p):
+    return torque(v, 0.0, p)
+
+
+LAW = Law("odd-names", Params, step, title="Odd names", equation="F = b v", source=("here",),
+          example={"register": 0.1}, steady=steady, passive="always")  # fmt: skip
