@@ -1,15 +1,17 @@
-"""What can go wrong, and who is meant by it::
+"""What can go wrong, and who is meant by it.
 
-StickslipError                    everything this package raises on purpose
-├── InputError                    the user can mend it; the command line prints one line and exits with 2
-│   ├── ParameterError            a parameter is missing, unknown or out of bounds
-│   ├── UnknownName               a law, compensator, reference, integrator, ... that is not registered
-│   ├── ConfigError               a key or value of a TOML file
-│   └── LawError                  a law's file says something that cannot be run (outside the scalar subset, say)
-└── SimulationError               a run ended early: when, why, and the record of what was computed
-    ├── Divergence                position or velocity left every reasonable bound, or is not a number
-    ├── EventStorm                more switches than the limit in a short time
-    └── StepFailure               no step that meets the tolerance was found
+The tree of exceptions::
+
+    StickslipError                    everything this package raises on purpose
+    ├── InputError                    the user can mend it; the command line prints one line and exits with 2
+    │   ├── ParameterError            a parameter is missing, unknown or out of bounds
+    │   ├── UnknownName               a law, compensator, reference, integrator, ... that is not registered
+    │   ├── ConfigError               a key or value of a TOML file
+    │   └── LawError                  a law's file says something that cannot be run (outside the scalar subset, say)
+    └── SimulationError               a run ended early: when, why, and the record of what was computed
+        ├── Divergence                position or velocity left every reasonable bound, or is not a number
+        ├── EventStorm                more switches than the limit in a short time
+        └── StepFailure               no step that meets the tolerance was found
 """
 
 from __future__ import annotations

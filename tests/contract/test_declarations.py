@@ -16,6 +16,7 @@ import pytest
 from stickslip import plugins
 from stickslip.errors import ParameterError
 from stickslip.jit import call_step, compiled_law, flat, kernel, pointer
+from stickslip.laws import LAWS
 from stickslip.spec import Law, Surroundings
 
 U = Surroundings()
@@ -42,6 +43,7 @@ def name_of(law: Law) -> str:
 
 
 VARIANTS = list(variants())
+REGISTERED = set(LAWS)
 every_variant = pytest.mark.parametrize("law", VARIANTS, ids=name_of)
 
 
@@ -144,11 +146,26 @@ def test_finite_and_bounded_for_any_parameters_and_steps(law):
         assert np.all(np.abs(torque[rest, -1]) <= 1.0001 * level_of(law, p)), p
 
 
-def test_cases_are_many_enough():
-    """Runs after the batches above in the same process."""
-    if COUNTED["cases"] == 0:
-        pytest.skip("needs the batches of this file")
-    assert len(VARIANTS) * CASES * MOTIONS >= 1e5
+def test_every_registered_law_and_option_is_among_them():
+    """Counted in the registry, not in the list above."""
+    options = sum(len(c.options) - 1 for name in REGISTERED for c in plugins.law(name).choices)
+    assert {law.name for law in VARIANTS} >= REGISTERED
+    assert len([law for law in VARIANTS if law.name in REGISTERED]) == len(REGISTERED) + options
+    assert len(set(map(name_of, VARIANTS))) == len(VARIANTS)
+
+
+def test_cases_are_many_enough(request, capsys):
+    """At least 1e5 random cases have passed above; says how many."""
+    batches = [i for i in request.session.items if i.name.startswith("test_finite_and_bounded")]
+    if len(batches) < len(VARIANTS):
+        pytest.skip("needs all the batches of this file")
+    laws = len({law.name for law in VARIANTS})
+    with capsys.disabled():
+        print(
+            f"\n{COUNTED['cases']} random cases: {laws} laws, {len(VARIANTS)} with their options, {STEPS} steps each"
+        )
+    assert COUNTED["cases"] == len(VARIANTS) * CASES * MOTIONS
+    assert COUNTED["cases"] >= 1e5
 
 
 @every_variant
