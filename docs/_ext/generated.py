@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 import subprocess
 import sys
 import time
@@ -58,6 +59,7 @@ def run(page: Path) -> None:
     now = hashlib.sha256(page.read_bytes() + package_hash().encode()).hexdigest()
     if stamp.exists() and stamp.read_text() == now:
         return
+    shutil.rmtree(folder, ignore_errors=True)  # what an earlier build left there is not on the page
     start = time.perf_counter()
     done = subprocess.run(
         [sys.executable, str(DOCS / "_ext" / "sessions.py"), str(page), str(folder)],
