@@ -289,14 +289,42 @@ def swings(rng: np.random.Generator, count: int, n: int = 600):
     return np.ascontiguousarray(velocity), np.full(velocity.shape, 1.0 / n)
 
 
-@every_variant
+def claims_passivity(law: Law) -> bool:
+    """Whether the law with its options is declared passive, perhaps under a condition on its parameters."""
+    return law.passive not in ("", "never") and all(law.option(c).passive for c in law.choices)
+
+
+def within_condition(law: Law, p):
+    """`p` where the law's condition holds, else `p` with the largest sigma1 (by halves) or with the constant s(v) that
+    meets it; None where neither does."""
+    values = p._asdict()
+    for _ in range(50):
+        if law.dissipates(p):
+            return p
+        if "sigma1" not in values:
+            break
+        for name in ("sigma1", "sigma1_negative"):
+            if name in values:
+                values[name] *= 0.5
+        p = law.parameters(values)
+    constant = {
+        **{f"fs{end}": values[f"fc{end}"] for end in ("", "_negative") if f"fs{end}" in values},
+        **{name: 0.0 for name in ("alpha1", "alpha2", "beta1", "beta2") if name in values},
+    }
+    if "curve_torque" in values:
+        constant["curve_torque"] = [values["curve_torque"][0]] * len(values["curve_torque"])
+    p = law.parameters({**values, **constant})
+    return p if law.dissipates(p) else None
+
+
+@pytest.mark.parametrize("law", [law for law in VARIANTS if claims_passivity(law)], ids=name_of)
 def test_a_passive_law_gives_no_energy_back(law):
     """Work from rest is never negative, within what the trapezoid of the work leaves open."""
     rng = seeded(law, 5)
     tried = 0
-    for _ in range(25):
-        p = nearby(law, rng)
-        if not law.dissipates(p):
+    for case in range(25):
+        p = within_condition(law, nearby(law, rng) if case else example(law))
+        if p is None:
             continue
         velocity, dt = swings(rng, 20)
         torque, _ = batch(law, p, velocity, dt)
@@ -306,8 +334,8 @@ def test_a_passive_law_gives_no_energy_back(law):
         work = np.cumsum(power, axis=1)
         room = 0.02 * np.abs(power).sum(axis=1) + 1e-15
         assert np.all(work.min(axis=1) >= -room), p
-        tried += 20
-    assert tried > 0 or not law.dissipates(example(law))
+        tried += 1
+    assert tried >= 15
 
 
 @pytest.mark.parametrize("law", [law for law in VARIANTS if law.stored is not None], ids=name_of)
@@ -346,6 +374,7 @@ def work_of(law: Law, p, legs):
 BRISTLES = {"sigma0": 1e4, "sigma1": 10.0, "sigma2": 0.0, "fs": 0.5, "fc": 0.2, "vs": 0.01}
 UNBOUND = {
     "lugre": BRISTLES,
+    "elasto_plastic": {**BRISTLES, "z_ba": 1e-5},  # half of the deflection that carries F_C
     "leuven": {
         "k": [5e3, 5e3], "w": [0.25, 0.25], "delta_i": 1.0, "sigma1": 10.0, "sigma2": 0.0, "fs": 0.5, "fc": 0.2,
         "vs": 0.01,
@@ -396,4 +425,4 @@ def test_a_slipping_element_gives_back_what_it_gained_without_work():
 def test_every_condition_has_its_counterexample():
     """The laws that are passive under a condition alone are those whose counterexamples stand above."""
     conditional = {law.name for law in VARIANTS if law.is_passive is not None}
-    assert conditional == {"lugre", "leuven", "gms"}
+    assert conditional == {"lugre", "elasto_plastic", "leuven", "gms"}

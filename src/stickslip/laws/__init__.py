@@ -22,6 +22,7 @@ LAWS = (
     "armstrong",
     "dahl",
     "lugre",
+    "elasto_plastic",
     "leuven",
     "maxwell_slip",
     "gms",
