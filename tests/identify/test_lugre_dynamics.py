@@ -36,6 +36,7 @@ def thesis_result(thesis_record: Response) -> Identification:
     return identify_lugre_dynamics(thesis_record, INERTIA, SLIDING)
 
 
+@pytest.mark.slow
 def test_the_thesis_record_does_not_determine_sigma0_by_its_position(thesis_result: Identification) -> None:
     result = thesis_result
     assert not result.details["plain_determines_sigma0"]
@@ -48,6 +49,7 @@ def test_the_thesis_record_does_not_determine_sigma0_by_its_position(thesis_resu
     assert np.interp(1e6, scan[:, 0], scan[:, 1]) == pytest.approx(0.0259, rel=0.03)
 
 
+@pytest.mark.slow
 def test_the_pre_sliding_parts_carry_the_stiffness(thesis_result: Identification) -> None:
     result = thesis_result
     assert result["sigma0"].value == pytest.approx(25_000.0, rel=0.1)

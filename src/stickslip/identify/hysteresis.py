@@ -307,7 +307,8 @@ def loop_picture(loop: Loop, curve: Array, rows: Rows, rest: Rows, template: Mod
         Trace("measured", loop.position[shown] - origin, loop.torque[shown]),
         Trace(template.law.title, loop.position[shown] - origin, curve[shown]),
     )
+    quantity = "force" if loop.unit[1] == "N" else "torque"
     return Picture(
         "hysteresis", f"Hysteresis: {template.law.title}", words[0].upper() + words[1:],
-        f"displacement ({loop.unit[0]})", f"friction torque ({loop.unit[1]})", traces,
+        f"displacement ({loop.unit[0]})", f"friction {quantity} ({loop.unit[1]})", traces,
     )  # fmt: skip

@@ -15,13 +15,22 @@ import numpy as np
 
 from stickslip.errors import InputError
 
-__all__ = ["Optimum", "Residuals", "central_differences", "descend", "distinct", "search", "spread_starts"]
+__all__ = [
+    "STEP",
+    "Optimum",
+    "Residuals",
+    "central_differences",
+    "descend",
+    "distinct",
+    "search",
+    "spread_starts",
+]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Residuals = Callable[[Array], Array]
 """Model minus data at the coordinates, shape (n,); what is not finite counts as infinitely bad."""
 
-STEP = np.finfo(np.float64).eps ** (1.0 / 3.0)
+STEP = float(np.finfo(np.float64).eps) ** (1.0 / 3.0)
 
 
 @dataclass(frozen=True)
@@ -54,12 +63,15 @@ def cost_of(r: Array) -> float:
 
 
 def central_differences(
-    residuals: Residuals, u: Array, free: Sequence[int], lower: Array, upper: Array
+    residuals: Residuals, u: Array, free: Sequence[int], lower: Array, upper: Array, difference: float = STEP
 ) -> Array:
-    """Jacobian by central differences inside the bounds, shape (n, p); error about 1e-10 of its scale."""
+    """Jacobian by central differences inside the bounds, shape (n, p); error about 1e-10 of its scale.
+
+    Residuals that are exact to fewer digits need a larger `difference`: relative above 1.
+    """
     columns: list[Array] = []
     for i in free:
-        h = STEP * max(1.0, abs(float(u[i])))
+        h = difference * max(1.0, abs(float(u[i])))
         ahead, behind = u.copy(), u.copy()
         ahead[i] = min(u[i] + h, upper[i])
         behind[i] = max(u[i] - h, lower[i])
@@ -77,6 +89,7 @@ def descend(
     held: Sequence[int] = (),
     iterations: int = 300,
     tolerance: float = 1e-15,
+    difference: float = STEP,
 ) -> Optimum:
     """The minimum that is reached from `start`.
 
@@ -91,6 +104,8 @@ def descend(
         Most Jacobians.
     tolerance : float
         Relative decrease of the sum of squares below which it ends.
+    difference : float
+        Of coordinates, for the Jacobian; relative above 1.
 
     Returns
     -------
@@ -110,7 +125,7 @@ def descend(
     jacobian = np.zeros((r.size, u.size))
     damping, scale = 1e-3, np.zeros(len(free))
     for _ in range(iterations if free else 0):
-        jacobian[:, free] = central_differences(residuals, u, free, lower, upper)
+        jacobian[:, free] = central_differences(residuals, u, free, lower, upper, difference)
         evaluations += 2 * len(free)
         part = np.where(np.isfinite(jacobian[:, free]), jacobian[:, free], 0.0)
         scale = np.maximum(scale, np.linalg.norm(part, axis=0))
@@ -132,7 +147,7 @@ def descend(
         if gain <= tolerance * cost or cost == 0.0:
             break
     if free:
-        jacobian[:, free] = central_differences(residuals, u, free, lower, upper)
+        jacobian[:, free] = central_differences(residuals, u, free, lower, upper, difference)
     return Optimum(u, cost, r, jacobian, evaluations + 2 * len(free))
 
 
@@ -215,26 +230,34 @@ def search(
     rough: int = 15,
     polished: int = 6,
     tolerance: float = 1e-15,
+    difference: float = STEP,
 ) -> list[Optimum]:
-    """Distinct minima, the best first: a short descent from every start, a full one from the best few.
+    """Distinct minima, the best first: a short descent from every start of several, a full one from the best few.
 
     Raises
     ------
     InputError
         If no start gives finite residuals.
     """
+    if len(starts) == 1:
+        return [descend(residuals, starts[0], lower, upper, tolerance=tolerance, difference=difference)]
     found: list[Optimum] = []
     for start in starts:
         inside = np.clip(start, lower, upper)
         if math.isfinite(cost_of(residuals(inside))):
-            found.append(descend(residuals, inside, lower, upper, iterations=rough, tolerance=1e-6))
+            found.append(
+                descend(
+                    residuals, inside, lower, upper, iterations=rough, tolerance=1e-6, difference=difference
+                )
+            )
     if not found:
         raise InputError(
             "the fit cannot start: the model gives no finite values at any start; give another start"
         )
     found.sort(key=lambda o: o.cost)
     full = [
-        descend(residuals, o.u, lower, upper, tolerance=tolerance) for o in distinct(found, 1e-3)[:polished]
+        descend(residuals, o.u, lower, upper, tolerance=tolerance, difference=difference)
+        for o in distinct(found, 1e-3)[:polished]
     ]
     full.sort(key=lambda o: o.cost)
     return distinct(full, 1e-4)

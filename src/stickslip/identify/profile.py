@@ -13,7 +13,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.noise import Noise, quantile
-from stickslip.identify.optimum import Optimum, Residuals, descend
+from stickslip.identify.optimum import STEP, Optimum, Residuals, descend
 
 __all__ = ["inverse_information", "long_run", "profiles_of"]
 
@@ -63,7 +63,13 @@ class Profiles:
 
 
 def profiles_of(
-    residuals: Residuals, best: Optimum, noise: Noise, lower: Array, upper: Array, lags: int
+    residuals: Residuals,
+    best: Optimum,
+    noise: Noise,
+    lower: Array,
+    upper: Array,
+    lags: int,
+    difference: float = STEP,
 ) -> Profiles:
     """Follow the profile of every coordinate to both sides."""
     inverse, seen = inverse_information(best.jacobian)
@@ -86,7 +92,9 @@ def profiles_of(
                 near = side * float(begin[i] - best.u[i])
                 if again and near <= 1.01 * reach[i, side]:
                     continue
-                profile = Profile(residuals, best, i, side, float(target[i]), valley, lower, upper)
+                profile = Profile(
+                    residuals, best, i, side, float(target[i]), valley, lower, upper, difference
+                )
                 reach[i, side] = profile.end(min(max(first, 1e-9), 1.0, farthest), farthest, near, begin)
                 family += profile.family
                 if profile.better is not None:
@@ -102,8 +110,9 @@ class Profile:
 
     def __init__(
         self, residuals: Residuals, best: Optimum, i: int, side: float, target: float, valley: Array,
-        lower: Array, upper: Array,
+        lower: Array, upper: Array, difference: float,
     ) -> None:  # fmt: skip
+        self.difference = difference
         self.residuals, self.best, self.i, self.side = residuals, best, i, side
         self.target, self.valley, self.lower, self.upper = target, valley, lower, upper
         self.family: list[Array] = []
@@ -156,7 +165,7 @@ class Profile:
             try:
                 found = descend(
                     self.residuals, begin, self.lower, self.upper,
-                    held=(self.i,), iterations=100, tolerance=1e-9,
+                    held=(self.i,), iterations=100, tolerance=1e-9, difference=self.difference,
                 )  # fmt: skip
             except InputError:  # not finite there
                 continue

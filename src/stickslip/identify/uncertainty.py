@@ -15,7 +15,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.noise import Noise, as_noise, noise_of_fit, quantile
-from stickslip.identify.optimum import Optimum, Residuals, descend, distinct, search, spread_starts
+from stickslip.identify.optimum import STEP, Optimum, Residuals, descend, distinct, search, spread_starts
 from stickslip.identify.profile import Profiles, inverse_information, long_run, profiles_of
 from stickslip.identify.vector import Parameter, Vector
 
@@ -86,6 +86,7 @@ def fit(
     lags: int = 0,
     seed: int = 0,
     tolerance: float = 1e-15,
+    difference: float = STEP,
 ) -> Fit:
     """Fit by least squares from many starts, and say what the data determine.
 
@@ -113,6 +114,8 @@ def fit(
         Of the starts.
     tolerance : float
         Relative decrease of the sum of squares at which a descent ends.
+    difference : float
+        Of coordinates, for Jacobians; larger where residuals are exact to fewer digits.
 
     Returns
     -------
@@ -132,17 +135,17 @@ def fit(
         if not isinstance(starts, int)
         else spread_starts(vector.start, low, high, starts, reach=reach, seed=seed)
     )
-    optima = search(residuals, first, low, high, tolerance=tolerance)
+    optima = search(residuals, first, low, high, tolerance=tolerance, difference=difference)
     if optima[0].residuals.size == 0:
         raise InputError("no data to fit; give at least one point")
     level = noise_of_fit(optima[0].cost, optima[0].residuals.size, vector.size, known, size)
     followed = Profiles({}, optima[0].u[None, :], None)
     for _ in range(8 if profiles and level.known else 0):
-        followed = profiles_of(residuals, optima[0], level, low, high, lags)
+        followed = profiles_of(residuals, optima[0], level, low, high, lags, difference)
         if followed.better is None:
             break
         # A profile met a better minimum: start again from there.
-        found = descend(residuals, followed.better, low, high, tolerance=tolerance)
+        found = descend(residuals, followed.better, low, high, tolerance=tolerance, difference=difference)
         optima = distinct(sorted([found, *optima], key=lambda o: o.cost), 1e-4)
         level = noise_of_fit(optima[0].cost, optima[0].residuals.size, vector.size, known, size)
         followed = Profiles({}, optima[0].u[None, :], None)
