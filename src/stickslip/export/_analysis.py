@@ -28,7 +28,7 @@ class Facts:
     returns : bool
         Whether it returns a number.
     kinds : mapping
-        Every local name (loop counters included) and every count to its type.
+        Every local name (loop counters included), every count and every argument that is an index to its type.
     counts : frozenset of str
         Names that stand for the number of elements, of points, ... (``elements_``).
     declared : mapping
@@ -102,7 +102,8 @@ def kind_of(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
 def _facts(tree: ast.FunctionDef, known: Mapping[str, Facts]) -> Facts:
     arguments = tuple(a.arg for a in tree.args.args)
     counts = _counts(tree, arguments)
-    kinds: dict[str, Kind] = {**_kinds(tree, counts), **dict.fromkeys(counts, "int")}
+    whole = counts | _indices(tree, arguments, known)
+    kinds: dict[str, Kind] = {**_kinds(tree, whole), **dict.fromkeys(whole, "int")}
     declared: dict[int, tuple[str, ...]] = {}
     opened: dict[int, tuple[str, ...]] = {}
     for name in kinds:
@@ -126,6 +127,19 @@ def _counts(tree: ast.FunctionDef, arguments: Sequence[str]) -> frozenset[str]:
     local = {n.id for n in names if isinstance(n.ctx, ast.Store)}
     free = {n.id for n in names if id(n) not in called} - local - {"math", *arguments}
     return frozenset(free)
+
+
+def _indices(tree: ast.FunctionDef, arguments: Sequence[str], known: Mapping[str, Facts]) -> frozenset[str]:
+    """Arguments that are an index here, or in a function that is called with them."""
+    out: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Subscript):
+            out |= {n.id for n in ast.walk(node.slice) if isinstance(n, ast.Name)}
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in known:
+            callee = known[node.func.id]
+            passed = zip(node.args, callee.arguments)
+            out |= {g.id for g, a in passed if isinstance(g, ast.Name) and callee.kinds.get(a) == "int"}
+    return frozenset(out & set(arguments))
 
 
 def _kinds(tree: ast.FunctionDef, counts: Iterable[str]) -> dict[str, Kind]:

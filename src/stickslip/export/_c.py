@@ -116,11 +116,14 @@ class _C(Language):
         if name == "int":
             return f"(int){self.expression(node.args[0], ATOM)}"
         callee = self.known[name]
-        given = [
-            a.id if argument in callee.structures and isinstance(a, ast.Name) else self.real(a)
-            for a, argument in zip(node.args, callee.arguments)
-        ]
+        given = [self.given(a, argument, callee) for a, argument in zip(node.args, callee.arguments)]
         return f"{self.dialect.prefix}{name}({', '.join(given)})"
+
+    def given(self, node: ast.expr, argument: str, callee: Facts) -> str:
+        """What is passed for an argument: a structure, an index or a number."""
+        if argument in callee.structures and isinstance(node, ast.Name):
+            return node.id
+        return self.expression(node) if callee.kinds.get(argument) == "int" else self.real(node)
 
     def library(self, name: str, arguments: Sequence[ast.expr]) -> str:
         """A call of math.h, in the precision of this export."""
@@ -211,7 +214,8 @@ def head(name: str, facts: Facts, dialect: Dialect) -> str:
     for argument in facts.arguments:
         kind = dialect.structures.get(argument) if argument in facts.structures else None
         if kind is None:
-            given.append(f"{dialect.real} {safe(argument)}")
+            plain = "int" if facts.kinds.get(argument) == "int" else dialect.real
+            given.append(f"{plain} {safe(argument)}")
         else:
             constant = "" if argument in facts.writes else "const "
             given.append(f"{constant}{dialect.prefix}_{kind} *{argument}")

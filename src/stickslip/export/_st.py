@@ -107,11 +107,14 @@ class _St(Language):
         if name == "int":
             return f"LREAL_TO_INT({self.helper('floor', node.args)})"
         callee = self.known[name]
-        given = [
-            f"{safe(a)} := {safe(g.id) if a in callee.structures and isinstance(g, ast.Name) else self.real(g)}"
-            for g, a in zip(node.args, callee.arguments)
-        ]
+        given = [f"{safe(a)} := {self.given(g, a, callee)}" for g, a in zip(node.args, callee.arguments)]
         return f"{self.prefix}{name}({', '.join(given)})"
+
+    def given(self, node: ast.expr, argument: str, callee: Facts) -> str:
+        """What is passed for an argument: a structure, an index or a number."""
+        if argument in callee.structures and isinstance(node, ast.Name):
+            return safe(node.id)
+        return self.expression(node) if callee.kinds.get(argument) == "int" else self.real(node)
 
     def library(self, name: str, arguments: Sequence[ast.expr]) -> str:
         """A mathematical function."""
@@ -212,10 +215,10 @@ def functions(
         head = [f"FUNCTION {prefix}{name} : {'LREAL' if facts.returns else 'BOOL'}"]
         plain = [a for a in facts.arguments if structures.get(a) is None or a not in facts.structures]
         shared = [a for a in facts.arguments if a not in plain]
-        head += section("VAR_INPUT", [f"{safe(a)} : LREAL;" for a in plain])
-        head += section("VAR_IN_OUT", [f"{safe(a)} : {prefix}_{structures[a]};" for a in shared])
         types = {"real": "LREAL", "int": "INT", "bool": "BOOL"}
-        own = [n for n in facts.kinds if n not in facts.arguments]
+        head += section("VAR_INPUT", [f"{safe(a)} : {types[facts.kinds.get(a, 'real')]};" for a in plain])
+        head += section("VAR_IN_OUT", [f"{safe(a)} : {prefix}_{structures[a]};" for a in shared])
+        own = [n for n in facts.kinds if n not in facts.arguments and n not in facts.counts]
         head += section("VAR", [f"{safe(n)} : {types[facts.kinds[n]]};" for n in own])
         out.append((name, ast.get_docstring(tree) or "", [*head, *(body or ["    ;"]), "END_FUNCTION"]))
     return [(f"_{n}", n, helper_lines(prefix, n)) for n in HELPERS if n in helpers] + out
