@@ -16,7 +16,7 @@ from stickslip.control.linear import place
 from stickslip.errors import InputError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.report.law_pictures import draw_law
+from stickslip.report.law_pictures import draw_gallery, draw_law
 from stickslip.simulation.closed_loop import INTEGRATORS, integrator_for, prepare
 from stickslip.spec import Field, Law, fields_of
 
@@ -31,6 +31,7 @@ def make() -> None:
     for law in laws:
         draw_law(Model(law, **law.example), FOLDER / f"{law.name}.svg")
         write(FOLDER / f"{law.name}.md", page(law))
+    draw_gallery([Model(law, **law.example) for law in laws], FOLDER / "gallery.svg")
     write(FOLDER / "index.md", index(laws))
 
 
@@ -46,6 +47,14 @@ def index(laws: list[Law]) -> str:
 Every law is one file of the package, and these pages are made from those files. `stickslip law NAME --plot` shows
 the same in a terminal, with your parameters, and for a law of your own ([how to write one](../../howto/own_law.md)).
 The torque is positive when it opposes positive velocity.
+
+```{{figure}} gallery.svg
+:alt: Torque over velocity and over position for every law
+
+Each law with the parameters of its example: above, torque over velocity along a slow sine; below, torque over position in
+slow motion of the size of pre-sliding, with a smaller loop inside. Karnopp's law answers in its band what is applied,
+here nothing.
+```
 
 {table(["name", "law", "passive", "sources"], rows)}
 

@@ -422,6 +422,14 @@ def test_a_slipping_element_gives_back_what_it_gained_without_work():
     assert law.dissipates(law.parameters({**p._asdict(), "fs": 0.1}))
 
 
+def test_karnopp_passes_on_what_is_applied_against_the_motion():
+    """In the band the friction is what is applied, though the contact be moved the other way."""
+    law = plugins.law("karnopp")
+    p = law.parameters(law.example)
+    assert law.step(-1e-4, -1e-4, 1e-3, [], p, Surroundings(applied=0.1)) * -1e-4 < 0.0
+    assert law.step(-1e-4, -1e-4, 1e-3, [], p, U) == 0.0
+
+
 def test_every_condition_has_its_counterexample():
     """The laws that are passive under a condition alone are those whose counterexamples stand above."""
     conditional = {law.name for law in VARIANTS if law.is_passive is not None}

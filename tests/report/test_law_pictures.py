@@ -11,7 +11,14 @@ import pytest
 from stickslip import plugins
 from stickslip.cli import main
 from stickslip.model import Model, Reference
-from stickslip.report.law_pictures import draw_law, presliding, scales_of, slow_sine, velocity_steps
+from stickslip.report.law_pictures import (
+    draw_gallery,
+    draw_law,
+    presliding,
+    scales_of,
+    slow_sine,
+    velocity_steps,
+)
 from stickslip.simulation.open_loop import respond
 
 every_law = pytest.mark.parametrize("name", plugins.law_names())
@@ -28,6 +35,11 @@ def test_every_law_is_drawn(name: str, tmp_path: Path) -> None:
     draw_law(example(name), tmp_path / "law.svg", tmp_path / "law.png")
     assert (tmp_path / "law.png").stat().st_size > 10_000
     assert "</svg>" in (tmp_path / "law.svg").read_text()
+
+
+def test_the_laws_are_drawn_side_by_side(tmp_path: Path) -> None:
+    draw_gallery([example("lugre"), example("gms")], tmp_path / "laws.svg")
+    assert "</svg>" in (tmp_path / "laws.svg").read_text()
 
 
 @every_law

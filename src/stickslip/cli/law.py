@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,6 +51,10 @@ def run(args: argparse.Namespace) -> int:
             f"{name} (default)" if name == choice.default else name for name in choice.options
         )
         print(f"{choice.name}: {options}")
+    if law.choices:
+        print()
+        for option, fields in brought(law):
+            table(f"with {option}", fields)
     print(f"passive: {law.passive}\nsource: {'; '.join(law.source)}\n\nas a study's file has it:")
     written = args.name if args.name.endswith(".py") else law.name
     print(f"  law = {json.dumps(written, ensure_ascii=False)}")
@@ -61,6 +65,17 @@ def run(args: argparse.Namespace) -> int:
     if args.plot is not None:
         draw(model, args.plot)
     return 0
+
+
+def brought(law: Law) -> Iterator[tuple[str, tuple[Field, ...]]]:
+    """The parameters that an option adds to those of the default."""
+    from stickslip.spec import fields_of
+
+    for choice in law.choices:
+        for name, option in choice.options.items():
+            fields = fields_of(option.params)
+            if fields and name != choice.default:
+                yield f"{choice.name} = {name}", fields
 
 
 def with_values(law: Law, settings: Sequence[str]) -> Model:

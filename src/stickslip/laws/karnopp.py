@@ -71,6 +71,7 @@ LAW = Law(
     steady=steady,
     holding=holding,
     rest_band=rest_band,
+    passive="nothing is applied in the band (what is applied there may push against the motion)",
     continuous=False,
     choices=(CURVE, VISCOUS),
 )

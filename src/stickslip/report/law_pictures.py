@@ -6,6 +6,7 @@ the motions are read off the law (`scales_of`), so that a new law needs nothing 
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,12 +18,13 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.model import Model
-from stickslip.report.plots import FORMATS, Array, Curve, Panel, Style, save, scaled
+from stickslip.report.plots import DATES, DPI, FORMATS, RC, WIDTH, Array, Curve, Panel, Style, save, scaled
 from stickslip.spec import Law, Surroundings
 
 __all__ = [
     "Response",
     "Scales",
+    "draw_gallery",
     "draw_law",
     "follow",
     "presliding",
@@ -192,6 +194,48 @@ def draw_law(model: Model, *targets: Path) -> None:
         raise InputError(
             f"cannot write {error.filename or targets[0]} ({error.strerror}); choose another place"
         ) from None
+
+
+def draw_gallery(models: Sequence[Model], path: Path) -> None:
+    """Draw the loops in pre-sliding and along a slow sine of many laws side by side, for comparison.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    path : Path
+        A file that ends in .svg, .png or .pdf.
+    """
+    columns = 5
+    rows = 2 * math.ceil(len(models) / columns)
+    context: Any = importlib.import_module("matplotlib").rc_context({**RC, "axes.grid": False})
+    with context:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure: Any = Figure(figsize=(1.8 * WIDTH, 1.1 * rows), layout="constrained")
+        FigureCanvasAgg(figure)
+        for i, model in enumerate(models):
+            place, scales = 2 * columns * (i // columns) + i % columns + 1, scales_of(model)
+            sine, loop = slow_sine(model, scales), presliding(model, scales)[0]
+            above = figure.add_subplot(rows, columns, place)
+            above.set_title(model.law.name, fontweight="bold")
+            _sketch(above, sine.velocity, sine.torque, "velocity")
+            _sketch(
+                figure.add_subplot(rows, columns, place + columns), loop.position, loop.torque, "position"
+            )
+        # No date in the file: the same laws give the same bytes.
+        undated = {"metadata": {DATES[path.suffix]: None}} if path.suffix in DATES else {}
+        figure.savefig(path, dpi=DPI, **undated)
+
+
+def _sketch(axes: Any, x: Array, y: Array, word: str) -> None:
+    """A curve without numbers, on its zero lines."""
+    axes.axhline(0.0, color="#bbbbbb", linewidth=0.5)
+    axes.axvline(0.0, color="#bbbbbb", linewidth=0.5)
+    axes.plot(x, y, color=TORQUE.colour, linewidth=1.1)
+    axes.set(xticks=[], yticks=[])
+    axes.set_xlabel(word, fontsize=6.5, labelpad=1.0)
+    axes.set_ylabel("torque", fontsize=6.5, labelpad=1.0)
 
 
 def _described(model: Model) -> str:
