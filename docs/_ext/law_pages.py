@@ -51,9 +51,9 @@ The torque is positive when it opposes positive velocity.
 ```{{figure}} gallery.svg
 :alt: Torque over velocity and over position for every law
 
-Each law with the parameters of its example: above, torque over velocity along a slow sine; below, torque over position in
-slow motion of the size of pre-sliding, with a smaller loop inside. Karnopp's law answers in its band what is applied,
-here nothing.
+Each law with the parameters of its example: above, torque over velocity along a slow sine; below, torque over
+position in slow motion of the size of pre-sliding, with a smaller loop inside. Karnopp's law answers in its band
+what is applied, here nothing.
 ```
 
 {table(["name", "law", "passive", "sources"], rows)}
