@@ -8,6 +8,12 @@ The tree of exceptions::
     │   ├── UnknownName               a law, compensator, reference, integrator, ... that is not registered
     │   ├── ConfigError               a key or value of a TOML file
     │   └── LawError                  a law's file says something that cannot be run (outside the scalar subset, say)
+    ├── RigError                      a run on a rig was stopped: when, why, and the record of what was measured
+    │   ├── LimitCrossed              position, speed, torque, temperature or following error
+    │   ├── MessageLost               a message to or from the rig did not arrive in time
+    │   ├── DriveFault                the rig itself reported a fault
+    │   ├── RecordFault               the record could not be written: a full disk
+    │   └── Interrupted               a signal asked for the end
     └── SimulationError               a run ended early: when, why, and the record of what was computed
         ├── Divergence                position or velocity left every reasonable bound, or is not a number
         ├── EventStorm                more switches than the limit in a short time
@@ -17,6 +23,7 @@ The tree of exceptions::
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -26,10 +33,16 @@ if TYPE_CHECKING:
 __all__ = [
     "ConfigError",
     "Divergence",
+    "DriveFault",
     "EventStorm",
     "InputError",
+    "Interrupted",
     "LawError",
+    "LimitCrossed",
+    "MessageLost",
     "ParameterError",
+    "RecordFault",
+    "RigError",
     "SimulationError",
     "StepFailure",
     "StickslipError",
@@ -64,6 +77,43 @@ class ConfigError(InputError):
 
 class LawError(InputError):
     """A law's file cannot be run."""
+
+
+class RigError(StickslipError):
+    """A run on a rig was stopped, its torque ramped to zero.
+
+    Attributes
+    ----------
+    time : float
+        By the rig's clock, s; NaN where it has none yet.
+    record : Record or None
+        What was measured until then.
+    """
+
+    def __init__(self, message: str, time: float = math.nan, record: Record | None = None) -> None:
+        super().__init__(message)
+        self.time = time
+        self.record = record
+
+
+class LimitCrossed(RigError):
+    """Position, speed, torque, temperature or following error left its limits, or was not a number."""
+
+
+class MessageLost(RigError):
+    """A message to or from the rig did not arrive in time."""
+
+
+class DriveFault(RigError):
+    """The rig itself reported a fault."""
+
+
+class RecordFault(RigError):
+    """The record could not be written."""
+
+
+class Interrupted(RigError):
+    """A signal asked for the end."""
 
 
 class SimulationError(StickslipError):

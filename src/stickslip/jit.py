@@ -35,6 +35,7 @@ from stickslip.subset import Layout, law_layouts, lower
 
 __all__ = [
     "LawPointers",
+    "call_guarded",
     "call_guards",
     "call_holding",
     "call_profile",
@@ -43,6 +44,7 @@ __all__ = [
     "call_step",
     "call_switch",
     "call_value",
+    "compiled_guarded",
     "compiled_law",
     "compiled_profile",
     "compiled_sample",
@@ -62,17 +64,24 @@ SIGNATURES = {
     "holding": FLOAT(FLOAT, ARRAY, ARRAY, ARRAY),
     "profile": types.void(FLOAT, ARRAY, ARRAY),
     "sample": FLOAT(FLOAT, FLOAT, FLOAT, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
+    "guarded": FLOAT(ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
 }
 
 # ---- where compiled code is kept --------------------------------------------------------------------------
 
 
+def _kernel_files() -> tuple[Path, ...]:
+    """The files that kernels are made of: the engines, and what begins with _ among machines and rigs."""
+    package = Path(__file__).parent
+    found = (package.glob(f"{part}.py") for part in ("simulation/*", "machines/_*", "rigs/_*"))
+    return (Path(__file__), *sorted(file for files in found for file in files))
+
+
 @functools.cache
 def cache_folder() -> Path:
     """The folder for compiled code: STICKSLIP_CACHE, else the user's cache folder, else a temporary one."""
-    package = Path(__file__).parent
     digest = hashlib.sha256(f"{numba.__version__} {sys.version} {platform.machine()}".encode())
-    for file in sorted([Path(__file__), *package.glob("simulation/*.py")]):
+    for file in _kernel_files():
         digest.update(file.read_bytes())
     home = os.environ.get("STICKSLIP_CACHE") or os.path.join(
         os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "stickslip"
@@ -160,6 +169,7 @@ call_value: Any = _caller("steady", 2, True)
 call_holding: Any = _caller("holding", 4, True)
 call_profile: Any = _caller("profile", 3, False)
 call_sample: Any = _caller("sample", 8, True)
+call_guarded: Any = _caller("guarded", 9, True)
 
 
 # ---- laws and references ----------------------------------------------------------------------------------
@@ -214,6 +224,11 @@ def compiled_sample(name: str, function: Callable[..., Any], layouts: Mapping[st
     """Compile one sample of a controller, ``sample(position, wanted, wanted_velocity, n, m, z, p, u)``;
     returns its address."""
     return _compile(name, {"sample": function}, layouts)["sample"]
+
+
+def compiled_guarded(name: str, function: Callable[..., Any], layouts: Mapping[str, Layout]) -> int:
+    """Compile one sample of a rig's loop, ``guarded(y, w, b, s, n, m, z, p, u)``; returns its address."""
+    return _compile(name, {"guarded": function}, layouts)["guarded"]
 
 
 def _compile(

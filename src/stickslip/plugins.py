@@ -1,8 +1,9 @@
-"""Names to things: laws, kinds of reference, compensators.
+"""Names to things: laws, kinds of reference, compensators, kinds of rig.
 
 Built-in ones are named in their family's tuple (``stickslip.laws.LAWS`` and so on) and imported when asked for.
-Others come from installed packages (entry points ``stickslip.laws``, ``stickslip.references``) or from files:
-a name that ends in ``.py`` is a law's file, and the environment variable STICKSLIP_LAWS lists such files.
+Others come from installed packages (entry points ``stickslip.laws``, ``stickslip.references``, ``stickslip.rigs``)
+or from files: a name that ends in ``.py`` is a law's file, and the environment variable STICKSLIP_LAWS lists such
+files.
 """
 
 from __future__ import annotations
@@ -16,13 +17,16 @@ from collections.abc import Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stickslip.errors import InputError, LawError, UnknownName
 from stickslip.spec import Law, ReferenceKind
 from stickslip.subset import law_layouts, lower
 
-__all__ = ["law", "law_names", "reference_kind", "reference_names"]
+if TYPE_CHECKING:
+    from stickslip.rigs.rig import RigKind
+
+__all__ = ["law", "law_names", "reference_kind", "reference_names", "rig_kind", "rig_kind_names"]
 
 
 def law_names() -> tuple[str, ...]:
@@ -76,6 +80,27 @@ def reference_kind(name: str) -> ReferenceKind:
     if name in (installed := _installed("stickslip.references")):
         return installed[name].load()
     raise UnknownName("reference", name, reference_names())
+
+
+def rig_kind_names() -> tuple[str, ...]:
+    """The name of every kind of rig."""
+    builtin: tuple[str, ...] = importlib.import_module("stickslip.rigs").RIGS
+    return (*builtin, *_installed("stickslip.rigs"))
+
+
+def rig_kind(name: str) -> RigKind:
+    """The kind of rig of that name.
+
+    Raises
+    ------
+    UnknownName
+    """
+    if name in importlib.import_module("stickslip.rigs").RIGS:
+        found: RigKind = importlib.import_module(f"stickslip.rigs.{name}").RIG
+        return found
+    if name in (installed := _installed("stickslip.rigs")):
+        return installed[name].load()
+    raise UnknownName("rig", name, rig_kind_names())
 
 
 @functools.cache

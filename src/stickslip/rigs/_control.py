@@ -1,0 +1,131 @@
+"""One sample of the loop, compiled: what `Loop` calls from Python and block rigs call from their own kernels."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Gains
+from stickslip.control.sampled import Memory, Settings, settings
+from stickslip.errors import InputError
+from stickslip.jit import call_guarded, compiled_guarded, flat, kernel, pointer
+from stickslip.rigs.rig import Limits, Measurement, Setpoint
+from stickslip.rigs.safety import ENDED, STOPPED, Safety, bounds, guarded_by
+from stickslip.rigs.safety import Bounds as BoundNames
+from stickslip.spec import Law, Surroundings, fields_of
+from stickslip.subset import Layout, law_layouts
+
+__all__ = ["COLUMNS", "UNITS", "Control", "control_of", "decide", "finished"]
+
+UNITS = {
+    "time": "s", "position": "rad", "velocity": "rad/s", "motor_torque": "N·m", "torque_command": "N·m",
+    "sensor_torque": "N·m", "temperature": "°C", "position_reference": "rad", "velocity_reference": "rad/s",
+    "torque_setpoint": "N·m", "compensation_torque": "N·m", "closed": "-", "status": "-", "state": "-",
+    "reason": "-",
+}  # fmt: skip
+"""A row of a record: its columns and their units, in order."""
+COLUMNS = tuple(UNITS)
+
+NOTHING = Controller(Gains(0.0))
+
+STATE, REASON, VELOCITY = (Safety._fields.index(name) for name in ("state", "reason", "velocity"))
+COMPENSATION = Memory._fields.index("compensation")
+
+
+class Control(NamedTuple):
+    """What one sample reads and writes; every array is one-dimensional and lives as long as this tuple."""
+
+    address: int
+    """of the compiled `stickslip.rigs.safety.guarded`"""
+    measured: Any
+    """The newest `Measurement`: the rig writes it"""
+    bounds: Any
+    safety: Any
+    settings: Any
+    memory: Any
+    state: Any
+    parameters: Any
+    surroundings: Any
+
+
+def control_of(
+    controller: Controller | None, limits: Limits, sample_time: float, travel: float = math.inf
+) -> Control:
+    """Lay out and compile the sample of a controller (None: torques alone) under limits.
+
+    Parameters
+    ----------
+    controller : Controller or None
+        Sampled at the rig's sample time; one in continuous time (``sample_time`` 0) is sampled too.
+    limits : Limits
+    sample_time : float
+        The rig's, s.
+    travel : float
+        Displacement from where the segment begins that ends it without a fault, rad.
+
+    Raises
+    ------
+    InputError
+        If the controller is meant for another sample time.
+    """
+    if controller is not None and controller.sample_time not in (0.0, sample_time):
+        raise InputError(
+            f"controller: sample_time = {controller.sample_time:g} s, the rig's is {sample_time:g} s; give the rig's"
+        )
+    chosen = controller or NOTHING
+    helper = chosen.compensator
+    law = helper.model.law if helper else None
+    parameters = helper.model.parameters if helper else None
+    return Control(
+        sampler(law),
+        np.zeros(len(Measurement._fields)),
+        np.array(bounds(limits, sample_time, travel)),
+        np.zeros(len(Safety._fields)),
+        np.array(settings(chosen)._replace(sample_time=sample_time)),
+        np.zeros(len(Memory._fields)),
+        flat(law.pack_state(law.state(parameters)) if law else []),
+        flat(law.pack(parameters) if law else []),
+        np.array(Surroundings()),
+    )
+
+
+@functools.cache
+def sampler(law: Law | None) -> int:
+    """Address of one guarded sample of the controller with this compensator."""
+    empty = {"z": Layout(()), "p": Layout(()), "u": Layout(Surroundings._fields)}
+    layouts = {
+        **(law_layouts(law) if law else empty),
+        "y": Layout(Measurement._fields),
+        "w": Layout(Setpoint._fields),
+        "b": Layout.of(fields_of(BoundNames), counted=False),
+        "s": Layout.of(fields_of(Safety), counted=False),
+        "n": Layout.of(fields_of(Settings), counted=False),
+        "m": Layout.of(fields_of(Memory), counted=False),
+    }
+    return compiled_guarded(f"guarded_{law.name}" if law else "guarded", guarded_by(law), layouts)
+
+
+@kernel()
+def decide(control: Control, setpoint: Any, row: Any) -> float:
+    """The torque for the next sample, N·m, from ``control.measured``; `row` gets what the record keeps."""
+    torque = call_guarded(
+        control.address, pointer(control.measured, 0), pointer(setpoint, 0), pointer(control.bounds, 0),
+        pointer(control.safety, 0), pointer(control.settings, 0), pointer(control.memory, 0),
+        pointer(control.state, 0), pointer(control.parameters, 0), pointer(control.surroundings, 0),
+    )  # fmt: skip
+    y, s = control.measured, control.safety
+    row[0], row[1], row[2], row[3], row[4] = y[0], y[1], s[VELOCITY], y[2], torque
+    row[5], row[6], row[7], row[8], row[9] = y[3], y[4], setpoint[0], setpoint[1], setpoint[2]
+    row[10], row[11], row[12] = control.memory[COMPENSATION], setpoint[3], y[5]
+    row[13], row[14] = s[STATE], s[REASON]
+    return torque
+
+
+@kernel()
+def finished(control: Control) -> bool:
+    """Whether the loop ends after this sample: the torque is ramped to zero, or the segment's travel is reached."""
+    return control.safety[STATE] == STOPPED or control.safety[STATE] == ENDED

@@ -1,0 +1,244 @@
+"""What a rig is: something that takes a torque every sample time and says what it measured.
+
+The loop (`stickslip.rigs.loop`) drives any `Rig`; procedures are written against the loop. One sample is::
+
+    measured = rig.open()
+    for every sample:
+        torque = control and safety(measured, setpoint)      # `stickslip.rigs._control.decide`, compiled
+        measured = rig.exchange(torque)                      # acts for one sample time, then measures
+
+A rig whose plant is compiled may also be a `BlockRig`, which runs these lines for many samples in one compiled loop;
+both ways give the same numbers, bit for bit, since both call the same compiled `decide`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from stickslip.errors import ParameterError
+
+if TYPE_CHECKING:
+    from stickslip.rigs._control import Control
+
+__all__ = [
+    "BlockRig",
+    "Capabilities",
+    "Limits",
+    "Measurement",
+    "Rig",
+    "RigKind",
+    "Setpoint",
+    "Watchdog",
+    "setpoints",
+]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+class Measurement(NamedTuple):
+    """What a rig measured at the end of a sample; NaN where it has no such sensor."""
+
+    time: float
+    """s, of the rig's own clock, ascending"""
+    position: float
+    """rad"""
+    torque: float
+    """Motor torque, N·m: measured current times the torque constant"""
+    sensor: float = math.nan
+    """Torque sensor, N·m"""
+    temperature: float = math.nan
+    """Degrees Celsius"""
+    status: float = 0.0
+    """0 if all is well, else the rig's own number of its fault (CiA 402: error code 603Fh); a fault stops the loop"""
+
+
+class Setpoint(NamedTuple):
+    """What is wanted during one sample."""
+
+    position: float = 0.0
+    """rad"""
+    velocity: float = 0.0
+    """rad/s"""
+    torque: float = 0.0
+    """Added to the controller's output; alone where the loop is open, N·m"""
+    closed: float = 0.0
+    """1: the controller follows position and velocity, and the following error is watched. 0: torque alone; the
+    controller forgets what it knew"""
+
+
+def setpoints(
+    count: int,
+    *,
+    position: Any = 0.0,
+    velocity: Any = 0.0,
+    torque: Any = 0.0,
+    closed: Any = 0.0,
+) -> Array:
+    """Setpoints of `count` samples, shape (count, 4): each argument a number or an array of that length."""
+    table = np.empty((count, len(Setpoint._fields)))
+    for i, column in enumerate((position, velocity, torque, closed)):
+        table[:, i] = column
+    return table
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a rig allows. Crossing any of them ramps the torque to zero (`stickslip.rigs.safety`).
+
+    Attributes
+    ----------
+    torque : float
+        Largest torque command, N·m. Measured torques (motor, sensor) may exceed it by a quarter: overshoot of the
+        current loop and noise.
+    speed : float
+        rad/s, by the difference of two samples' positions.
+    position : (float, float)
+        Lowest and highest position, rad; infinite for an axis that turns freely.
+    temperature : float
+        Highest, degrees Celsius; infinite where it is not measured.
+    following_error : float
+        Largest distance between wanted and measured position while the loop is closed, rad.
+    stop_time : float
+        The declared time of a stop, s: from the sample that sees the reason until the torque command is zero. The
+        torque falls by ``torque / stop_time``, so a smaller torque is gone sooner.
+    """
+
+    torque: float
+    speed: float
+    position: tuple[float, float] = (-math.inf, math.inf)
+    temperature: float = math.inf
+    following_error: float = math.inf
+    stop_time: float = 0.02
+
+    def __post_init__(self) -> None:
+        for name in ("torque", "speed", "stop_time"):
+            value = getattr(self, name)
+            if not (value > 0.0 and math.isfinite(value)):
+                raise ParameterError(f"limits: {name} = {value:g} must be a finite number greater than 0")
+        if not self.following_error > 0.0:
+            raise ParameterError(
+                f"limits: following_error = {self.following_error:g} rad must be greater than 0"
+            )
+        if not self.position[0] < self.position[1]:
+            raise ParameterError(f"limits: position = {self.position} rad must be (lowest, highest)")
+        if math.isnan(self.temperature):
+            raise ParameterError("limits: temperature = nan °C must be a number")
+
+
+@dataclass(frozen=True)
+class Watchdog:
+    """The rig's own: what takes the torque away when the loop's process dies.
+
+    ``time`` is how long it may take, s; ``how`` says what does it, for people.
+    """
+
+    time: float
+    how: str
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What a rig can do.
+
+    Attributes
+    ----------
+    watchdog : Watchdog or None
+        None: nothing takes the torque away if this process dies; such a rig is armed only on request.
+    real_clock : bool
+        True: its time passes by itself, so the loop must keep pace. False: a sample passes when it is exchanged.
+    blocks : bool
+        It is a `BlockRig`.
+    torque_sensor, temperature : bool
+        Whether it measures them.
+    """
+
+    watchdog: Watchdog | None
+    real_clock: bool = True
+    blocks: bool = False
+    torque_sensor: bool = False
+    temperature: bool = False
+
+
+@runtime_checkable
+class Rig(Protocol):
+    """Takes a torque every sample time and says what it measured.
+
+    ``open``, ``exchange`` and ``pause`` raise `stickslip.errors.RigError` for what went wrong: `MessageLost` where the
+    rig did not answer in time, `DriveFault` where it answered with a fault. `exchange` first sends, then waits for the
+    answer: the loop goes on calling it while it ramps the torque to zero, whatever it raises.
+    """
+
+    @property
+    def name(self) -> str:
+        """What the record says it comes from."""
+        ...
+
+    @property
+    def sample_time(self) -> float:
+        """s"""
+        ...
+
+    @property
+    def limits(self) -> Limits:
+        """What may never be exceeded; a run may ask for less."""
+        ...
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What it can do."""
+        ...
+
+    def open(self) -> Measurement:
+        """Connect, check and arm, with zero torque; returns the first measurement."""
+        ...
+
+    def exchange(self, torque: float) -> Measurement:
+        """Apply a torque (N·m) from now on, for one sample time; returns what is measured after it."""
+        ...
+
+    def pause(self, seconds: float) -> Measurement:
+        """Let time pass with zero torque; a virtual rig advances its clock without stepping through it."""
+        ...
+
+    def close(self) -> None:
+        """Disarm and disconnect; it may be called at any time, also twice, and after a failed `open`."""
+        ...
+
+
+@runtime_checkable
+class BlockRig(Rig, Protocol):
+    """A rig that runs plant, controller and safety in one compiled loop."""
+
+    def exchange_block(self, control: Control, setpoints: Array, rows: Array) -> int:
+        """Run up to ``len(setpoints)`` samples; returns how many were run.
+
+        In a compiled loop, for every sample k: ``torque = decide(control, setpoints[k], rows[k])``, advance the plant
+        by a sample with that torque, write what is then measured to ``control.measured`` (the order of `Measurement`),
+        and leave the loop after the sample for which `finished(control)` is true. `decide` and `finished` are kernels
+        of `stickslip.rigs._control`.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class RigKind:
+    """A registered kind of rig.
+
+    Attributes
+    ----------
+    name : str
+    build : callable
+        ``build(settings) -> Rig`` from the rest of the ``[rig]`` table of a TOML file; raises
+        `stickslip.errors.InputError` for what it cannot use.
+    title : str
+        One line for people.
+    """
+
+    name: str
+    build: Callable[[Mapping[str, Any]], Rig]
+    title: str
