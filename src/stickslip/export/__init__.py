@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 __all__ = ["TARGETS", "target_named"]
 
-TARGETS = ("c99", "python", "matlab", "st")
+TARGETS = ("c99", "python", "matlab", "st", "fmu")
 
 
 def target_named(name: str) -> Target:

@@ -54,7 +54,8 @@ def translated(job: Job) -> dict[str, Any]:
     """The functions of the law, and of the controller where there is one, as trees of the subset."""
     law = job.model.law
     # The public ones first: they have the right to their names.
-    entries = {**({"_steady": law.steady} if law.steady else {}), "_step": law.step}
+    entries = {"_steady": law.steady, "_holding": law.holding, "_step": law.step}
+    entries = {name: function for name, function in entries.items() if function}
     layouts = law_layouts(law)
     if job.controller is not None:
         helper = job.controller.compensator
@@ -72,7 +73,7 @@ def write(job: Job) -> Export:
     law, p, dialect = job.model.law, job.model.parameters, dialect_of(job)
     trees = translated(job)
     known = analyse(trees)
-    public = [n for n in ("_step", "_steady", "_sample") if n in trees]
+    public = [n for n in ("_step", "_steady", "_holding", "_sample") if n in trees]
     written = functions(trees, dialect, public)
     about = {name: ascii_only(first_line(doc)) for name, doc, _ in written}
     vectors = golden(job.model)

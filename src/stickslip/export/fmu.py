@@ -1,0 +1,112 @@
+"""FMI 2.0 and 3.0 co-simulation: a contact that is moved, for simulators of whole machines.
+
+Inputs are the velocity at the beginning of a step and its slope over the step (and what else the law reads: position,
+load, temperature, applied torque); the output is the friction torque at the step's end. Compiled for Linux where gcc
+is installed; the sources are inside for other machines.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip.export._fmu import VERSIONS, Variable, archive, law_variables, numbered, surroundings_read
+from stickslip.export._fmu_run import played
+from stickslip.export._text import render
+from stickslip.export.golden import random_steps
+from stickslip.export.job import Check, Export, Job
+from stickslip.export.target import Target
+from stickslip.spec import Surroundings
+
+__all__ = ["TARGET", "Moved", "moved"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+class Moved(NamedTuple):
+    """Communication steps in order, and what plain Python answers: shape (n,) each, SI units."""
+
+    dt: Array
+    velocity: Array
+    acceleration: Array
+    position: Array
+    torque: Array
+
+
+def variables_of(job: Job) -> list[Variable]:
+    """Inputs, output, parameters and state."""
+    ports = [
+        Variable("velocity", "velocity", "input", "rad/s", "Velocity at the beginning of a step", 0.0),
+        Variable("acceleration", "acceleration", "input", "rad/s2", "Slope of the velocity over a step", 0.0),
+        *surroundings_read(job),
+        Variable("friction_torque", "friction_torque", "output", "N.m", "Positive against positive velocity"),
+    ]
+    return numbered([*ports, *law_variables(job)])
+
+
+def write(job: Job) -> Export:
+    """A unit of each version, vectors, and how to use them."""
+    variables = variables_of(job)
+    about = f"Friction torque of a contact: {job.model.law.title}"
+    slope = {"of": variables[0].reference, "place": variables[1].place}
+    units = {fmi: archive(job, fmi, "fmu_contact.c.j2", variables, about, slope=slope) for fmi in VERSIONS}
+    compiled = all(binary for _, binary in units.values())
+    files = {file_of(job, fmi): content for fmi, (content, _) in units.items()}
+    readme = render(
+        "fmu_readme.md.j2",
+        x=job.name,
+        law=job.model.law,
+        variables=variables,
+        files=list(files),
+        compiled=compiled,
+    )
+    note = (
+        ()
+        if compiled
+        else ("no compiler for Linux on x86-64 here: sources only; `fmpy compile` builds them",)
+    )
+    return Export({**files, "golden.csv": as_csv(moved(job)), "README.md": readme}, note)
+
+
+def file_of(job: Job, fmi: str) -> str:
+    """The file of a version: 2.0 is what most importers read."""
+    return f"{job.name}.fmu" if fmi == "2.0" else f"{job.name}_{VERSIONS[fmi]}.fmu"
+
+
+def moved(job: Job, count: int = 400, seed: int = 1) -> Moved:
+    """Random communication steps and the torque of plain Python, from rest."""
+    law, p = job.model.law, job.model.parameters
+    v0, v1, dt, position = random_steps(count, seed)
+    slope = (v1 - v0) / dt
+    z, time, torque = law.state(p), 0.0, np.empty(count)
+    for i, (v, a, h, x) in enumerate(zip(*(column.tolist() for column in (v0, slope, dt, position)))):
+        time += h
+        torque[i] = law.step(v, v + a * h, h, z, p, Surroundings(position=x, time=time))
+    return Moved(dt, v0, slope, position, torque)
+
+
+def as_csv(vectors: Moved) -> str:
+    """The vectors as CSV; numbers with all their digits."""
+    rows = "\n".join(",".join(repr(float(x)) for x in row) for row in zip(*vectors))
+    return f"dt_s,velocity_rad_s,acceleration_rad_s2,position_rad,torque_Nm\n{rows}\n"
+
+
+def check(job: Job, export: Export) -> Check:
+    """Validate the units in FMPy and play the vectors in it."""
+    vectors = moved(job)
+    inputs = {k: getattr(vectors, k) for k in ("velocity", "acceleration", "position")}
+    wanted = np.genfromtxt(str(export.files["golden.csv"]).splitlines(), delimiter=",", names=True)[
+        "torque_Nm"
+    ]
+    errors: dict[str, float] = {}
+    for fmi in VERSIONS:
+        answer = played(export.files[file_of(job, fmi)], vectors.dt, inputs, ("friction_torque",))
+        if isinstance(answer, Check):
+            return answer
+        errors[f"FMI {fmi}"] = float(np.abs(answer[:, 0] - wanted).max())
+    worst = max(errors.values())
+    return Check(worst == 0.0, f"FMPy: valid; at most {worst:.3g} N·m off the definition", errors)
+
+
+TARGET = Target("fmu", "FMI 2.0 and 3.0 co-simulation unit of a contact that is moved", write, check)
