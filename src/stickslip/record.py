@@ -73,20 +73,27 @@ class Record:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Record:
-        """Read the record that `save` wrote to `path`.
+        """Read the record that `save` wrote to `path`, or the stream of a rig (`stickslip.stream`).
 
         Raises
         ------
         InputError
             If there is no such file, or it is not a record.
         """
+        from stickslip.stream import MAGIC, load_stream
+
         try:
+            with open(path, "rb") as file:
+                if file.read(len(MAGIC)) == MAGIC:
+                    return load_stream(path)
             with np.load(path, allow_pickle=False) as data:
                 header = json.loads(str(data["__header__"]))
                 channels = {k: data[k] for k in data.files if k not in ("time", "__header__")}
                 return cls(data["time"], channels, header["units"], header["meta"])
         except FileNotFoundError:
             raise InputError(f"no record at {path}; check the path") from None
+        except InputError:
+            raise
         except Exception as error:  # NumPy, zip, zlib and JSON each raise their own on a damaged file
             raise InputError(f"{path} is not a record of this package ({error})") from None
 

@@ -8,12 +8,15 @@ from typing import cast
 
 from stickslip.readers._table import Column, Format, Table
 from stickslip.record import Record
+from stickslip.stream import MAGIC
 
 __all__ = ["FORMAT"]
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """A zip archive with the header that `Record.save` writes."""
+    """A zip archive with the header that `Record.save` writes, or a rig's stream."""
+    if head.startswith(MAGIC):
+        return True
     if not head.startswith(b"PK"):
         return False
     try:
@@ -36,4 +39,4 @@ def read(path: Path) -> Table:
     return Table("record", tuple(columns), constants)
 
 
-FORMAT = Format("record", "a record of this package", (".npz",), recognise, read)
+FORMAT = Format("record", "a record of this package", (".npz", ".stream"), recognise, read)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 import math
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.control.sampled import Memory, Settings, settings
+from stickslip.control.sampled import Memory, Settings, design_filter, settings
 from stickslip.errors import InputError
 from stickslip.jit import call_guarded, compiled_guarded, flat, kernel, pointer
 from stickslip.rigs.rig import Limits, Measurement, Setpoint
@@ -77,6 +78,9 @@ def control_of(
             f"controller: sample_time = {controller.sample_time:g} s, the rig's is {sample_time:g} s; give the rig's"
         )
     chosen = controller or NOTHING
+    numbers = settings(chosen)._replace(sample_time=sample_time)
+    memory = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0))
+    design_filter(numbers, memory)
     helper = chosen.compensator
     law = helper.model.law if helper else None
     parameters = helper.model.parameters if helper else None
@@ -85,8 +89,8 @@ def control_of(
         np.zeros(len(Measurement._fields)),
         np.array(bounds(limits, sample_time, travel)),
         np.zeros(len(Safety._fields)),
-        np.array(settings(chosen)._replace(sample_time=sample_time)),
-        np.zeros(len(Memory._fields)),
+        np.array(numbers),
+        np.array([getattr(memory, name) for name in Memory._fields]),
         flat(law.pack_state(law.state(parameters)) if law else []),
         flat(law.pack(parameters) if law else []),
         np.array(Surroundings()),

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from stickslip.errors import ParameterError
+from stickslip.errors import InputError, ParameterError
 
 if TYPE_CHECKING:
     from stickslip.rigs._control import Control
@@ -38,6 +38,11 @@ __all__ = [
 ]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+
+LIMIT_UNITS = {
+    "position": "rad", "speed": "rad/s", "torque": "N·m", "temperature": "°C", "following error": "rad",
+}  # fmt: skip
+"""Limits by their names in messages"""
 
 
 class Measurement(NamedTuple):
@@ -128,6 +133,37 @@ class Limits:
             raise ParameterError(f"limits: position = {self.position} rad must be (lowest, highest)")
         if math.isnan(self.temperature):
             raise ParameterError("limits: temperature = nan °C must be a number")
+
+    def narrowed(self, wanted: Limits) -> Limits:
+        """Return `wanted`, which may not be wider than these.
+
+        Raises
+        ------
+        InputError
+            Which limit is, and the value here.
+        """
+        for name in ("torque", "speed", "temperature", "following_error", "stop_time"):
+            value, most = getattr(wanted, name), getattr(self, name)
+            if value > most:
+                raise InputError(f"limits: {name} = {value:g} is wider than the rig's {most:g}")
+        if wanted.position[0] < self.position[0] or wanted.position[1] > self.position[1]:
+            raise InputError(
+                f"limits: position = {wanted.position} rad is wider than the rig's {self.position}"
+            )
+        return wanted
+
+    def text(self, name: str) -> str:
+        """A limit for people, without its unit; empty where there is none of that name."""
+        if name == "position":
+            return "{:g} to {:g}".format(*self.position)
+        value: float | None = getattr(self, name.replace(" ", "_"), None)
+        return "" if value is None or name not in LIMIT_UNITS else f"{value:g}"
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data for a record's meta; a limit that is infinite is left out."""
+        low, high = self.position
+        values = {**vars(self), "position": None, "lowest_position": low, "highest_position": high}
+        return {k: v for k, v in values.items() if v is not None and math.isfinite(v)}
 
 
 @dataclass(frozen=True)

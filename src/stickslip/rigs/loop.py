@@ -1,0 +1,400 @@
+"""The loop: a torque every sample time, from setpoints and a controller, under limits, onto a record.
+
+    with Loop(rig, path="run.stream") as loop:
+        rows = loop.run(setpoints(1000, position=0.0, closed=1.0), controller)
+
+It runs in real time, or as fast as it can where the rig's clock is not real. Whatever happens (a limit, an exception
+in a controller or in the rig, a signal, a lost message, a full disk), the torque is ramped to zero within the rig's
+declared time, the record is ended, the rig is closed, and one error says why.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.control.controller import Controller
+from stickslip.control.sampled import Memory
+from stickslip.errors import (
+    DriveFault,
+    InputError,
+    Interrupted,
+    LimitCrossed,
+    RigError,
+)
+from stickslip.record import Record
+from stickslip.rigs import safety
+from stickslip.rigs._control import COLUMNS, REASON, STATE, UNITS, Control, control_of, decide, finished
+from stickslip.rigs.pace import Account, Pace, soft_real_time
+from stickslip.rigs.rig import LIMIT_UNITS, BlockRig, Limits, Measurement, Rig, Setpoint, setpoints
+from stickslip.rigs.safety import ASKED, REASONS, RUNNING, STATUS, STOPPED, STOPPING, Bounds, Safety
+from stickslip.stream import Stream
+
+__all__ = ["Loop", "PythonController"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+PythonController = Callable[[Measurement, Setpoint], float]
+"""A controller in Python: the torque from what is measured and wanted, N·m. It runs sample by sample."""
+
+BLOCK = 50
+"""Samples of one compiled block: a signal is heard, and rows are committed, at least that often"""
+TIME, POSITION = Measurement._fields.index("time"), Measurement._fields.index("position")
+TORQUE, STARTED, ORIGIN, VALUE = (Safety._fields.index(n) for n in ("torque", "started", "origin", "value"))
+BEGUN, ERROR_SUM = Memory._fields.index("started"), Memory._fields.index("error_sum")
+KNOWN = slice(0, Memory._fields.index("forward"))
+"""What one controller takes over from another: position and velocities, but not its own filter's weights"""
+TRAVEL = Bounds._fields.index("travel")
+
+
+class Loop:
+    """Drives a rig; a context manager that arms it and leaves it disarmed.
+
+    Parameters
+    ----------
+    rig : Rig
+    path : path or None
+        File of the record (`stickslip.stream`), which must not exist yet; None keeps it in memory.
+    meta : mapping
+        What the record is to say of the run.
+    limits : Limits or None
+        Narrower ones than the rig's.
+    realtime : bool or None
+        Keep pace with the clock. None: where the rig's clock is real, which always must.
+    without_watchdog : bool
+        Arm a rig that declares no watchdog: nothing takes its torque away if this process dies.
+
+    Raises
+    ------
+    InputError
+        If the limits are wider than the rig's, or it declares no watchdog.
+    RigError
+        From `run` and from entering: what the rig or the record could not do.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        *,
+        path: str | os.PathLike[str] | None = None,
+        meta: Mapping[str, Any] | None = None,
+        limits: Limits | None = None,
+        realtime: bool | None = None,
+        without_watchdog: bool = False,
+    ) -> None:
+        self.rig = rig
+        self.limits = rig.limits.narrowed(limits) if limits else rig.limits
+        self.realtime = rig.capabilities.real_clock if realtime is None else realtime
+        if rig.capabilities.real_clock and not self.realtime:
+            raise InputError(f"{rig.name}: its clock is real; it cannot run as fast as it can")
+        if rig.capabilities.watchdog is None and not without_watchdog:
+            raise InputError(
+                f"{rig.name}: no watchdog is declared, so nothing takes its torque away if this process dies; "
+                "give it one, or arm it with --no-watchdog (without_watchdog=True)"
+            )
+        self._pace = Pace(rig.sample_time)
+        self._stream: Stream | None = None
+        self._path, self._meta = path, dict(meta or {})
+        self._controls: dict[int, tuple[Any, Control]] = {}
+        self._control = self.prepare(None)
+        self._fault: BaseException | None = None
+        self._signal = 0
+        self._undo = ExitStack()
+        self._scratch = np.zeros((1, len(COLUMNS)))
+
+    # ---- arming and disarming ------------------------------------------------------------------------------
+
+    def __enter__(self) -> Loop:
+        with ExitStack() as undo:
+            self._stream = Stream(UNITS, self._path, self._described(), self._absent())
+            undo.callback(self._end_record)
+            self._warm()
+            if self.realtime:
+                self._pace.granted = undo.enter_context(soft_real_time())
+            self._hear_signals(undo)
+            undo.callback(self.rig.close)
+            first = self.rig.open()
+            self._control.measured[:] = first
+            self._undo = undo.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._undo:
+            self._ramp_down()
+
+    def _described(self) -> dict[str, Any]:
+        plain = self.limits.plain()
+        return {"rig": self.rig.name, "sample_time": self.rig.sample_time, "limits": plain, **self._meta}
+
+    def _absent(self) -> list[str]:
+        able = self.rig.capabilities
+        lacks = {"sensor_torque": not able.torque_sensor, "temperature": not able.temperature}
+        return [name for name, missing in lacks.items() if missing]
+
+    def _warm(self) -> None:
+        """Compile what the loop calls before anything moves."""
+        idle = self._control._replace(safety=np.zeros(len(Safety._fields)))
+        decide(idle, np.zeros(len(Setpoint._fields)), self._scratch[0])
+        finished(idle)
+
+    def _hear_signals(self, undo: ExitStack) -> None:
+        """SIGINT and SIGTERM end the run by its ramp; only the main thread may ask to hear them."""
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for number in (signal.SIGINT, signal.SIGTERM):
+            undo.callback(signal.signal, number, signal.getsignal(number))
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, number: int, _: object) -> None:
+        self._signal = number
+
+    def _end_record(self) -> None:
+        if self._stream is not None:
+            self._stream.close({"loop": self.account().plain(), "ended": self._ending()})
+            if self._stream.path is not None and self._stream.count == 0:
+                self._stream.path.unlink()  # the rig did not open: nothing to keep, and the name is free again
+
+    def _ending(self) -> str:
+        return "as planned" if self._fault is None else str(self._fault)
+
+    # ---- running -------------------------------------------------------------------------------------------
+
+    def prepare(self, controller: Controller | PythonController | None) -> Control:
+        """Lay out and compile a controller, so that `run` need not while the rig is armed."""
+        if id(controller) not in self._controls:
+            compiled = controller if isinstance(controller, Controller) else None
+            control = control_of(compiled, self.limits, self.rig.sample_time)
+            self._controls[id(controller)] = (controller, control)
+        return self._controls[id(controller)][1]
+
+    def run(
+        self,
+        wanted: Array,
+        controller: Controller | PythonController | None = None,
+        *,
+        travel: float = math.inf,
+    ) -> Array:
+        """Run a segment.
+
+        Parameters
+        ----------
+        wanted : array, shape (n, 4)
+            A `Setpoint` per sample (`stickslip.rigs.rig.setpoints`).
+        controller : Controller, callable or None
+            None: the setpoints' torques alone.
+        travel : float
+            The segment ends early, without a fault, when the axis has moved that far from where it began, rad.
+
+        Returns
+        -------
+        array, shape (m, columns)
+            The rows of `stickslip.rigs._control.COLUMNS`, m <= n.
+
+        Raises
+        ------
+        RigError
+            After the torque was ramped to zero: why.
+        """
+        stream = self._open_stream()
+        if wanted.ndim != 2 or wanted.shape[1] != len(Setpoint._fields):
+            raise InputError(
+                f"setpoints have shape {wanted.shape}; give (n, {len(Setpoint._fields)}), see setpoints()"
+            )
+        begin = stream.count
+        self._take_over(self.prepare(controller), travel)
+        self._pace.restart()
+        table = np.ascontiguousarray(wanted, dtype=np.float64)
+        python = controller if callable(controller) else None
+        if self.rig.capabilities.blocks and not self.realtime and python is None:
+            self._in_blocks(stream, table)
+        else:
+            self._by_samples(stream, table, python)
+        if self._control.safety[STATE] == STOPPING:
+            self._ramp(stream)
+        if self._control.safety[STATE] == STOPPED:
+            raise self._error(stream)
+        return stream.rows(begin, stream.count)
+
+    def pause(self, seconds: float) -> Measurement:
+        """Ramp the torque to zero and let time pass; nothing is recorded meanwhile."""
+        self._open_stream()
+        self._ramp_down()
+        if self.rig.capabilities.real_clock:
+            count = max(1, round(seconds / self.rig.sample_time))
+            self._take_over(self.prepare(None), math.inf)
+            self._pace.restart()
+            self._by_samples(None, setpoints(count), None)
+            if self._control.safety[STATE] == STOPPED:
+                raise self._error(self._open_stream())
+        else:
+            self._control.measured[:] = self.rig.pause(seconds)
+            # The axis may have moved: no speed across the pause.
+            self._control.safety[STARTED] = self._control.memory[BEGUN] = 0.0
+        return Measurement(*self._control.measured)
+
+    def account(self) -> Account:
+        """How the loop kept its time."""
+        return self._pace.account()
+
+    def record(self) -> Record:
+        """What was recorded so far."""
+        return self._open_stream().record()
+
+    def _open_stream(self) -> Stream:
+        if self._stream is None:
+            raise InputError("the loop is not armed; use it in a `with` statement")
+        return self._stream
+
+    def _take_over(self, control: Control, travel: float) -> None:
+        """Go on from where the last segment left the axis, with another controller."""
+        last = self._control
+        control.bounds[TRAVEL] = min(travel, safety.UNBOUNDED)
+        control.measured[:] = last.measured
+        control.safety[:] = last.safety
+        if control is not last:
+            control.memory[KNOWN] = last.memory[KNOWN]
+            control.memory[ERROR_SUM] = 0.0
+        control.safety[ORIGIN] = control.measured[POSITION]
+        if self._fault is None:
+            control.safety[STATE] = RUNNING
+        self._control = control
+
+    # ---- samples -------------------------------------------------------------------------------------------
+
+    def _by_samples(self, stream: Stream | None, wanted: Array, python: PythonController | None) -> None:
+        """Sample by sample through `Rig.exchange`."""
+        times = self._pace.room(len(wanted))
+        for k in range(len(wanted)):
+            self._sample(stream, wanted[k], python, times[k])
+            if finished(self._control):
+                return
+
+    def _sample(
+        self, stream: Stream | None, setpoint: Array, python: PythonController | None, times: Any
+    ) -> None:
+        """One sample: control, record, keep pace, exchange. No exception leaves it but the system's end."""
+        control = self._control
+        begin = time.perf_counter_ns()
+        if python is not None:
+            setpoint = self._with_python(python, setpoint)
+        row, stream = self._row(stream)
+        if self._signal:
+            self._ask(Interrupted(f"{signal.Signals(self._signal).name} asked for the end"))
+        before = time.thread_time_ns()
+        torque = decide(control, setpoint, row)
+        times[2] = time.thread_time_ns() - before
+        if stream is not None:
+            stream.commit()
+        times[1] = time.perf_counter_ns() - begin
+        if self.realtime:
+            times[0] = self._pace.wait()
+        try:
+            control.measured[:] = self.rig.exchange(torque)
+        except BaseException as error:  # whatever it is: the torque goes to zero first
+            control.measured[TIME] += self.rig.sample_time
+            self._ask(error)
+
+    def _row(self, stream: Stream | None) -> tuple[Array, Stream | None]:
+        """Where the sample goes; without room for it, nowhere, and the loop stops."""
+        if stream is None:
+            return self._scratch[0], None
+        if stream.fault is not None:
+            self._ask(stream.fault)
+        try:
+            return stream.room(1)[0], stream
+        except RigError as error:
+            self._ask(error)
+            return self._scratch[0], None
+
+    def _with_python(self, python: PythonController, setpoint: Array) -> Array:
+        """The setpoint with the torque of a controller written in Python added."""
+        out = setpoint.copy()
+        try:
+            out[2] += python(Measurement(*self._control.measured), Setpoint(*setpoint))
+        except BaseException as error:
+            self._ask(error)
+        return out
+
+    def _in_blocks(self, stream: Stream, wanted: Array) -> None:
+        """In compiled blocks through `BlockRig.exchange_block`."""
+        rig = cast(BlockRig, self.rig)
+        done = 0
+        while done < len(wanted) and not finished(self._control) and not self._signal:
+            if stream.fault is not None:
+                break
+            try:
+                rows = stream.room(min(BLOCK, len(wanted) - done))
+                count = rig.exchange_block(self._control, wanted[done : done + len(rows)], rows)
+            except BaseException as error:
+                self._ask(error)
+                return
+            stream.commit(count)
+            done += count
+        if self._signal:
+            self._ask(Interrupted(f"{signal.Signals(self._signal).name} asked for the end"))
+        if stream.fault is not None:
+            self._ask(stream.fault)
+
+    # ---- stopping ------------------------------------------------------------------------------------------
+
+    def _ask(self, reason: BaseException) -> None:
+        """Begin to stop, unless that is under way; the first reason is the one that is told."""
+        s = self._control.safety
+        if s[STATE] in (STOPPING, STOPPED):
+            return
+        self._fault = reason
+        s[STATE], s[REASON] = STOPPING, ASKED
+
+    def _ramp(self, stream: Stream | None) -> None:
+        """Samples until the torque is zero; the ramp is the compiled one, so its length is bounded."""
+        at_rest = np.array(Setpoint())
+        times = np.zeros(3, dtype=np.int64)
+        while self._control.safety[STATE] != STOPPED:
+            self._sample(stream, at_rest, None, times)
+
+    def _ramp_down(self) -> None:
+        """Take the torque away without a fault: before a pause and at the end."""
+        s = self._control.safety
+        if s[STATE] == STOPPED:
+            return
+        if s[TORQUE] != 0.0 or s[STATE] == STOPPING:
+            s[STATE] = STOPPING
+            self._ramp(self._stream)
+        s[STATE], s[REASON] = RUNNING, 0.0
+
+    def _error(self, stream: Stream) -> BaseException:
+        """What is raised once the torque is zero."""
+        s, at = self._control.safety, float(self._control.measured[TIME])
+        reason = REASONS[int(s[REASON])]
+        if self._fault is None:
+            self._fault = self._crossed(reason, float(s[VALUE]), at)
+        fault = self._fault
+        if not isinstance(fault, RigError):
+            if isinstance(fault, InputError) or not isinstance(fault, Exception):
+                return fault
+            told = RigError(f"{type(fault).__name__} in the loop: {fault}; the torque was ramped to zero")
+            told.__cause__ = fault
+            fault = self._fault = told
+        if math.isnan(fault.time):
+            fault.time = at
+        if fault.record is None:
+            fault.record = stream.record()
+        return fault
+
+    def _crossed(self, reason: str, value: float, at: float) -> RigError:
+        where = f"at t = {at:.3f} s; the torque was ramped to zero"
+        if self._control.safety[REASON] == STATUS:
+            return DriveFault(
+                f"{self.rig.name} reports fault 0x{int(value) if value == value else 0:04X} {where}"
+            )
+        if limit := self.limits.text(reason):
+            unit = LIMIT_UNITS[reason]
+            return LimitCrossed(f"{reason} = {value:g} {unit} is beyond its limit {limit} {where}")
+        return LimitCrossed(f"position or torque is {value:g}, {reason}, {where}")
