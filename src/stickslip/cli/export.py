@@ -3,6 +3,7 @@
 stickslip export model.toml --to c99
 stickslip export model.toml --to c99 --single --out firmware --name axis1
 stickslip export run.toml --to c99 --controller      # the whole sampled controller of a `stickslip simulate` file
+stickslip export model.toml --to urdf --nearest      # what a poorer target can hold, with its error
 
 model.toml is what identification writes; by hand it is `law = "lugre"` and a table [parameters]. `stickslip export
 --list` names the targets. With --check the export is tried in its own tool, where that is installed.
@@ -12,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stickslip.export.job import Export, Job
@@ -36,6 +37,21 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--controller", action="store_true", help="the whole sampled controller of the file's [controller]"
     )
+    parser.add_argument(
+        "--nearest", action="store_true", help="where the target cannot hold the law, the nearest that it can"
+    )
+    parser.add_argument(
+        "--top-speed", type=float, metavar="SPEED",
+        help="greatest velocity of the application, rad/s: up to it tables are made and sliding curves compared "
+        "(default: 100 times the velocity over which the law changes)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a setting of the target; --list names them",
+    )
     parser.add_argument("--check", action="store_true", help="try the export in its own tool")
     parser.add_argument("--json", action="store_true", help="print files, notes and check as JSON")
 
@@ -45,10 +61,11 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.cli import _output
     from stickslip.errors import InputError
     from stickslip.export import TARGETS, target_named
+    from stickslip.export.target import settings_of
 
     if args.list:
         for name in TARGETS:
-            print(f"{name:<10}{target_named(name).title}")
+            print("\n".join(described(target_named(name))))
         return 0
     if args.file is None or args.to is None:
         raise InputError(
@@ -60,6 +77,9 @@ def run(args: argparse.Namespace) -> int:
     if args.controller and not chosen.controller:
         raise InputError(f"--controller: {chosen.name} carries the law alone; leave it out, or take --to c99")
     job = job_of(args)
+    if job.nearest and not chosen.forms:
+        raise InputError(f"--nearest: {chosen.name} carries {chosen.carries}; leave it out")
+    settings_of(chosen, job.settings)
     export = chosen.write(job)
     folder: Path = args.out or Path(f"{job.name}-{chosen.name}")
     written = store(export, folder)
@@ -78,6 +98,15 @@ def run(args: argparse.Namespace) -> int:
     return 1 if result and result.passed is False else 0
 
 
+def described(target: Target) -> list[str]:
+    """What `--list` says of a target."""
+    lines = [f"{target.name:<10}{target.title}", f"{'':<10}carries {target.carries}"]
+    for s in target.settings:
+        default = "must be given" if s.default is None else f"default {s.default}"
+        lines.append(f"{'':<10}--set {s.name}=...: {s.meaning} ({default})")
+    return lines
+
+
 def job_of(args: argparse.Namespace) -> Job:
     """The model of the file, or the model and controller of a file for `stickslip simulate`."""
     import re
@@ -87,14 +116,23 @@ def job_of(args: argparse.Namespace) -> Job:
     from stickslip.model import Model
 
     name = args.name or re.sub(r"[^A-Za-z0-9_]+", "_", args.file.stem)
+    settings: dict[str, str | float] = {}
+    for text in args.set:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise InputError(f"--set {text}: write NAME=VALUE")
+        settings[key] = value
+    options: dict[str, Any] = {
+        "single": args.single, "nearest": args.nearest, "top_speed": args.top_speed, "settings": settings
+    }  # fmt: skip
     if not args.controller:
-        return Job(Model.from_file(args.file), name, None, args.single)
+        return Job(Model.from_file(args.file), name, **options)
     from stickslip.study.study import load_run
 
     controller = load_run(args.file).control
     if controller.compensator is None:
         raise InputError(f"{args.file}: [controller] has no compensator; add one, or export the law alone")
-    return Job(controller.compensator.model, name, controller, args.single)
+    return Job(controller.compensator.model, name, controller, **options)
 
 
 def store(export: Export, folder: Path) -> list[str]:

@@ -12,7 +12,14 @@ if TYPE_CHECKING:
 
 __all__ = ["TARGETS", "target_named"]
 
-TARGETS = ("c99", "python", "matlab", "st", "fmu")
+TARGETS = (
+    "c99",
+    "python",
+    "matlab",
+    "st",
+    "fmu",
+    "urdf",
+)
 
 
 def target_named(name: str) -> Target:

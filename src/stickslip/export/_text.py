@@ -20,13 +20,15 @@ LETTERS = {
 def _environment() -> jinja2.Environment:
     import jinja2
 
-    return jinja2.Environment(
+    made = jinja2.Environment(
         loader=jinja2.PackageLoader("stickslip.export"),
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
         trim_blocks=False,
         autoescape=False,
     )
+    made.filters["plain"] = ascii_only
+    return made
 
 
 def render(template: str, **values: Any) -> str:

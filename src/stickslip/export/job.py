@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -33,18 +34,30 @@ class Job:
         The whole sampled controller, with the model in its compensator; None exports the law alone.
     single : bool
         Single precision, where the target has the choice.
+    nearest : bool
+        Where the target cannot carry the model, take the nearest that it can.
+    top_speed : float or None
+        Greatest velocity of the application, rad/s: up to it sliding curves are compared and tables made. None: 100
+        times the velocity over which the law changes.
+    settings : mapping
+        Values of the target's own settings by name (`Target.settings`); what is not given has the default.
     """
 
     model: Model
     name: str
     controller: Controller | None = None
     single: bool = False
+    nearest: bool = False
+    top_speed: float | None = None
+    settings: Mapping[str, str | float] = field(default_factory=dict[str, str | float])
 
     def __post_init__(self) -> None:
         if not IDENTIFIER.fullmatch(self.name):
             raise InputError(
                 f"{self.name!r} is no name in most languages; use letters, digits and _, a letter first (--name)"
             )
+        if self.top_speed is not None and not 0.0 < self.top_speed < math.inf:
+            raise InputError(f"the top speed is {self.top_speed:g} rad/s; give one greater than 0")
         if self.controller is not None and self.controller.sample_time <= 0.0:
             raise InputError(
                 "a controller in continuous time cannot be exported; give it a sample_time greater than 0"

@@ -2,12 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from stickslip.errors import InputError, UnknownName
+from stickslip.export._nearest import Form
 from stickslip.export.job import Check, Export, Job
 
-__all__ = ["Target"]
+__all__ = ["Setting", "Target", "settings_of"]
+
+ANY_LAW = "any law, as it is"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What only one target asks for: a joint's name, a drive's rated torque.
+
+    Attributes
+    ----------
+    default : str or float or None
+        Text where the value is text. None: a number that must be given.
+    meaning : str
+        With the unit of a number.
+    lower, upper : float
+        Bounds of a number, included.
+    """
+
+    name: str
+    default: str | float | None
+    meaning: str
+    lower: float = -math.inf
+    upper: float = math.inf
+
+    def checked(self, value: str | float) -> str | float:
+        """The value as the target reads it.
+
+        Raises
+        ------
+        InputError
+        """
+        if isinstance(self.default, str):
+            if not str(value).isprintable() or not str(value):
+                raise InputError(f"--set {self.name}={value!r}: give printable text ({self.meaning})")
+            return str(value)
+        try:
+            number = float(value)
+        except ValueError:
+            raise InputError(f"--set {self.name}={value}: give a number ({self.meaning})") from None
+        if not (math.isfinite(number) and self.lower <= number <= self.upper):
+            raise InputError(
+                f"--set {self.name}={value}: give a number from {self.lower:g} to {self.upper:g} ({self.meaning})"
+            )
+        return number
 
 
 @dataclass(frozen=True)
@@ -25,6 +72,10 @@ class Target:
         Whether it heeds ``Job.single``.
     controller : bool
         Whether it carries a whole controller.
+    forms : tuple of Form
+        The laws that it has room for, the simplest first; empty where it carries any.
+    settings : tuple of Setting
+        What it asks for besides the model (``--set NAME=VALUE``).
     """
 
     name: str
@@ -33,3 +84,30 @@ class Target:
     check: Callable[[Job, Export], Check] | None = None
     precision: bool = False
     controller: bool = False
+    forms: tuple[Form, ...] = ()
+    settings: tuple[Setting, ...] = ()
+
+    @property
+    def carries(self) -> str:
+        """What of a model it holds, for people."""
+        return " or ".join(form.words for form in self.forms) or ANY_LAW
+
+
+def settings_of(target: Target, given: Mapping[str, str | float]) -> dict[str, str | float]:
+    """Every setting of a target, checked.
+
+    Raises
+    ------
+    UnknownName, InputError
+    """
+    known = {s.name: s for s in target.settings}
+    out: dict[str, str | float] = {}
+    for name in given:
+        if name not in known:
+            raise UnknownName(f"setting of {target.name}", name, known)
+    for name, setting in known.items():
+        value = given.get(name, setting.default)
+        if value is None:
+            raise InputError(f"{target.name} needs the {setting.meaning}; give it with --set {name}=VALUE")
+        out[name] = setting.checked(value)
+    return out

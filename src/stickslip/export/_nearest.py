@@ -1,0 +1,406 @@
+"""What a target with a law of its own can hold of a model, what it loses, and the nearest it can carry.
+
+Such a target names the laws of this package that say the same as its own (`Form`). `carried` returns the model in
+the first form that loses nothing; where all lose something it refuses with what is lost and offers the nearest form,
+with its residual on the model's sliding curve, which `Job.nearest` takes.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from stickslip import plugins
+from stickslip.errors import InputError, ParameterError
+from stickslip.export.job import CannotCarry, Job
+from stickslip.model import Model
+from stickslip.spec import Mode, Surroundings
+from stickslip.subset import law_layouts, named
+
+__all__ = ["COULOMB", "STATIC", "STRIBECK", "Curve", "Form", "Nearest", "carried", "losses", "nearest"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+EXACT = 1e-9
+"""Of the largest torque: what differs by less is the same."""
+SCALES = 100.0
+"""Stribeck velocities up to which a sliding curve is compared where nothing else is said."""
+WAY = 200
+"""Steps of 1 mrad after which a law without sliding curve slides as it always will."""
+DEPENDENCES = {
+    "position": "its dependence on position",
+    "load": "its dependence on the normal load",
+    "temperature": "its dependence on temperature",
+    "time": "its slow change over time",
+}
+
+
+# ---- the sliding curve of any model ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Torque of a model at constant velocity, in both directions and at rest.
+
+    Attributes
+    ----------
+    given : Model
+    top : float
+        Greatest velocity, rad/s.
+    """
+
+    given: Model
+    top: float
+
+    @staticmethod
+    def of(model: Model, top: float | None = None) -> Curve:
+        """The curve up to `top` rad/s; without it, up to 100 times the velocity over which the law changes."""
+        if top is None:
+            scale = velocity_scale(model)
+            top = SCALES * scale if scale > 0.0 else 1.0
+        return Curve(model, top)
+
+    @cached_property
+    def model(self) -> Model:
+        """The model at the surroundings for which its parameters hold."""
+        return independent(self.given)
+
+    @cached_property
+    def slowest(self) -> float:
+        """The velocity up to which the law takes the contact as at rest, or lets it creep, rad/s; mostly 0."""
+        law, p = self.model.law, self.model.parameters
+        if law.rest_band is not None:
+            return law.rest_band(p)
+        if law.state_fields or not law.continuous or velocity_scale(self.model) == 0.0:
+            return 0.0
+        slow = velocity_scale(self.model) * np.logspace(-9.0, 0.0, 500)
+        torques = np.array([min(self.torque(v), -self.torque(-v)) for v in slow])
+        slope = torques / slow
+        creeps = slope >= (1.0 - 1e-6) * slope[0]
+        return float(slow[creeps][-1]) if slope[0] > 2.0 * slope[-1] else 0.0
+
+    @cached_property
+    def velocity(self) -> Array:
+        """Velocities above 0: evenly spaced ones, and four decades below the first of them; rad/s, shape (n,)."""
+        even = np.linspace(0.0, self.top, 201)[1:]
+        all_of_them = np.concatenate([even[0] * np.logspace(-4.0, 0.0, 100, endpoint=False), even])
+        return all_of_them[all_of_them > 1.1 * self.slowest]
+
+    @cached_property
+    def width(self) -> Array:
+        """The part of the range for which each velocity stands; adds up to 1."""
+        bounds = np.concatenate([[0.0], 0.5 * (self.velocity[1:] + self.velocity[:-1]), [self.top]])
+        return np.diff(bounds) / self.top
+
+    @cached_property
+    def forward(self) -> Array:
+        """Torque against positive velocities, N·m, shape (n,)."""
+        return np.array([self.torque(v) for v in self.velocity])
+
+    @cached_property
+    def backward(self) -> Array:
+        """Torque against negative velocities, as a positive number, N·m, shape (n,)."""
+        if self.model.law.odd:
+            return self.forward
+        return np.array([-self.torque(-v) for v in self.velocity])
+
+    @cached_property
+    def mean(self) -> Array:
+        """Mean of both directions, N·m, shape (n,)."""
+        return 0.5 * (self.forward + self.backward)
+
+    @cached_property
+    def size(self) -> float:
+        """The largest torque, N·m."""
+        return float(max(np.abs(self.forward).max(), np.abs(self.backward).max(), *self.rest, 1e-300))
+
+    @cached_property
+    def rest(self) -> tuple[float, float]:
+        """What the contact withstands at rest in both directions, N·m; of one that creeps, where it lets go."""
+        law, p = self.model.law, self.model.parameters
+        if law.holding is not None:
+            z = law.state(p)
+            hold = law.holding
+            return abs(hold(1.0, z, p, Surroundings())), abs(hold(-1.0, z, p, Surroundings()))
+        edge = 1.05 * self.slowest if self.slowest > 0.0 else 1e-9 * self.top
+        if self.slowest == 0.0 and not law.state_fields:
+            return 0.0, 0.0
+        return self.torque(edge), -self.torque(-edge)
+
+    def torque(self, velocity: float) -> float:
+        """Torque at a constant velocity, N·m; of a law without sliding curve, after a long way at it."""
+        law, p = self.model.law, self.model.parameters
+        if law.steady is not None:
+            return law.steady(float(velocity), p)
+        z, torque = law.state(p), math.nan
+        for _ in range(WAY):
+            before = torque
+            torque = law.step(float(velocity), float(velocity), 1e-3 / abs(velocity), z, p, Surroundings())
+            if abs(torque - before) <= 1e-12 * abs(torque):
+                break
+        return torque
+
+
+def independent(model: Model) -> Model:
+    """The model without its dependences, at the surroundings for which its parameters hold."""
+    law = model.law
+    chosen = {c.name: "none" for c in law.choices if law.option(c).reads_surroundings}
+    if not chosen:
+        return model
+    bare = law.having(**chosen)
+    values: dict[str, Any] = model.parameters._asdict()
+    return Model(bare, **{f.name: values[f.name] for f in bare.fields})
+
+
+def velocity_scale(model: Model) -> float:
+    """A velocity over which the law's torque changes much, rad/s; 0 where there is none."""
+    scale = model.law.velocity_scale
+    return scale(model.parameters) if scale else 0.0
+
+
+# ---- forms -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Form:
+    """A law that a target has room for.
+
+    Attributes
+    ----------
+    words : str
+        What it is, for people.
+    law : str
+        The law of this package that says the same.
+    fit : callable
+        ``fit(curve)``: values of that law's parameters, nearest to a sliding curve.
+    keeps : frozenset of str
+        What it holds besides a symmetric sliding curve and the torque at rest: "memory", "slope" (through rest),
+        "direction", "position", "load", "temperature", "time".
+    """
+
+    words: str
+    law: str
+    fit: Callable[[Curve], dict[str, float]]
+    keeps: frozenset[str] = frozenset()
+
+
+def fit_coulomb(curve: Curve) -> dict[str, float]:
+    """Coulomb and viscous friction: least squares with velocities weighted evenly, neither below 0."""
+    (fc, sigma2), _ = _not_negative([np.ones_like(curve.velocity), curve.velocity], curve.mean, curve.width)
+    return {"fc": fc, "sigma2": sigma2}
+
+
+def fit_static(curve: Curve) -> dict[str, float]:
+    """The torque at rest, and Coulomb and viscous friction as `fit_coulomb`."""
+    sliding = fit_coulomb(curve)
+    return {"fs": max(sum(curve.rest) / 2.0, sliding["fc"], 1e-12 * curve.size), **sliding}
+
+
+def fit_stribeck(curve: Curve) -> dict[str, float]:
+    """Stribeck friction with any shape factor: as much weight on the slowest velocities as on the rest."""
+    optimize: Any = importlib.import_module("scipy.optimize")  # it carries no types
+    v, target = np.append(curve.velocity, 0.0), np.append(curve.mean, sum(curve.rest) / 2.0)
+    weight = np.ones_like(v)
+
+    def parts(x: Array) -> tuple[list[float], Array]:
+        bend = np.exp(-np.power(v / math.exp(x[0]), x[1]))
+        return _not_negative([np.ones_like(v), bend, v], target, weight)
+
+    starts = [(math.log(curve.top * share), shape) for share in (1e-3, 1e-2, 1e-1) for shape in (1.0, 2.0)]
+    bounds = ([math.log(1e-6 * curve.top), 0.2], [math.log(10.0 * curve.top), 20.0])
+
+    def residuals(x: Array) -> Array:
+        return parts(x)[1]
+
+    found: list[Any] = [
+        optimize.least_squares(residuals, s, bounds=bounds, xtol=1e-14, ftol=1e-14) for s in starts
+    ]
+    best: Array = min(found, key=_cost).x
+    (fc, rise, sigma2), _ = parts(best)
+    return {
+        "fs": fc + rise, "fc": fc, "vs": math.exp(best[0]), "delta_s": float(best[1]), "sigma2": sigma2
+    }  # fmt: skip
+
+
+def _cost(found: Any) -> float:
+    return found.cost
+
+
+def _not_negative(columns: Sequence[Array], target: Array, weight: Array) -> tuple[list[float], Array]:
+    """Least squares with coefficients that are not negative, and the weighted residuals."""
+    optimize: Any = importlib.import_module("scipy.optimize")
+    root = np.sqrt(weight)
+    matrix = np.stack(columns, axis=1) * root[:, None]
+    size = np.abs(matrix).max(axis=0)
+    x: Array = optimize.nnls(matrix / size, target * root)[0] / size
+    return [float(c) for c in x], matrix @ x - target * root
+
+
+COULOMB = Form("Coulomb and viscous friction", "coulomb", fit_coulomb)
+STATIC = Form("static, Coulomb and viscous friction", "static", fit_static)
+STRIBECK = Form("Stribeck and viscous friction", "stribeck_plain", fit_stribeck)
+
+
+# ---- what is lost ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """A model in a form of the target.
+
+    Attributes
+    ----------
+    form : Form
+    model : Model
+        Of the form's law.
+    lost : tuple of str
+        What it does not hold; empty where it is the user's model as it is.
+    residual, at : float
+        Largest difference on the sliding curve, N·m, and its velocity, rad/s (0: at rest).
+    rms : float
+        Over evenly spaced velocities of both directions, N·m.
+    size, top : float
+        The largest torque of the curve, N·m, and its greatest velocity, rad/s.
+    """
+
+    form: Form
+    model: Model
+    lost: tuple[str, ...]
+    residual: float
+    at: float
+    rms: float
+    size: float
+    top: float
+
+    @property
+    def values(self) -> str:
+        """The parameters, for people."""
+        law, p = self.model.law, self.model.parameters
+        return ", ".join(f"{f.name} = {getattr(p, f.name):.5g} {f.par.unit}" for f in law.fields)
+
+    @property
+    def error(self) -> str:
+        """The residual, for people."""
+        place = "at rest" if self.at == 0.0 else f"at {self.at:.3g} rad/s"
+        return (
+            f"at most {self.residual:.3g} N·m ({100.0 * self.residual / self.size:.3g} %, {place}) off the sliding "
+            f"curve, {self.rms:.3g} N·m rms from 0 to {self.top:.3g} rad/s"
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user must know of it; nothing where nothing is lost."""
+        if not self.lost:
+            return ()
+        return (f"not carried: {'; '.join(self.lost)}", f"nearest {self.form.words}: {self.error}")
+
+
+def carried(job: Job, target: str, forms: Sequence[Form]) -> Nearest:
+    """The job's model in the first of the forms, the simplest first, that loses nothing.
+
+    Raises
+    ------
+    CannotCarry
+        If all lose something and the job does not ask for the nearest.
+    """
+    if job.controller is not None:
+        raise InputError(f"{target} carries a law alone, no controller")
+    curve = Curve.of(job.model, job.top_speed)
+    tried = [found for form in forms if (found := nearest(curve, form)) is not None]
+    for found in tried:
+        if not found.lost:
+            return found
+    if not tried:
+        raise CannotCarry(
+            f"{target} carries {forms[-1].words}, and nothing of {job.model.law.name} is of that kind"
+        )
+    best = min(tried, key=lambda n: (len(n.lost), n.rms))
+    if job.nearest:
+        return best
+    raise CannotCarry(
+        f"{target} carries {best.form.words}; {job.model.law.name} would lose {'; '.join(best.lost)}. The nearest is "
+        f"{best.values}: {best.error}. Take it with --nearest"
+    )
+
+
+def nearest(curve: Curve, form: Form) -> Nearest | None:
+    """The nearest model of a form, or None where the form has no such parameters."""
+    same = _made(form, _same_names(curve, form))
+    as_it_is = _compared(curve, same, form) if same else None
+    if as_it_is is not None and as_it_is.residual <= EXACT * curve.size:
+        return as_it_is
+    fitted = _made(form, form.fit(curve))
+    found = _compared(curve, fitted, form) if fitted else None
+    return min((n for n in (as_it_is, found) if n is not None), key=lambda n: n.rms, default=None)
+
+
+def _made(form: Form, values: Mapping[str, Any]) -> Model | None:
+    try:
+        return Model(form.law, **values)
+    except ParameterError:
+        return None
+
+
+def _same_names(curve: Curve, form: Form) -> dict[str, Any]:
+    """The model's own values of the parameters that the form calls by the same names."""
+    values: dict[str, Any] = curve.model.parameters._asdict()
+    fields = plugins.law(form.law).fields
+    return {f.name: values.get(f.name, 0.0 if f.par.default is None else f.par.default) for f in fields}
+
+
+def _compared(curve: Curve, model: Model, form: Form) -> Nearest:
+    other = Curve(model, curve.top)
+    other.__dict__["velocity"] = curve.velocity  # where the model slides
+    error = np.maximum(abs(other.forward - curve.forward), abs(other.backward - curve.backward))
+    worst = int(np.argmax(error))
+    residual, at = float(error[worst]), float(curve.velocity[worst])
+    at_rest = max(abs(a - b) for a, b in zip(other.rest, curve.rest))
+    if at_rest >= 0.99 * residual:
+        residual, at = max(at_rest, residual), 0.0
+    both = (other.forward - curve.forward) ** 2 + (other.backward - curve.backward) ** 2
+    rms = math.sqrt(float(np.sum(curve.width * both)) / 2.0)
+    lost = losses(curve, form)
+    shape = float(np.max(np.abs(other.mean - curve.mean)))
+    if shape > EXACT * curve.size:
+        lost.append("the shape of its sliding curve")
+    elif at_rest > EXACT * curve.size and "the difference between the directions" not in lost:
+        lost.append("its torque at rest")
+    return Nearest(form, model, tuple(lost), residual, at, rms, curve.size, curve.top)
+
+
+def losses(curve: Curve, form: Form) -> list[str]:
+    """What a form does not hold of a model, besides the shape of its sliding curve."""
+    law = curve.given.law
+    out: list[str] = []
+    if "memory" not in form.keeps and law.state_fields:
+        bends = [f.par.meaning for f in law.state_fields if not isinstance(f.par, Mode)]
+        memory = "; non-local memory" if law.non_local_memory else ""
+        out.append(f"pre-sliding and hysteresis ({', '.join(bends[:3]) or 'its states'}{memory})")
+    if "slope" not in form.keeps and curve.slowest > 0.0:
+        out.append(f"its slope or band of rest up to {curve.slowest:.2g} rad/s")
+    unequal = float(np.max(np.abs(curve.forward - curve.backward)))
+    if (
+        "direction" not in form.keeps
+        and max(unequal, abs(curve.rest[0] - curve.rest[1])) > EXACT * curve.size
+    ):
+        out.append("the difference between the directions")
+    read = surroundings_of(curve.given)
+    return out + [words for name, words in DEPENDENCES.items() if name in read and name not in form.keeps]
+
+
+def surroundings_of(model: Model) -> set[str]:
+    """The surroundings on which a law's torque depends, other than the applied torque: they are seen in its code."""
+    trees = named({"_step": model.law.step}, law_layouts(model.law))
+    return {
+        node.attr
+        for tree in trees.values()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "u"
+    } - {"applied"}
