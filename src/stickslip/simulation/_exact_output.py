@@ -40,7 +40,7 @@ from stickslip.simulation._exact_stretch import (
     slip_torque_at,
     state_at,
 )
-from stickslip.simulation._meter import MAX_WINDOW, meter
+from stickslip.simulation._meter import MAX_WINDOW, WINDOW, meter
 
 ROW_SIZE = len(COLUMNS)
 SHORTEST_WINDOW = 1e-10
@@ -51,6 +51,8 @@ FINEST_NODES = 0.03
 """Half a window in radians (or e-folds) of the free motion, that need not be undercut."""
 UNSEEN = 1e-8
 """Free motion slower than this (rad/s) adds nothing to a metric; the nodes need not follow it."""
+UNSEEN_COARSE = 1e-4
+"""The same where only coarse metrics are wanted: 1e-8 rad of the ringing in pre-sliding."""
 
 
 @kernel(exact=False)
@@ -177,35 +179,36 @@ def row_after(parameters: Any, plan: Any, sides: Any, loop: Any, count: Any, row
 
 
 @kernel(exact=False, inline=True)
-def windows_for(rate: float, speed: float, h: float) -> float:
+def windows_for(rate: float, speed: float, h: float, unseen: float) -> float:
     """Windows whose five nodes follow a free motion of that rate (1/s) and velocity (rad/s) over h, at least 1.
 
     Boole's rule is wrong by about 2e-3 y^6 of the changing part for nodes y/2 of a radian apart.
     """
     y = 0.5 * h * abs(rate)
     # Most stretches are short; a root costs as much as the rest.
-    if speed < UNSEEN or y <= FINEST_NODES or (y <= 1.0 and y * y * y * speed <= 1e-5):
+    if speed < unseen or y <= FINEST_NODES or (y <= 1.0 and y * y * y * speed <= 1e-5):
         return 1.0
     return y / max(FINEST_NODES, min(1.0, 0.1 * (1e-2 / speed) ** (1.0 / 3.0)))
 
 
 @kernel(exact=False, inline=True)
-def windows_of(lin: Linear, stretch: Any, h: float) -> int:
-    """Windows in which the meter sees the first h of a stretch."""
+def windows_of(lin: Linear, stretch: Any, h: float, longest: float) -> int:
+    """Windows, none longer than `longest`, in which the meter sees the first h of a stretch."""
     p = stretch[FREE_POSITION]
     q = stretch[FREE_VELOCITY]
+    unseen = UNSEEN_COARSE if longest > MAX_WINDOW else UNSEEN
     if lin.discriminant > 0.0:
         rate = max(lin.frequency, lin.decay)
-        most = windows_for(rate, abs(q) + rate * abs(p), h)
+        most = windows_for(rate, abs(q) + rate * abs(p), h, unseen)
     else:
         fast = -lin.decay - lin.frequency
         slow = -lin.decay + lin.frequency
         share = 0.5 / (lin.frequency + 1e-9)
         most = max(
-            windows_for(fast, abs(fast * (q - slow * p)) * share, h),
-            windows_for(slow, abs(slow * (q - fast * p)) * share, h),
+            windows_for(fast, abs(fast * (q - slow * p)) * share, h, unseen),
+            windows_for(slow, abs(slow * (q - fast * p)) * share, h, unseen),
         )
-    return math.ceil(max(most, h / MAX_WINDOW) * (1.0 - 1e-9))
+    return math.ceil(max(most, h / longest) * (1.0 - 1e-9))
 
 
 @kernel(exact=False)
@@ -216,7 +219,7 @@ def measure(
     """Hand the first h of the stretch to the meter, in windows of five nodes."""
     if h < SHORTEST_WINDOW:
         return
-    windows = windows_of(lin, stretch, h)
+    windows = windows_of(lin, stretch, h, acc[WINDOW])
     width = h / windows
     c = cubic_of(stretch)
     m = flow(lin, 0.25 * width)

@@ -20,6 +20,7 @@ TRIGGER = 1e-3  # rad/s, Schmitt trigger of the reversals, and standstill
 MOVING = 2e-3  # rad/s, the reference moves
 STANDSTILL = 10e-3  # s, shortest standstill that counts
 MAX_WINDOW = 2e-3  # s
+LONG_WINDOW = 16e-3  # s, where only the metrics of COARSE are wanted
 SETTLED_FOR = 0.1  # of the run, without leaving the band again
 
 # ---- layout of the accumulator --------------------------------------------------------------------------------
@@ -28,13 +29,18 @@ SETTLED_FOR = 0.1  # of the run, without leaving the band again
     W2_E2, W2_E_MAX, W2_E_LOW, W2_E_HIGH, W2_EV2, W2_TM2, W2_HP2, W2_REVERSALS,
     LOW_PASS, SIDE, STILL_SINCE, STILL_COUNT, STILL_LONGEST, OUTSIDE_LAST, WORK, LOSS, COMPENSATION_WORK,
     REFERENCE_SIDE, REFERENCE_REVERSALS, TURN_TIME, TURN_POSITION, TURN_COUNT,
-    LAST_VELOCITY, SIZE,
-) = range(37)  # fmt: skip
+    LAST_VELOCITY, WINDOW, SIZE,
+) = range(38)  # fmt: skip
 
 
-def new_meter(duration: float, settle_band: float) -> Any:
-    """Return an empty accumulator for a run of `duration` s; `settle_band` in rad, 0 for none."""
+def new_meter(duration: float, settle_band: float, window: float = MAX_WINDOW) -> Any:
+    """Return an empty accumulator for a run of `duration` s; `settle_band` in rad, 0 for none.
+
+    `window` is the longest stretch in s that the meter is handed. With one above MAX_WINDOW it leaves out what needs
+    short ones, and the metrics are those of `COARSE`.
+    """
     acc = np.zeros(SIZE)
+    acc[WINDOW] = window
     acc[DURATION] = duration
     acc[SETTLE_BAND] = settle_band
     acc[STILL_SINCE] = -1.0
@@ -90,7 +96,6 @@ def meter(acc: Any, turns: Any, t: float, h: float, nodes: Any) -> None:
     acc[V_MAX] = max(acc[V_MAX], peak(nodes, acc[V_MAX]))
     for i in range(5):
         acc[TM_MAX] = max(acc[TM_MAX], abs(nodes[MOTOR, i]))
-    high_pass(acc, h, nodes, second)
     if second:
         acc[W2_E2] += scale * e2
         acc[W2_EV2] += scale * ev2
@@ -98,6 +103,9 @@ def meter(acc: Any, turns: Any, t: float, h: float, nodes: Any) -> None:
         acc[W2_E_MAX] = max(acc[W2_E_MAX], -low, high)
         acc[W2_E_LOW] = min(acc[W2_E_LOW], low)
         acc[W2_E_HIGH] = max(acc[W2_E_HIGH], high)
+    if acc[WINDOW] > MAX_WINDOW:
+        return
+    high_pass(acc, h, nodes, second)
     reversals(acc, turns, t, h, nodes, second)
     standstill(acc, t, h, nodes)
     band = acc[SETTLE_BAND]
@@ -277,22 +285,38 @@ def settle_band_of(reference: Any, duration: float) -> float:
     return 0.02 * travel if travel > 0.0 and at_rest else 0.0
 
 
+@kernel()
 def limit_cycle(turns: Any, duration: float) -> tuple[float, float]:
     """Amplitude (rad) and period (s) of a limit cycle in the last 40 % of a run, or two NaN.
 
     There is one where at least 5 periods have amplitudes and periods that spread (standard deviation over
-    mean) by less than 5 %. ``turns`` has time and position of the velocity's reversals, shape (n, 2).
+    mean) by less than 5 %. ``turns`` has time and position of the velocity's reversals, shape (n, 2), ascending.
     """
-    none = (math.nan, math.nan)
-    late = turns[turns[:, 0] >= 0.6 * duration]
-    if late.shape[0] < 11:
-        return none
-    periods = late[2:, 0] - late[:-2, 0]
-    swings = np.abs(np.diff(late[:, 1]))
-    for values in (periods, swings):
-        if values.mean() <= 0.0 or values.std() >= 0.05 * values.mean():
-            return none
-    return float(0.5 * swings.mean()), float(periods.mean())
+    first = 0
+    while first < turns.shape[0] and turns[first, 0] < 0.6 * duration:
+        first += 1
+    count = turns.shape[0] - first
+    if count < 11:
+        return math.nan, math.nan
+    found = (0.0, 0.0)
+    for kind in range(2):
+        # Periods from every second turn to the next, swings from one turn to the next.
+        apart = 2 if kind == 0 else 1
+        values = np.abs(turns[first + apart :, kind] - turns[first : turns.shape[0] - apart, kind])
+        mean = values.mean()
+        if not mean > 0.0 or values.std() >= 0.05 * mean:
+            return math.nan, math.nan
+        found = (mean, found[0])
+    return 0.5 * found[0], found[1]
+
+
+COARSE = (
+    "position_rms_rad", "position_peak_rad", "steady_state_error_rad", "end_error_rad", "velocity_rms_rad_s",
+    "velocity_peak_rad_s", "torque_rms_Nm", "torque_peak_Nm", "friction_residual_rms_Nm",
+    "second_half_position_rms_rad", "second_half_position_peak_rad", "second_half_position_span_rad",
+    "second_half_velocity_rms_rad_s", "second_half_torque_rms_Nm", "motor_work_J", "friction_loss_J",
+)  # fmt: skip
+"""Metrics that windows longer than MAX_WINDOW give as well."""
 
 
 def metrics(acc: Any, turns: Any) -> dict[str, float]:
@@ -300,36 +324,46 @@ def metrics(acc: Any, turns: Any) -> dict[str, float]:
 
     The definitions are in docs/metrics.md.
     """
-    duration = acc[DURATION]
+    late = np.ascontiguousarray(turns[turns[:, 0] > 0.0])
+    amplitude, period = limit_cycle(late, acc[DURATION])
+    return {name: float(value) for name, value in columns(acc, amplitude, period).items()}
+
+
+def columns(acc: Any, amplitude: Any, period: Any) -> dict[str, Any]:
+    """The metrics of many finished accumulators, shape (..., SIZE), and of their limit cycles, shape (...)."""
+    duration = acc[..., DURATION]
     half = 0.5 * duration
     # For good: a limit cycle that happens to end inside the band has not settled.
-    settled = acc[SETTLE_BAND] > 0.0 and acc[OUTSIDE_LAST] <= (1.0 - SETTLED_FOR) * duration
-    amplitude, period = limit_cycle(turns, duration)
+    settled = (acc[..., SETTLE_BAND] > 0.0) & (acc[..., OUTSIDE_LAST] <= (1.0 - SETTLED_FOR) * duration)
     return {
-        "position_rms_rad": math.sqrt(acc[E2] / duration),
-        "position_peak_rad": acc[E_MAX],
-        "steady_state_error_rad": acc[SS_E] / (0.2 * duration),
-        "end_error_rad": acc[E_END],
-        "settling_s": acc[OUTSIDE_LAST] if settled else math.nan,
-        "velocity_rms_rad_s": math.sqrt(acc[EV2] / duration),
-        "velocity_peak_rad_s": acc[V_MAX],
-        "torque_rms_Nm": math.sqrt(acc[TM2] / duration),
-        "torque_peak_Nm": acc[TM_MAX],
-        "friction_residual_rms_Nm": math.sqrt(acc[DF2] / duration),
-        "standstills": acc[STILL_COUNT],
-        "longest_standstill_s": acc[STILL_LONGEST],
-        "reversals_per_s": acc[REVERSALS] / duration,
-        "reversals_beyond_reference_per_s": (acc[REVERSALS] - acc[REFERENCE_REVERSALS]) / duration,
-        "velocity_above_50Hz_rms_rad_s": math.sqrt(acc[HP2] / duration),
+        "position_rms_rad": np.sqrt(acc[..., E2] / duration),
+        "position_peak_rad": acc[..., E_MAX],
+        "steady_state_error_rad": acc[..., SS_E] / (0.2 * duration),
+        "end_error_rad": acc[..., E_END],
+        "settling_s": np.where(settled, acc[..., OUTSIDE_LAST], math.nan),
+        "velocity_rms_rad_s": np.sqrt(acc[..., EV2] / duration),
+        "velocity_peak_rad_s": acc[..., V_MAX],
+        "torque_rms_Nm": np.sqrt(acc[..., TM2] / duration),
+        "torque_peak_Nm": acc[..., TM_MAX],
+        "friction_residual_rms_Nm": np.sqrt(acc[..., DF2] / duration),
+        "standstills": acc[..., STILL_COUNT],
+        "longest_standstill_s": acc[..., STILL_LONGEST],
+        "reversals_per_s": acc[..., REVERSALS] / duration,
+        "reversals_beyond_reference_per_s": (acc[..., REVERSALS] - acc[..., REFERENCE_REVERSALS]) / duration,
+        "velocity_above_50Hz_rms_rad_s": np.sqrt(acc[..., HP2] / duration),
         "limit_cycle_amplitude_rad": amplitude,
         "limit_cycle_period_s": period,
-        "second_half_position_rms_rad": math.sqrt(acc[W2_E2] / half),
-        "second_half_position_peak_rad": acc[W2_E_MAX],
-        "second_half_position_span_rad": acc[W2_E_HIGH] - acc[W2_E_LOW],
-        "second_half_velocity_rms_rad_s": math.sqrt(acc[W2_EV2] / half),
-        "second_half_torque_rms_Nm": math.sqrt(acc[W2_TM2] / half),
-        "second_half_velocity_above_50Hz_rms_rad_s": math.sqrt(acc[W2_HP2] / half),
-        "second_half_reversals_per_s": acc[W2_REVERSALS] / half,
-        "motor_work_J": acc[WORK],
-        "friction_loss_J": acc[LOSS],
+        "second_half_position_rms_rad": np.sqrt(acc[..., W2_E2] / half),
+        "second_half_position_peak_rad": acc[..., W2_E_MAX],
+        "second_half_position_span_rad": acc[..., W2_E_HIGH] - acc[..., W2_E_LOW],
+        "second_half_velocity_rms_rad_s": np.sqrt(acc[..., W2_EV2] / half),
+        "second_half_torque_rms_Nm": np.sqrt(acc[..., W2_TM2] / half),
+        "second_half_velocity_above_50Hz_rms_rad_s": np.sqrt(acc[..., W2_HP2] / half),
+        "second_half_reversals_per_s": acc[..., W2_REVERSALS] / half,
+        "motor_work_J": acc[..., WORK],
+        "friction_loss_J": acc[..., LOSS],
     }
+
+
+METRICS = tuple(columns(np.ones(SIZE), 0.0, 0.0))
+"""Names of the metrics."""

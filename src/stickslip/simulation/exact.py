@@ -48,6 +48,8 @@ TURNS = 20_000
 NOTHING: Array = np.zeros((0, 2))
 NOTHING_1: Array = np.zeros(1)
 NODES: Array = np.zeros((8, 5))
+CURVE_SPEEDS: Array = np.concatenate([np.linspace(0.0, 10.0, 21), np.geomspace(10.0, 1e4, 13)])
+"""Velocities over a curve's scale at which its least value is looked for."""
 
 
 def elements_of(side: Side) -> Elements | Bristle | None:
@@ -303,7 +305,7 @@ def lowest(side: Side, e: Elements | Bristle) -> float:
         return 0.999 * e.breakaway
     curve, p = curve_of(side).function, side.model.parameters
     assert curve is not None
-    speeds = e.velocity_scale * np.concatenate([np.linspace(0.0, 10.0, 21), np.geomspace(10.0, 1e4, 13)])
+    speeds = e.velocity_scale * CURVE_SPEEDS
     return 0.99 * min(curve(sign * float(v), p) for v in speeds for sign in (1.0, -1.0))
 
 
