@@ -33,7 +33,7 @@ MOTION = (
     "velocity_reference",
     "acceleration",
 )
-EFFORT = ("motor_torque", "friction_torque", "compensation_torque")
+EFFORT = ("motor_torque", "friction_torque", "sensor_torque", "compensation_torque")
 PERIODS = (
     "dt",
     "ts",

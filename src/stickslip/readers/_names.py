@@ -23,6 +23,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "acceleration": ("angular acceleration", "acceleration"),
     "motor_torque": ("torque", "force", "share"),
     "friction_torque": ("torque", "force"),
+    "sensor_torque": ("torque", "force"),
     "compensation_torque": ("torque", "force", "share"),
     "current": ("current", "share"),
     "current_reference": ("current", "share"),
@@ -95,6 +96,7 @@ WHOLE = _table(
         n_act omega_m w_m v_m thetadot q_dot theta_dot
     motor_torque: tq te t_m tm tau_m 6077 s-0-0084 r0080 r80 m_act m_motor u_tau tau_act
     friction_torque: tf t_f ff f_f tau_f m_r mr
+    sensor_torque: sensor_torque torque_sensor
     current: i i_q iq_measured iq_act 6078 il.fb r0078 r78 i_act im i_m ia
     voltage: u vm u_q u_m v_motor ua input_volts 6079
     acceleration: a ddq qddot ddx a_act

@@ -1,0 +1,126 @@
+"""How much repeated runs of each controller differ, at every time and over all; thesis 4.4, figures 4.52 to 4.56."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from stickslip.analyse.spectrum import channel_of
+from stickslip.errors import InputError
+from stickslip.record import Record
+
+__all__ = ["Repeated", "repeatability"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """Runs of one controller laid over each other.
+
+    Attributes
+    ----------
+    name, channel, unit : str
+    time : array, shape (n,)
+        s, from the start of every run.
+    runs : array, shape (m, n)
+        The channel of every run.
+    mean, spread, low, high : array, shape (n,)
+        Over the runs, at every time: mean, standard deviation (of a sample of m), least, greatest.
+    """
+
+    name: str
+    channel: str
+    unit: str
+    time: Array
+    runs: Array
+    mean: Array
+    spread: Array
+    low: Array
+    high: Array
+
+    @property
+    def rms_spread(self) -> float:
+        """Root of the mean over time of the squared standard deviation."""
+        return math.sqrt(float(np.mean(self.spread**2)))
+
+    @property
+    def greatest_range(self) -> float:
+        """Greatest distance of two runs at one time."""
+        return float(np.max(self.high - self.low))
+
+    @property
+    def relative(self) -> float:
+        """`rms_spread` over half the peak-to-peak of the mean; infinite where the mean does not move."""
+        half = 0.5 * float(np.ptp(self.mean))
+        return self.rms_spread / half if half > 0.0 else math.inf
+
+    @property
+    def alikeness(self) -> float:
+        """Least correlation of two runs: 1 where all have the same shape."""
+        moving = [run for run in self.runs if np.ptp(run) > 0.0]
+        if len(moving) < 2:
+            return math.nan
+        return min(float(np.corrcoef(a, b)[0, 1]) for a, b in combinations(moving, 2))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, without the curves."""
+        return {
+            "controller": self.name, "channel": self.channel, "unit": self.unit, "runs": len(self.runs),
+            "rms_spread": self.rms_spread, "greatest_range": self.greatest_range, "relative": self.relative,
+            "least_correlation": self.alikeness,
+        }  # fmt: skip
+
+    def lines(self) -> list[str]:
+        """What people read."""
+        return [
+            f"{self.name}: {len(self.runs)} runs, {self.channel}: spread {self.rms_spread:.3g} {self.unit} RMS "
+            f"({100 * self.relative:.3g} % of the amplitude), greatest range {self.greatest_range:.3g} {self.unit}, "
+            f"least correlation {self.alikeness:.4f}"
+        ]
+
+
+def repeatability(groups: Mapping[str, Sequence[Record]], channel: str = "position") -> list[Repeated]:
+    """Lay the runs of every controller over each other.
+
+    Parameters
+    ----------
+    groups : mapping of str to sequence of Record
+        Runs of the same motion, by controller; at least two each. Each run counts from its own first sample; what all
+        of a group have in common in length is compared.
+    channel : str
+        As for `stickslip.analyse.spectrum.spectrum`.
+
+    Raises
+    ------
+    InputError
+        If a controller has one run only, or a record lacks the channel.
+    """
+    return [_repeated(name, records, channel) for name, records in groups.items()]
+
+
+def _repeated(name: str, records: Sequence[Record], channel: str) -> Repeated:
+    if len(records) < 2:
+        raise InputError(
+            f"repeatability: {name!r} has {len(records)} run; give at least two of the same motion"
+        )
+    clocks = [record.time - record.time[0] for record in records]
+    length = min(float(clock[-1]) for clock in clocks)
+    spacing = max(float(np.median(np.diff(clock))) for clock in clocks)
+    if not (length > 0.0 and spacing > 0.0):
+        raise InputError(f"repeatability: the runs of {name!r} have no length; check their times")
+    time = np.arange(math.floor(length / spacing * (1.0 + 1e-9)) + 1, dtype=np.float64) * spacing
+    signals = [channel_of(record, channel) for record in records]
+    runs = np.array([np.interp(time, c, values) for c, (values, _) in zip(clocks, signals, strict=True)])
+    if not np.all(np.isfinite(runs)):
+        raise InputError(f"repeatability: {channel} of {name!r} has gaps; check the records")
+    spread: Array = np.asarray(runs.std(axis=0, ddof=1), dtype=np.float64)
+    mean = np.asarray(runs.mean(axis=0), dtype=np.float64)
+    return Repeated(
+        name, channel, signals[0][1], time, runs, mean, spread, runs.min(axis=0), runs.max(axis=0)
+    )  # fmt: skip

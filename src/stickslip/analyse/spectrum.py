@@ -1,0 +1,223 @@
+"""Power spectral density of a run that oscillates, its peaks, the modes they excite; thesis 4.5, figures 4.58, 4.59.
+
+Welch's estimate: Hann windows that overlap by half, means removed, one-sided, so that its integral over frequency is
+the variance of the signal.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError, ParameterError
+from stickslip.record import Record
+
+__all__ = ["Peak", "Spectrum", "channel_of", "evenly", "spectrum"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+SEGMENTS = 8
+"""Windows over a record whose resolution is not given."""
+PROMINENCE = 10.0
+"""dB by which a peak rises above its surroundings: noise averaged over 8 windows does not."""
+NEAR = 0.12
+"""Share of its frequency by which a peak may miss a mode and still be named after it."""
+FEWEST = 64
+
+
+@dataclass(frozen=True)
+class Peak:
+    """One peak.
+
+    Attributes
+    ----------
+    frequency : float
+        Hz
+    amplitude : float
+        Of a sinusoid with the power of the peak, in the signal's unit.
+    share : float
+        Of the signal's variance.
+    mode : str
+        Name of the mode it excites; empty where none is near.
+    """
+
+    frequency: float
+    amplitude: float
+    share: float
+    mode: str
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Power spectral density of one channel.
+
+    Attributes
+    ----------
+    name, channel, unit : str
+        Of the record, of the channel, of the signal.
+    frequency, density : array, shape (n,)
+        Hz, unit²/Hz (one-sided).
+    rms : float
+        Of the signal without its mean.
+    sample_rate : float
+        Hz
+    peaks : tuple of Peak
+        The strongest first.
+    modes : mapping of str to float
+        The modes that peaks were compared with, Hz, as seen at this sample rate.
+    """
+
+    name: str
+    channel: str
+    unit: str
+    frequency: Array
+    density: Array
+    rms: float
+    sample_rate: float
+    peaks: tuple[Peak, ...]
+    modes: Mapping[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, without the curve."""
+        return {
+            "record": self.name, "channel": self.channel, "unit": self.unit, "rms": self.rms,
+            "sample_rate": self.sample_rate, "resolution": float(self.frequency[1]), "modes": dict(self.modes),
+            "peaks": [asdict(p) for p in self.peaks],
+        }  # fmt: skip
+
+    def lines(self) -> list[str]:
+        """What people read."""
+        head = (
+            f"{self.name}: {self.channel}, RMS {self.rms:.4g} {self.unit} about its mean, "
+            f"{self.sample_rate:g} samples/s, resolution {self.frequency[1]:.3g} Hz"
+        )
+        if not self.peaks:
+            return [head, f"  no peak rises {PROMINENCE:g} dB above its surroundings"]
+        rows = [
+            f"  {p.frequency:8.1f} Hz  amplitude {p.amplitude:8.3g} {self.unit}  {100 * p.share:5.1f} % of the variance"
+            f"{f'  {p.mode}' if p.mode else ''}"
+            for p in self.peaks
+        ]
+        return [head, *rows]
+
+
+def channel_of(record: Record, channel: str) -> tuple[Array, str]:
+    """A channel's values and unit; ``position_error`` and ``velocity`` are made from others where they are missing."""
+    if channel in record.channels:
+        return record[channel], record.units[channel]
+    if channel == "position_error" and "position_reference" in record.channels:
+        return record["position_reference"] - record["position"], record.units["position"]
+    if channel == "velocity" and "position" in record.channels:
+        return np.gradient(record["position"], record.time), f"{record.units['position']}/s"
+    return record[channel], ""  # raises, and says what there is
+
+
+def evenly(record: Record, values: Array) -> tuple[Array, Array]:
+    """The signal on even times, of the record's own median spacing: times and values.
+
+    Raises
+    ------
+    InputError
+        If there are too few samples.
+    """
+    first = np.flatnonzero(np.diff(record.time, prepend=-math.inf))  # a time may occur twice
+    time = record.time[first]
+    good = np.isfinite(values[first])
+    time, values = time[good], values[first][good]
+    if time.size < FEWEST:
+        raise InputError(f"spectrum: {time.size} samples are too few; give at least {FEWEST}")
+    # Rows at events lie between those of the grid: the usual spacing is the longest common one.
+    spacing = float(np.quantile(np.diff(time), 0.9))
+    count = math.floor((time[-1] - time[0]) / spacing * (1.0 + 1e-9)) + 1
+    grid = np.arange(count, dtype=np.float64) * spacing + float(time[0])
+    return grid, np.interp(grid, time, values)
+
+
+def seen_at(frequency: float, rate: float) -> float:
+    """Where a frequency appears when it is sampled at `rate`, Hz."""
+    folded = math.fmod(frequency, rate)
+    return min(folded, rate - folded)
+
+
+def spectrum(
+    record: Record,
+    channel: str = "position_error",
+    *,
+    modes: Mapping[str, float] | None = None,
+    resolution: float | None = None,
+    start: float = 0.0,
+    end: float = math.inf,
+    name: str = "",
+) -> Spectrum:
+    """Power spectral density of a channel of a record.
+
+    Parameters
+    ----------
+    record : Record
+    channel : str
+        A channel of the record; ``position_error`` is position_reference - position.
+    modes : mapping of str to float, optional
+        Known modes by name, Hz. One above half the sample rate is looked for where it folds to.
+    resolution : float, optional
+        Hz; a window is 1/resolution long. Without it the record is cut into 8 windows' lengths.
+    start, end : float
+        s: the part of the record that counts.
+    name : str
+        Of the record.
+
+    Raises
+    ------
+    ParameterError, InputError
+    """
+    if resolution is not None and not resolution > 0.0:
+        raise ParameterError(f"spectrum: resolution = {resolution:g} Hz must be greater than 0")
+    values, unit = channel_of(record, channel)
+    inside = (record.time >= start) & (record.time <= end)
+    part = Record(record.time[inside], {channel: values[inside]}, {channel: unit})
+    time, signal = evenly(part, part[channel])
+    rate = 1.0 / float(time[1] - time[0])
+    count = min(signal.size, round(rate / resolution) if resolution else 2 * signal.size // (SEGMENTS + 1))
+    welch: Any = importlib.import_module("scipy.signal").welch
+    frequency, density = welch(signal, rate, nperseg=max(count, FEWEST // 2), detrend="constant")
+    known = {label: seen_at(f, rate) for label, f in (modes or {}).items()}
+    variance = float(np.var(signal))
+    found = _peaks(frequency, density, variance, known)
+    return Spectrum(name, channel, unit, frequency, density, math.sqrt(variance), rate, found, known)
+
+
+def _peaks(frequency: Array, density: Array, variance: float, modes: Mapping[str, float]) -> tuple[Peak, ...]:
+    """The peaks, strongest first, and the modes they lie at."""
+    if variance <= 0.0 or not np.any(density > 0.0):
+        return ()
+    signal: Any = importlib.import_module("scipy.signal")
+    level = 10.0 * np.log10(np.maximum(density, 1e-12 * density.max()))
+    # The first bins hold the motion itself and what is left of the mean.
+    places, about = signal.find_peaks(level[2:], prominence=PROMINENCE)
+    out: list[Peak] = []
+    for place, left, right in zip(places + 2, about["left_bases"] + 2, about["right_bases"] + 2, strict=True):
+        low, high = _foot(level, int(place), int(left), -1), _foot(level, int(place), int(right), 1)
+        power = float(np.sum(density[low : high + 1]) * frequency[1])
+        at = float(np.average(frequency[place - 1 : place + 2], weights=density[place - 1 : place + 2]))
+        out.append(Peak(at, math.sqrt(2.0 * power), power / variance, _nearest(at, modes)))
+    return tuple(sorted(out, key=lambda p: -p.share))
+
+
+def _foot(level: Array, place: int, base: int, step: int) -> int:
+    """Where a peak ends on one side: 20 dB below it, or its base."""
+    i = place
+    while i != base and level[i] > level[place] - 20.0:
+        i += step
+    return min(max(i, 0), level.size - 1)
+
+
+def _nearest(frequency: float, modes: Mapping[str, float]) -> str:
+    """The mode nearest to a peak, if near enough."""
+    if not modes:
+        return ""
+    name = min(modes, key=lambda m: abs(modes[m] - frequency))
+    return name if abs(modes[name] - frequency) <= NEAR * modes[name] else ""

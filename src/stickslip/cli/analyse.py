@@ -1,0 +1,258 @@
+"""Numbers out of records and machines: spectra, repeatability, flexibility, the two sides, dependence, stability.
+
+stickslip analyse spectrum run.npz --mode "elastic mode=335" --plot spectrum.png
+stickslip analyse repeatability PID=1.npz PID=2.npz LuGre=3.npz LuGre=4.npz
+stickslip analyse flexibility --stiffness 17800,396 --inertia 4.2757e-4 --torque dry=0.2951 --claimed 270
+stickslip analyse sides slow.npz fast.npz
+stickslip analyse position slow.npz --channel sensor_torque
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from stickslip.cli import _reading
+
+if TYPE_CHECKING:
+    from stickslip.record import Record
+
+SUMMARY = "spectrum, repeatability, flexibility, both sides, dependence on position"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """One analysis, its records and options."""
+    kinds = parser.add_subparsers(dest="analysis", metavar="ANALYSIS", title="analyses", required=True)
+    for name, (summary, own, work) in ANALYSES.items():
+        sub = kinds.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
+        own(sub)
+        sub.add_argument("--plot", type=Path, metavar="FILE", help="draw into FILE.png, .svg or .pdf")
+        sub.add_argument("--json", action="store_true", help="print the result as JSON")
+        sub.set_defaults(work=work)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what was found; draw it."""
+    from stickslip.errors import InputError
+    from stickslip.report.plots import FORMATS
+
+    if args.plot and args.plot.suffix not in FORMATS:
+        raise InputError(f"--plot {args.plot} must end in one of {', '.join(FORMATS)}")
+    args.work(args)
+    return 0
+
+
+# ---- records ---------------------------------------------------------------------------------------------------
+
+
+def _with_records(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("records", nargs="+", metavar="[NAME=]RECORD", help="records, perhaps named")
+    _reading.add_arguments(parser)
+
+
+def _opened(args: argparse.Namespace) -> list[tuple[str, Record]]:
+    """Name and record of every argument; without a name the file's."""
+    out: list[tuple[str, Record]] = []
+    for text in args.records:
+        name, equals, path = str(text).partition("=")
+        path = Path(path if equals else text)
+        out.append((name if equals else path.stem, _reading.open_record(path, args).record))
+    return out
+
+
+def _numbers(option: str, text: str, unit: str) -> list[float]:
+    """Numbers between commas."""
+    from stickslip.errors import InputError
+
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{option} {text!r} must be numbers in {unit} with commas between them") from None
+
+
+def _named(option: str, texts: Sequence[str], unit: str) -> dict[str, float]:
+    """Numbers with names, NAME=NUMBER; a name may be left out."""
+    out: dict[str, float] = {}
+    for text in texts:
+        name, _, value = text.rpartition("=")
+        out[name] = _numbers(option, value, unit)[0]
+    return out
+
+
+def _show(args: argparse.Namespace, found: Sequence[Any], picture: Callable[[], Any]) -> None:
+    """Lines or JSON, and the picture where one is wanted."""
+    from stickslip.cli import _output
+
+    if args.json:
+        data = [one.as_dict() for one in found]
+        _output.print_json(data[0] if len(data) == 1 else data)
+    else:
+        for one in found:
+            print("\n".join(one.lines()))
+    if args.plot:
+        from stickslip.report.analysis_pictures import draw_analysis
+
+        draw_analysis(picture(), args.plot)
+        if not args.json:
+            print(f"picture: {args.plot}")
+
+
+# ---- spectrum ----------------------------------------------------------------------------------------------------
+
+
+def _spectrum_arguments(parser: argparse.ArgumentParser) -> None:
+    _with_records(parser)
+    parser.add_argument("--channel", default="position_error", help="default position_error")
+    parser.add_argument(
+        "--mode", action="append", default=[], metavar="NAME=HZ", help="a known mode; peaks near it get its name"
+    )  # fmt: skip
+    parser.add_argument("--resolution", type=float, metavar="HZ", help="default: 8 windows over the record")
+    parser.add_argument("--from", dest="start", type=float, default=0.0, metavar="S", help="leave out before")
+    parser.add_argument("--to", dest="end", type=float, default=float("inf"), metavar="S", help="and after")
+
+
+def _spectrum(args: argparse.Namespace) -> None:
+    from stickslip.analyse.spectrum import spectrum
+
+    modes = _named("--mode", args.mode, "Hz")
+    found = [
+        spectrum(
+            record, args.channel, modes=modes, resolution=args.resolution, start=args.start, end=args.end, name=name
+        )
+        for name, record in _opened(args)
+    ]  # fmt: skip
+
+    def picture() -> Any:
+        from stickslip.report.analysis_pictures import picture_of_spectra
+
+        return picture_of_spectra(found)
+
+    _show(args, found, picture)
+
+
+# ---- repeatability ----------------------------------------------------------------------------------------------
+
+
+def _repeatability_arguments(parser: argparse.ArgumentParser) -> None:
+    _with_records(parser)
+    parser.add_argument("--channel", default="position", help="default position")
+
+
+def _repeatability(args: argparse.Namespace) -> None:
+    from stickslip.analyse.repeatability import repeatability
+
+    groups: dict[str, list[Record]] = {}
+    for text, (name, record) in zip(args.records, _opened(args), strict=True):
+        groups.setdefault(name if "=" in text else "runs", []).append(record)
+    found = repeatability(groups, args.channel)
+
+    def picture() -> Any:
+        from stickslip.report.analysis_pictures import picture_of_repeatability
+
+        return picture_of_repeatability(found)
+
+    _show(args, found, picture)
+
+
+# ---- flexibility -------------------------------------------------------------------------------------------------
+
+
+def _flexibility_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--stiffness", required=True, metavar="K1,K2", help="of the springs, motor first, N·m/rad"
+    )
+    parser.add_argument(
+        "--inertia", required=True, metavar="J or J1,J2,J3", help="the whole, or its parts, kg·m²"
+    )
+    parser.add_argument(
+        "--torque", action="append", default=[], metavar="[NAME=]NM", help="twists the springs; repeatable"
+    )
+    parser.add_argument("--claimed", metavar="F1,F2", help="first modes to judge, Hz")
+
+
+def _flexibility(args: argparse.Namespace) -> None:
+    from stickslip.analyse.flexibility import flexibility
+
+    inertias = _numbers("--inertia", args.inertia, "kg·m²")
+    found = flexibility(
+        _numbers("--stiffness", args.stiffness, "N·m/rad"), sum(inertias),
+        torques=_named("--torque", args.torque, "N·m"), inertias=inertias if len(inertias) > 1 else (),
+        claimed=_numbers("--claimed", args.claimed, "Hz") if args.claimed else (),
+    )  # fmt: skip
+
+    def picture() -> Any:
+        from stickslip.report.analysis_pictures import picture_of_flexibility
+
+        return picture_of_flexibility(found)
+
+    _show(args, [found], picture)
+
+
+# ---- both sides, position -----------------------------------------------------------------------------------------
+
+
+def _sides_arguments(parser: argparse.ArgumentParser) -> None:
+    _with_records(parser)
+    parser.add_argument(
+        "--inertia", type=float, default=0.0, metavar="KGM2", help="where the speed changes (default 0)"
+    )
+
+
+def _sides(args: argparse.Namespace) -> None:
+    from stickslip.analyse.sides import sides
+
+    found = sides(_distinct(_opened(args)), args.inertia)
+
+    def picture() -> Any:
+        from stickslip.report.analysis_pictures import picture_of_sides
+
+        return picture_of_sides(found)
+
+    _show(args, [found], picture)
+
+
+def _distinct(named: Sequence[tuple[str, Record]]) -> dict[str, Record]:
+    """Records by name; those of the same name are numbered."""
+    names = [name for name, _ in named]
+    return {
+        name if names.count(name) == 1 else f"{name}-{names[: i + 1].count(name)}": record
+        for i, (name, record) in enumerate(named)
+    }
+
+
+def _position_arguments(parser: argparse.ArgumentParser) -> None:
+    _with_records(parser)
+    parser.add_argument("--channel", default="motor_torque", help="a torque (default motor_torque)")
+    parser.add_argument(
+        "--transient", type=float, default=20.0, metavar="DEG", help="travel left out at the start (default 20)"
+    )  # fmt: skip
+
+
+def _position(args: argparse.Namespace) -> None:
+    from math import radians
+
+    from stickslip.analyse.dependence import dependence
+
+    found = dependence(_distinct(_opened(args)), args.channel, transient=radians(args.transient))
+
+    def picture() -> Any:
+        from stickslip.report.analysis_pictures import picture_of_dependence
+
+        return picture_of_dependence(found)
+
+    _show(args, [found], picture)
+
+
+Arguments = Callable[[argparse.ArgumentParser], None]
+Work = Callable[[argparse.Namespace], None]
+ANALYSES: dict[str, tuple[str, Arguments, Work]] = {
+    "spectrum": ("power spectral density of a run that oscillates, and the modes excited",
+                 _spectrum_arguments, _spectrum),
+    "repeatability": ("how much repeated runs differ, per controller", _repeatability_arguments, _repeatability),
+    "flexibility": ("static twist, modes, and what first mode is possible at all",
+                    _flexibility_arguments, _flexibility),
+    "sides": ("motor side against sensor side: what the bearings take", _sides_arguments, _sides),
+    "position": ("torque against position and time while the axis slides", _position_arguments, _position),
+}  # fmt: skip

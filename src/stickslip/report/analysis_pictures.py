@@ -1,0 +1,181 @@
+"""Pictures of the analyses: each takes an analysis's result and gives a title, a message and panels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.analyse.dependence import Dependence
+from stickslip.analyse.flexibility import Chain, Flexibility, modes
+from stickslip.analyse.repeatability import Repeated
+from stickslip.analyse.sides import Sides
+from stickslip.analyse.spectrum import Spectrum
+from stickslip.report.plots import SPARE, Curve, Panel, Style, envelope, save, scaled
+
+__all__ = [
+    "draw_analysis",
+    "picture_of_dependence",
+    "picture_of_flexibility",
+    "picture_of_repeatability",
+    "picture_of_sides",
+    "picture_of_spectra",
+]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Drawn = tuple[str, str, Sequence[Panel], float]
+"""Title, message, panels, height of one in inches."""
+
+MAIN = Style("#0072B2", "-", 1.3)
+OTHER = Style("#D55E00", (0, (4, 1.2)), 1.3)
+BOUND = Style("#000000", (0, (1, 1.5)), 1.3)
+BAND = Style("#0072B2", "-", 0.6)
+LINES = (MAIN, OTHER, *SPARE[1:])
+SHARES = np.linspace(0.02, 0.98, 97)
+SPLITS = {"the rest at the motor": 0.001, "the rest in the middle": 0.999}
+
+
+def draw_analysis(picture: Drawn, path: Path) -> None:
+    """Save a picture to a path that ends in .svg, .png or .pdf."""
+    title, message, panels, height = picture
+    save([path], title, message, panels, height)
+
+
+def picture_of_spectra(found: Sequence[Spectrum], limit: float = 0.0) -> Drawn:
+    """Densities, one panel a record, with the modes as lines across."""
+    panels = [_density(one, limit) for one in found]
+    first = found[0].peaks[0] if found[0].peaks else None
+    where = f"strongest peak at {first.frequency:.0f} Hz" if first else "no peak stands out"
+    mode = f", {first.mode}" if first and first.mode else ""
+    return f"Spectrum of the {found[0].channel.replace('_', ' ')}", where + mode, panels, 2.0
+
+
+def _density(one: Spectrum, limit: float) -> Panel:
+    peak = float(one.density[1:].max())
+    modes = [
+        Curve(np.array([f]), np.array([peak]), f"{name} ({f:.0f} Hz)", style, "vertical")
+        for (name, f), style in zip(one.modes.items(), _marks(len(one.modes)))
+    ]
+    low = max(1e-6 * peak, 0.3 * float(one.density[1:].min()))
+    note = one.name + "".join(f"  {p.frequency:.0f} Hz" for p in one.peaks[:3])
+    return Panel(
+        [Curve(one.frequency[1:], one.density[1:], "measured", MAIN), *modes],
+        f"density ({one.unit}²/Hz)", "frequency (Hz)", (0.0, limit or 0.5 * one.sample_rate),
+        (low, 3.0 * peak), note, y_scale="log",
+    )  # fmt: skip
+
+
+def _marks(count: int) -> list[Style]:
+    return [Style(SPARE[i % len(SPARE)].colour, SPARE[i % len(SPARE)].dashes, 1.0) for i in range(count)]
+
+
+def picture_of_repeatability(found: Sequence[Repeated]) -> Drawn:
+    """Every controller's runs over time, with their range and mean."""
+    worst = max(found, key=lambda one: one.relative)
+    message = f"the runs of {worst.name} differ most: {100 * worst.relative:.2g} % of the amplitude RMS"
+    return "Repeated runs", message, [p for one in found for p in (_runs(one), _spread(one))], 1.6
+
+
+def _runs(one: Repeated) -> Panel:
+    factor, unit = scaled(float(np.max(np.abs(one.runs))), one.unit)
+    x, low = _thin(one.time, factor * one.low)
+    high = _thin(one.time, factor * one.high)[1]
+    grey = Style("#777777", "-", 0.5)
+    curves = [Curve(x, low, "range", BAND, "band", high)]
+    curves += [
+        Curve(*envelope(one.time, factor * run), "runs" if i == 0 else "", grey)
+        for i, run in enumerate(one.runs)
+    ]
+    curves.append(Curve(*_thin(one.time, factor * one.mean), "mean", MAIN))
+    note = f"{one.name}: {len(one.runs)} runs, spread {100 * one.relative:.2g} % of the amplitude"
+    channel = one.channel.replace("_", " ")
+    return Panel(curves, f"{channel} ({unit})", "time (s)", (0.0, float(one.time[-1])), None, note)
+
+
+def _spread(one: Repeated) -> Panel:
+    factor, unit = scaled(float(np.max(one.spread)), one.unit)
+    curve = Curve(*envelope(one.time, factor * one.spread), "spread", OTHER)
+    return Panel([curve], f"spread ({unit})", "time (s)", (0.0, float(one.time[-1])))
+
+
+def _thin(x: Array, y: Array, most: int = 760) -> tuple[Array, Array]:
+    step = max(1, x.size // most)
+    return x[::step], y[::step]
+
+
+def picture_of_dependence(found: Dependence) -> Drawn:
+    """Torque over the angle, one line a pass."""
+    angle = np.degrees(found.angle)
+    curves = [
+        Curve(angle, p.torque, f"{p.name}, {p.velocity:+.3g} rad/s, {p.time:.0f} s", LINES[i % len(LINES)])
+        for i, p in enumerate(found.passes[: len(LINES)])
+    ]
+    panels = [
+        Panel(
+            curves, f"{found.channel.replace('_', ' ')} (N·m)", "angle of the shaft (degrees)", (0.0, 360.0)
+        )
+    ]
+    swing = max(p.swing for p in found.passes)
+    return "Torque against position", f"peak to peak up to {swing:.3g} N·m", panels, 2.4
+
+
+def picture_of_sides(found: Sides) -> Drawn:
+    """Both torques over the velocity, and their difference with its fit."""
+    v = np.array([p.velocity for p in found.points])
+    order = np.argsort(v)
+    motor = np.array([p.motor for p in found.points])[order]
+    sensor = np.array([p.sensor for p in found.points])[order]
+    v = v[order]
+    span: Array = np.linspace(float(found.velocity.min()), float(found.velocity.max()), 401)
+    fit = np.where(np.abs(span) > 1e-3 * np.max(np.abs(span)), found.difference(span), math.nan)
+    top = Panel(
+        [Curve(v, motor, "motor", MAIN, "points"), Curve(v, sensor, "sensor", OTHER, "open points")],
+        "torque (N·m)", "velocity (rad/s)",
+    )  # fmt: skip
+    below = Panel(
+        [Curve(v, motor - sensor, "motor less sensor", BOUND, "points"), Curve(span, fit, "Coulomb and viscous", MAIN)],
+        "difference (N·m)", "velocity (rad/s)",
+    )  # fmt: skip
+    message = f"between them {found.coulomb:.3g} N·m sign(v) + {found.viscous:.3g} N·m·s/rad v"
+    return "Motor side and sensor side", message, (top, below), 1.8
+
+
+def picture_of_flexibility(found: Flexibility) -> Drawn:
+    """First mode over the share of the last inertia: however the rest is divided, none goes below the bound."""
+    curves: list[Curve] = []
+    if len(found.stiffness) == 2:
+        for i, (label, part) in enumerate(SPLITS.items()):
+            # Of what the last inertia leaves, `part` is the middle one's.
+            f = [
+                modes(Chain(((1 - s) * (1 - part) * found.inertia, (1 - s) * part * found.inertia, s * found.inertia),
+                            found.stiffness)).frequencies[1]
+                for s in SHARES
+            ]  # fmt: skip
+            curves.append(Curve(100.0 * SHARES, np.array(f), label, LINES[i]))
+    else:
+        f = [
+            modes(Chain(((1 - s) * found.inertia, s * found.inertia), found.stiffness[-1:])).frequencies[1]
+            for s in SHARES
+        ]
+        curves.append(Curve(100.0 * SHARES, np.array(f), "last spring alone", MAIN))
+    ends = np.array([0.0, 100.0])
+    curves.append(
+        Curve(ends, np.full(2, found.floor), f"lowest possible, {found.floor:.0f} Hz", Style("#000000", "-", 1.6))
+    )  # fmt: skip
+    curves += [
+        Curve(ends, np.full(2, f), f"stated, {f:.0f} Hz", Style(SPARE[i].colour, BOUND.dashes, 1.4))
+        for i, f in enumerate(found.claimed)
+    ]
+    top = 2.5 * found.floor
+    impossible = [f for f in found.claimed if f < found.floor]
+    what = " and ".join(f"{f:g} Hz" for f in impossible)
+    message = f"no division of {found.inertia:.4g} kg·m² puts the first mode below {found.floor:.0f} Hz" + (
+        f"; {what}: impossible" if impossible else ""
+    )
+    panel = Panel(
+        curves, "first mode (Hz)", "share of the last inertia in the whole (%)", (0.0, 100.0), (0.6 * found.floor, top)
+    )  # fmt: skip
+    return "What first mode the train can have", message, (panel,), 2.6

@@ -1,0 +1,91 @@
+"""Twist and modes against the thesis's numbers and known answers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip.analyse.flexibility import (
+    Chain,
+    far_inertia,
+    flexibility,
+    lowest_first_mode,
+    modes,
+    sum_of_inverse_squares,
+    twist,
+)
+from stickslip.errors import ParameterError
+
+TOTAL, SPRINGS = 4.2757e-4, (17800.0, 396.0)
+sizes = st.floats(1e-3, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("torque", "stiffness", "printed", "room"),
+    [
+        # 396 is rounded to 3 digits, so 7.46e-4 is met to 0.13 %.
+        (0.2951, 396.0, 7.46e-4, 1.3e-3),
+        (80.7454 - 80.4742, 396.0, 6.85e-4, 1e-3),
+        (0.2951, 17800.0, 1.7e-5, 0.03),
+        (80.7454 - 80.4742, 17800.0, 1.5e-5, 0.03),
+    ],
+)
+def test_twists_of_the_thesis(torque, stiffness, printed, room):
+    assert twist(torque, stiffness) == pytest.approx(printed, rel=room)
+
+
+def test_two_inertias_have_the_textbook_mode():
+    found = modes(Chain((2.0, 3.0), (50.0,)))
+    assert found.frequencies == pytest.approx([0.0, math.sqrt(50.0 * (1 / 2 + 1 / 3)) / (2 * math.pi)])
+    assert found.shapes[:, 0] == pytest.approx([1.0, 1.0])
+    assert found.shapes[:, 1] == pytest.approx([1.0, -2.0 / 3.0])
+
+
+@given(st.tuples(sizes, sizes, sizes), st.tuples(st.floats(1.0, 1e5), st.floats(1.0, 1e5)))
+def test_no_inertias_go_below_the_bound(parts, springs):
+    chain = Chain(tuple(TOTAL * p / sum(parts) for p in parts), springs)
+    frequencies = 2.0 * math.pi * modes(chain).frequencies[1:]
+    assert np.sum(frequencies**-2.0) == pytest.approx(sum_of_inverse_squares(chain), rel=1e-6)
+    assert frequencies[0] >= 2.0 * math.pi * lowest_first_mode(springs, TOTAL) * (1.0 - 1e-9)
+
+
+def test_the_bound_is_reached_and_excludes_270_hz():
+    floor = lowest_first_mode(SPRINGS, TOTAL)
+    assert floor == pytest.approx(303.0, abs=0.1)
+    halves = Chain((0.5 * TOTAL, 1e-9 * TOTAL, 0.5 * TOTAL), SPRINGS)
+    assert modes(halves).frequencies[1] == pytest.approx(floor, rel=1e-6)
+    found = flexibility(SPRINGS, TOTAL, claimed=(270.0, 330.0))
+    assert "270 Hz is impossible" in "\n".join(found.lines())
+    assert "330 Hz is possible" in "\n".join(found.lines())
+    # Read as the frequency of the far inertia with the rest held, 270 Hz is near what was measured.
+    assert far_inertia(396.0, 270.0) == pytest.approx(1.376e-4, rel=1e-3)
+    assert 320.0 < found.true_first[0] < 340.0
+
+
+def test_printed_270_and_2750_agree_as_frequencies_of_parts():
+    """With 270 Hz the far inertia's own, 2750 Hz is the mode of what is left on the coupling."""
+    rest = TOTAL - far_inertia(396.0, 270.0)
+    product = 17800.0 * rest / (2.0 * math.pi * 2750.0) ** 2
+    root = math.sqrt(rest**2 / 4.0 - product)
+    parts = (rest / 2.0 + root, rest / 2.0 - root)
+    assert modes(Chain(parts, (17800.0,))).frequencies[1] == pytest.approx(2750.0)
+    assert min(parts) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("springs", "whole", "more"),
+    [
+        ((0.0,), 1.0, {}),
+        ((1.0,), -1.0, {}),
+        ((1.0,), 1.0, {"inertias": (0.5, 0.2)}),
+        ((1.0, 1.0), 1.0, {"inertias": (0.5, 0.5)}),
+        ((1.0,), 1.0, {"claimed": (0.0,)}),
+    ],
+)
+def test_bad_input(springs, whole, more):
+    with pytest.raises(ParameterError):
+        flexibility(springs, whole, **more)
