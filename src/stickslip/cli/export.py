@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
     from stickslip.export.job import Export, Job
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--single: {chosen.name} has one precision; leave it out")
     if args.controller and not chosen.controller:
         raise InputError(f"--controller: {chosen.name} carries the law alone; leave it out, or take --to c99")
-    job = job_of(args)
+    job = job_of(args, chosen)
     if job.nearest and not chosen.forms:
         raise InputError(f"--nearest: {chosen.name} carries {chosen.carries}; leave it out")
     settings_of(chosen, job.settings)
@@ -107,7 +107,16 @@ def described(target: Target) -> list[str]:
     return lines
 
 
-def job_of(args: argparse.Namespace) -> Job:
+def axis_values(file: Path, chosen: Target) -> dict[str, str | float]:
+    """Settings of the target that an identified model's file holds of its axis (growth with the load, ...)."""
+    from stickslip.config import read_toml
+
+    axis: object = read_toml(file).values.get("axis", {})
+    known = cast("dict[str, float]", axis) if isinstance(axis, dict) else {}
+    return {s.name: known[s.name] for s in chosen.settings if s.name in known}
+
+
+def job_of(args: argparse.Namespace, chosen: Target) -> Job:
     """The model of the file, or the model and controller of a file for `stickslip simulate`."""
     import re
 
@@ -122,6 +131,7 @@ def job_of(args: argparse.Namespace) -> Job:
         if not equals:
             raise InputError(f"--set {text}: write NAME=VALUE")
         settings[key] = value
+    settings = axis_values(args.file, chosen) | settings
     options: dict[str, Any] = {
         "single": args.single, "nearest": args.nearest, "top_speed": args.top_speed, "settings": settings
     }  # fmt: skip

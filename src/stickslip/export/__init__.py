@@ -19,6 +19,9 @@ TARGETS = (
     "st",
     "fmu",
     "urdf",
+    "bam",
+    "isaac",
+    "ros",
 )
 
 

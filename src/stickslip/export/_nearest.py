@@ -11,7 +11,7 @@ import ast
 import importlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -264,6 +264,8 @@ class Nearest:
         What it does not hold; empty where it is the user's model as it is.
     residual, at : float
         Largest difference on the sliding curve, N·m, and its velocity, rad/s (0: at rest).
+    at_rest : float
+        Difference of the torque at rest, N·m.
     rms : float
         Over evenly spaced velocities of both directions, N·m.
     size, top : float
@@ -275,6 +277,7 @@ class Nearest:
     lost: tuple[str, ...]
     residual: float
     at: float
+    at_rest: float
     rms: float
     size: float
     top: float
@@ -288,6 +291,8 @@ class Nearest:
     @property
     def error(self) -> str:
         """The residual, for people."""
+        if self.residual <= EXACT * self.size:
+            return f"0 N·m off the sliding curve from 0 to {self.top:.3g} rad/s"
         place = "at rest" if self.at == 0.0 else f"at {self.at:.3g} rad/s"
         return (
             f"at most {self.residual:.3g} N·m ({100.0 * self.residual / self.size:.3g} %, {place}) off the sliding "
@@ -302,8 +307,10 @@ class Nearest:
         return (f"not carried: {'; '.join(self.lost)}", f"nearest {self.form.words}: {self.error}")
 
 
-def carried(job: Job, target: str, forms: Sequence[Form]) -> Nearest:
+def carried(job: Job, target: str, forms: Sequence[Form], also_lost: Sequence[str] = ()) -> Nearest:
     """The job's model in the first of the forms, the simplest first, that loses nothing.
+
+    ``also_lost`` is what the target does not hold for reasons of its own.
 
     Raises
     ------
@@ -313,7 +320,8 @@ def carried(job: Job, target: str, forms: Sequence[Form]) -> Nearest:
     if job.controller is not None:
         raise InputError(f"{target} carries a law alone, no controller")
     curve = Curve.of(job.model, job.top_speed)
-    tried = [found for form in forms if (found := nearest(curve, form)) is not None]
+    near = [found for form in forms if (found := nearest(curve, form)) is not None]
+    tried = [replace(found, lost=(*found.lost, *also_lost)) for found in near]
     for found in tried:
         if not found.lost:
             return found
@@ -321,7 +329,7 @@ def carried(job: Job, target: str, forms: Sequence[Form]) -> Nearest:
         raise CannotCarry(
             f"{target} carries {forms[-1].words}, and nothing of {job.model.law.name} is of that kind"
         )
-    best = min(tried, key=lambda n: (len(n.lost), n.rms))
+    best = min(tried, key=lambda n: (len(n.lost), n.rms, n.at_rest))
     if job.nearest:
         return best
     raise CannotCarry(
@@ -372,7 +380,7 @@ def _compared(curve: Curve, model: Model, form: Form) -> Nearest:
         lost.append("the shape of its sliding curve")
     elif at_rest > EXACT * curve.size and "the difference between the directions" not in lost:
         lost.append("its torque at rest")
-    return Nearest(form, model, tuple(lost), residual, at, rms, curve.size, curve.top)
+    return Nearest(form, model, tuple(lost), residual, at, at_rest, rms, curve.size, curve.top)
 
 
 def losses(curve: Curve, form: Form) -> list[str]:

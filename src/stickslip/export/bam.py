@@ -1,0 +1,244 @@
+"""BAM: parameter files of "Better Actuator Models" (M1 to M6), which its simulators load.
+
+BAM lets friction withstand the stopping torque up to a budget: base (Coulomb) torque, a Stribeck part
+exp(-(|v|/dtheta_stribeck)^alpha), parts in proportion to the torques that meet in the gearing, and viscous friction.
+M1: base and viscous; M2: with Stribeck; M3, M4: with load; M5: with a load coefficient for the motor's torque and
+one for the torque from outside; M6: with quadratic load terms, which no law here has. Keys and equations as in
+version 1.0.2, https://github.com/Rhoban/bam (Duclusaud and Passault).
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.errors import InputError, ParameterError
+from stickslip.export._nearest import COULOMB, STRIBECK, Curve, Nearest, carried
+from stickslip.export._text import render
+from stickslip.export.job import CannotCarry, Check, Export, Job
+from stickslip.export.target import Setting, Target, settings_of
+from stickslip.model import Model
+
+__all__ = ["TARGET", "Bam", "read", "write"]
+
+STRIBECK_KEYS = {"friction_stribeck": "N·m", "dtheta_stribeck": "rad/s", "alpha": "-"}
+KEYS = {
+    "friction_base": "N·m, Coulomb torque",
+    "friction_stribeck": "N·m, above it at rest",
+    "dtheta_stribeck": "rad/s, Stribeck velocity",
+    "alpha": "-, Stribeck shape factor",
+    "load_friction_base": "-, per torque in the gearing",
+    "load_friction_stribeck": "-, per torque in the gearing, above it at rest",
+    "load_friction_motor": "-, per torque of the motor",
+    "load_friction_external": "-, per torque from outside",
+    "load_friction_motor_stribeck": "-, per torque of the motor, above it at rest",
+    "load_friction_external_stribeck": "-, per torque from outside, above it at rest",
+    "load_friction_motor_quad": "1/(N·m), quadratic",
+    "load_friction_external_quad": "1/(N·m), quadratic",
+    "friction_viscous": "N·m·s/rad",
+}
+LOADS: dict[str, tuple[str, ...]] = {
+    "m1": (), "m2": (), "m3": ("load_friction_base",), "m4": ("load_friction_base", "load_friction_stribeck"),
+    "m5": ("load_friction_motor", "load_friction_external", "load_friction_motor_stribeck",
+           "load_friction_external_stribeck"),
+}  # fmt: skip
+LOADS["m6"] = (*LOADS["m5"], "load_friction_motor_quad", "load_friction_external_quad")
+UNLOADED = "the growth of its viscous part with the load"
+
+
+@dataclass(frozen=True)
+class Bam:
+    """What a parameter file says of friction.
+
+    Attributes
+    ----------
+    variant, actuator : str
+        "m1" to "m6"; BAM's name of the motor.
+    model : Model
+        Friction without load.
+    loads : mapping
+        The load terms by BAM's names, which add to the budget.
+    """
+
+    variant: str
+    actuator: str
+    model: Model
+    loads: Mapping[str, float]
+
+
+def write(job: Job) -> Export:
+    """One parameter file and how to use it."""
+    content, found = written(job)
+    name = content["model"]
+    rows = [(key, repr(content[key]), KEYS[key]) for key in content if key in KEYS]
+    values: dict[str, Any] = {
+        "x": job.name, "law": job.model.law, "variant": name, "actuator": content["actuator"], "rows": rows,
+        "notes": found.notes,
+    }  # fmt: skip
+    files = {
+        f"{job.name}.json": json.dumps(content, indent=2) + "\n",
+        "README.md": render("bam_readme.md.j2", **values),
+    }
+    return Export(files, found.notes)
+
+
+def written(job: Job) -> tuple[dict[str, Any], Nearest]:
+    """The content of the file, and the model that it holds."""
+    settings = settings_of(TARGET, job.settings)
+    motor, external = float(settings["load_motor"]), float(settings["load_external"])
+    wanted = str(settings["variant"])
+    if wanted not in ("any", *LOADS):
+        raise InputError(f"--set variant={wanted}: choose any or one of {', '.join(LOADS)}")
+    forms, loaded = [COULOMB, STRIBECK], motor > 0.0 or external > 0.0
+    if wanted in ("m1", "m3"):
+        forms = [COULOMB]
+    if loaded and _exponent(job.model) == 1.0:
+        forms = [replace(form, keeps=form.keeps | {"load"}) for form in forms]
+    sigma2 = Curve.of(job.model).model.parameters._asdict().get("sigma2", 0.0)
+    found = carried(job, TARGET.name, forms, [UNLOADED] if loaded and sigma2 != 0.0 else [])
+    variant = _variant(found.form.law == STRIBECK.law, motor, external)
+    if wanted != "any":
+        variant = _checked(wanted, variant)
+    return _content(found.model, variant, motor, external) | {
+        "model": variant, "actuator": settings["actuator"]
+    }, found  # fmt: skip
+
+
+def _exponent(model: Model) -> float | None:
+    """The power of the relative load where the law reads it itself; 1 where friction is scaled from outside."""
+    values: dict[str, float] = model.parameters._asdict()
+    return values.get("load_exponent", 1.0)
+
+
+def _variant(stribeck: bool, motor: float, external: float) -> str:
+    """The simplest variant with these parts."""
+    if motor != external:
+        return "m5"
+    if motor > 0.0:
+        return "m4" if stribeck else "m3"
+    return "m2" if stribeck else "m1"
+
+
+def _checked(wanted: str, least: str) -> str:
+    """The variant asked for, where it has all the parts of the simplest one."""
+    holds = {"m1": ("m1", "m2", "m3", "m4", "m5", "m6"), "m2": ("m2", "m4", "m5", "m6"), "m3": ("m3", "m4", "m5", "m6"),
+             "m4": ("m4", "m5", "m6"), "m5": ("m5", "m6")}  # fmt: skip
+    if wanted in holds[least]:
+        return wanted
+    raise CannotCarry(
+        f"bam's {wanted} would lose friction that grows with the load; leave --set variant={wanted} out for {least}, "
+        "or set load_motor and load_external to 0"
+    )
+
+
+def _content(model: Model, variant: str, motor: float, external: float) -> dict[str, Any]:
+    values: dict[str, float] = model.parameters._asdict()
+    base = values["fc"]
+    rise = values.get("fs", base) - base
+    out = {"friction_base": base}
+    if variant not in ("m1", "m3"):
+        out |= {
+            "friction_stribeck": rise,
+            "dtheta_stribeck": values.get("vs", 0.1),
+            "alpha": values.get("delta_s", 2.0),
+        }
+    loads = {
+        "load_friction_base": base * motor, "load_friction_stribeck": rise * motor,
+        "load_friction_motor": base * motor, "load_friction_external": base * external,
+        "load_friction_motor_stribeck": rise * motor, "load_friction_external_stribeck": rise * external,
+        "load_friction_motor_quad": 0.0, "load_friction_external_quad": 0.0,
+    }  # fmt: skip
+    return out | {key: loads[key] for key in LOADS[variant]} | {"friction_viscous": values["sigma2"]}
+
+
+# ---- the way back -----------------------------------------------------------------------------------------------
+
+
+def read(text: str) -> Bam:
+    """The friction of a BAM parameter file.
+
+    Raises
+    ------
+    InputError
+        If it is no such file, or a number of its variant is missing.
+    """
+    try:
+        content: Any = json.loads(text)
+    except ValueError as error:
+        raise InputError(f"this is no BAM file: {error}") from None
+    if not isinstance(content, dict) or cast("dict[str, Any]", content).get("model") not in LOADS:
+        raise InputError('this is no BAM file: it has no "model" that is one of m1 to m6')
+    table = cast("dict[str, Any]", content)
+    variant = str(table["model"])
+    bent = variant not in ("m1", "m3")
+    fc, sigma2 = _number(table, "friction_base"), _number(table, "friction_viscous")
+    loads = {key: _number(table, key) for key in LOADS[variant]}
+    values: dict[str, Any] = {"fc": fc, "sigma2": sigma2}
+    if bent:
+        values |= {
+            "fs": fc + _number(table, "friction_stribeck"),
+            "vs": _number(table, "dtheta_stribeck"),
+            "delta_s": _number(table, "alpha"),
+        }
+    try:
+        model = Model("stribeck_plain" if bent else "coulomb", **values)
+    except ParameterError as error:
+        raise InputError(f"a BAM file of a friction that no law here has: {error}") from None
+    return Bam(variant, str(table.get("actuator", "")), model, loads)
+
+
+def _number(table: Mapping[str, Any], key: str) -> float:
+    value = table.get(key)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(f"a BAM file of model {table['model']} needs the number {key!r}, not {value!r}")
+    return float(value)
+
+
+# ---- the check --------------------------------------------------------------------------------------------------
+
+
+def check(job: Job, export: Export) -> Check:
+    """Compare with the budget that BAM itself computes, where it is installed."""
+    if importlib.util.find_spec("bam") is None or importlib.util.find_spec("bam.model") is None:
+        return Check(None, "BAM is not installed (https://github.com/Rhoban/bam)")
+    theirs: Any = importlib.import_module("bam.model")
+    content = json.loads(str(export.files[f"{job.name}.json"]))
+    settings = settings_of(TARGET, job.settings)
+    loaded = theirs.load_model_from_dict(content)
+    _, found = written(job)
+    ours, viscous = Curve.of(found.model, found.top), found.model.parameters.sigma2
+    errors: list[float] = []
+    for v in ours.velocity:
+        for drive, outside in ((0.0, 0.0), (1.0, -0.5), (-0.4, 2.0)):
+            budget, damping = loaded.compute_frictions(drive, outside, float(v))
+            share = 1.0 + abs(
+                float(settings["load_motor"]) * drive - float(settings["load_external"]) * outside
+            )
+            expected = share * (ours.torque(float(v)) - viscous * v) + viscous * v
+            errors.append(abs(float(budget) + damping * v - expected))
+    worst = float(np.max(errors))
+    return Check(worst <= 1e-9 * ours.size, f"BAM: at most {worst:.3g} N·m off", {"bam": worst})
+
+
+TARGET = Target(
+    "bam",
+    "BAM parameter file (Better Actuator Models, M1 to M6)",
+    write,
+    check,
+    forms=(
+        COULOMB,
+        replace(STRIBECK, words="Stribeck and viscous friction, also growing with the torque in the gearing"),
+    ),
+    settings=(
+        Setting("actuator", "mx106", "BAM's name of the motor"),
+        Setting("variant", "any", "m1 to m6, or any: the simplest that holds the law"),
+        Setting("load_motor", 0.0, "growth of friction per torque of the motor, 1/(N·m)", 0.0, 1e6),
+        Setting("load_external", 0.0, "growth of friction per torque from outside, 1/(N·m)", 0.0, 1e6),
+    ),
+)
