@@ -2,7 +2,8 @@
 
 The controller of an ``effort`` interface adds ``gains.<joint>.ff_velocity_scale`` times the desired velocity, read in
 the parameter file of ros2_controllers 6 (the key is the same since 2), and the ``effort`` of a trajectory's points
-(since March 2025, pull request 1200). It has no key for Coulomb friction; a function of one file puts that into the points.
+(since March 2025, pull request 1200). It has no key for Coulomb friction; a function of one file puts that
+into the points.
 """
 
 from __future__ import annotations
