@@ -1,23 +1,23 @@
 """One suite over every pair of law and target: it writes, says what it cannot carry, and passes its own check."""
 
-import importlib
 from pathlib import Path
 
 import pytest
 
 from laws import farthest, label, registered
 from stickslip import plugins
-from stickslip.export import TARGETS
+from stickslip.export import TARGETS, target_named
 from stickslip.export.job import CannotCarry, Job
 from stickslip.model import Model
 
-ALL = {name: importlib.import_module(f"stickslip.export.{name}").TARGET for name in TARGETS}
+ALL = {name: target_named(name) for name in TARGETS}
 ODD = plugins.law(str(Path(__file__).with_name("odd_names.py")))
 LAWS = [ODD, *registered(), *(farthest(law) for law in registered() if law.choices)]
 
 
-def job(law, **more):
-    return Job(Model(law, **dict(law.example)), "friction", **more)
+def job(law, target, **more):
+    needed = {s.name: 4e-4 for s in target.settings if s.default is None}
+    return Job(Model(law, **dict(law.example)), "friction", settings=needed, **more)
 
 
 def held_to_its_check(target, order, export):
@@ -34,7 +34,7 @@ def held_to_its_check(target, order, export):
 @pytest.mark.parametrize("law", LAWS, ids=label)
 @pytest.mark.parametrize("target", ALL.values(), ids=lambda t: t.name)
 def test_a_law_leaves_or_is_refused_with_what_is_lost_and_the_nearest(target, law):
-    order = job(law)
+    order = job(law, target)
     try:
         held_to_its_check(target, order, target.write(order))
         return
@@ -45,7 +45,7 @@ def test_a_law_leaves_or_is_refused_with_what_is_lost_and_the_nearest(target, la
     assert f"{law.name} would lose" in said
     assert "off the sliding curve" in said
     assert said.endswith("--nearest")
-    order = job(law, nearest=True)
+    order = job(law, target, nearest=True)
     export = target.write(order)
     assert any(note.startswith("not carried: ") for note in export.notes)
     held_to_its_check(target, order, export)
@@ -55,9 +55,9 @@ def test_a_law_leaves_or_is_refused_with_what_is_lost_and_the_nearest(target, la
 def test_a_targets_check_fails_on_a_wrong_export(target, monkeypatch):
     if target.check is None:
         pytest.skip("nothing to run")
-    right, other = job(ODD), Model(ODD, **{k: 1.1 * v for k, v in ODD.example.items()})
+    right, other = job(ODD, target), Model(ODD, **{k: 1.1 * v for k, v in ODD.example.items()})
     export = target.write(right)
-    wrong = target.write(Job(other, right.name))
+    wrong = target.write(Job(other, right.name, settings=right.settings))
     mixed = {
         **export.files,
         **{n: c for n, c in wrong.files.items() if "golden" not in n and "check" not in n},

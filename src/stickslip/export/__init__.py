@@ -18,6 +18,7 @@ TARGETS = (
     "matlab",
     "st",
     "fmu",
+    "fmu-axis",
     "urdf",
     "bam",
     "isaac",
@@ -34,5 +35,5 @@ def target_named(name: str) -> Target:
     """
     if name not in TARGETS:
         raise UnknownName("export target", name, TARGETS)
-    found: Target = importlib.import_module(f"stickslip.export.{name}").TARGET
+    found: Target = importlib.import_module(f"stickslip.export.{name.replace('-', '_')}").TARGET
     return found

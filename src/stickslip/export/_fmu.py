@@ -27,7 +27,7 @@ from stickslip.export._text import ascii_only, render
 from stickslip.export.job import Job
 from stickslip.spec import Field, Surroundings
 
-__all__ = ["VERSIONS", "Variable", "archive", "law_variables", "numbered", "unit_named"]
+__all__ = ["VERSIONS", "Variable", "archive", "law_variables", "numbered", "surroundings_read", "units_of"]
 
 VERSIONS = {"2.0": "fmi2", "3.0": "fmi3"}
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-builtin", "-fPIC", "-shared", "-fvisibility=hidden")
@@ -164,6 +164,25 @@ def numbered(variables: Iterable[Variable]) -> list[Variable]:
         taken.add(name)
         out.append(replace(v, name=name, reference=len(out) + 1))
     return out
+
+
+def units_of(
+    job: Job, core: str, variables: Sequence[Variable], about: str, **more: Any
+) -> tuple[dict[str, bytes], tuple[str, ...]]:
+    """The unit of each version by its file's name (2.0 has the plain one, most importers read it), and what to say.
+
+    The arguments are those of `archive`.
+    """
+    files: dict[str, bytes] = {}
+    compiled = True
+    for fmi, kind in VERSIONS.items():
+        name = f"{job.name}.fmu" if fmi == "2.0" else f"{job.name}_{kind}.fmu"
+        files[name], binary = archive(job, fmi, core, variables, about, **more)
+        compiled = compiled and binary
+    missing = (
+        "no compiler for Linux on x86-64 here, so the units hold sources only; `fmpy compile` builds them"
+    )
+    return files, () if compiled else (missing,)
 
 
 def archive(

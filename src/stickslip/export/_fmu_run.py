@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -18,7 +18,12 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def played(
-    unit: str | bytes, dt: Array, inputs: Mapping[str, Array], outputs: Sequence[str], **start: float
+    unit: str | bytes,
+    time: Array,
+    dt: Array,
+    inputs: Mapping[str, Array],
+    outputs: Sequence[str],
+    **start: float,
 ) -> Array | Check:
     """Outputs after each communication step, shape (n, outputs); a `Check` where it cannot run or is not valid.
 
@@ -26,8 +31,8 @@ def played(
     ----------
     unit : bytes
         The file.
-    dt : array, shape (n,)
-        Communication steps, s.
+    time, dt : array, shape (n,)
+        Communication points and steps, s.
     inputs : mapping of str to array, shape (n,)
         Set before each step; those that the unit does not have are left out.
     outputs : sequence of str
@@ -49,11 +54,11 @@ def played(
         fmpy.extract(str(file), unzipdir=folder)
         if not Path(folder, "binaries").exists():
             return Check(None, "FMPy: valid; not run, there is no binary in it")
-        return stepped(described, folder, dt, inputs, outputs, start)
+        return stepped(described, folder, time, dt, inputs, outputs, start)
 
 
 def stepped(
-    described: Any, folder: str, dt: Array, inputs: Mapping[str, Array], outputs: Sequence[str],
+    described: Any, folder: str, time: Array, dt: Array, inputs: Mapping[str, Array], outputs: Sequence[str],
     start: Mapping[str, float],
 ) -> Array:  # fmt: skip
     """Instantiate the unit in the folder and step it."""
@@ -74,13 +79,13 @@ def stepped(
     unit.enterInitializationMode()
     unit.exitInitializationMode()
     known = [name for name in inputs if name in references]
-    columns = zip(*(inputs[name].tolist() for name in known)) if known else ((),) * dt.size
-    time = 0.0
+    columns: Iterable[Sequence[float]] = (
+        zip(*(inputs[name].tolist() for name in known)) if known else ((),) * dt.size
+    )
     rows: list[Any] = []
-    for h, values in zip(dt.tolist(), columns):
+    for now, h, values in zip(time.tolist(), dt.tolist(), columns):
         set_values([references[name] for name in known], list(values))
-        unit.doStep(time, h)
-        time += h
+        unit.doStep(now, h)
         rows.append(get_values([references[name] for name in outputs]))
     unit.terminate()
     unit.freeInstance()

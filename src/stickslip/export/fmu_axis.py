@@ -1,0 +1,146 @@
+"""FMI 2.0 and 3.0 co-simulation: an axis with friction, J dv/dt = torque - friction torque.
+
+The input is the torque, held over a step; outputs are position, velocity and friction torque. Each step is cut into
+equal parts of at most ``max_step``, and each part is the two-stage L-stable SDIRK of `stickslip.simulation.driven`:
+at equal steps the unit moves as `stickslip.simulation.driven.drive_axis` does (tested).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip.export._fmu import Variable, law_variables, numbered, surroundings_read, units_of
+from stickslip.export._fmu_run import played
+from stickslip.export._text import render
+from stickslip.export.job import Check, Export, Job
+from stickslip.export.target import Setting, Target, settings_of
+
+__all__ = ["BOUND", "MAX_STEP", "TARGET", "Driven", "driven", "inertia_of"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+BOUND = 1e-9
+"""Largest error against the package's own motion: rad, rad/s, N·m."""
+MAX_STEP = 1e-3
+"""Longest part of a step to begin with, s."""
+
+
+class Driven(NamedTuple):
+    """Communication steps of equal length, and how the package's own axis moves: shape (n,) each."""
+
+    dt: Array
+    torque: Array
+    position: Array
+    velocity: Array
+
+
+def inertia_of(job: Job) -> float:
+    """The inertia of the job, kg·m²."""
+    return float(settings_of(TARGET, job.settings)["inertia"])
+
+
+def variables_of(job: Job) -> list[Variable]:
+    """Ports, mechanics, parameters and state."""
+    around = [v for v in surroundings_read(job) if v.name not in ("position", "applied")]
+    return numbered(
+        [
+            Variable("torque", "torque", "input", "N.m", "Torque of the drive, held over a step", 0.0),
+            *around,
+            Variable("position", "position", "output", "rad", "Angle of the axis"),
+            Variable("velocity", "velocity", "output", "rad/s", "Angular velocity of the axis"),
+            Variable(
+                "friction_torque", "friction_torque", "output", "N.m", "Positive against positive velocity"
+            ),
+            Variable(
+                "inertia",
+                "inertia",
+                "parameter",
+                "kg.m2",
+                "Moment of inertia",
+                inertia_of(job),
+                positive=True,
+            ),
+            Variable("start_position", "start_position", "parameter", "rad", "Angle at the start", 0.0),
+            Variable("start_velocity", "start_velocity", "parameter", "rad/s", "Velocity at the start", 0.0),
+            Variable(
+                "max_step", "max_step", "parameter", "s", "Longest part of a step", MAX_STEP, positive=True
+            ),
+            *law_variables(job),
+        ]
+    )
+
+
+def write(job: Job) -> Export:
+    """A unit of each version, vectors, and how to use them."""
+    about = f"Axis with friction: {job.model.law.title}"
+    variables = variables_of(job)
+    files, notes = units_of(
+        job,
+        "fmu_axis.c.j2",
+        variables,
+        about,
+        slope=None,
+        inertia=repr(inertia_of(job)),
+        max_step=repr(MAX_STEP),
+    )
+    readme = render(
+        "fmu_axis_readme.md.j2",
+        x=job.name,
+        law=job.model.law,
+        variables=variables,
+        files=list(files),
+        compiled=not notes,
+    )
+    return Export({**files, "golden.csv": as_csv(driven(job)), "README.md": readme}, notes)
+
+
+def driven(job: Job, count: int = 400, step: float = 1e-3, seed: int = 1) -> Driven:
+    """A random torque, new every 20 steps and often below break-away, and the motion of `drive_axis` under it."""
+    from stickslip.simulation.driven import Drive, Mechanics, drive_axis
+
+    draw = np.random.default_rng(seed)
+    law, p = job.model.law, job.model.parameters
+    sliding = abs(law.steady(1e-3, p)) if law.steady else 1.0
+    level = sliding * draw.choice((-1.0, 1.0), count) * draw.uniform(0.0, 1.6, count)
+    torque = np.repeat(level, 20)[:count]
+    time: Array = step * np.arange(count + 1, dtype=np.float64)
+    drive = Drive(time, np.append(torque, torque[-1]), max_step=MAX_STEP)
+    motion = drive_axis(Mechanics(inertia=inertia_of(job)), job.model, drive)
+    return Driven(time[1:] - time[:-1], torque, motion[1:, 0], motion[1:, 1])
+
+
+def as_csv(vectors: Driven) -> str:
+    """The vectors as CSV; numbers with all their digits."""
+    rows = "\n".join(",".join(repr(float(x)) for x in row) for row in zip(*vectors))
+    return f"dt_s,torque_Nm,position_rad,velocity_rad_s\n{rows}\n"
+
+
+def check(job: Job, export: Export) -> Check:
+    """Validate the units in FMPy and drive them as the package's own axis was driven."""
+    wanted = np.genfromtxt(str(export.files["golden.csv"]).splitlines(), delimiter=",", names=True)
+    errors: dict[str, float] = {}
+    still = np.zeros(wanted.size)  # the package's axis takes no account of a slow change over time
+    for name, unit in export.files.items():
+        if not name.endswith(".fmu"):
+            continue
+        answer = played(
+            unit, still, wanted["dt_s"], {"torque": wanted["torque_Nm"]}, ("position", "velocity")
+        )
+        if isinstance(answer, Check):
+            return answer
+        off = np.abs(answer - np.column_stack([wanted["position_rad"], wanted["velocity_rad_s"]]))
+        errors[name] = float(off.max())
+    worst = max(errors.values())
+    return Check(
+        worst <= BOUND, f"FMPy: valid; at most {worst:.3g} rad or rad/s off the package's axis", errors
+    )
+
+
+TARGET = Target(
+    "fmu-axis",
+    "FMI 2.0 and 3.0 co-simulation unit of an axis with friction",
+    write,
+    check,
+    settings=(Setting("inertia", None, "inertia of the axis, kg·m²", lower=1e-15),),
+)
