@@ -13,6 +13,7 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.identify.estimate import Identification
 from stickslip.identify.noise import noise_of_repeats
 from stickslip.identify.optimum import central_differences, descend
+from stickslip.identify.secant import descend_by_secants
 from stickslip.identify.selection import criteria, cross_validate
 from stickslip.identify.uncertainty import fit
 from stickslip.identify.vector import Parameter, Vector
@@ -84,6 +85,36 @@ def test_rosenbrock_to_the_last_digit() -> None:
     out = descend(lambda u: np.array([10.0 * (u[1] - u[0] ** 2), 1.0 - u[0]]), np.array([-1.2, 1.0]),
                   np.full(2, -9.0), np.full(2, 9.0))  # fmt: skip
     assert out.u == pytest.approx([1.0, 1.0], abs=1e-12)
+
+
+def test_secants_reach_the_same_minimum_with_fewer_evaluations() -> None:
+    x = np.linspace(0.0, 3.0, 25)
+    y = 2.0 * np.exp(-1.3 * x) + 0.4 + np.random.default_rng(1).normal(0.0, 0.02, x.size)
+    calls = [0]
+
+    def residuals(u: np.ndarray) -> np.ndarray:
+        calls[0] += 1
+        return u[0] * np.exp(-u[1] * x) + u[2] - y
+
+    start, free = np.array([1.0, 0.1, 0.0]), np.full(3, np.inf)
+    ours = descend(residuals, start, -free, free, tolerance=1e-10)
+    full, calls[0] = calls[0], 0
+    u, cost = descend_by_secants(residuals, start, -free, free, tolerance=1e-10)
+    assert calls[0] < 0.7 * full
+    assert u == pytest.approx(ours.u, rel=1e-4)
+    assert cost == pytest.approx(ours.cost, rel=1e-8)
+    bounded, _ = descend_by_secants(residuals, start, np.array([-9.0, -9.0, 0.45]), free, tolerance=1e-10)
+    assert bounded == pytest.approx(descend(residuals, start, np.array([-9.0, -9.0, 0.45]), free).u, rel=1e-4)
+    held, _ = descend_by_secants(residuals, start, -free, free, held=[2], tolerance=1e-10)
+    assert held[2] == 0.0
+    assert held == pytest.approx(descend(residuals, start, -free, free, held=[2]).u, rel=1e-4)
+
+
+def test_secants_follow_a_curved_valley() -> None:
+    u, cost = descend_by_secants(lambda u: np.array([10.0 * (u[1] - u[0] ** 2), 1.0 - u[0]]), np.array([-1.2, 1.0]),
+                                 np.full(2, -9.0), np.full(2, 9.0), tolerance=1e-12)  # fmt: skip
+    assert u == pytest.approx([1.0, 1.0], abs=1e-6)
+    assert cost < 1e-12
 
 
 @pytest.mark.parametrize("given_noise", [0.1, None])

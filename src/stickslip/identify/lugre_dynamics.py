@@ -22,7 +22,8 @@ from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identify.hysteresis import correlation_lags
 from stickslip.identify.noise import Noise, as_noise
-from stickslip.identify.optimum import descend
+from stickslip.identify.optimum import Residuals
+from stickslip.identify.secant import descend_by_secants
 from stickslip.identify.uncertainty import Fit, fit
 from stickslip.identify.vector import Vector
 from stickslip.model import Model
@@ -42,8 +43,12 @@ STEP = 2e-4
 """s, longest step of the simulation, whose error is extrapolated to none from this one and half of it."""
 ROUGH = 1e-3
 """s, the same while the search is far from its minimum."""
-ENOUGH = 1e-6
-"""Decrease of the sum of squares, relative, that ends the search: far below a standard deviation for any record."""
+ENOUGH = 0.1
+"""Decrease of the sum of squares, in squared standard deviations of a sample, that ends the search."""
+BUSY = (0.1, 10.0)
+"""Times the Stribeck velocity: between these speeds friction falls and rises, and nearly all error is made there."""
+GRADES = ((0.02, STEP), (0.002, 5e-5))
+"""s before and after these speeds, and the longest step there, s; what rings after a stop has died away by then."""
 FLAT = 1.1
 """Misfits within this factor are not told apart."""
 
@@ -149,30 +154,67 @@ class Simulation:
 
     LuGre's friction is smooth but for its slope at zero velocity, so that the error of the second-order step falls
     with its square; two runs, one with half the step of the other, take that part away (Richardson 1911).
+    ``longest`` is the longest step, s, between all samples or between each two.
     """
 
-    def __init__(self, response: Response, vector: Vector, inertia: float, longest: float = STEP) -> None:
+    def __init__(
+        self, response: Response, vector: Vector, inertia: float, longest: float | Array = STEP
+    ) -> None:
         assert vector.base is not None
-        self.vector, self.mechanics = vector, Mechanics(inertia)
-        period = float(np.median(np.diff(response.time)))
-        # Chords of a sine at 1 kHz lose 3e-6 of it, which a slip makes into 1e-5 rad: follow the bend.
-        self.parts = max(1, math.ceil(period / longest - 1e-9))
-        index = np.arange(response.time.size, dtype=np.float64)
-        between = np.arange((index.size - 1) * self.parts + 1) / self.parts
-        time = np.interp(between, index, response.time)
-        torque: Array = np.asarray(Akima1DInterpolator(response.time, response.torque, method="makima")(time))
+        self.response, self.vector, self.mechanics = response, vector, Mechanics(inertia)
+        period = np.diff(response.time)
+        parts = np.maximum(np.ceil(period / longest - 1e-9), 1.0).astype(np.intp)
+        self.rows = np.concatenate([[0], np.cumsum(parts)])
+        first = np.repeat(np.arange(parts.size), parts)
+        inside = (np.arange(first.size) - self.rows[first]) / parts[first]
+        time = np.append(response.time[first] + inside * period[first], response.time[-1])
+        # Chords of a sine at 1 kHz lose 3e-6 of it, which a slip makes into 1e-5 rad: both follow the bend, so that
+        # what is left of it is taken away too.
+        bend = Akima1DInterpolator(response.time, response.torque, method="makima")
         start = (float(response.position[0]), 0.0)
-        step = min(period, longest)
         self.coarse, self.fine = (
-            Course(vector.base.law, Drive(time, torque, "linear", start=start, max_step=h))
-            for h in (step, 0.5 * step)
+            Course(vector.base.law, Drive(t, np.asarray(bend(t)), "linear", start=start, max_step=math.inf))
+            for t in (time, with_middles(time))
         )
 
     def position(self, u: Array) -> Array:
         """rad, at the times of the record."""
         parameters = self.vector.law_parameters(u)
-        coarse, fine = (c.run(self.mechanics, parameters)[:: self.parts, 0] for c in (self.coarse, self.fine))
+        coarse = self.coarse.run(self.mechanics, parameters)[self.rows, 0]
+        fine = self.fine.run(self.mechanics, parameters)[2 * self.rows, 0]
         return fine + (fine - coarse) / 3.0
+
+    def graded(self, u: Array, vs: float) -> Simulation:
+        """The same with steps as short as the motion at u asks for."""
+        velocity = self.fine.run(self.mechanics, self.vector.law_parameters(u))[2 * self.rows, 1]
+        return Simulation(
+            self.response, self.vector, self.mechanics.inertia, graded(self.response, velocity, vs)
+        )
+
+
+def misfit(response: Response, simulation: Simulation) -> Residuals:
+    """Simulated minus measured position at the vector's coordinates, rad."""
+    return lambda u: simulation.position(u) - response.position
+
+
+def with_middles(values: Array) -> Array:
+    """The values with the middle of every two between them."""
+    out = np.zeros(2 * values.size - 1)
+    out[::2], out[1::2] = values, 0.5 * (values[:-1] + values[1:])
+    return out
+
+
+def graded(response: Response, velocity: Array, vs: float) -> Array:
+    """Longest steps between the samples, s: short where the axis breaks away or comes to rest, shape (n - 1,)."""
+    speed, time = np.abs(velocity), response.time
+    busy = time[(speed > BUSY[0] * vs) & (speed < BUSY[1] * vs)]
+    longest = np.full(time.size - 1, ROUGH)
+    for around, step in GRADES if busy.size else ():
+        right = np.minimum(np.searchsorted(busy, time), busy.size - 1)
+        left = np.maximum(right - 1, 0)
+        close = np.minimum(np.abs(busy[right] - time), np.abs(time - busy[left])) <= around
+        longest[close[:-1] | close[1:]] = step
+    return longest
 
 
 def fit_position(
@@ -184,26 +226,27 @@ def fit_position(
     Right where the friction is LuGre's; where it is not, see `identify_lugre_dynamics`.
     """
     vector = lugre_vector(sliding, sigma0, sigma1)
-    simulation = Simulation(response, vector, inertia)
     rough = Simulation(response, vector, inertia, ROUGH)
-
-    def residuals(u: Array) -> Array:
-        return simulation.position(u) - response.position
-
     # sigma0 alone first: far from the minimum sigma1 would be driven to 0, which it leaves slowly.
-    near = descend(
-        lambda u: rough.position(u) - response.position, vector.start, vector.lower, vector.upper,
+    near, _ = descend_by_secants(
+        misfit(response, rough), vector.start, vector.lower, vector.upper,
         held=[vector.names.index("sigma1")], tolerance=0.1, difference=DIFFERENCE,
     )  # fmt: skip
+    enough = ENOUGH / response.time.size
+    near, _ = descend_by_secants(
+        misfit(response, rough.graded(near, sliding["vs"])), near, vector.lower, vector.upper, tolerance=enough,
+        difference=DIFFERENCE,
+    )  # fmt: skip
+    residuals = misfit(response, rough.graded(near, sliding["vs"]))
     known, size = as_noise(noise), float(np.ptp(response.position))
     first = fit(
         residuals,
         vector,
         noise=known,
         size=size,
-        starts=near.u[None, :],
+        starts=near[None, :],
         profiles=False,
-        tolerance=ENOUGH,
+        tolerance=enough,
         difference=DIFFERENCE,
     )
     # What exceeds the noise is error of the model or the simulation, and correlated.
@@ -212,7 +255,7 @@ def fit_position(
         return first
     return fit(
         residuals, vector, noise=known, size=size, starts=first.u[None, :], profiles=profiles, lags=lags,
-        tolerance=ENOUGH, difference=DIFFERENCE,
+        tolerance=enough, difference=DIFFERENCE,
     )  # fmt: skip
 
 
@@ -257,16 +300,25 @@ def identify_lugre_dynamics(
 
     wanted = bristles(response.position)
 
-    def residuals(u: Array) -> Array:
-        return bristles(simulation.position(u)) - wanted
+    def descended(u: Array) -> tuple[Array, float]:
+        stepped = simulation.graded(u, sliding["vs"])
+        return descend_by_secants(
+            lambda u: bristles(stepped.position(u)) - wanted, u, vector.lower, vector.upper, tolerance=enough,
+            difference=DIFFERENCE,
+        )  # fmt: skip
 
+    # sigma1 hardly matters here, and may end at either of its bounds.
+    enough, undamped = ENOUGH / wanted.size, vector.start.copy()
+    undamped[vector.names.index("sigma1")] = 0.0
+    near = min((descended(u) for u in (vector.start, undamped)), key=lambda found: found[1])[0]
+    stepped = simulation.graded(near, sliding["vs"])
     found = fit(
-        residuals,
+        lambda u: bristles(stepped.position(u)) - wanted,
         vector,
         noise=known,
         size=float(np.max(np.abs(wanted))),
-        starts=1,
-        tolerance=ENOUGH,
+        starts=near[None, :],
+        tolerance=enough,
         difference=DIFFERENCE,
     )
     scan = plain_scan(response, simulation, found)

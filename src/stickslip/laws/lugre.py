@@ -55,8 +55,11 @@ def relax(v0: float, v1: float, dt: float, z: float, p: Any) -> float:
     """
     vm = 0.5 * (v0 + v1)
     s0 = sliding(v0, p)
-    s1 = sliding(v1, p)
-    exponent = p.sigma0 * dt / 6.0 * (abs(v0) / s0 + 4.0 * abs(vm) / sliding(vm, p) + abs(v1) / s1)
+    s1 = s0
+    exponent = p.sigma0 * dt * abs(v0) / s0
+    if v0 != v1:
+        s1 = sliding(v1, p)
+        exponent = p.sigma0 * dt / 6.0 * (abs(v0) / s0 + 4.0 * abs(vm) / sliding(vm, p) + abs(v1) / s1)
     if vm < 0.0:
         s0 = -s0
         s1 = -s1

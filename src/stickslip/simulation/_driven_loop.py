@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulation._driven_step import BACK_EMF, BACKLASH, DRIVE_GAIN, Plant, advance
+from stickslip.simulation._driven_step import BACK_EMF, BACKLASH, DRIVE_GAIN, INERTIA, Plant, advance
 
 # ---- the drive's numbers ----------------------------------------------------------------------------------
 (
@@ -92,10 +92,11 @@ def follow(
     """Simulate over the record's times; returns how many rows of `out` were reached with finite numbers."""
     n = numbers
     states, trial, base = start.copy(), start.copy(), start.copy()
+    slopes = np.full(2, n[INERTIA])
     z = pointer(states, 0)
     plant = Plant(
         pointer(numbers, 0), step, holding, pointer(parameters, 0), pointer(surroundings, 0), pointer(base, 0),
-        pointer(trial, 0), start.size,
+        pointer(trial, 0), pointer(slopes, 0), start.size,
     )  # fmt: skip
     state, m = np.zeros(2), np.zeros(MEMORY)
     state[0], state[1] = c[START_POSITION], c[START_VELOCITY]
@@ -129,7 +130,7 @@ def follow(
         if not (math.isfinite(state[0]) and abs(state[1]) < SPEED_LIMIT):
             return k + 1
     # The arrays are used here so that they outlive their addresses.
-    return rows if states.size + trial.size + base.size >= 0 else 0
+    return rows if states.size + trial.size + base.size + slopes.size >= 0 else 0
 
 
 @kernel()

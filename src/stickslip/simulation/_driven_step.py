@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from stickslip.jit import call_holding, call_step, kernel
 
 GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
-ROUNDING = 1e-13  # of the velocity, relative above 1e-2
+ROUNDING = 1e-11  # of the velocity, relative above 1e-2
 
 # ---- the plant's numbers ----------------------------------------------------------------------------------
 (
@@ -39,6 +39,7 @@ class Plant(NamedTuple):
     surroundings: Any
     base: Any
     trial: Any
+    slopes: Any
     states: int
 
 
@@ -99,11 +100,21 @@ def unbalance(
 
 @kernel()
 def stage(
-    plant: Plant, z0: Any, q0: float, v0: float, drive: float, h: float, factor: float, guess: float
+    plant: Plant,
+    z0: Any,
+    q0: float,
+    v0: float,
+    drive: float,
+    h: float,
+    factor: float,
+    guess: float,
+    which: int,
 ) -> float:
-    """The velocity after a stage of backward Euler from (q0, v0, z0); ``trial`` holds the law's new state."""
+    """The velocity after a stage of backward Euler from (q0, v0, z0); ``trial`` holds the law's new state.
+
+    ``which`` is the stage's place in ``slopes``: how the unbalance rose with the velocity when it was last solved.
+    """
     n = plant.numbers
-    low, side = 0.0, 0.0
     if plant.holding != 0:
         impulse = n[INERTIA] * v0 + h * (drive - outer(n, q0))
         side = 1.0 if impulse > 0.0 else -1.0
@@ -111,49 +122,60 @@ def stage(
         if abs(impulse) <= h * held:
             friction(plant, z0, 0.0, h, factor)
             return 0.0
-        f_low = side * h * held - impulse
-        low, high = 0.0, (impulse - side * h * held) / n[INERTIA]
+        # The unbalance jumps at rest: on this side of it lies the root.
+        near, f_near = 0.0, side * h * held - impulse
+        if guess * side <= 0.0:
+            guess = (impulse - side * h * held) / n[INERTIA]
+        x = guess
     else:
-        low = guess
-        f_low = unbalance(plant, z0, q0, v0, drive, h, factor, low)
-        if f_low == 0.0:
-            return low
-        high = low - f_low / n[INERTIA]
-    # From here: the unbalance at `low` has the sign from which `high` leads away; widen until it changes.
-    stride = high - low
-    f_high = unbalance(plant, z0, q0, v0, drive, h, factor, high)
+        near = guess
+        f_near = unbalance(plant, z0, q0, v0, drive, h, factor, near)
+        if f_near == 0.0:
+            return near
+        x = near - f_near / plant.slopes[which]
+    f = unbalance(plant, z0, q0, v0, drive, h, factor, x)
+    # Away from `near` until the sign changes, by secants that lead at least as far again, at most ten times.
     for _ in range(60):
-        if f_high * f_low <= 0.0 or not math.isfinite(f_high):
+        if f * f_near <= 0.0 or solved(plant, f, x):
             break
-        low, f_low = high, f_high
-        stride *= 2.0
-        high = low + stride
-        f_high = unbalance(plant, z0, q0, v0, drive, h, factor, high)
-    return narrow(plant, z0, q0, v0, drive, h, factor, low, f_low, high, f_high)
+        stride = x - near
+        onwards = -f * stride / (f - f_near)
+        ratio = onwards / stride
+        near, f_near = x, f
+        x += stride * (min(ratio * 1.1, 10.0) if ratio > 0.0 else 10.0)
+        f = unbalance(plant, z0, q0, v0, drive, h, factor, x)
+    return narrow(plant, z0, q0, v0, drive, h, factor, near, f_near, x, f, which)
+
+
+@kernel(inline=True)
+def solved(plant: Plant, f: float, v: float) -> bool:
+    """Whether an unbalance is small enough; one that is not finite ends the search too."""
+    return abs(f) <= plant.numbers[INERTIA] * ROUNDING * max(1e-2, abs(v)) or not math.isfinite(f)
 
 
 @kernel()
 def narrow(
     plant: Plant, z0: Any, q0: float, v0: float, drive: float, h: float, factor: float,
-    low: float, f_low: float, high: float, f_high: float,
+    other: float, f_other: float, x: float, f: float, which: int,
 ) -> float:  # fmt: skip
-    """Root between two velocities of opposite unbalance: Illinois, every fourth time the middle."""
-    enough = plant.numbers[INERTIA] * ROUNDING
-    for count in range(100):
-        if abs(f_high) <= enough * max(1e-2, abs(high)) or not math.isfinite(f_high):
+    """Root between two velocities of opposite unbalance: secants, and the middle where they do not help."""
+    last, f_last = other, f_other
+    for _ in range(200):
+        if solved(plant, f, x) or abs(x - other) <= ROUNDING * max(1e-2, abs(x)):
             break
-        x = high - f_high * (high - low) / (f_high - f_low)
-        if count % 4 == 3 or not min(low, high) < x < max(low, high):
-            x = 0.5 * (low + high)
+        new = x - f * (x - last) / (f - f_last)
+        if not min(x, other) < new < max(x, other) or abs(f) > 0.5 * abs(f_last):
+            new = 0.5 * (x + other)
+        last, f_last = x, f
+        x = new
         f = unbalance(plant, z0, q0, v0, drive, h, factor, x)
-        if f * f_high < 0.0:
-            low, f_low = high, f_high
-        else:
-            f_low *= 0.5
-        high, f_high = x, f
-        if abs(high - low) <= ROUNDING * max(1e-2, abs(high)):
-            break
-    return high
+        if f * f_last < 0.0:
+            other, f_other = last, f_last
+    if f != f_last:
+        rise = (f - f_last) / (x - last)
+        if rise > 0.0 and math.isfinite(rise):
+            plant.slopes[which] = rise
+    return x
 
 
 @kernel()
@@ -168,7 +190,7 @@ def advance(plant: Plant, state: Any, z: Any, drive: float, rate: float, h: floa
     u = plant.surroundings
     u[0], u[1] = q, load_of(n, q, v, drive)
     factor = share(n, q) * (u[1] if n[SCALED_BY_LOAD] != 0.0 else 1.0)
-    middle = stage(plant, z, q, v, drive + rate * part, part, factor, v)
+    middle = stage(plant, z, q, v, drive + rate * part, part, factor, v, 0)
     ratio = rest / part
     # The second stage starts from the begin, moved on for `rest` with the slopes of the first.
     for i in range(plant.states):
@@ -178,7 +200,7 @@ def advance(plant: Plant, state: Any, z: Any, drive: float, rate: float, h: floa
         plant.base[i] = plant.trial[i]
     q_base = q + rest * middle
     v_base = v + ratio * (middle - v)
-    end = stage(plant, plant.base, q_base, v_base, drive + rate * h, part, factor, middle + (middle - v))
+    end = stage(plant, plant.base, q_base, v_base, drive + rate * h, part, factor, middle + (middle - v), 1)
     for i in range(plant.states):
         z[i] = plant.trial[i]
     state[0], state[1] = q_base + part * end, end
