@@ -60,6 +60,22 @@ def test_a_whole_controller_leaves(tmp_path, monkeypatch, capsys):
     assert "drive_sample(" in (tmp_path / "drive-c99" / "drive.h").read_text()
 
 
+@pytest.mark.parametrize("kind", ["ff", "fb"])
+def test_a_compensator_leaves_without_a_controllers_file(kind, model, tmp_path):
+    call = ["export", model, "--to", "c99", "--compensator", kind, "--out", "drive", "--check"]
+    assert main(call) == 0
+    source = (tmp_path / "drive" / "my_model.c").read_text()
+    assert f"n->source = {'1.0' if kind == 'ff' else '2.0'};" in source
+    assert "n->kp = 0.0;" in source
+
+
+def test_the_inertia_comes_from_the_models_file(model, tmp_path):
+    with open(model, "a") as file:
+        file.write("[axis]\ninertia = 2e-3\n")
+    assert main(["export", model, "--to", "fmu-axis"]) == 0
+    assert "| inertia | parameter | 0.002 |" in (tmp_path / "my_model-fmu-axis" / "README.md").read_text()
+
+
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
@@ -67,6 +83,11 @@ def test_a_whole_controller_leaves(tmp_path, monkeypatch, capsys):
         ([], "--list"),
         (["--to", "python", "--single"], "one precision"),
         (["--to", "matlab", "--controller"], "law alone"),
+        (["--to", "matlab", "--compensator", "ff"], "law alone"),
+        (["--to", "c99", "--compensator", "fb", "--filter-hz", "0"], "filter_hz"),
+        (["--to", "c99", "--compensator", "fb", "--sample-time", "0"], "sample_time"),
+        (["--to", "c99", "--filter-hz", "10"], "--compensator"),
+        (["--to", "fmu-axis"], "--set inertia="),
         (["--to", "c99", "--name", "1st"], "no name in most languages"),
         (["--to", "c99", "--out", "/proc/none"], "/proc/none"),
     ],

@@ -3,6 +3,7 @@
 stickslip export model.toml --to c99
 stickslip export model.toml --to c99 --single --out firmware --name axis1
 stickslip export run.toml --to c99 --controller      # the whole sampled controller of a `stickslip simulate` file
+stickslip export model.toml --to c99 --compensator fb --filter-hz 10      # the law as a sampled compensator
 stickslip export model.toml --to urdf --nearest      # what a poorer target can hold, with its error
 
 model.toml is what identification writes; by hand it is `law = "lugre"` and a table [parameters]. `stickslip export
@@ -16,8 +17,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
+    from stickslip.control.controller import Controller
     from stickslip.export.job import Export, Job
     from stickslip.export.target import Target
+    from stickslip.model import Model
 
 SUMMARY = "write a model as C, structured text, MATLAB, Python, ..."
 
@@ -36,6 +39,20 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--single", action="store_true", help="single precision, where the target has it")
     parser.add_argument(
         "--controller", action="store_true", help="the whole sampled controller of the file's [controller]"
+    )
+    parser.add_argument(
+        "--compensator", choices=("ff", "fb"),
+        help="the law as a compensator that is called every sample: feedforward of the reference velocity, or "
+        "feedback of the measured one",
+    )  # fmt: skip
+    parser.add_argument(
+        "--sample-time", type=float, metavar="TIME", help="of the compensator, s (default: 0.001)"
+    )
+    parser.add_argument(
+        "--filter-hz",
+        type=float,
+        metavar="FREQUENCY",
+        help="low-pass on the compensator's velocity (default: none)",
     )
     parser.add_argument(
         "--nearest", action="store_true", help="where the target cannot hold the law, the nearest that it can"
@@ -74,8 +91,11 @@ def run(args: argparse.Namespace) -> int:
     chosen = target_named(args.to)
     if args.single and not chosen.precision:
         raise InputError(f"--single: {chosen.name} has one precision; leave it out")
-    if args.controller and not chosen.controller:
-        raise InputError(f"--controller: {chosen.name} carries the law alone; leave it out, or take --to c99")
+    for option in ("controller", "compensator"):
+        if getattr(args, option) and not chosen.controller:
+            raise InputError(
+                f"--{option}: {chosen.name} carries the law alone; leave it out, or take --to c99"
+            )
     job = job_of(args, chosen)
     if job.nearest and not chosen.forms:
         raise InputError(f"--nearest: {chosen.name} carries {chosen.carries}; leave it out")
@@ -125,24 +145,54 @@ def job_of(args: argparse.Namespace, chosen: Target) -> Job:
     from stickslip.model import Model
 
     name = args.name or re.sub(r"[^A-Za-z0-9_]+", "_", args.file.stem)
-    settings: dict[str, str | float] = {}
-    for text in args.set:
-        key, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"--set {text}: write NAME=VALUE")
-        settings[key] = value
-    settings = axis_values(args.file, chosen) | settings
     options: dict[str, Any] = {
-        "single": args.single, "nearest": args.nearest, "top_speed": args.top_speed, "settings": settings
+        "single": args.single, "nearest": args.nearest, "top_speed": args.top_speed,
+        "settings": settings_given(args, chosen),
     }  # fmt: skip
+    if args.compensator is None:
+        for option in ("sample_time", "filter_hz"):
+            if getattr(args, option) is not None:
+                raise InputError(
+                    f"--{option.replace('_', '-')} belongs to --compensator; give both or neither"
+                )
+    elif args.controller:
+        raise InputError("--controller takes the compensator of its file; leave --compensator out")
     if not args.controller:
-        return Job(Model.from_file(args.file), name, **options)
+        model = Model.from_file(args.file)
+        return Job(model, name, compensator_of(args, model), **options)
     from stickslip.study.study import load_run
 
     controller = load_run(args.file).control
     if controller.compensator is None:
         raise InputError(f"{args.file}: [controller] has no compensator; add one, or export the law alone")
     return Job(controller.compensator.model, name, controller, **options)
+
+
+def settings_given(args: argparse.Namespace, chosen: Target) -> dict[str, str | float]:
+    """The target's settings: what the model's file holds of its axis, and before that the command line."""
+    from stickslip.errors import InputError
+
+    given = axis_values(args.file, chosen)
+    for text in args.set:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise InputError(f"--set {text}: write NAME=VALUE")
+        given[key] = value
+    return given
+
+
+def compensator_of(args: argparse.Namespace, model: Model) -> Controller | None:
+    """A sampled controller that has nothing but the compensator asked for."""
+    from stickslip.control.compensators.feedback import Feedback
+    from stickslip.control.compensators.feedforward import Feedforward
+    from stickslip.control.controller import Controller
+    from stickslip.control.linear import Gains
+
+    if args.compensator is None:
+        return None
+    kind = {"ff": Feedforward, "fb": Feedback}[args.compensator]
+    time = 1e-3 if args.sample_time is None else args.sample_time
+    return Controller(Gains(kp=0.0), kind(model, filter_hz=args.filter_hz), sample_time=time)
 
 
 def store(export: Export, folder: Path) -> list[str]:
