@@ -1,0 +1,163 @@
+"""The friction of a machine: a law, what it varies with, and the bearings' part of it.
+
+Torques that people identify at the motor contain the bearings' friction; the law of a machine is written down with
+it, and `Contact.clutch` takes it off again (thesis 4.3.1.1.2: "the friction in bearings can be treated as it is
+composed of Coulomb and viscous friction levels").
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, cast
+
+from stickslip.errors import ParameterError
+from stickslip.machines.motor import Harmonics
+from stickslip.model import Model
+
+__all__ = ["Bearings", "Contact", "Drift", "Heat"]
+
+LEVELS = ("fs", "fc", "alpha0", "beta0", "curve_torque")
+"""Parameters that lift a whole sliding curve: of the Stribeck curve, of thesis eqs. 4.4 and 4.5, of a table."""
+NONE = Harmonics()
+
+
+@dataclass(frozen=True)
+class Bearings:
+    """Coulomb and viscous friction of the shaft's and the motor's bearings, between motor and torque sensor.
+
+    ``coulomb`` (N·m) is approached over a displacement as in Dahl's law, whose ``stiffness`` (N·m/rad) a bearing has at
+    rest; ``viscous`` in N·m·s/rad.
+    """
+
+    coulomb: float = 0.0
+    viscous: float = 0.0
+    stiffness: float = 5.0
+
+    def __post_init__(self) -> None:
+        for name in ("coulomb", "viscous"):
+            value = getattr(self, name)
+            if not (value >= 0.0 and math.isfinite(value)):
+                raise ParameterError(f"bearings: {name} = {value:g} must be a finite number of at least 0")
+        if not (self.stiffness > 0.0 and math.isfinite(self.stiffness)):
+            raise ParameterError(f"bearings: stiffness = {self.stiffness:g} N·m/rad must be greater than 0")
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Slow change of friction after the machine was switched on: a factor 1 + change (1 - exp(-t / time))."""
+
+    change: float = 0.0
+    time: float = 1800.0
+
+    def __post_init__(self) -> None:
+        if not -1.0 < self.change <= 10.0:
+            raise ParameterError(f"drift: change = {self.change:g} must be above -1 and at most 10")
+        if not self.time > 0.0:
+            raise ParameterError(f"drift: time = {self.time:g} s must be greater than 0")
+
+
+@dataclass(frozen=True)
+class Heat:
+    """How warm the contact gets and what that does: a factor exp(coefficient (T - reference)).
+
+    The temperature follows ``ambient`` plus ``resistance`` times the power of friction, delayed by ``time``.
+    """
+
+    coefficient: float = 0.0
+    reference: float = 20.0
+    ambient: float = 20.0
+    resistance: float = 0.0
+    time: float = 600.0
+
+    def __post_init__(self) -> None:
+        if not abs(self.coefficient) <= 0.1:
+            raise ParameterError(f"heat: coefficient = {self.coefficient:g} 1/K must be from -0.1 to 0.1")
+        if not (self.resistance >= 0.0 and self.time > 0.0):
+            raise ParameterError(
+                f"heat: resistance = {self.resistance:g} K/W must be at least 0, time = {self.time:g} s greater"
+            )
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The friction of a machine.
+
+    Attributes
+    ----------
+    friction : Model
+        The whole friction of the axis as a motor sees it, the bearings' included; parameters for both directions.
+    ripple : Harmonics
+        What it varies by over a revolution, relative.
+    direction : (float, float)
+        Factors on levels and viscous terms for positive and for negative velocity.
+    bearings : Bearings
+    drift : Drift
+    heat : Heat
+    """
+
+    friction: Model
+    ripple: Harmonics = NONE
+    direction: tuple[float, float] = (1.0, 1.0)
+    bearings: Bearings = Bearings()
+    drift: Drift = Drift()
+    heat: Heat = Heat()
+
+    def __post_init__(self) -> None:
+        if math.fsum(self.ripple.amplitude) >= 1.0:
+            raise ParameterError(
+                f"contact: its ripple adds up to {math.fsum(self.ripple.amplitude):g} of friction; it must stay below 1"
+            )
+        for factor in self.direction:
+            if not 0.0 < factor < 10.0:
+                raise ParameterError(f"contact: direction factor {factor:g} must lie between 0 and 10")
+
+    def clutch(self, stiffness: float = 1.0) -> Model:
+        """The law of the friction disk alone: without the bearings' part, per direction; springs times `stiffness`."""
+        values: dict[str, Any] = dict(self.friction.parameters._asdict())
+        law = self.friction.law
+        _less(values, law.name, self.bearings)
+        if stiffness != 1.0:
+            for name in ("k", "sigma0"):
+                if name in values:
+                    values[name] = _times(stiffness, values[name])
+        if self.direction != (1.0, 1.0):
+            for f in law.fields:
+                if f.par.directional and "N·m" in f.par.unit:
+                    base = values[f.name]
+                    values[f"{f.name}_negative"] = _times(self.direction[1], base)
+                    values[f.name] = _times(self.direction[0], base)
+            law = law.having(symmetry="asymmetric")
+        return Model(law, {}, **_listed(values))
+
+
+def _less(values: dict[str, Any], name: str, bearings: Bearings) -> None:
+    """Take the bearings' part off the levels and the viscous term."""
+    if bearings.coulomb > 0.0:
+        lifted = [key for key in LEVELS if key in values]
+        if not lifted:
+            raise ParameterError(
+                f"bearings: law {name!r} has no level ({', '.join(LEVELS)}) that holds the bearings' Coulomb friction; "
+                "set coulomb = 0"
+            )
+        for key in lifted:
+            old = values[key]
+            values[key] = (
+                [x - bearings.coulomb for x in cast("tuple[float, ...]", old)]
+                if isinstance(old, tuple)
+                else old - bearings.coulomb
+            )
+    if bearings.viscous > 0.0:
+        if "sigma2" not in values:
+            raise ParameterError(f"bearings: law {name!r} has no viscous term sigma2; set viscous = 0")
+        values["sigma2"] -= bearings.viscous
+
+
+def _times(factor: float, value: Any) -> Any:
+    if isinstance(value, (tuple, list)):
+        return [factor * v for v in cast("list[float]", value)]
+    return factor * value
+
+
+def _listed(values: dict[str, Any]) -> dict[str, Any]:
+    return {k: list(cast("tuple[float, ...]", v)) if isinstance(v, tuple) else v for k, v in values.items()}

@@ -1,0 +1,92 @@
+"""The axis as three inertias: rotor, coupling, shaft and friction disk; thesis 4.5 and figure 4.57.
+
+Motor torque acts on the rotor, friction on the disk, and the encoder sits on the shaft between coupling and disk.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from stickslip.errors import ParameterError
+
+__all__ = ["FlexibleAxis", "lowest_first_mode"]
+
+
+@dataclass(frozen=True)
+class FlexibleAxis:
+    """Rotor, shaft and disk, with the coupling and the shaft as springs between them.
+
+    Attributes
+    ----------
+    rotor, shaft, disk : float
+        J_1, J_2, J_3, kg·m²: rotor with half of the coupling; the other half with encoder and shaft up to the disk; the
+        rest of the shaft with the friction disk.
+    coupling, elasticity : float
+        k_1 between rotor and shaft, k_2 between shaft and disk, N·m/rad.
+    damping : float
+        Part of critical damping of each spring with the inertias beside it.
+    """
+
+    rotor: float
+    shaft: float
+    disk: float
+    coupling: float
+    elasticity: float
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, unit in (
+            ("rotor", "kg·m²"), ("shaft", "kg·m²"), ("disk", "kg·m²"), ("coupling", "N·m/rad"),
+            ("elasticity", "N·m/rad"),
+        ):  # fmt: skip
+            value = getattr(self, name)
+            if not (value > 0.0 and math.isfinite(value)):
+                raise ParameterError(f"flexible axis: {name} = {value:g} {unit} must be greater than 0")
+        if not 0.0 <= self.damping < 1.0:
+            raise ParameterError(
+                f"flexible axis: damping = {self.damping:g} must be at least 0 and less than 1"
+            )
+
+    @property
+    def inertia(self) -> float:
+        """Of the whole axis, kg·m²."""
+        return self.rotor + self.shaft + self.disk
+
+    @property
+    def modes(self) -> tuple[float, float, float]:
+        """Undamped modes of the free axis, Hz: 0, that of the shaft, that of the coupling."""
+        j1, j2, j3, k1, k2 = self.rotor, self.shaft, self.disk, self.coupling, self.elasticity
+        half = 0.5 * (k1 * (1.0 / j1 + 1.0 / j2) + k2 * (1.0 / j2 + 1.0 / j3))
+        product = k1 * k2 * self.inertia / (j1 * j2 * j3)
+        upper = half + math.sqrt(half * half - product)
+        return 0.0, math.sqrt(product / upper) / (2.0 * math.pi), math.sqrt(upper) / (2.0 * math.pi)
+
+    @property
+    def dampers(self) -> tuple[float, float]:
+        """Viscous damping beside coupling and shaft, N·m·s/rad."""
+        behind = 1.0 / (self.rotor + self.shaft) + 1.0 / self.disk
+        first = 2.0 * self.damping * math.sqrt(self.coupling / (1.0 / self.rotor + 1.0 / self.shaft))
+        return first, 2.0 * self.damping * math.sqrt(self.elasticity / behind)
+
+    def twist(self, torque: float) -> tuple[float, float]:
+        """Static deflection of coupling and shaft under a torque at the disk (N·m), rad."""
+        return torque / self.coupling, torque / self.elasticity
+
+    def visible(self, stiffness: float) -> float:
+        """Stiffness of a contact at the disk (N·m/rad) as the encoder sees it: in series with the shaft."""
+        return 1.0 / (1.0 / stiffness + 1.0 / self.elasticity)
+
+    def behind(self, visible: float) -> float:
+        """Stiffness of the contact whose stiffness at the encoder is `visible`; infinite if the shaft is softer."""
+        rest = 1.0 / visible - 1.0 / self.elasticity
+        return 1.0 / rest if rest > 0.0 else math.inf
+
+
+def lowest_first_mode(inertia: float, coupling: float, elasticity: float) -> float:
+    """The lowest first mode, Hz, that any division of the inertia (kg·m²) into three has.
+
+    The slowest division leaves nothing between coupling and shaft: both in series, between two equal halves.
+    """
+    series = 1.0 / (1.0 / coupling + 1.0 / elasticity)
+    return math.sqrt(4.0 * series / inertia) / (2.0 * math.pi)

@@ -1,0 +1,104 @@
+"""What stands between a torque command and the torque on the rotor: converters, current loop, cogging, noise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from stickslip.errors import ParameterError
+
+__all__ = ["Amplifier", "Converter", "Harmonics"]
+
+
+@dataclass(frozen=True)
+class Converter:
+    """An analogue output or input of so many bits over plus and minus a range; 0 bits convert exactly."""
+
+    bits: int = 0
+    range: float = math.inf
+
+    def __post_init__(self) -> None:
+        if self.bits < 0 or self.bits > 52:
+            raise ParameterError(f"converter: bits = {self.bits} must be from 0 to 52")
+        if self.bits and not (self.range > 0.0 and math.isfinite(self.range)):
+            raise ParameterError(f"converter: range = {self.range:g} must be a finite number greater than 0")
+
+    @property
+    def step(self) -> float:
+        """The least difference it tells, in the unit of its range; 0 for an exact one."""
+        return 2.0 * self.range / 2.0**self.bits if self.bits else 0.0
+
+
+@dataclass(frozen=True)
+class Amplifier:
+    """A current amplifier with its motor.
+
+    Attributes
+    ----------
+    torque_constant : float
+        N·m/A
+    current_limit : float
+        A, where the current saturates.
+    bandwidth : float
+        Of the current loop, Hz (first order); infinite follows at once.
+    command, monitor : Converter
+        What the command comes from and the measured current goes to, A.
+    current_noise : float
+        Of the current itself, A RMS, drawn anew for every sample.
+    monitor_noise : float
+        Of the measured current alone, A RMS.
+    """
+
+    torque_constant: float
+    current_limit: float = math.inf
+    bandwidth: float = math.inf
+    command: Converter = Converter()
+    monitor: Converter = Converter()
+    current_noise: float = 0.0
+    monitor_noise: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("torque_constant", "current_limit", "bandwidth"):
+            if not getattr(self, name) > 0.0:
+                raise ParameterError(f"amplifier: {name} = {getattr(self, name):g} must be greater than 0")
+        for name in ("current_noise", "monitor_noise"):
+            if not getattr(self, name) >= 0.0:
+                raise ParameterError(f"amplifier: {name} = {getattr(self, name):g} A must be at least 0")
+
+
+@dataclass(frozen=True)
+class Harmonics:
+    """A sum of amplitude_k cos(order_k theta + phase_k) over a revolution.
+
+    Cogging of a motor (amplitudes in N·m), or what a contact's friction varies by (relative).
+    """
+
+    order: tuple[float, ...] = ()
+    amplitude: tuple[float, ...] = ()
+    phase: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not len(self.order) == len(self.amplitude) == len(self.phase):
+            raise ParameterError(
+                f"harmonics: {len(self.order)} orders, {len(self.amplitude)} amplitudes and {len(self.phase)} phases; "
+                "give as many of each"
+            )
+        for order in self.order:
+            if order != round(order) or not 1 <= order <= 64:
+                raise ParameterError(f"harmonics: order {order:g} must be a whole number from 1 to 64")
+
+    def at(self, angle: float) -> float:
+        """The sum at an angle, rad."""
+        return math.fsum(
+            a * math.cos(n * angle + p)
+            for n, a, p in zip(self.order, self.amplitude, self.phase, strict=True)
+        )
+
+    def peak_to_peak(self, points: int = 3600) -> float:
+        """Greatest less least value over a revolution."""
+        values = [self.at(2.0 * math.pi * i / points) for i in range(points)]
+        return max(values) - min(values)
+
+    def scaled(self, factor: float) -> Harmonics:
+        """All amplitudes multiplied."""
+        return Harmonics(self.order, tuple(factor * a for a in self.amplitude), self.phase)

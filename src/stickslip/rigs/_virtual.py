@@ -1,0 +1,26 @@
+"""The compiled loop of a virtual rig: controller, safety and machine, sample by sample."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from stickslip.jit import kernel
+from stickslip.rigs._control import Control, decide, finished
+from stickslip.simulation._machine_step import plant_of, sample
+
+__all__ = ["run_block"]
+
+
+@kernel()
+def run_block(
+    numbers: Any, matrix: Any, memory: Any, parameters: Any, surroundings: Any, law: int, holding: int,
+    control: Control, setpoints: Any, rows: Any,
+) -> int:  # fmt: skip
+    """`stickslip.rigs.rig.BlockRig.exchange_block` on a machine; returns how many samples were run."""
+    plant = plant_of(numbers, matrix, memory, parameters, surroundings, law, holding)
+    for k in range(setpoints.shape[0]):
+        torque = decide(control, setpoints[k], rows[k])
+        sample(plant, torque, control.measured)
+        if finished(control):
+            return k + 1
+    return setpoints.shape[0]

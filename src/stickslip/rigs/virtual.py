@@ -1,0 +1,159 @@
+"""The virtual rig: a machine of `stickslip.machines` behind the protocol of `stickslip.rigs.rig`.
+
+Its clock is its own: a sample passes when it is exchanged, and a pause advances the clock without stepping through it
+(friction drifts on, the contact cools). Blocks and single samples give the same numbers, bit for bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.machines.machine import IMPERFECTIONS, Machine, machine
+from stickslip.rigs._control import Control
+from stickslip.rigs._virtual import run_block
+from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
+from stickslip.simulation import _machine_step as place
+from stickslip.simulation.machine import lay_out_machine, look, run, wait
+
+__all__ = ["RIG", "VirtualRig", "virtual_rig"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+TORQUE, SPEED = 1.0, 100.0
+"""N·m and rad/s, of a machine whose file limits neither."""
+SETTLE, LONGEST_SETTLE = 0.05, 2.0
+"""s, of which a pause steps through as many as the axis needs to come to rest."""
+AT_REST = 0.05
+"""rad/s"""
+
+
+class VirtualRig:
+    """A machine as a rig.
+
+    Parameters
+    ----------
+    machine : Machine
+        With or without some of its imperfections (`Machine.without`).
+    substeps : int
+        Of a sample; 0 lets the machine choose.
+    """
+
+    def __init__(self, machine: Machine, *, substeps: int = 0) -> None:
+        self.machine = machine
+        self.laid = lay_out_machine(machine, substeps)
+        given = machine.limits
+        current = machine.amplifier.torque_constant * machine.amplifier.current_limit
+        torque = given.get("torque", current if math.isfinite(current) else TORQUE)
+        self._limits = Limits(
+            torque=min(torque, current), speed=min(0.98 * machine.encoder.max_speed, SPEED),
+            temperature=given.get("temperature", math.inf),
+            following_error=given.get("following_error", math.inf), stop_time=given.get("stop_time", 0.02),
+        )  # fmt: skip
+        self._one, self._row = np.zeros(1), np.zeros((1, len(Measurement._fields)))
+        laid = self.laid
+        self._plant = (
+            laid.numbers, laid.matrix, laid.memory, laid.parameters, laid.surroundings, laid.step, laid.holding,
+        )  # fmt: skip
+
+    @property
+    def name(self) -> str:
+        """The machine's, and what it goes without."""
+        off = self.machine.switched_off
+        return f"virtual {self.machine.name}" + (f" without {', '.join(off)}" if off else "")
+
+    @property
+    def sample_time(self) -> float:
+        """s"""
+        return self.machine.sample_time
+
+    @property
+    def limits(self) -> Limits:
+        """From the machine's file; the speed stays below that at which its encoder loses counts."""
+        return self._limits
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """A virtual machine cannot outlive its process, which serves as watchdog."""
+        return Capabilities(
+            Watchdog(self.sample_time, "the machine ends with its process"), False, True, True, True
+        )
+
+    def open(self) -> Measurement:
+        """Measure, with zero torque; a machine that was closed goes on where it stood."""
+        look(*self._plant, self._row[0])
+        return self._measured()
+
+    def exchange(self, torque: float) -> Measurement:
+        """One sample with a torque, N·m."""
+        self._one[0] = torque
+        run(*self._plant, self._one, self._row)
+        return self._measured()
+
+    def exchange_block(self, control: Control, setpoints: Array, rows: Array) -> int:
+        """Samples of the loop, compiled."""
+        return run_block(*self._plant, control, setpoints, rows)
+
+    def pause(self, seconds: float) -> Measurement:
+        """Zero torque until the axis rests, then the clock alone.
+
+        Raises
+        ------
+        InputError
+            If `seconds` is no number of at least 0.
+        """
+        if not (seconds >= 0.0 and math.isfinite(seconds)):
+            raise InputError(f"pause: seconds = {seconds:g} must be a finite number of at least 0")
+        left = seconds
+        rows = np.zeros((max(1, round(SETTLE / self.sample_time)), len(Measurement._fields)))
+        width = len(rows) * self.sample_time
+        while left >= width and (left > seconds - LONGEST_SETTLE or self.speed > AT_REST):
+            run(*self._plant, np.zeros(len(rows)), rows)
+            left -= width
+            if self.speed < 1e-3 * AT_REST:
+                break
+        wait(self.laid, left)
+        return self.open()
+
+    def close(self) -> None:
+        """Nothing to disconnect; torque that was on its way is dropped."""
+        self.laid.memory[place.PENDING] = 0.0
+
+    @property
+    def speed(self) -> float:
+        """Of the friction disk, rad/s, as no sensor shows it."""
+        return abs(float(self.laid.memory[place.HEAD + int(self.laid.numbers[place.DISK]) + 1]))
+
+    def _measured(self) -> Measurement:
+        return Measurement(*(float(x) for x in self._row[0]))
+
+
+def virtual_rig(name: str, without: Sequence[str] = ()) -> VirtualRig:
+    """The virtual rig of a machine by name or file, without some of its imperfections.
+
+    Raises
+    ------
+    UnknownName, ConfigError
+    """
+    return VirtualRig(machine(name).without(*without))
+
+
+def build(settings: Mapping[str, Any]) -> VirtualRig:
+    """From ``machine`` (a name of the library or a file) and ``without`` (a list of imperfections)."""
+    values = dict(settings)
+    name, without = values.pop("machine", None), values.pop("without", [])
+    if values:
+        raise InputError(f"virtual rig: unknown {', '.join(sorted(values))}; give machine and without")
+    if not isinstance(name, str):
+        raise InputError("virtual rig: machine is missing; give the name of a machine or its file")
+    names = cast("list[Any]", without)
+    if not isinstance(without, list) or not all(isinstance(n, str) for n in names):
+        raise InputError(f"virtual rig: without must be a list of {', '.join(IMPERFECTIONS)}")
+    return virtual_rig(name, names)
+
+
+RIG = RigKind("virtual", build, "a simulated machine, with every imperfection of a real one")

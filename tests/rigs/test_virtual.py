@@ -1,0 +1,115 @@
+"""The virtual rig: blocks and samples agree bit for bit, with every imperfection; speed; pauses; complaints."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.controller import Controller
+from stickslip.control.linear import place
+from stickslip.errors import InputError, UnknownName
+from stickslip.machines.machine import IMPERFECTIONS, machine
+from stickslip.plugins import rig_kind
+from stickslip.rigs.loop import Loop
+from stickslip.rigs.rig import BlockRig, Rig, setpoints
+from stickslip.rigs.virtual import VirtualRig, virtual_rig
+
+T = 1e-3
+
+
+class OneByOne(VirtualRig):
+    """The same machine without blocks."""
+
+    @property
+    def capabilities(self):
+        return replace(super().capabilities, blocks=False)
+
+
+def controller(name):
+    gains = place("PD", 4.2757e-4, 25.0, 1.0)
+    return Controller(gains, Feedback(machine(name).models["lugre"], 0.5, 10.0), torque_limit=1.0)
+
+
+def tracking(seconds):
+    t = T * np.arange(round(seconds / T))
+    w = 2.0 * np.pi * 0.4
+    return setpoints(t.size, position=0.3 * (1 - np.cos(w * t)), velocity=0.3 * w * np.sin(w * t), closed=1.0)
+
+
+def test_is_a_rig():
+    rig = virtual_rig("thesis-dry", ["cogging"])
+    assert isinstance(rig, Rig)
+    assert isinstance(rig, BlockRig)
+    assert rig.name == "virtual thesis-dry without cogging"
+    assert rig.limits.torque == 1.085
+    assert rig.limits.speed < 37.7
+    assert rig_kind("virtual").build({"machine": "ideal", "without": ["delay"]}).machine.name == "ideal"
+
+
+@pytest.mark.parametrize("name", ["thesis-dry", "thesis-grease", "ideal"])
+def test_blocks_and_single_samples_agree_bit_for_bit(name):
+    wanted = tracking(3.0)
+    law = controller(name) if name != "ideal" else None
+    kept = []
+    for kind in (VirtualRig, OneByOne):
+        with Loop(kind(machine(name))) as loop:
+            loop.run(wanted, law)
+            loop.pause(30.0)
+            kept.append(loop.run(wanted, law))
+    assert np.array_equal(kept[0], kept[1])
+    assert len(kept[0]) == len(wanted)
+
+
+@pytest.mark.parametrize("name", ["thesis-dry", "thesis-grease"])
+def test_speed_with_every_imperfection_on(name):
+    """The package asks 100 000 samples/s of CPU time; a busy machine may take half of that."""
+    wanted, law = tracking(20.0), controller(name)
+    best = 0.0
+    for _ in range(3):
+        with Loop(virtual_rig(name)) as loop:
+            loop.prepare(law)
+            begin = time.process_time()
+            loop.run(wanted, law)
+            best = max(best, len(wanted) / (time.process_time() - begin))
+    assert best > 5e4
+    rig = virtual_rig(name)
+    rig.open()
+    begin = time.process_time()
+    for _ in range(2000):
+        rig.exchange(0.1)
+    assert 2000 * T / (time.process_time() - begin) > 10.0
+
+
+def test_pause_comes_to_rest_and_lets_time_pass():
+    rig = virtual_rig("thesis-dry")
+    with Loop(rig) as loop:
+        loop.run(setpoints(300, torque=0.6))
+        assert rig.speed > 1.0
+        after = loop.pause(600.0)
+        assert rig.speed < 0.05
+        assert after.time == pytest.approx(600.3, abs=0.1)
+        again = loop.pause(600.0)
+        assert again.position == pytest.approx(after.position, abs=1e-4)
+
+
+@pytest.mark.parametrize("name", list(IMPERFECTIONS))
+def test_the_rig_runs_without_each_imperfection(name):
+    rig = virtual_rig("thesis-grease", [name])
+    rig.open()
+    for _ in range(50):
+        measured = rig.exchange(0.2)
+    assert np.all(np.isfinite(measured))
+
+
+def test_complaints():
+    with pytest.raises(UnknownName, match="coggin"):
+        virtual_rig("thesis-dry", ["coggin"])
+    for settings in ({}, {"machine": "ideal", "speed": 3}, {"machine": "ideal", "without": "cogging"}):
+        with pytest.raises(InputError):
+            rig_kind("virtual").build(settings)
+    with pytest.raises(InputError, match="finite"):
+        virtual_rig("ideal").pause(-1.0)

@@ -1,0 +1,148 @@
+"""The virtual machine's samples: convergence, equilibrium, energy, seeds, and laws that hold at rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Gains
+from stickslip.machines.contact import Contact
+from stickslip.machines.machine import Machine, machine
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model, Reference
+from stickslip.simulation.closed_loop import simulate
+from stickslip.simulation.machine import lay_out_machine, look, run, wait
+
+J = 4.2757e-4
+STIFF = Model("lugre", sigma0=2e4, sigma1=0.1, fs=0.335, fc=0.285, vs=0.01, sigma2=0.018)
+
+
+def moved(m, torques, substeps=0, laid=None):
+    """Measured rows, one per torque."""
+    laid = laid or lay_out_machine(m, substeps)
+    rows = np.zeros((len(torques), 6))
+    run(
+        laid.numbers, laid.matrix, laid.memory, laid.parameters, laid.surroundings, laid.step, laid.holding,
+        np.asarray(torques, dtype=np.float64), rows,
+    )  # fmt: skip
+    return rows
+
+
+@pytest.mark.parametrize("friction", ["thesis", "stiff"])
+def test_converges_to_the_adaptive_integrator_in_its_own_sub_step(friction):
+    """A torque by constants that breaks away, slides, reverses and sticks; halving the sub-step quarters the error."""
+    m = machine("ideal") if friction == "thesis" else Machine("stiff", J, Contact(STIFF))
+    model = m.clutch
+    scale = 1e9  # torque = kp (reference - position): held as long as the reference is, the position's part is 1e-9
+    levels = [0.2, 0.45, 0.1, -0.45, 0.0]
+    times = np.concatenate([[0.0], *[[0.1 * i, 0.1 * i + 1e-9] for i in range(1, 5)], [0.5]])
+    values = np.repeat(levels, 2)
+    reference = Reference(
+        "table", time=times.tolist(), position=(scale * values).tolist(), velocity=[0.0] * 10
+    )
+    truth = simulate(
+        RigidAxis(J, model), Controller(Gains(1.0 / scale)), reference, 0.5, integrator="adaptive",
+        tolerance=1e-11, output=np.arange(0.0, 0.5001, 0.01), metered=False,
+    )  # fmt: skip
+    grid = truth["event"] == 0.0
+    wanted = np.interp(np.arange(0.01, 0.5, 0.01), truth.time[grid], truth["position"][grid])
+    torques = np.repeat(levels, 100)
+    errors = []
+    for substeps in (8, 16, 32, 64):
+        rows = moved(m, torques, substeps)
+        errors.append(float(np.max(np.abs(rows[9:-1:10, 1] - wanted))))
+    assert errors[-1] < 2e-6
+    assert errors[1] < 0.35 * errors[0]
+    assert errors[2] < 0.35 * errors[1]
+
+
+@pytest.mark.parametrize("name", ["thesis-dry", "thesis-grease"])
+def test_rests_where_the_springs_balance_the_torque(name):
+    m = machine(name).without(
+        "encoder-counts", "encoder-noise", "current-noise", "sensor-noise", "converters", "cogging", "position",
+        "drift", "temperature", "direction",
+    )  # fmt: skip
+    rows = moved(m, np.concatenate([np.linspace(0.0, 0.02, 500), np.full(2000, 0.02)]))
+    seen = 0.02 / rows[-200:, 1].mean()
+    assert seen == pytest.approx(m.visible_stiffness, rel=0.01)
+    assert rows[-1, 3] == pytest.approx(0.02, rel=0.05)  # what the bearings do not carry
+
+
+def test_noise_depends_on_seed_and_sample_alone():
+    m = machine("thesis-dry")
+    torques = 0.4 * np.sin(0.01 * np.arange(400))
+    whole = moved(m, torques)
+    laid = lay_out_machine(m)
+    single = np.concatenate([moved(m, torques[i : i + 1], laid=laid) for i in range(400)])
+    assert np.array_equal(whole, single)
+    assert not np.array_equal(whole, moved(replace(m, seed=7), torques))
+    # Switching the sensor's noise off leaves the current's.
+    quiet = moved(m.without("sensor-noise"), torques)
+    assert np.array_equal(quiet[:, :3], whole[:, :3])
+    assert not np.array_equal(quiet[:, 3], whole[:, 3])
+
+
+def test_amplifier_saturates_and_the_drive_trips_on_overspeed():
+    m = machine("thesis-grease").without("current-noise", "converters", "bandwidth")
+    rows = moved(m, np.full(20, 5.0))
+    assert rows[:, 2].max() == pytest.approx(0.22 * 6.0)
+    rows = moved(m, np.full(800, 1.0))
+    tripped = np.flatnonzero(rows[:, 5])
+    assert tripped.size
+    speed = np.diff(rows[:, 1]) / 1e-3
+    assert speed[tripped[0] - 1] == pytest.approx(37.7, rel=0.05)
+    assert np.abs(rows[tripped[0] + 1 :, 2]).max() == 0.0
+    assert speed[-1] < speed[tripped[0]]
+
+
+def test_delay_moves_the_torque_by_its_part_of_a_sample():
+    m = machine("ideal")
+    late = moved(replace(m, delay=1.0), [0.5, 0.0, 0.0])
+    now = moved(m, [0.5, 0.0, 0.0])
+    assert late[0, 1] == 0.0
+    assert late[1, 1] == pytest.approx(now[0, 1], rel=1e-12)
+
+
+def test_pause_advances_drift_and_cools():
+    m = machine("thesis-dry")
+    laid = lay_out_machine(m)
+    moved(m, np.full(3000, 0.45), laid=laid)
+    warm = laid.memory[3]
+    wait(laid, 600.0)
+    row = np.zeros(6)
+    look(
+        laid.numbers,
+        laid.matrix,
+        laid.memory,
+        laid.parameters,
+        laid.surroundings,
+        laid.step,
+        laid.holding,
+        row,
+    )
+    assert row[0] == pytest.approx(603.0)
+    assert row[4] - 20.0 == pytest.approx((warm - 20.0) * np.exp(-1.0), rel=1e-9)
+
+
+@pytest.mark.parametrize("law", ["coulomb", "karnopp", "stribeck", "lugre", "dahl", "maxwell_slip", "static"])
+def test_any_law_of_the_package_moves_and_stops(law):
+    from stickslip import plugins
+
+    found = plugins.law(law)
+    m = Machine("any", J, Contact(Model(found, {}, **found.example)))
+    torques = np.concatenate([np.full(300, 0.1), np.full(100, 0.6), np.zeros(1500)])
+    rows = moved(m, torques)
+    assert abs(rows[299, 1]) < 2e-3
+    assert rows[399, 1] > 0.1
+    rest = rows[-200:, 1]
+    assert np.ptp(rest) < 1e-5
+
+
+def test_singular_viscous_term_settles():
+    """|v|^0.38 of Table 10 has an infinite slope at rest; the contact still comes to rest under any load."""
+    m = machine("thesis-grease").without("current-noise", "encoder-counts", "encoder-noise", "converters")
+    rows = moved(m, np.concatenate([np.full(200, 0.5), np.zeros(3000)]))
+    assert np.ptp(rows[-500:, 1]) < 1e-6
