@@ -137,11 +137,13 @@ class Machine:
     @property
     def contact_stiffness(self) -> float:
         """Total stiffness of the law as written, N·m/rad; 0 where it has no spring."""
-        p = self.contact.friction.parameters
+        values: dict[str, Any] = self.contact.friction.parameters._asdict()
+        springs: Any = values.get("k", values.get("sigma0", 0.0))
+        # A single k is the slope of a static law over the velocity, no spring.
         return (
-            float(sum(p.k))
-            if hasattr(p, "k") and isinstance(p.k, tuple)
-            else float(getattr(p, "sigma0", 0.0))
+            math.fsum(cast("tuple[float, ...]", springs))
+            if isinstance(springs, tuple)
+            else float(values.get("sigma0", 0.0))
         )
 
     @property
