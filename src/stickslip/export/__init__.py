@@ -23,6 +23,8 @@ TARGETS = (
     "bam",
     "isaac",
     "ros",
+    "table",
+    "beckhoff",
 )
 
 

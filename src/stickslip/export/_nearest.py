@@ -21,7 +21,7 @@ from stickslip import plugins
 from stickslip.errors import InputError, ParameterError
 from stickslip.export.job import CannotCarry, Job
 from stickslip.model import Model
-from stickslip.spec import Mode, Surroundings
+from stickslip.spec import Law, Mode, Surroundings
 from stickslip.subset import law_layouts, named
 
 __all__ = ["COULOMB", "STATIC", "STRIBECK", "Curve", "Form", "Nearest", "carried", "losses", "nearest"]
@@ -54,18 +54,21 @@ class Curve:
     given : Model
     top : float
         Greatest velocity, rad/s.
+    density : int
+        How many times closer than usual its velocities lie.
     """
 
     given: Model
     top: float
+    density: int = 1
 
     @staticmethod
-    def of(model: Model, top: float | None = None) -> Curve:
+    def of(model: Model, top: float | None = None, density: int = 1) -> Curve:
         """The curve up to `top` rad/s; without it, up to 100 times the velocity over which the law changes."""
         if top is None:
             scale = velocity_scale(model)
             top = SCALES * scale if scale > 0.0 else 1.0
-        return Curve(model, top)
+        return Curve(model, top, density)
 
     @cached_property
     def model(self) -> Model:
@@ -88,10 +91,11 @@ class Curve:
 
     @cached_property
     def velocity(self) -> Array:
-        """Velocities above 0: evenly spaced ones, and four decades below the first of them; rad/s, shape (n,)."""
-        even = np.linspace(0.0, self.top, 201)[1:]
-        all_of_them = np.concatenate([even[0] * np.logspace(-4.0, 0.0, 100, endpoint=False), even])
-        return all_of_them[all_of_them > 1.1 * self.slowest]
+        """Velocities above 0, evenly spaced ones and evenly by decades; rad/s, shape (n,)."""
+        k = self.density
+        both = [np.linspace(0.01 / k, 1.0, 100 * k), np.logspace(-6.0, 0.0, 200 * k, endpoint=False)]
+        velocity = self.top * np.sort(np.concatenate(both))
+        return velocity[velocity > 1.1 * self.slowest]
 
     @cached_property
     def width(self) -> Array:
@@ -176,19 +180,25 @@ class Form:
     ----------
     words : str
         What it is, for people.
-    law : str
-        The law of this package that says the same.
+    law : str or Law
+        The law that says the same.
     fit : callable
         ``fit(curve)``: values of that law's parameters, nearest to a sliding curve.
     keeps : frozenset of str
         What it holds besides a symmetric sliding curve and the torque at rest: "memory", "slope" (through rest),
         "direction", "position", "load", "temperature", "time".
+    density : int
+        How close the velocities must lie at which it is compared (`Curve`).
+    tolerance : float
+        Of the largest torque: a curve that differs by less counts as carried.
     """
 
     words: str
-    law: str
-    fit: Callable[[Curve], dict[str, float]]
+    law: str | Law
+    fit: Callable[[Curve], Mapping[str, Any]]
     keeps: frozenset[str] = frozenset()
+    density: int = 1
+    tolerance: float = EXACT
 
 
 def fit_coulomb(curve: Curve) -> dict[str, float]:
@@ -204,7 +214,7 @@ def fit_static(curve: Curve) -> dict[str, float]:
 
 
 def fit_stribeck(curve: Curve) -> dict[str, float]:
-    """Stribeck friction with any shape factor: as much weight on the slowest velocities as on the rest."""
+    """Stribeck friction with any shape factor; slow velocities weigh as much as fast ones."""
     optimize: Any = importlib.import_module("scipy.optimize")  # it carries no types
     v, target = np.append(curve.velocity, 0.0), np.append(curve.mean, sum(curve.rest) / 2.0)
     weight = np.ones_like(v)
@@ -286,6 +296,9 @@ class Nearest:
     def values(self) -> str:
         """The parameters, for people."""
         law, p = self.model.law, self.model.parameters
+        per = next((f for f in law.fields if f.per_element), None)
+        if per is not None:
+            return f"one of {len(getattr(p, per.name))} {per.par.per}s"
         return ", ".join(f"{f.name} = {getattr(p, f.name):.5g} {f.par.unit}" for f in law.fields)
 
     @property
@@ -302,9 +315,9 @@ class Nearest:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a user must know of it; nothing where nothing is lost."""
-        if not self.lost:
-            return ()
-        return (f"not carried: {'; '.join(self.lost)}", f"nearest {self.form.words}: {self.error}")
+        lost = (f"not carried: {'; '.join(self.lost)}",) if self.lost else ()
+        differs = self.lost or self.residual > EXACT * self.size
+        return (*lost, f"nearest {self.form.words}: {self.error}") if differs else ()
 
 
 def carried(job: Job, target: str, forms: Sequence[Form], also_lost: Sequence[str] = ()) -> Nearest:
@@ -319,7 +332,7 @@ def carried(job: Job, target: str, forms: Sequence[Form], also_lost: Sequence[st
     """
     if job.controller is not None:
         raise InputError(f"{target} carries a law alone, no controller")
-    curve = Curve.of(job.model, job.top_speed)
+    curve = Curve.of(job.model, job.top_speed, max(form.density for form in forms))
     near = [found for form in forms if (found := nearest(curve, form)) is not None]
     tried = [replace(found, lost=(*found.lost, *also_lost)) for found in near]
     for found in tried:
@@ -359,7 +372,7 @@ def _made(form: Form, values: Mapping[str, Any]) -> Model | None:
 def _same_names(curve: Curve, form: Form) -> dict[str, Any]:
     """The model's own values of the parameters that the form calls by the same names."""
     values: dict[str, Any] = curve.model.parameters._asdict()
-    fields = plugins.law(form.law).fields
+    fields = (plugins.law(form.law) if isinstance(form.law, str) else form.law).fields
     return {f.name: values.get(f.name, 0.0 if f.par.default is None else f.par.default) for f in fields}
 
 
@@ -376,9 +389,9 @@ def _compared(curve: Curve, model: Model, form: Form) -> Nearest:
     rms = math.sqrt(float(np.sum(curve.width * both)) / 2.0)
     lost = losses(curve, form)
     shape = float(np.max(np.abs(other.mean - curve.mean)))
-    if shape > EXACT * curve.size:
+    if shape > form.tolerance * curve.size:
         lost.append("the shape of its sliding curve")
-    elif at_rest > EXACT * curve.size and "the difference between the directions" not in lost:
+    elif at_rest > form.tolerance * curve.size and "the difference between the directions" not in lost:
         lost.append("its torque at rest")
     return Nearest(form, model, tuple(lost), residual, at, at_rest, rms, curve.size, curve.top)
 
