@@ -261,22 +261,26 @@ def load_stream(path: str | os.PathLike[str]) -> Record:
             magic, start, count, length, trailer = HEAD.unpack(file.read(HEAD.size))
             if magic != MAGIC:
                 raise ValueError("no header")
-            header = json.loads(file.read(length))
-            width = len(header["units"])
+            header = json.loads(file.read(min(length, start)))
+            units, absent, meta = (
+                dict(header["units"]),
+                header["absent"],
+                {**header["meta"], "complete": False},
+            )
             file.seek(start)
-            values = np.frombuffer(file.read(count * width * 8), dtype="<f8")
-            rows = values[: len(values) // width * width].reshape(-1, width)
-            meta = {**header["meta"], "complete": False}
-            if trailer:
+            data = file.read(min(count * len(units) * 8, os.fstat(file.fileno()).st_size))
+            if trailer and len(data) == count * len(units) * 8:
                 meta |= json.loads(file.read(trailer))
     except FileNotFoundError:
         raise InputError(f"no record at {path}; check the path") from None
-    except (OSError, ValueError, KeyError, TypeError, struct.error) as error:
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, struct.error) as error:
         raise InputError(f"{path} is not a record of this package ({error})") from None
+    values = np.frombuffer(data, dtype="<f8", count=len(data) // 8)
+    rows = values[: len(values) // len(units) * len(units)].reshape(-1, len(units))
     # After a crash of the whole machine the number may have reached the disk before the rows: these hold zeros.
     late = np.flatnonzero(~(np.diff(rows[:, 0]) > 0.0))
     whole = rows[: late[0] + 1] if late.size else rows
-    return _record(header["units"], header["absent"], whole, meta)
+    return _record(units, absent, whole, meta)
 
 
 def _record(units: Mapping[str, str], absent: Sequence[str], rows: Array, meta: Mapping[str, Any]) -> Record:

@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from axis import FRICTION, LIMITS, AxisRig
+from axis_rig import FRICTION, LIMITS, AxisRig
 
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller

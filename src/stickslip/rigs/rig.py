@@ -14,7 +14,7 @@ both ways give the same numbers, bit for bit, since both call the same compiled 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
@@ -23,6 +23,7 @@ import numpy as np
 from stickslip.errors import InputError, ParameterError
 
 if TYPE_CHECKING:
+    from stickslip.config import Table
     from stickslip.rigs._control import Control
 
 __all__ = [
@@ -269,12 +270,12 @@ class RigKind:
     ----------
     name : str
     build : callable
-        ``build(settings) -> Rig`` from the rest of the ``[rig]`` table of a TOML file; raises
+        ``build(settings) -> Rig`` from the ``[rig]`` table of a TOML file (`stickslip.rigs.files`); raises
         `stickslip.errors.InputError` for what it cannot use.
     title : str
         One line for people.
     """
 
     name: str
-    build: Callable[[Mapping[str, Any]], Rig]
+    build: Callable[[Table], Rig]
     title: str

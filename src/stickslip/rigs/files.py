@@ -1,0 +1,64 @@
+"""Rigs described in TOML files: ``[rig]`` names the kind and what it needs, ``[rig.limits]`` what it allows.
+
+[rig]
+kind = "ds402"
+bus = {interface = "socketcan", channel = "can0"}
+node = 1
+
+[rig.limits]
+torque = 1.2          # N·m
+speed = 30.0          # rad/s
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+from stickslip import plugins
+from stickslip.config import Table, read_toml
+from stickslip.rigs.rig import Limits, Rig
+
+__all__ = ["limits_in", "read_rig"]
+
+
+def read_rig(path: str | os.PathLike[str]) -> Rig:
+    """The rig that a TOML file describes, not yet open.
+
+    Raises
+    ------
+    ConfigError
+        Which key is wrong, and what is allowed.
+    """
+    with read_toml(Path(path)) as document, document.table("rig") as table:
+        kind = plugins.rig_kind(table.choice("kind", plugins.rig_kind_names()))
+        with table.blamed():
+            return kind.build(table)
+
+
+def limits_in(table: Table, default: Limits | None = None) -> Limits:
+    """The table's ``limits``; keys that are missing are those of `default`, or no limit.
+
+    Raises
+    ------
+    ConfigError
+        If a torque or speed is missing and there is no default, or a value is out of bounds.
+    """
+    if not table.has("limits") and default is not None:
+        return default
+    with table.table("limits") as t, t.blamed():
+        low, high = default.position if default else (-math.inf, math.inf)
+        return Limits(
+            torque=t.positive("torque", "N·m", default.torque if default else None),
+            speed=t.positive("speed", "rad/s", default.speed if default else None),
+            position=(
+                t.number("lowest_position", "rad", low),
+                t.number("highest_position", "rad", high),
+            ),
+            temperature=t.number("temperature", "°C", default.temperature if default else math.inf),
+            following_error=t.positive(
+                "following_error", "rad", default.following_error if default else math.inf
+            ),
+            stop_time=t.positive("stop_time", "s", default.stop_time if default else 0.02),
+        )

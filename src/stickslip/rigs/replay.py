@@ -1,0 +1,143 @@
+"""A recorded run as a rig: it answers what was measured then, whatever torque it is given.
+
+What the loop, its limits or a controller would have made of a run is so asked of the record alone. Nothing moves.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from stickslip.config import Table
+from stickslip.errors import InputError, RigError
+from stickslip.readers import read
+from stickslip.record import Record
+from stickslip.rigs.files import limits_in
+from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
+
+__all__ = ["RIG", "Replay"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+UNLIMITED = Limits(torque=1e9, speed=1e9)
+"""Nothing moves: there is nothing to protect"""
+UNEVEN = 0.01  # of the sample time, by which a recorded time may be off before the record is resampled
+CHANNELS = ("position", "motor_torque", "sensor_torque", "temperature", "status")
+
+
+class Replay:
+    """A rig that plays a record back.
+
+    Parameters
+    ----------
+    record : Record
+        With ``position`` (rad), and as far as it has them ``motor_torque``, ``sensor_torque`` (N·m), ``temperature``
+        (°C) and ``status``.
+    sample_time : float or None
+        s; None takes the one its meta tells, else the median of its times. A record with other times is
+        interpolated linearly.
+    limits : Limits or None
+
+    Raises
+    ------
+    InputError
+        If the record has no position, or fewer than two samples.
+    """
+
+    name = "replay"
+
+    def __init__(
+        self, record: Record, *, sample_time: float | None = None, limits: Limits | None = None
+    ) -> None:
+        if len(record) < 2:
+            raise InputError("replay: the record has fewer than two samples; give a longer one")
+        record["position"]  # raises where there is none
+        self.sample_time = sample_time or sample_time_of(record)
+        self.limits = limits or UNLIMITED
+        self.capabilities = Capabilities(
+            Watchdog(0.0, "nothing moves"),
+            real_clock=False,
+            torque_sensor="sensor_torque" in record.channels,
+            temperature="temperature" in record.channels,
+        )
+        self._rows = self._laid_out(record)
+        self._next = 0
+
+    def _laid_out(self, record: Record) -> Array:
+        """Rows of `Measurement`, a sample time apart but for pauses."""
+        time: Array = record.time
+        steps = np.diff(time)
+        uneven = np.abs(steps - self.sample_time) > UNEVEN * self.sample_time
+        at = time
+        # A gap is a pause of the run; what is merely uneven is resampled.
+        if np.any(uneven & (steps < 2.0 * self.sample_time)):
+            count = round(float(time[-1] - time[0]) / self.sample_time) + 1
+            at = float(time[0]) + self.sample_time * np.arange(count, dtype=np.float64)
+        rows = np.zeros((at.size, 1 + len(CHANNELS)))
+        rows[:, 0] = at
+        for i, name in enumerate(CHANNELS, 1):
+            if name in record.channels:
+                rows[:, i] = np.interp(at, time, record[name])
+            elif name != "status":
+                rows[:, i] = math.nan
+        return rows
+
+    def open(self) -> Measurement:
+        """The first sample."""
+        self._next = 0
+        return self._answer()
+
+    def exchange(self, torque: float) -> Measurement:
+        """The next sample.
+
+        Raises
+        ------
+        RigError
+            Where the record ends.
+        """
+        return self._answer()
+
+    def pause(self, seconds: float) -> Measurement:
+        """The first sample after the pause that was recorded, or after `seconds` of the record."""
+        times = self._rows[: self._next, 0]
+        # The last sample before a pause is followed by no torque, so a record goes on with the first one after it.
+        if times.size > 1 and times[-1] - times[-2] > 1.5 * self.sample_time:
+            return self._row(self._next - 1)
+        end: float = self._rows[max(self._next - 1, 0), 0] + seconds - 0.5 * self.sample_time
+        after: Any = np.searchsorted(self._rows[:, 0], end)
+        self._next = max(self._next, int(after))
+        return self._answer()
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+    def _row(self, index: int) -> Measurement:
+        values: list[float] = self._rows[index].tolist()
+        return Measurement(*values)
+
+    def _answer(self) -> Measurement:
+        if self._next >= len(self._rows):
+            raise RigError("replay: the record has ended", float(self._rows[-1, 0]))
+        self._next += 1
+        return self._row(self._next - 1)
+
+
+def sample_time_of(record: Record) -> float:
+    """What the record says of itself, or the median between its times, to the nanosecond; s."""
+    told = record.meta.get("sample_time")
+    if isinstance(told, float):
+        return told
+    median: Any = np.median(np.diff(record.time))
+    return round(float(median), 9)
+
+
+def build(settings: Table) -> Replay:
+    """From ``file`` (any log that `stickslip.readers` reads), ``sample_time`` and ``limits``."""
+    path = settings.document.locate(settings.text("file"))
+    sample_time = settings.positive("sample_time", "s") if settings.has("sample_time") else None
+    return Replay(read(path), sample_time=sample_time, limits=limits_in(settings, UNLIMITED))
+
+
+RIG = RigKind("replay", build, "a recorded run, played back")
