@@ -50,6 +50,7 @@ __all__ = [
     "compiled_sample",
     "kernel",
     "pointer",
+    "pointer_at",
 ]
 
 FLOAT = types.float64
@@ -141,6 +142,18 @@ def _pointer(typingctx: Any, array: Any, offset: Any) -> Any:
 
 
 pointer: Any = intrinsic(_pointer)
+
+
+def _pointer_at(typingctx: Any, address: Any) -> Any:
+    """The pointer to an address that Python knows: what costs an array per call to unbox need not be passed."""
+
+    def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], ir.DoubleType().as_pointer())
+
+    return ARRAY(types.int64), generate
+
+
+pointer_at: Any = intrinsic(_pointer_at)
 
 
 def _caller(name: str, count: int, returns: bool) -> Any:

@@ -73,6 +73,8 @@ class Stream:
         self.fault: RecordFault | None = None
         """Why no more room could be reserved; the rows that were reserved before can still be written."""
         self._extents: list[Array] = []
+        self._places: list[int] = []
+        self._stride = 8 * len(self.units)
         self._maps: list[mmap.mmap] = []
         self._wanted = threading.Semaphore(0)
         self._closing = False
@@ -109,6 +111,12 @@ class Stream:
         if extent >= len(self._extents):
             self._await_room()
         return self._extents[extent][begin : begin + count]
+
+    def place(self) -> int:
+        """The address of the next row, for compiled code that writes it; raises as `room` does."""
+        self.room(1)
+        extent, begin = divmod(self._written, EXTENT)
+        return self._places[extent] + begin * self._stride
 
     def commit(self, count: int = 1) -> None:
         """The next `count` rows hold samples: from now on they belong to the record."""
@@ -169,10 +177,12 @@ class Stream:
 
     def _extend(self) -> None:
         """Reserve one more extent and touch its pages, so that storing a row waits for nothing."""
+        rows = self._mapped() if self._file >= 0 else np.zeros((EXTENT, len(self.units)))
+        self._places.append(rows.ctypes.data)
+        self._extents.append(rows)
+
+    def _mapped(self) -> Array:
         width = len(self.units)
-        if self._file < 0:
-            self._extents.append(np.zeros((EXTENT, width)))
-            return
         size = EXTENT * width * 8
         offset = self._start + len(self._extents) * size
         _allocate(self._file, offset, size)
@@ -180,7 +190,7 @@ class Stream:
         self._maps.append(mapped)
         rows = np.frombuffer(mapped, dtype="<f8").reshape(EXTENT, width)
         rows[...] = 0.0
-        self._extents.append(rows)
+        return rows
 
     def _reserve(self) -> None:
         """The thread: an extent ahead of the one that is written."""

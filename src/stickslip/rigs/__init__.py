@@ -5,4 +5,4 @@ should not enter the package is offered by the entry point ``stickslip.rigs``. C
 begins with an underscore: the cache of compiled code watches those.
 """
 
-RIGS: tuple[str, ...] = ("virtual", "replay")
+RIGS: tuple[str, ...] = ("virtual", "replay", "ds402")

@@ -13,14 +13,14 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.control.sampled import Memory, Settings, design_filter, settings
 from stickslip.errors import InputError
-from stickslip.jit import call_guarded, compiled_guarded, flat, kernel, pointer
+from stickslip.jit import call_guarded, compiled_guarded, flat, kernel, pointer, pointer_at
 from stickslip.rigs.rig import Limits, Measurement, Setpoint
 from stickslip.rigs.safety import ENDED, STOPPED, Safety, bounds, guarded_by
 from stickslip.rigs.safety import Bounds as BoundNames
 from stickslip.spec import Law, Surroundings, fields_of
 from stickslip.subset import Layout, law_layouts
 
-__all__ = ["COLUMNS", "UNITS", "Control", "control_of", "decide", "finished"]
+__all__ = ["COLUMNS", "UNITS", "Control", "addresses", "control_of", "decide", "decide_at", "finished"]
 
 UNITS = {
     "time": "s", "position": "rad", "velocity": "rad/s", "motor_torque": "N·m", "torque_command": "N·m",
@@ -113,20 +113,48 @@ def sampler(law: Law | None) -> int:
     return compiled_guarded(f"guarded_{law.name}" if law else "guarded", guarded_by(law), layouts)
 
 
+@kernel(inline=True)
+def step(
+    address: int, y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any, row: Any
+) -> float:
+    """One guarded sample through pointers; `row` gets what the record keeps."""
+    torque = call_guarded(address, y, w, b, s, n, m, z, p, u)
+    row[0], row[1], row[2], row[3], row[4] = y[0], y[1], s[VELOCITY], y[2], torque
+    row[5], row[6], row[7], row[8], row[9] = y[3], y[4], w[0], w[1], w[2]
+    row[10], row[11], row[12], row[13], row[14] = m[COMPENSATION], w[3], y[5], s[STATE], s[REASON]
+    return torque
+
+
 @kernel()
 def decide(control: Control, setpoint: Any, row: Any) -> float:
     """The torque for the next sample, N·m, from ``control.measured``; `row` gets what the record keeps."""
-    torque = call_guarded(
+    return step(
         control.address, pointer(control.measured, 0), pointer(setpoint, 0), pointer(control.bounds, 0),
         pointer(control.safety, 0), pointer(control.settings, 0), pointer(control.memory, 0),
         pointer(control.state, 0), pointer(control.parameters, 0), pointer(control.surroundings, 0),
+        pointer(row, 0),
     )  # fmt: skip
-    y, s = control.measured, control.safety
-    row[0], row[1], row[2], row[3], row[4] = y[0], y[1], s[VELOCITY], y[2], torque
-    row[5], row[6], row[7], row[8], row[9] = y[3], y[4], setpoint[0], setpoint[1], setpoint[2]
-    row[10], row[11], row[12] = control.memory[COMPENSATION], setpoint[3], y[5]
-    row[13], row[14] = s[STATE], s[REASON]
-    return torque
+
+
+@kernel()
+def decide_at(a: Any) -> float:
+    """`decide` by addresses: the function's, then those of its arrays in its order, then the row's."""
+    return step(
+        a[0], pointer_at(a[1]), pointer_at(a[2]), pointer_at(a[3]), pointer_at(a[4]), pointer_at(a[5]),
+        pointer_at(a[6]), pointer_at(a[7]), pointer_at(a[8]), pointer_at(a[9]), pointer_at(a[10]),
+    )  # fmt: skip
+
+
+SETPOINT, ROW = 2, 10  # places in the addresses that change from sample to sample
+
+
+def addresses(control: Control) -> Any:
+    """What `decide_at` reads but for setpoint and row; `control` must outlive it."""
+    arrays = (
+        control.measured, None, control.bounds, control.safety, control.settings, control.memory,
+        control.state, control.parameters, control.surroundings, None,
+    )  # fmt: skip
+    return np.array([control.address, *(0 if x is None else x.ctypes.data for x in arrays)], dtype=np.int64)
 
 
 @kernel()

@@ -16,8 +16,9 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -32,7 +33,18 @@ from stickslip.errors import (
 )
 from stickslip.record import Record
 from stickslip.rigs import safety
-from stickslip.rigs._control import COLUMNS, REASON, STATE, UNITS, Control, control_of, decide, finished
+from stickslip.rigs._control import (
+    COLUMNS,
+    REASON,
+    ROW,
+    SETPOINT,
+    STATE,
+    UNITS,
+    Control,
+    addresses,
+    control_of,
+    decide_at,
+)  # fmt: skip
 from stickslip.rigs.pace import Account, Pace, soft_real_time
 from stickslip.rigs.rig import LIMIT_UNITS, BlockRig, Limits, Measurement, Rig, Setpoint, setpoints
 from stickslip.rigs.safety import ASKED, REASONS, RUNNING, STATUS, STOPPED, STOPPING, Bounds, Safety
@@ -41,6 +53,7 @@ from stickslip.stream import Stream
 __all__ = ["Loop", "PythonController"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Result = TypeVar("Result")
 PythonController = Callable[[Measurement, Setpoint], float]
 """A controller in Python: the torque from what is measured and wanted, N·m. It runs sample by sample."""
 
@@ -107,7 +120,9 @@ class Loop:
         self._fault: BaseException | None = None
         self._signal = 0
         self._undo = ExitStack()
-        self._scratch = np.zeros((1, len(COLUMNS)))
+        self._scratch = np.zeros(len(COLUMNS))
+        self._wanted = np.zeros(len(Setpoint._fields))
+        self._addresses = addresses(self._control)
 
     # ---- arming and disarming ------------------------------------------------------------------------------
 
@@ -141,8 +156,9 @@ class Loop:
     def _warm(self) -> None:
         """Compile what the loop calls before anything moves."""
         idle = self._control._replace(safety=np.zeros(len(Safety._fields)))
-        decide(idle, np.zeros(len(Setpoint._fields)), self._scratch[0])
-        finished(idle)
+        at = addresses(idle)
+        at[SETPOINT], at[ROW] = self._wanted.ctypes.data, self._scratch.ctypes.data
+        decide_at(at)
 
     def _hear_signals(self, undo: ExitStack) -> None:
         """SIGINT and SIGTERM end the run by its ramp; only the main thread may ask to hear them."""
@@ -167,7 +183,7 @@ class Loop:
     # ---- running -------------------------------------------------------------------------------------------
 
     def prepare(self, controller: Controller | PythonController | None) -> Control:
-        """Lay out and compile a controller, so that `run` need not while the rig is armed."""
+        """Lay out and compile a controller before the rig is armed; `run` else does, with zero torque meanwhile."""
         if id(controller) not in self._controls:
             compiled = controller if isinstance(controller, Controller) else None
             control = control_of(compiled, self.limits, self.rig.sample_time)
@@ -208,6 +224,8 @@ class Loop:
                 f"setpoints have shape {wanted.shape}; give (n, {len(Setpoint._fields)}), see setpoints()"
             )
         begin = stream.count
+        if id(controller) not in self._controls:
+            self.meanwhile(lambda: self.prepare(controller))
         self._take_over(self.prepare(controller), travel)
         self._pace.restart()
         table = np.ascontiguousarray(wanted, dtype=np.float64)
@@ -227,17 +245,28 @@ class Loop:
         self._open_stream()
         self._ramp_down()
         if self.rig.capabilities.real_clock:
-            count = max(1, round(seconds / self.rig.sample_time))
-            self._take_over(self.prepare(None), math.inf)
-            self._pace.restart()
-            self._by_samples(None, setpoints(count), None)
-            if self._control.safety[STATE] == STOPPED:
-                raise self._error(self._open_stream())
+            self._rest(seconds)
         else:
             self._control.measured[:] = self.rig.pause(seconds)
             # The axis may have moved: no speed across the pause.
             self._control.safety[STARTED] = self._control.memory[BEGUN] = 0.0
         return Measurement(*self._control.measured)
+
+    def meanwhile(self, work: Callable[[], Result]) -> Result:
+        """Do `work` (compile, identify) with zero torque; a rig whose clock is real is served all the while.
+
+        Returns
+        -------
+        What `work` returns.
+        """
+        if not self.rig.capabilities.real_clock:
+            return work()
+        self._ramp_down()
+        with ThreadPoolExecutor(1) as pool:
+            future = pool.submit(work)
+            while not future.done():
+                self._rest(0.01)
+        return future.result()
 
     def account(self) -> Account:
         """How the loop kept its time."""
@@ -246,6 +275,15 @@ class Loop:
     def record(self) -> Record:
         """What was recorded so far."""
         return self._open_stream().record()
+
+    def _rest(self, seconds: float) -> None:
+        """Samples with zero torque that are not recorded; limits are watched."""
+        count = max(1, round(seconds / self.rig.sample_time))
+        self._take_over(self.prepare(None), math.inf)
+        self._pace.restart()
+        self._by_samples(None, setpoints(count), None)
+        if self._control.safety[STATE] == STOPPED:
+            raise self._error(self._open_stream())
 
     def _open_stream(self) -> Stream:
         if self._stream is None:
@@ -264,69 +302,69 @@ class Loop:
         control.safety[ORIGIN] = control.measured[POSITION]
         if self._fault is None:
             control.safety[STATE] = RUNNING
-        self._control = control
+        self._control, self._addresses = control, addresses(control)
 
     # ---- samples -------------------------------------------------------------------------------------------
 
     def _by_samples(self, stream: Stream | None, wanted: Array, python: PythonController | None) -> None:
         """Sample by sample through `Rig.exchange`."""
         times = self._pace.room(len(wanted))
+        place, stride = wanted.ctypes.data, wanted.strides[0]
         for k in range(len(wanted)):
-            self._sample(stream, wanted[k], python, times[k])
-            if finished(self._control):
+            if python is None:
+                self._sample(stream, place + k * stride, times[k])
+            else:
+                self._ask_python(python, wanted[k])
+                self._sample(stream, self._wanted.ctypes.data, times[k])
+            if self._control.safety[STATE] >= STOPPED:
                 return
 
-    def _sample(
-        self, stream: Stream | None, setpoint: Array, python: PythonController | None, times: Any
-    ) -> None:
-        """One sample: control, record, keep pace, exchange. No exception leaves it but the system's end."""
-        control = self._control
+    def _sample(self, stream: Stream | None, setpoint: int, times: Any) -> None:
+        """One sample: control, record, keep pace, exchange. No exception leaves it: each is a reason to stop."""
         begin = time.perf_counter_ns()
-        if python is not None:
-            setpoint = self._with_python(python, setpoint)
-        row, stream = self._row(stream)
+        at = self._addresses
+        at[SETPOINT], at[ROW] = setpoint, self._row(stream)
         if self._signal:
             self._ask(Interrupted(f"{signal.Signals(self._signal).name} asked for the end"))
         before = time.thread_time_ns()
-        torque = decide(control, setpoint, row)
+        torque = decide_at(at)
         times[2] = time.thread_time_ns() - before
-        if stream is not None:
+        if stream is not None and at[ROW] != self._scratch.ctypes.data:
             stream.commit()
         times[1] = time.perf_counter_ns() - begin
         if self.realtime:
             times[0] = self._pace.wait()
+        measured = self._control.measured
         try:
-            control.measured[:] = self.rig.exchange(torque)
+            measured[:] = self.rig.exchange(torque)
         except BaseException as error:  # whatever it is: the torque goes to zero first
-            control.measured[TIME] += self.rig.sample_time
+            measured[TIME] += self.rig.sample_time
             self._ask(error)
 
-    def _row(self, stream: Stream | None) -> tuple[Array, Stream | None]:
-        """Where the sample goes; without room for it, nowhere, and the loop stops."""
-        if stream is None:
-            return self._scratch[0], None
-        if stream.fault is not None:
-            self._ask(stream.fault)
-        try:
-            return stream.room(1)[0], stream
-        except RigError as error:
-            self._ask(error)
-            return self._scratch[0], None
+    def _row(self, stream: Stream | None) -> int:
+        """Address of where the sample is recorded; without room for it, nowhere, and the loop stops."""
+        if stream is not None:
+            if stream.fault is not None:
+                self._ask(stream.fault)
+            try:
+                return stream.place()
+            except RigError as error:
+                self._ask(error)
+        return self._scratch.ctypes.data
 
-    def _with_python(self, python: PythonController, setpoint: Array) -> Array:
+    def _ask_python(self, python: PythonController, setpoint: Array) -> None:
         """The setpoint with the torque of a controller written in Python added."""
-        out = setpoint.copy()
+        self._wanted[:] = setpoint
         try:
-            out[2] += python(Measurement(*self._control.measured), Setpoint(*setpoint))
+            self._wanted[2] += python(Measurement(*self._control.measured), Setpoint(*setpoint))
         except BaseException as error:
             self._ask(error)
-        return out
 
     def _in_blocks(self, stream: Stream, wanted: Array) -> None:
         """In compiled blocks through `BlockRig.exchange_block`."""
         rig = cast(BlockRig, self.rig)
         done = 0
-        while done < len(wanted) and not finished(self._control) and not self._signal:
+        while done < len(wanted) and self._control.safety[STATE] < STOPPED and not self._signal:
             if stream.fault is not None:
                 break
             try:
@@ -354,10 +392,10 @@ class Loop:
 
     def _ramp(self, stream: Stream | None) -> None:
         """Samples until the torque is zero; the ramp is the compiled one, so its length is bounded."""
-        at_rest = np.array(Setpoint())
+        self._wanted[:] = 0.0
         times = np.zeros(3, dtype=np.int64)
         while self._control.safety[STATE] != STOPPED:
-            self._sample(stream, at_rest, None, times)
+            self._sample(stream, self._wanted.ctypes.data, times)
 
     def _ramp_down(self) -> None:
         """Take the torque away without a fault: before a pause and at the end."""

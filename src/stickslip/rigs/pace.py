@@ -26,7 +26,7 @@ AWAKE = 80_000
 """ns before a deadline that are waited for awake: what a sleep may come late on an ordinary kernel"""
 PRIORITY = 50  # of SCHED_FIFO: above everything ordinary, below the kernel's own threads
 PR_SET_TIMERSLACK = 29
-MCL_CURRENT = 1
+MCL_CURRENT, MCL_ONFAULT = 1, 4
 PERCENTILES = (50.0, 99.0, 99.9, 100.0)
 
 
@@ -176,6 +176,6 @@ def _slack() -> Callable[[], None] | None:
 def _lock() -> Callable[[], None] | None:
     """Keep what is in memory there: no page comes back from the disk inside the loop."""
     libc = _libc()
-    if libc is None or libc.mlockall(MCL_CURRENT) != 0:
+    if libc is None or libc.mlockall(MCL_CURRENT | MCL_ONFAULT) != 0:
         return None
     return libc.munlockall

@@ -1,0 +1,475 @@
+"""A drive with the CiA 402 profile over CANopen: cyclic synchronous torque, a SYNC every sample time.
+
+Every sample the loop sends an RPDO (controlword 6040h, target torque 6071h) and a SYNC; at the SYNC the drive takes the
+torque over and latches what its TPDO then says (statusword 6041h, position 6064h, torque 6077h). The measurement is
+so from the instant at which the torque begins to act: one sample of delay, as on any synchronous drive.
+
+The drive guards itself (CiA 301 and 402): it watches the RPDO (its event timer, 1400h:5) or the heartbeat of this
+process (1016h), and on their absence does what 6007h says, here "disable voltage". Both are sent by the loop itself,
+so that a loop that hangs is missed as one that was killed is.
+
+Configuration uses `canopen`; during the run the bus is read in the loop's own thread, since handing frames from
+thread to thread costs more than a sample has. `pip install 'stickslip[canopen]'` brings canopen (MIT) and
+python-can (LGPL).
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from stickslip.config import Table
+from stickslip.errors import DriveFault, InputError, MessageLost, RigError
+from stickslip.rigs.files import limits_in
+from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
+
+if TYPE_CHECKING:
+    import canopen
+
+__all__ = ["RIG", "Ds402", "Settings"]
+
+# ---- objects: CiA 301 and CiA 402 (IEC 61800-7-201) -------------------------------------------------------------
+DEVICE_TYPE, CONSUMER_HEARTBEAT = 0x1000, 0x1016
+RPDO, RPDO_MAP, TPDO, TPDO_MAP = 0x1400, 0x1600, 0x1800, 0x1A00
+ABORT_OPTION, ERROR_CODE = 0x6007, 0x603F
+CONTROLWORD, STATUSWORD, MODE, MODE_SHOWN, MODES = 0x6040, 0x6041, 0x6060, 0x6061, 0x6502
+POSITION, TARGET_TORQUE, RATED_TORQUE, TORQUE, ENCODER = 0x6064, 0x6071, 0x6076, 0x6077, 0x608F
+PROFILE = 402
+HOMING, CYCLIC_TORQUE = 6, 10  # modes of operation
+DISABLE_VOLTAGE_COMMAND = 2  # of the abort option code
+SYNCHRONOUS = 1  # transmission type: at every SYNC
+OFF = 1 << 31  # of a PDO's COB-ID: it does not exist
+
+# ---- the state machine of CiA 402 -------------------------------------------------------------------------------
+SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP, DISABLE, RESET = 0x06, 0x07, 0x0F, 0x02, 0x00, 0x80
+STATES = {
+    "switch on disabled": (0x4F, 0x40),
+    "ready to switch on": (0x6F, 0x21),
+    "switched on": (0x6F, 0x23),
+    "operation enabled": (0x6F, 0x27),
+    "quick stop active": (0x6F, 0x07),
+    "fault reaction active": (0x4F, 0x0F),
+    "fault": (0x4F, 0x08),
+    "not ready to switch on": (0x4F, 0x00),
+}
+"""State: mask and value of the statusword"""
+NEXT = {
+    "switch on disabled": SHUTDOWN,
+    "ready to switch on": SWITCH_ON,
+    "switched on": ENABLE,
+    "quick stop active": DISABLE,
+}
+"""The controlword that leads from a state towards operation enabled"""
+HOMED, HOMING_ERROR = 1 << 12, 1 << 13  # of the statusword in homing mode
+UNKNOWN_FAULT = 0xFFFF
+
+COMMAND, ANSWER = struct.Struct("<Hh"), struct.Struct("<Hih")
+FORMATS = {1: "<B", 2: "<H", 4: "<I"}
+WATCHDOGS = ("rpdo", "heartbeat", "none")
+OWN_NODE = 127
+"""Node number of this process, for its heartbeat"""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a drive needs to be told, and what to be told about it.
+
+    Attributes
+    ----------
+    bus : mapping
+        Arguments of python-can's ``can.Bus``: ``interface``, ``channel``, ``bitrate``, ...
+    node : int
+    limits : Limits
+        A finite position limit demands a drive that was homed.
+    sample_time : float
+        s
+    watchdog : {"rpdo", "heartbeat", "none"}
+        What the drive watches: the cyclic torque, the heartbeat of this process, or nothing.
+    watchdog_time : float
+        After which the drive takes the torque away, s; whole ms.
+    reset_fault : bool
+        Reset a fault that the drive shows when it is opened.
+    timeout : float
+        How long the answer to a SYNC is waited for, s.
+    """
+
+    bus: Mapping[str, Any]
+    node: int
+    limits: Limits
+    sample_time: float = 1e-3
+    watchdog: str = "rpdo"
+    watchdog_time: float = 0.01
+    reset_fault: bool = False
+    timeout: float = 0.005
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.node < OWN_NODE:
+            raise InputError(f"ds402: node = {self.node} must be from 1 to {OWN_NODE - 1}")
+        if self.watchdog not in WATCHDOGS:
+            raise InputError(f"ds402: watchdog = {self.watchdog!r}; choose from {', '.join(WATCHDOGS)}")
+        if self.watchdog != "none" and not 2.0 * self.sample_time <= self.watchdog_time <= 1.0:
+            raise InputError(
+                f"ds402: watchdog_time = {self.watchdog_time:g} s must be at least two sample times and at most 1 s"
+            )
+
+
+@dataclass
+class Ds402:
+    """A drive as a rig: see the module."""
+
+    settings: Settings
+    name: str = field(init=False)
+    sample_time: float = field(init=False)
+    limits: Limits = field(init=False)
+    capabilities: Capabilities = field(init=False)
+
+    def __post_init__(self) -> None:
+        s = self.settings
+        self.name, self.sample_time, self.limits = f"ds402 node {s.node}", s.sample_time, s.limits
+        how = {"rpdo": "the drive misses the cyclic torque", "heartbeat": "the drive misses the heartbeat"}
+        watchdog = None if s.watchdog == "none" else Watchdog(s.watchdog_time, how[s.watchdog])
+        self.capabilities = Capabilities(watchdog)
+        self._network: canopen.Network | None = None
+        self._error = 0
+        self._beats = 0
+        self._begin = 0
+        self._lost = False
+        self._armed = False
+
+    # ---- the rig ---------------------------------------------------------------------------------------------
+
+    def open(self) -> Measurement:
+        """Connect, check and configure the drive, and enable it with zero torque.
+
+        Raises
+        ------
+        InputError
+            Without `canopen`, where the bus cannot be opened, or the drive cannot do what is asked.
+        DriveFault, MessageLost
+        """
+        self._connect()
+        self._check()
+        self._configure()
+        network = self._bus()
+        network.send_message(0, bytes([0x80, self.settings.node]))  # pre-operational
+        assert network.notifier is not None
+        network.notifier.stop(1.0)  # from now on this thread reads the bus
+        network.send_message(0, bytes([0x01, self.settings.node]))  # operational
+        self._begin = time.monotonic_ns()
+        return self._enable()
+
+    def exchange(self, torque: float) -> Measurement:
+        """Send the torque and a SYNC, wait for the answer.
+
+        Raises
+        ------
+        MessageLost
+            If the drive does not answer in time.
+        DriveFault
+            If the drive has left "operation enabled" without a fault.
+        """
+        status, measured = self._cycle(ENABLE, torque)
+        state = state_of(status)
+        if state in ("fault", "fault reaction active"):
+            return measured._replace(status=float(self._error or UNKNOWN_FAULT))
+        if state != "operation enabled":
+            raise DriveFault(
+                f"{self.name}: the drive is in state {state!r} (statusword 0x{status:04X})", measured.time
+            )
+        return measured
+
+    def pause(self, seconds: float) -> Measurement:
+        """Zero torque for that time, at the sample rate: the drive's watchdog is kept content."""
+        end = time.monotonic() + seconds
+        measured = self.exchange(0.0)
+        while time.monotonic() < end:
+            time.sleep(self.sample_time)
+            measured = self.exchange(0.0)
+        return measured
+
+    def quick_stop(self) -> None:
+        """Tell the drive to stop by itself (605Ah says how); no answer is waited for."""
+        self._send(QUICK_STOP, 0.0)
+
+    def close(self) -> None:
+        """Zero torque, disable the drive, disconnect. A drive that does not answer is told to stop all the same."""
+        network, self._network = self._network, None
+        if network is None:
+            return
+        try:
+            if self._armed:
+                self._armed = False
+                for word in (QUICK_STOP if self._lost else ENABLE, SHUTDOWN, DISABLE):
+                    network.send_message(0x200 + self.settings.node, COMMAND.pack(word, 0))
+                    network.send_message(0x80, b"")
+            network.send_message(0, bytes([0x80, self.settings.node]))
+        except Exception as error:
+            raise MessageLost(
+                f"{self.name}: the bus failed while the drive was disabled ({error})"
+            ) from error
+        finally:
+            network.disconnect()
+
+    # ---- connecting --------------------------------------------------------------------------------------------
+
+    def _connect(self) -> None:
+        try:
+            import can
+            import canopen
+        except ModuleNotFoundError:
+            raise InputError("ds402 needs canopen; run `pip install 'stickslip[canopen]'`") from None
+        network = canopen.Network()
+        network.NOTIFIER_CYCLE = 0.02
+        try:
+            arguments: dict[str, Any] = dict(self.settings.bus)
+            network.bus = can.Bus(**arguments)
+            network.connect()  # pyright: ignore[reportUnknownMemberType]
+        except (can.CanError, OSError, ValueError, TypeError) as error:
+            raise InputError(
+                f"{self.name}: the bus {dict(self.settings.bus)} cannot be opened: {error}"
+            ) from None
+        self._network = network
+        self._error, self._lost = 0, False
+        node = network.add_node(self.settings.node, canopen.ObjectDictionary())
+        node.sdo.RESPONSE_TIMEOUT = 0.5
+        network.subscribe(0x80 + self.settings.node, self._on_emergency)
+
+    def _bus(self) -> canopen.Network:
+        if self._network is None:
+            raise RigError(f"{self.name} is not open; use it in a Loop")
+        return self._network
+
+    def _on_emergency(self, _: int, data: bytearray, __: float) -> None:
+        self._error = struct.unpack_from("<H", data)[0]
+
+    def _read(self, index: int, sub: int = 0) -> int:
+        """An object of the drive, unsigned."""
+        data = self._sdo("upload", index, sub)
+        return int.from_bytes(data, "little")
+
+    def _write(self, index: int, sub: int, value: int, size: int) -> None:
+        self._sdo("download", index, sub, struct.pack(FORMATS[size], value))
+
+    def _sdo(self, verb: str, index: int, sub: int, *data: bytes) -> bytes:
+        import canopen
+
+        sdo: Any = self._bus()[self.settings.node].sdo
+        try:
+            return getattr(sdo, verb)(index, sub, *data) or b""
+        except canopen.SdoAbortedError as error:
+            raise InputError(
+                f"{self.name}: the drive refuses {verb} of {index:04X}h:{sub}: {error}"
+            ) from None
+        except canopen.SdoCommunicationError as error:
+            raise MessageLost(f"{self.name}: no answer to {verb} of {index:04X}h:{sub} ({error})") from None
+
+    # ---- checking and configuring --------------------------------------------------------------------------------
+
+    def _check(self) -> None:
+        """The drive is one, can do cyclic torque, is without fault, and homed where a position is limited."""
+        self._bus().send_message(0, bytes([0x80, self.settings.node]))
+        if (kind := self._read(DEVICE_TYPE) & 0xFFFF) != PROFILE:
+            raise InputError(
+                f"{self.name}: its device type says profile {kind}, not CiA {PROFILE}; check the node"
+            )
+        if not self._read(MODES) >> (CYCLIC_TORQUE - 1) & 1:
+            raise InputError(f"{self.name}: the drive has no cyclic synchronous torque mode (6502h)")
+        self._rated = 1e-3 * self._read(RATED_TORQUE)  # mN·m
+        increments, turns = self._read(ENCODER, 1), self._read(ENCODER, 2)
+        if not self._rated > 0.0 or increments == 0:
+            raise InputError(
+                f"{self.name}: rated torque (6076h) or encoder resolution (608Fh) is 0; set them"
+            )
+        if self.limits.torque > 32.767 * self._rated:
+            raise InputError(
+                f"{self.name}: the torque limit is beyond 3276.7 % of the rated {self._rated:g} N·m"
+            )
+        self._count = 2.0 * math.pi * max(turns, 1) / increments
+        self._reset()
+        if math.isfinite(self.limits.position[0]) or math.isfinite(self.limits.position[1]):
+            self._demand_homed()
+
+    def _reset(self) -> None:
+        """Reset a fault, where that is asked for; else refuse the drive."""
+        if state_of(self._read(STATUSWORD)) != "fault":
+            return
+        code = self._read(ERROR_CODE)
+        if not self.settings.reset_fault:
+            raise DriveFault(
+                f"{self.name}: the drive shows fault 0x{code:04X}; mend its cause, or set reset_fault"
+            )
+        self._write(CONTROLWORD, 0, 0, 2)
+        self._write(CONTROLWORD, 0, RESET, 2)
+        self._await(STATUSWORD, lambda word: state_of(word) != "fault", f"fault 0x{code:04X} does not reset")
+        self._write(CONTROLWORD, 0, 0, 2)
+        self._error = 0
+
+    def _demand_homed(self) -> None:
+        """In homing mode the statusword tells whether the position is known."""
+        self._write(MODE, 0, HOMING, 1)
+        self._await(MODE_SHOWN, lambda mode: mode == HOMING, "it does not enter homing mode")
+        status = self._read(STATUSWORD)
+        if not status & HOMED or status & HOMING_ERROR:
+            raise InputError(
+                f"{self.name}: the position is limited, but the drive is not homed; home it first"
+            )
+
+    def _await(self, index: int, good: Callable[[int], bool], complaint: str, seconds: float = 0.5) -> None:
+        end = time.monotonic() + seconds
+        while not good(self._read(index)):
+            if time.monotonic() > end:
+                raise DriveFault(f"{self.name}: {complaint}")
+
+    def _configure(self) -> None:
+        """PDOs, the watchdog, and the mode."""
+        node = self.settings.node
+        self._pdo(RPDO, RPDO_MAP, 0x200 + node, {CONTROLWORD: 16, TARGET_TORQUE: 16})
+        self._pdo(TPDO, TPDO_MAP, 0x180 + node, {STATUSWORD: 16, POSITION: 32, TORQUE: 16})
+        milliseconds = math.ceil(1e3 * self.settings.watchdog_time - 1e-6)
+        watched = self.settings.watchdog
+        self._write(ABORT_OPTION, 0, DISABLE_VOLTAGE_COMMAND if watched != "none" else 0, 2)
+        if watched == "rpdo":
+            self._write(RPDO, 5, milliseconds, 2)
+        elif watched == "heartbeat":
+            self._write(CONSUMER_HEARTBEAT, 1, OWN_NODE << 16 | milliseconds, 4)
+        self._beat_every = max(1, int(0.3 * self.settings.watchdog_time / self.sample_time))
+        self._write(MODE, 0, CYCLIC_TORQUE, 1)
+        self._await(MODE_SHOWN, lambda mode: mode == CYCLIC_TORQUE, "it does not enter cyclic torque mode")
+        self._last = signed(self._read(POSITION))
+        self._turned = self._last
+
+    def _pdo(self, parameters: int, mapping: int, cob: int, objects: Mapping[int, int]) -> None:
+        """Map objects (index to bits) into the first PDO of a kind; CiA 301, 7.5.2.36."""
+        self._write(parameters, 1, cob | OFF, 4)
+        self._write(parameters, 2, SYNCHRONOUS, 1)
+        self._write(mapping, 0, 0, 1)
+        for place, (index, bits) in enumerate(objects.items(), 1):
+            self._write(mapping, place, index << 16 | bits, 4)
+        self._write(mapping, 0, len(objects), 1)
+        self._write(parameters, 1, cob, 4)
+
+    # ---- cycles --------------------------------------------------------------------------------------------------
+
+    def _enable(self) -> Measurement:
+        """Walk the state machine to "operation enabled", a SYNC every sample time."""
+        end = time.monotonic() + 1.0
+        word, misses = DISABLE, 0
+        while True:
+            try:
+                status, measured = self._cycle(word, 0.0)
+            except MessageLost:
+                # The first answers may take longer while the drive starts its PDOs.
+                misses += 1
+                if misses > 20:
+                    raise
+                continue
+            state = state_of(status)
+            if state == "operation enabled":
+                self._armed, self._lost = True, False
+                return measured
+            if state in ("fault", "fault reaction active"):
+                raise DriveFault(f"{self.name}: fault 0x{self._error:04X} while it is enabled", measured.time)
+            if time.monotonic() > end:
+                raise DriveFault(f"{self.name}: the drive stays in state {state!r} while it is enabled")
+            word = NEXT.get(state, DISABLE)
+            self._armed = True
+            time.sleep(self.sample_time)
+
+    def _send(self, word: int, torque: float) -> None:
+        network = self._bus()
+        per_mille = max(-32768, min(32767, round(1e3 * torque / self._rated)))
+        network.send_message(0x200 + self.settings.node, COMMAND.pack(word, per_mille))
+        network.send_message(0x80, b"")
+        if self.settings.watchdog == "heartbeat":
+            if self._beats % self._beat_every == 0:
+                network.send_message(0x700 + OWN_NODE, b"\x05")
+            self._beats += 1
+
+    def _cycle(self, word: int, torque: float) -> tuple[int, Measurement]:
+        """One sample: statusword and measurement."""
+        network = self._bus()
+        bus: Any = network.bus
+        try:
+            # Answers that came too late for their own sample are not taken for this one's.
+            while (stale := bus.recv(0)) is not None:
+                self._heed(stale)
+            self._send(word, torque)
+            sent = time.monotonic_ns()
+            end = sent + int(1e9 * self.settings.timeout)
+            answer = None
+            while answer is None:
+                left = end - time.monotonic_ns()
+                message = bus.recv(1e-9 * left) if left > 0 else None
+                if message is None:
+                    break
+                answer = self._heed(message)
+        except RigError:
+            raise
+        except Exception as error:  # python-can's drivers raise their own
+            self._lost = True
+            raise MessageLost(f"{self.name}: the bus failed ({error})") from error
+        if answer is None:
+            self._lost = True
+            raise MessageLost(
+                f"{self.name}: no answer within {1e3 * self.settings.timeout:g} ms",
+                1e-9 * (sent - self._begin),
+            )
+        status, position, per_mille = ANSWER.unpack(answer)
+        self._turned += signed((position - self._last) & 0xFFFFFFFF)
+        self._last = position
+        return status, Measurement(
+            1e-9 * (sent - self._begin), self._count * self._turned, 1e-3 * per_mille * self._rated
+        )
+
+    def _heed(self, message: Any) -> bytes | None:
+        """Take a frame in; the data of the TPDO, where it is one."""
+        if message.arbitration_id == 0x180 + self.settings.node:
+            return bytes(message.data) if len(message.data) == ANSWER.size else None
+        if message.arbitration_id == 0x80 + self.settings.node and len(message.data) >= 2:
+            self._on_emergency(0, message.data, 0.0)
+        return None
+
+
+def state_of(status: int) -> str:
+    """The state that a statusword tells."""
+    return next((name for name, (mask, value) in STATES.items() if status & mask == value), f"0x{status:04X}")
+
+
+def signed(value: int) -> int:
+    """32 bits as a signed number."""
+    return (value ^ 0x80000000) - 0x80000000
+
+
+def whole(value: Any) -> Any:
+    """A whole number as such: python-can wants those for ports and bit rates."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+# ---- from a file ----------------------------------------------------------------------------------------------
+
+
+def build(table: Table) -> Ds402:
+    """From ``bus``, ``node``, ``limits``, and what `Settings` has defaults for."""
+    node = table.number("node", "")
+    if not node.is_integer():
+        raise table.error("node", "must be a whole number")
+    bus = {k: whole(v) for k, v in table.table("bus").rest().items()}
+    return Ds402(
+        Settings(
+            bus=bus,
+            node=int(node),
+            limits=limits_in(table),
+            sample_time=table.positive("sample_time", "s", 1e-3),
+            watchdog=table.choice("watchdog", WATCHDOGS, "rpdo"),
+            watchdog_time=table.positive("watchdog_time", "s", 0.01),
+            reset_fault=table.choice("reset_fault", ("no", "yes"), "no") == "yes",
+            timeout=table.positive("timeout", "s", 0.005),
+        )
+    )
+
+
+RIG = RigKind("ds402", build, "a CiA 402 drive over CANopen, cyclic synchronous torque")
