@@ -13,7 +13,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError, UnknownName
 from stickslip.machines.machine import IMPERFECTIONS, machine
-from stickslip.plugins import rig_kind
+from stickslip.rigs.files import read_rig
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import BlockRig, Rig, setpoints
 from stickslip.rigs.virtual import VirtualRig, virtual_rig
@@ -47,7 +47,25 @@ def test_is_a_rig():
     assert rig.name == "virtual thesis-dry without cogging"
     assert rig.limits.torque == 1.085
     assert rig.limits.speed < 37.7
-    assert rig_kind("virtual").build({"machine": "ideal", "without": ["delay"]}).machine.name == "ideal"
+
+
+@pytest.mark.parametrize(
+    ("lines", "name"),
+    [
+        ('machine = "ideal"\nwithout = ["delay"]', "virtual ideal without delay"),
+        ("", None),
+        ('machine = "ideal"\nspeed = 3', None),
+        ('machine = "ideal"\nwithout = "cogging"', None),
+    ],
+)
+def test_from_a_file(tmp_path, lines, name):
+    path = tmp_path / "rig.toml"
+    path.write_text(f'[rig]\nkind = "virtual"\n{lines}\n')
+    if name:
+        assert read_rig(path).name == name
+    else:
+        with pytest.raises(InputError):
+            read_rig(path)
 
 
 @pytest.mark.parametrize("name", ["thesis-dry", "thesis-grease", "ideal"])
@@ -108,8 +126,5 @@ def test_the_rig_runs_without_each_imperfection(name):
 def test_complaints():
     with pytest.raises(UnknownName, match="coggin"):
         virtual_rig("thesis-dry", ["coggin"])
-    for settings in ({}, {"machine": "ideal", "speed": 3}, {"machine": "ideal", "without": "cogging"}):
-        with pytest.raises(InputError):
-            rig_kind("virtual").build(settings)
     with pytest.raises(InputError, match="finite"):
         virtual_rig("ideal").pause(-1.0)

@@ -7,11 +7,12 @@ Its clock is its own: a sample passes when it is exchanged, and a pause advances
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, cast
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from stickslip.config import Table
 from stickslip.errors import InputError
 from stickslip.machines.machine import IMPERFECTIONS, Machine, machine
 from stickslip.rigs._control import Control
@@ -142,18 +143,10 @@ def virtual_rig(name: str, without: Sequence[str] = ()) -> VirtualRig:
     return VirtualRig(machine(name).without(*without))
 
 
-def build(settings: Mapping[str, Any]) -> VirtualRig:
+def build(settings: Table) -> VirtualRig:
     """From ``machine`` (a name of the library or a file) and ``without`` (a list of imperfections)."""
-    values = dict(settings)
-    name, without = values.pop("machine", None), values.pop("without", [])
-    if values:
-        raise InputError(f"virtual rig: unknown {', '.join(sorted(values))}; give machine and without")
-    if not isinstance(name, str):
-        raise InputError("virtual rig: machine is missing; give the name of a machine or its file")
-    names = cast("list[Any]", without)
-    if not isinstance(without, list) or not all(isinstance(n, str) for n in names):
-        raise InputError(f"virtual rig: without must be a list of {', '.join(IMPERFECTIONS)}")
-    return virtual_rig(name, names)
+    without = settings.texts("without", IMPERFECTIONS) if settings.has("without") else []
+    return virtual_rig(settings.text("machine"), without)
 
 
 RIG = RigKind("virtual", build, "a simulated machine, with every imperfection of a real one")
