@@ -13,6 +13,7 @@ longer say.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import struct
 import sys
@@ -20,9 +21,7 @@ import time
 from collections.abc import Callable
 
 import can
-import numpy as np
 from axis_rig import AxisRig
-from axis_rig import sample as axis_sample
 from durand import MinimalNode, Variable
 from durand.datatypes import DatatypeEnum as DT
 from durand.network import NetworkABC
@@ -73,7 +72,7 @@ class Drive:
         self.od = self.node.object_dictionary
         self.describe()
         self.axis = AxisRig()
-        self.measured = np.zeros(6)
+        self.position = self.axis.open().position
         self.state, self.torque, self.syncs, self.error = "switch on disabled", 0.0, 0, 0
         self.word = 0
         self.moved = time.monotonic()
@@ -173,12 +172,11 @@ class Drive:
             )
 
     def move(self) -> None:
-        """The axis, up to now."""
+        """The axis, up to now, in whole samples: one a SYNC, and as many as pass where none comes."""
         now = time.monotonic()
-        while now > self.moved:
-            step = min(now - self.moved, 1e-3)
-            axis_sample(*self.axis._plant, self.torque, step, self.measured)
-            self.moved = self.moved + step if now - self.moved > 1e-3 else now
+        for _ in range(round((now - self.moved) / self.axis.sample_time)):
+            self.position = self.axis.exchange(self.torque).position
+            self.moved = now
 
     # ---- messages ------------------------------------------------------------------------------------------
 
@@ -201,7 +199,7 @@ class Drive:
             elif kind == SAFE_TORQUE_OFF:
                 self.go("switch on disabled")
         self.move()
-        position = round(self.measured[1] / (2.0 * np.pi) * COUNTS)
+        position = round(self.position / (2.0 * math.pi) * COUNTS)
         self.od.write(0x6064, 0, (position + 2**31) % 2**32 - 2**31)
         self.od.write(0x6077, 0, round(1e6 * self.torque / RATED))
         self.show()
