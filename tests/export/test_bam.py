@@ -63,16 +63,10 @@ def test_friction_that_grows_with_the_load_keeps_its_terms(law, motor, external,
         assert back.loads["load_friction_motor_stribeck"] == 0.125 * motor
     else:
         assert back.loads["load_friction_base"] == 0.25 * motor
-    # The budget of Duclusaud et al. at 0.1 rad/s, motor 1 N·m, from outside -0.5 N·m, by hand.
-    bend = math.exp(-1.0)
-    if variant == "m5":
-        budget = 0.25 + 0.125 * bend + (0.25 + 0.125 * bend) * (0.5 * 1.0 + 0.25 * 0.5)
-        got = (
-            content["friction_base"] + content["friction_stribeck"] * bend
-            + abs(-0.5 * content["load_friction_external"] - content["load_friction_motor"])
-            + bend * abs(-0.5 * content["load_friction_external_stribeck"] - content["load_friction_motor_stribeck"])
-        )  # fmt: skip
-        assert got == pytest.approx(budget, rel=1e-12)
+    # At 0.1 rad/s, motor 1 N·m, from outside -0.5 N·m: both meet in the gearing.
+    bend, share = math.exp(-1.0), 1.0 + motor * 1.0 + external * 0.5
+    own = (0.25 if law == "coulomb" else 0.25 + 0.125 * bend) * share
+    assert bam.budget(content, 0.1, 1.0, -0.5) == pytest.approx(own, rel=1e-12)
 
 
 def test_viscous_friction_that_grows_with_the_load_is_lost():

@@ -25,6 +25,7 @@ TARGETS = (
     "ros",
     "table",
     "beckhoff",
+    "linuxcnc",
 )
 
 
