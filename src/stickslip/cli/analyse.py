@@ -5,6 +5,7 @@ stickslip analyse repeatability PID=1.npz PID=2.npz LuGre=3.npz LuGre=4.npz
 stickslip analyse flexibility --stiffness 17800,396 --inertia 4.2757e-4 --torque dry=0.2951 --claimed 270
 stickslip analyse sides slow.npz fast.npz
 stickslip analyse position slow.npz --channel sensor_torque
+stickslip analyse stability --rig thesis-dry --linear PD --bandwidth 36 --plot map.png
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip.cli import _reading
+from stickslip.cli import _reading, _stability
 
 if TYPE_CHECKING:
     from stickslip.record import Record
 
-SUMMARY = "spectrum, repeatability, flexibility, both sides, dependence on position"
+SUMMARY = "spectrum, repeatability, flexibility, both sides, dependence on position, stability"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -254,5 +255,7 @@ ANALYSES: dict[str, tuple[str, Arguments, Work]] = {
     "flexibility": ("static twist, modes, and what first mode is possible at all",
                     _flexibility_arguments, _flexibility),
     "sides": ("motor side against sensor side: what the bearings take", _sides_arguments, _sides),
+    "stability": ("why feedback compensation oscillates: margins against gain, sample time and filter",
+                  _stability.arguments, lambda args: _stability.work(args, _show)),
     "position": ("torque against position and time while the axis slides", _position_arguments, _position),
 }  # fmt: skip

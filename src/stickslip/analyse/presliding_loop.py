@@ -1,0 +1,342 @@
+"""The loop in pre-sliding as a linear sampled system: plant, drive and compensator; its poles.
+
+While every contact sticks, friction is a spring (and a damper) at the place where it acts, and so is the law in a
+feedback compensator, with the opposite sign. The plant is a chain of inertias (thesis figure 4.57) with the motor on the
+first, the contact on the last. Its torque is held for a sample time, and may come late by whole samples; the drive is that
+of `stickslip.control.sampled`, linearised about rest.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from stickslip.analyse.flexibility import Chain
+from stickslip.control.linear import Gains
+from stickslip.errors import ParameterError
+from stickslip.model import Model
+from stickslip.spec import Surroundings
+
+__all__ = ["Contact", "Drive", "Loop", "Poles", "Train", "describing"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+STEPS = 64
+"""Of a period, in the describing function of a law."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A friction law for small motion about rest: torque = stiffness x + damping v (N·m/rad, N·m·s/rad)."""
+
+    stiffness: float
+    damping: float = 0.0
+
+
+def describing(model: Model, amplitude: float, frequency: float) -> Contact:
+    """A law's first harmonic along a sinusoid about rest: its describing function.
+
+    It is what the law's own `step` answers in the second period, so it holds for every law: a contact that sticks is a
+    spring, one that begins to slip a softer spring with damping, Coulomb friction a damper of 4 F_C / (pi amplitude w).
+
+    Parameters
+    ----------
+    model : Model
+    amplitude : float
+        rad
+    frequency : float
+        Hz
+    """
+    for name, value, unit in (("amplitude", amplitude, "rad"), ("frequency", frequency, "Hz")):
+        if not (value > 0.0 and math.isfinite(value)):
+            raise ParameterError(f"stability: {name} = {value:g} {unit} must be greater than 0")
+    law, p, w = model.law, model.parameters, 2.0 * math.pi * frequency
+    z, u = law.state(p), SimpleNamespace(**Surroundings()._asdict())
+    dt = 1.0 / (STEPS * frequency)
+    speeds = [amplitude * w * math.cos(2.0 * math.pi * (i + 0.5) / STEPS) for i in range(-1, STEPS)]
+    in_phase = in_step = 0.0
+    for turn in range(2):
+        for i in range(STEPS):
+            # Half-way between zeros of the velocity: a law that jumps there is taken on either side.
+            torque = law.step(speeds[i], speeds[i + 1], dt, z, p, u)
+            if turn == 1:
+                angle = 2.0 * math.pi * (i + 0.5) / STEPS
+                in_phase += torque * math.sin(angle)
+                in_step += torque * math.cos(angle)
+    scale = 2.0 / (STEPS * amplitude)
+    return Contact(max(scale * in_phase, 0.0), scale * in_step / w)  # a jump's phase is only rounded
+
+
+@dataclass(frozen=True)
+class Train:
+    """What the drive moves, while the contact sticks.
+
+    Attributes
+    ----------
+    inertias : tuple of float
+        kg·m², motor first; one alone is the rigid axis.
+    springs : tuple of float
+        N·m/rad between them.
+    dampers : tuple of float
+        N·m·s/rad beside the springs; empty for none.
+    contact : Contact
+        On the last inertia.
+    encoder : int
+        The inertia whose angle is measured.
+    encoder_mode, encoder_damping : float
+        Resonance of the encoder's mounting, Hz, and its damping ratio; 0 Hz for none.
+    encoder_share : float
+        Part of the reading that goes through it: (1 - share) angle + share (angle of a mass that follows it).
+    amplifier : float
+        Bandwidth of the current loop, Hz (first order); infinite for none.
+    bearings : Contact
+        On the encoder's inertia.
+    """
+
+    inertias: tuple[float, ...]
+    springs: tuple[float, ...] = ()
+    contact: Contact = Contact(0.0)
+    dampers: tuple[float, ...] = ()
+    encoder: int = 0
+    encoder_mode: float = 0.0
+    encoder_damping: float = 0.0
+    encoder_share: float = 1.0
+    amplifier: float = math.inf
+    bearings: Contact = Contact(0.0)
+
+    def __post_init__(self) -> None:
+        Chain(self.inertias, self.springs)
+        if not 0 <= self.encoder < len(self.inertias):
+            raise ParameterError(f"stability: encoder = {self.encoder} is not the number of an inertia")
+        if self.dampers and len(self.dampers) != len(self.springs):
+            raise ParameterError(f"stability: {len(self.dampers)} dampers for {len(self.springs)} springs")
+
+    def softer(self, share: float) -> Train:
+        """The same, but that the encoder sees only so much of the contact: some of its elements slip."""
+        seen = share * (self.visible - self.bearings.stiffness)
+        if seen <= 0.0:
+            return replace(self, contact=replace(self.contact, stiffness=0.0))
+        behind = 1.0 / seen - math.fsum(1.0 / k for k in self.springs[self.encoder :])
+        return replace(self, contact=replace(self.contact, stiffness=1.0 / behind))
+
+    @property
+    def reach(self) -> float:
+        """How much of a slow motion of the encoder arrives at the contact."""
+        compliance = math.fsum(1.0 / k for k in self.springs[self.encoder :])
+        return 1.0 / (1.0 + self.contact.stiffness * compliance)
+
+    @property
+    def visible(self) -> float:
+        """Stiffness of the contact as the encoder sees it, shaft included, N·m/rad."""
+        behind = self.springs[self.encoder :]
+        beside = self.bearings.stiffness
+        if self.contact.stiffness <= 0.0:
+            return beside
+        return beside + 1.0 / (1.0 / self.contact.stiffness + math.fsum(1.0 / k for k in behind))
+
+    def state_space(self) -> tuple[Array, Array, Array]:
+        """A, B, C of dx/dt = A x + B torque, measured angle = C x."""
+        n = len(self.inertias)
+        chain = Chain(self.inertias, self.springs)
+        stiffness, damping = chain.stiffness_matrix(), np.zeros((n, n))
+        if self.dampers:
+            damping += _chain_matrix(self.dampers, n)
+        stiffness[-1, -1] += self.contact.stiffness
+        damping[-1, -1] += self.contact.damping
+        stiffness[self.encoder, self.encoder] += self.bearings.stiffness
+        damping[self.encoder, self.encoder] += self.bearings.damping
+        mass = np.array(self.inertias)
+        a = np.zeros((2 * n, 2 * n))
+        a[:n, n:] = np.eye(n)
+        a[n:, :n], a[n:, n:] = -stiffness / mass[:, None], -damping / mass[:, None]
+        b, c = np.zeros((2 * n, 1)), np.zeros((1, 2 * n))
+        b[n, 0], c[0, self.encoder] = 1.0 / mass[0], 1.0
+        if self.encoder_mode > 0.0:
+            a, b, c = self._with_encoder(a, b, c)
+        if math.isfinite(self.amplifier):
+            a, b, c = _with_lag(a, b, c, 2.0 * math.pi * self.amplifier)
+        return a, b, c
+
+    def _with_encoder(self, a: Array, b: Array, c: Array) -> tuple[Array, Array, Array]:
+        """A part of the reading follows the angle of the encoder's inertia through a resonance."""
+        n, w = a.shape[0], 2.0 * math.pi * self.encoder_mode
+        wide = np.zeros((n + 2, n + 2))
+        wide[:n, :n] = a
+        damped = 2.0 * self.encoder_damping * w
+        wide[n, n + 1] = 1.0
+        wide[n + 1, :n] = w * w * c[0] + damped * (c @ a)[0]
+        wide[n + 1, n:] = -w * w, -damped
+        out = np.hstack([(1.0 - self.encoder_share) * c, np.array([[self.encoder_share, 0.0]])])
+        return wide, np.vstack([b, np.zeros((2, 1))]), out
+
+
+def _chain_matrix(values: tuple[float, ...], n: int) -> Array:
+    out = np.zeros((n, n))
+    for i, value in enumerate(values):
+        out[i : i + 2, i : i + 2] += value * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return out
+
+
+def _with_lag(a: Array, b: Array, c: Array, corner: float) -> tuple[Array, Array, Array]:
+    """A first-order lag before the plant."""
+    n = a.shape[0]
+    wide = np.zeros((n + 1, n + 1))
+    wide[:n, :n], wide[:n, n:] = a, b
+    wide[n, n] = -corner
+    into = np.zeros((n + 1, 1))
+    into[n, 0] = corner
+    return wide, into, np.hstack([c, np.zeros((1, 1))])
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The sampled controller.
+
+    Attributes
+    ----------
+    gains : Gains
+    law : Contact
+        What the feedback compensator runs on, while it sticks.
+    gain : float
+        Factor on the compensating torque.
+    filter_hz : float
+        Corner of the second-order Butterworth low-pass on what the compensator sees; 0 for none.
+    sample_time : float
+        s
+    delay : int
+        Samples by which the torque comes late.
+    """
+
+    gains: Gains
+    law: Contact = Contact(0.0)
+    gain: float = 1.0
+    filter_hz: float = 0.0
+    sample_time: float = 1e-3
+    delay: int = 0
+
+    def __post_init__(self) -> None:
+        if not (self.sample_time > 0.0 and math.isfinite(self.sample_time)):
+            raise ParameterError(f"stability: sample_time = {self.sample_time:g} s must be greater than 0")
+        if self.delay < 0:
+            raise ParameterError(f"stability: delay = {self.delay} samples must be 0 or more")
+
+    def state_space(self) -> tuple[Array, Array, Array, float]:
+        """A, B, C, D from measured angle to torque.
+
+        States: the last angle, the integral of the error where there is a gain on it, and with a filter its input two
+        samples ago and its last two outputs. The filter acts on the angle, which is the same as on its difference.
+        """
+        t, g = self.sample_time, self.gains
+        integral, filtered = g.ki > 0.0, self.filter_hz > 0.0
+        size = 1 + integral + 3 * filtered
+        a, b, c = np.zeros((size, size)), np.zeros((size, 1)), np.zeros((1, size))
+        b[0, 0], c[0, 0], d = 1.0, g.kd / t, -g.kp - g.kd / t
+        if integral:
+            a[1, 0], a[1, 1], b[1, 0] = -0.5 * t, 1.0, -0.5 * t
+            c[0, :2] += g.ki * a[1, :2]
+            d += g.ki * b[1, 0]
+        # The law: stiffness times the mean of the last two angles, damping times their difference.
+        now = self.gain * (0.5 * self.law.stiffness + self.law.damping / t)
+        last = self.gain * (0.5 * self.law.stiffness - self.law.damping / t)
+        if not filtered:
+            c[0, 0] += last
+            return a, b, c, d + now
+        x2, y1, y2 = size - 3, size - 2, size - 1
+        forward, back_1, back_2 = self._filter()
+        a[y1, 0], a[y1, x2], a[y1, y1], a[y1, y2], b[y1, 0] = 2.0 * forward, forward, -back_1, -back_2, forward
+        a[x2, 0] = a[y2, y1] = 1.0
+        c[0] += now * a[y1]
+        c[0, y1] += last
+        return a, b, c, d + now * forward
+
+    def _filter(self) -> tuple[float, float, float]:
+        """Weights of the low-pass, as `stickslip.control.sampled` has them."""
+        g = math.tan(min(math.pi * self.filter_hz * self.sample_time, 0.495 * math.pi))
+        scale = 1.0 / (1.0 + math.sqrt(2.0) * g + g * g)
+        return g * g * scale, 2.0 * (g * g - 1.0) * scale, (1.0 - math.sqrt(2.0) * g + g * g) * scale
+
+
+@dataclass(frozen=True)
+class Poles:
+    """The least stable pole of a sampled loop.
+
+    Attributes
+    ----------
+    radius : float
+        Its distance from 0; below 1 the loop is stable.
+    growth : float
+        ln(radius) / sample time, 1/s.
+    frequency : float
+        Hz
+    """
+
+    radius: float
+    growth: float
+    frequency: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether a small motion dies out."""
+        return self.radius < 1.0
+
+
+@lru_cache(maxsize=512)
+def held(train: Train, sample_time: float) -> tuple[Array, Array, Array]:
+    """A, B, C of the train from sample to sample, its torque held in between."""
+    linalg: Any = importlib.import_module("scipy.linalg")
+    a, b, c = train.state_space()
+    n = a.shape[0]
+    both = np.zeros((n + 1, n + 1))
+    both[:n, :n], both[:n, n:] = a, b
+    flow = linalg.expm(both * sample_time)
+    return flow[:n, :n], flow[:n, n:], c
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A train under a drive.
+
+    Attributes
+    ----------
+    train : Train
+    drive : Drive
+    measured : float
+        Factor on the measured angle: 1, or what a quantiser's describing function makes of it.
+    """
+
+    train: Train
+    drive: Drive
+    measured: float = 1.0
+
+    def matrix(self) -> Array:
+        """The closed loop from sample to sample."""
+        ad, bd, c = held(self.train, self.drive.sample_time)
+        n = ad.shape[0]
+        ac, bc, cc, dc = self.drive.state_space()
+        c = self.measured * c
+        m, late = ac.shape[0], self.drive.delay
+        out = np.zeros((n + m + late, n + m + late))
+        out[:n, :n] = ad
+        out[n : n + m, :n], out[n : n + m, n : n + m] = bc @ c, ac
+        torque = np.hstack([dc * c, cc, np.zeros((1, late))])
+        if late == 0:
+            out[:n] += bd @ torque
+            return out
+        out[:n, n + m + late - 1 :] += bd
+        out[n + m : n + m + 1] = torque
+        for i in range(1, late):
+            out[n + m + i, n + m + i - 1] = 1.0
+        return out
+
+    def poles(self) -> Poles:
+        """The least stable pole."""
+        found = np.linalg.eigvals(self.matrix())
+        worst = found[np.argmax(np.abs(found))]
+        radius, t = float(np.abs(worst)), self.drive.sample_time
+        return Poles(radius, math.log(max(radius, 1e-300)) / t, abs(float(np.angle(worst))) / (2.0 * math.pi * t))

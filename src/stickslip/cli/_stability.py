@@ -1,0 +1,80 @@
+"""`stickslip analyse stability`: options and output."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from stickslip.analyse.stability import Stability
+    from stickslip.machines.machine import Machine
+
+__all__ = ["arguments", "work"]
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Machine, linear controller, drive."""
+    parser.add_argument("--rig", required=True, metavar="MACHINE", help="a machine of the library, or its TOML file")
+    parser.add_argument(
+        "--without", default="", metavar="NAMES", help="imperfections switched off, with commas between them"
+    )
+    parser.add_argument("--linear", choices=("PR", "PD", "PID"), default="PD", help="default PD")
+    for option, default, unit, what in (
+        ("--bandwidth", 36.0, "HZ", "of its poles"),
+        ("--damping", 1.0, "D", "of its poles"),
+    ):
+        parser.add_argument(option, type=float, default=default, metavar=unit, help=f"{what} (default {default:g})")
+    parser.add_argument("--inertia", type=float, metavar="KGM2", help="it was placed with (default the machine's)")
+    parser.add_argument("--sample-time", type=float, metavar="S", help="default the machine's")
+    parser.add_argument("--delay", type=int, metavar="N", help="whole samples (default the machine's)")
+    parser.add_argument("--filter", action="append", type=float, default=[], metavar="HZ",
+                        help="of the compensators' input, repeatable; 0 for none (default 0 and 10)")  # fmt: skip
+    parser.add_argument("--amplitude", type=float, default=0.0, metavar="RAD",
+                        help="small motion at the encoder (default one count)")  # fmt: skip
+    parser.add_argument("--law", action="append", default=[], metavar="NAME",
+                        help="of the machine's models (default all)")  # fmt: skip
+
+
+def work(args: argparse.Namespace, show: Callable[[argparse.Namespace, list[Any], Callable[[], Any]], None]) -> None:
+    """Reckon and show."""
+    found = reckoned(args)
+
+    def picture() -> Any:
+        from stickslip.report.stability_pictures import picture_of_stability
+
+        return picture_of_stability(found)
+
+    show(args, [found], picture)
+
+
+def reckoned(args: argparse.Namespace) -> Stability:
+    """The stability of what the options describe."""
+    from stickslip.analyse.machine_axis import axis_of
+    from stickslip.analyse.presliding_loop import Drive
+    from stickslip.analyse.stability import stability
+    from stickslip.control.linear import place
+    from stickslip.errors import InputError
+    from stickslip.machines.machine import machine
+
+    plant = machine(args.rig).without(*(n.strip() for n in args.without.split(",") if n.strip()))
+    if args.amplitude < 0.0 or any(f < 0.0 for f in args.filter):
+        raise InputError("--amplitude and --filter must be 0 or greater")
+    gains = place(args.linear, plant.inertia if args.inertia is None else args.inertia, args.bandwidth, args.damping)
+    drive = Drive(
+        gains, sample_time=plant.sample_time if args.sample_time is None else args.sample_time,
+        delay=plant.delay if args.delay is None else args.delay,
+    )  # fmt: skip
+    models = {name: plant.models[name] for name in _chosen(plant, args.law)}
+    return stability(axis_of(plant, args.amplitude), drive, models, args.filter or (0.0, 10.0))
+
+
+def _chosen(plant: Machine, names: list[str]) -> list[str]:
+    from stickslip.errors import InputError, UnknownName
+
+    for name in names:
+        if name not in plant.models:
+            raise UnknownName("model of this machine", name, plant.models)
+    if not plant.models:
+        raise InputError(f"machine {plant.name}: no [models.NAME]; give it the laws that its compensators run")
+    return names or list(plant.models)
