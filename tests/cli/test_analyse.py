@@ -19,6 +19,7 @@ COMMANDS = {
     "flexibility": TRAIN,
     "sides": ["run.npz", "again.npz"],
     "position": ["run.npz"],
+    "stability": ["--rig", "thesis-dry", "--bandwidth", "10", "--law", "lugre"],
 }
 
 
@@ -66,6 +67,10 @@ def test_numbers_of_the_flexibility(capsys):
         ["flexibility", "--stiffness", "1,2", "--inertia", "1,2"],
         ["position", "run.npz", "--transient", "100000"],
         ["position", "run.npz", "--plot", "picture.doc"],
+        ["stability", "--rig", "none"],
+        ["stability", "--rig", "ideal", "--law", "gmss"],
+        ["stability", "--rig", "thesis-dry", "--sample-time", "0"],
+        ["stability", "--rig", "thesis-dry", "--filter", "-1"],
         [],
     ],
 )

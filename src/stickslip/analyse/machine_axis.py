@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from stickslip.analyse.presliding_loop import Contact, Train
-from stickslip.analyse.stability import Axis
+from stickslip.analyse.presliding_loop import Axis, Contact, Train
 from stickslip.machines.machine import Machine
 
 __all__ = ["axis_of"]

@@ -1,9 +1,9 @@
 """The loop in pre-sliding as a linear sampled system: plant, drive and compensator; its poles.
 
 While every contact sticks, friction is a spring (and a damper) at the place where it acts, and so is the law in a
-feedback compensator, with the opposite sign. The plant is a chain of inertias (thesis figure 4.57) with the motor on the
-first, the contact on the last. Its torque is held for a sample time, and may come late by whole samples; the drive is that
-of `stickslip.control.sampled`, linearised about rest.
+feedback compensator, with the opposite sign. The plant is a chain of inertias (thesis figure 4.57) with the motor on
+the first, the contact on the last. Its torque is held for a sample time, and may come late; the drive is that of
+`stickslip.control.sampled`, linearised about rest.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from stickslip.errors import ParameterError
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
-__all__ = ["Contact", "Drive", "Loop", "Poles", "Train", "describing"]
+__all__ = ["Axis", "Contact", "Drive", "Loop", "Poles", "Train", "describing"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -209,8 +209,8 @@ class Drive:
         Corner of the second-order Butterworth low-pass on what the compensator sees; 0 for none.
     sample_time : float
         s
-    delay : int
-        Samples by which the torque comes late.
+    delay : float
+        By how much of a sample time, or of several, the torque comes late.
     """
 
     gains: Gains
@@ -218,13 +218,13 @@ class Drive:
     gain: float = 1.0
     filter_hz: float = 0.0
     sample_time: float = 1e-3
-    delay: int = 0
+    delay: float = 0.0
 
     def __post_init__(self) -> None:
         if not (self.sample_time > 0.0 and math.isfinite(self.sample_time)):
             raise ParameterError(f"stability: sample_time = {self.sample_time:g} s must be greater than 0")
-        if self.delay < 0:
-            raise ParameterError(f"stability: delay = {self.delay} samples must be 0 or more")
+        if not 0.0 <= self.delay <= 100.0:
+            raise ParameterError(f"stability: delay = {self.delay:g} samples must be from 0 to 100")
 
     def state_space(self) -> tuple[Array, Array, Array, float]:
         """A, B, C, D from measured angle to torque.
@@ -249,7 +249,13 @@ class Drive:
             return a, b, c, d + now
         x2, y1, y2 = size - 3, size - 2, size - 1
         forward, back_1, back_2 = self._filter()
-        a[y1, 0], a[y1, x2], a[y1, y1], a[y1, y2], b[y1, 0] = 2.0 * forward, forward, -back_1, -back_2, forward
+        a[y1, 0], a[y1, x2], a[y1, y1], a[y1, y2], b[y1, 0] = (
+            2.0 * forward,
+            forward,
+            -back_1,
+            -back_2,
+            forward,
+        )
         a[x2, 0] = a[y2, y1] = 1.0
         c[0] += now * a[y1]
         c[0, y1] += last
@@ -287,15 +293,16 @@ class Poles:
 
 
 @lru_cache(maxsize=512)
-def held(train: Train, sample_time: float) -> tuple[Array, Array, Array]:
-    """A, B, C of the train from sample to sample, its torque held in between."""
+def held(train: Train, sample_time: float, late: float) -> tuple[Array, Array, Array, Array]:
+    """From sample to sample: A, B of the new torque, which acts from `late` samples on, B of the one before, C."""
     linalg: Any = importlib.import_module("scipy.linalg")
     a, b, c = train.state_space()
     n = a.shape[0]
     both = np.zeros((n + 1, n + 1))
     both[:n, :n], both[:n, n:] = a, b
-    flow = linalg.expm(both * sample_time)
-    return flow[:n, :n], flow[:n, n:], c
+    first = linalg.expm(both * sample_time * late)
+    then = linalg.expm(both * sample_time * (1.0 - late))
+    return then[:n, :n] @ first[:n, :n], then[:n, n:], then[:n, :n] @ first[:n, n:], c
 
 
 @dataclass(frozen=True)
@@ -316,22 +323,23 @@ class Loop:
 
     def matrix(self) -> Array:
         """The closed loop from sample to sample."""
-        ad, bd, c = held(self.train, self.drive.sample_time)
-        n = ad.shape[0]
+        whole = math.floor(self.drive.delay)
+        part = self.drive.delay - whole
+        ad, new, old, c = held(self.train, self.drive.sample_time, part)
         ac, bc, cc, dc = self.drive.state_space()
         c = self.measured * c
-        m, late = ac.shape[0], self.drive.delay
+        n, m = ad.shape[0], ac.shape[0]
+        late = whole + (part > 0.0)  # torques that are remembered
         out = np.zeros((n + m + late, n + m + late))
         out[:n, :n] = ad
         out[n : n + m, :n], out[n : n + m, n : n + m] = bc @ c, ac
         torque = np.hstack([dc * c, cc, np.zeros((1, late))])
-        if late == 0:
-            out[:n] += bd @ torque
-            return out
-        out[:n, n + m + late - 1 :] += bd
-        out[n + m : n + m + 1] = torque
-        for i in range(1, late):
-            out[n + m + i, n + m + i - 1] = 1.0
+        # Torques, newest first: this sample's, then those remembered.
+        torques = np.vstack([torque, np.eye(n + m + late)[n + m :]])
+        out[:n] += new @ torques[whole : whole + 1]
+        if part > 0.0:
+            out[:n] += old @ torques[whole + 1 : whole + 2]
+        out[n + m :] = torques[:late]
         return out
 
     def poles(self) -> Poles:
@@ -339,4 +347,30 @@ class Loop:
         found = np.linalg.eigvals(self.matrix())
         worst = found[np.argmax(np.abs(found))]
         radius, t = float(np.abs(worst)), self.drive.sample_time
-        return Poles(radius, math.log(max(radius, 1e-300)) / t, abs(float(np.angle(worst))) / (2.0 * math.pi * t))
+        return Poles(
+            radius, math.log(max(radius, 1e-300)) / t, abs(float(np.angle(worst))) / (2.0 * math.pi * t)
+        )
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A train, the law of its contact, and the amplitude of motion at the encoder (rad) that counts as small."""
+
+    train: Train
+    friction: Model
+    amplitude: float = math.pi * 2e-6
+
+    @property
+    def ringing(self) -> float:
+        """Frequency of the whole inertia on the contact that the encoder sees, Hz."""
+        stiff = self.at(self.amplitude, 100.0).visible
+        return math.sqrt(max(stiff, 1e-9) / math.fsum(self.train.inertias)) / (2.0 * math.pi)
+
+    def at(self, amplitude: float, frequency: float) -> Train:
+        """The train with its contact as it is at that amplitude of the encoder (rad) and frequency (Hz)."""
+        out = self.train
+        # How far the contact moves depends on its stiffness, and that on how far it moves.
+        for _ in range(3):
+            moved = amplitude * (out.reach if out.contact.stiffness > 0.0 else 1.0)
+            out = replace(self.train, contact=describing(self.friction, moved, frequency))
+        return out

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from stickslip.analyse.stability import Stability
+    from stickslip.analyse.stability_result import Stability
     from stickslip.machines.machine import Machine
 
 __all__ = ["arguments", "work"]
@@ -15,7 +15,9 @@ __all__ = ["arguments", "work"]
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Machine, linear controller, drive."""
-    parser.add_argument("--rig", required=True, metavar="MACHINE", help="a machine of the library, or its TOML file")
+    parser.add_argument(
+        "--rig", required=True, metavar="MACHINE", help="a machine of the library, or its TOML file"
+    )
     parser.add_argument(
         "--without", default="", metavar="NAMES", help="imperfections switched off, with commas between them"
     )
@@ -24,10 +26,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         ("--bandwidth", 36.0, "HZ", "of its poles"),
         ("--damping", 1.0, "D", "of its poles"),
     ):
-        parser.add_argument(option, type=float, default=default, metavar=unit, help=f"{what} (default {default:g})")
-    parser.add_argument("--inertia", type=float, metavar="KGM2", help="it was placed with (default the machine's)")
+        parser.add_argument(
+            option, type=float, default=default, metavar=unit, help=f"{what} (default {default:g})"
+        )
+    parser.add_argument(
+        "--inertia", type=float, metavar="KGM2", help="it was placed with (default the machine's)"
+    )
     parser.add_argument("--sample-time", type=float, metavar="S", help="default the machine's")
-    parser.add_argument("--delay", type=int, metavar="N", help="whole samples (default the machine's)")
+    parser.add_argument(
+        "--delay", type=float, metavar="SAMPLES", help="of the torque, in samples (default the machine's)"
+    )
     parser.add_argument("--filter", action="append", type=float, default=[], metavar="HZ",
                         help="of the compensators' input, repeatable; 0 for none (default 0 and 10)")  # fmt: skip
     parser.add_argument("--amplitude", type=float, default=0.0, metavar="RAD",
@@ -36,7 +44,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
                         help="of the machine's models (default all)")  # fmt: skip
 
 
-def work(args: argparse.Namespace, show: Callable[[argparse.Namespace, list[Any], Callable[[], Any]], None]) -> None:
+def work(
+    args: argparse.Namespace, show: Callable[[argparse.Namespace, list[Any], Callable[[], Any]], None]
+) -> None:
     """Reckon and show."""
     found = reckoned(args)
 
@@ -60,7 +70,9 @@ def reckoned(args: argparse.Namespace) -> Stability:
     plant = machine(args.rig).without(*(n.strip() for n in args.without.split(",") if n.strip()))
     if args.amplitude < 0.0 or any(f < 0.0 for f in args.filter):
         raise InputError("--amplitude and --filter must be 0 or greater")
-    gains = place(args.linear, plant.inertia if args.inertia is None else args.inertia, args.bandwidth, args.damping)
+    gains = place(
+        args.linear, plant.inertia if args.inertia is None else args.inertia, args.bandwidth, args.damping
+    )
     drive = Drive(
         gains, sample_time=plant.sample_time if args.sample_time is None else args.sample_time,
         delay=plant.delay if args.delay is None else args.delay,
@@ -76,5 +88,7 @@ def _chosen(plant: Machine, names: list[str]) -> list[str]:
         if name not in plant.models:
             raise UnknownName("model of this machine", name, plant.models)
     if not plant.models:
-        raise InputError(f"machine {plant.name}: no [models.NAME]; give it the laws that its compensators run")
+        raise InputError(
+            f"machine {plant.name}: no [models.NAME]; give it the laws that its compensators run"
+        )
     return names or list(plant.models)

@@ -90,7 +90,7 @@ class Curve:
     """One line: its points, shape (n,), label (empty for none in the legend) and style.
 
     ``kind`` is "line" (as is any word not named here), "points", "open points", "vertical" (a line across the panel
-    at every x) or "band" (filled between y and y2).
+    at every x), "band" (filled between y and y2) or "area" (filled where y2, shape (len(y), len(x)), is above 0).
     """
 
     x: Array
@@ -236,6 +236,10 @@ def _line(axes: Any, curve: Curve) -> None:
     if curve.kind == "vertical":
         for x in curve.x:
             axes.axvline(x, color=style.colour, linestyle=style.dashes, linewidth=style.width, label=label)
+    elif curve.kind == "area" and curve.y2 is not None:
+        colour = style.colour
+        axes.contourf(curve.x, curve.y, curve.y2, levels=[0.0, np.inf], colors=[colour], alpha=0.45)
+        axes.plot([], [], color=colour, linewidth=6.0, alpha=0.45, label=label)
     elif curve.kind in ("points", "open points"):
         fill = style.colour if curve.kind == "points" else "none"
         axes.plot(
@@ -259,8 +263,18 @@ def _line(axes: Any, curve: Curve) -> None:
         )  # fmt: skip
 
 
+def _plain_ticks(axes: Any, low: float, high: float) -> None:
+    """1, 2 and 5 of each decade: matplotlib's own labels overlap on short logarithmic axes."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    ticks = [m * 10.0**d for d in decades for m in (1, 2, 5) if low * 0.999 <= m * 10.0**d <= high * 1.001]
+    axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    axes.set_xticks([], minor=True)
+
+
 def _fill(axes: Any, panel: Panel, bare: bool) -> None:
     axes.set_xscale(panel.x_scale)
+    if panel.x_scale == "log" and panel.x_limits and panel.x_limits[1] < 300.0 * panel.x_limits[0]:
+        _plain_ticks(axes, *panel.x_limits)
     axes.set_yscale(panel.y_scale)
     for curve in panel.curves:
         _line(axes, curve)

@@ -1,4 +1,4 @@
-"""The map of stability: which gain every compensator bears, over sample time and over filter."""
+"""The map of stability: gain against sample time, and gain against the filter's corner."""
 
 from __future__ import annotations
 
@@ -7,46 +7,65 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyse.stability import FILTERS, MOST_GAIN, TIMES, Stability
-from stickslip.report.plots import Curve, Panel, Style, style_of
+from stickslip.analyse.stability import SLOW
+from stickslip.analyse.stability_result import FILTERS, GAINS, TIMES, Map, Stability
+from stickslip.report.plots import Curve, Panel, Style
 
 __all__ = ["picture_of_stability"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-ONE = Style("#000000", (0, (1, 1.5)), 1.0)
-NOW = Style("#999999", "-", 0.9)
+ONE = Style("#000000", (0, (1, 1.5)), 1.2)
+NOW = Style("#000000", (0, (4, 1.5)), 1.0)
+SAFE = Style("#000000", "-", 1.0)
+AREAS = {
+    "stable": Style("#56B4E9"), "unstable: rings": Style("#E69F00"), "unstable: creeps away": Style("#CC79A7"),
+}  # fmt: skip
 
 
 def picture_of_stability(found: Stability) -> tuple[str, str, Sequence[Panel], float]:
-    """Gain margins over sample time and over the filter's corner: stable below each line."""
-    now, names = 1e3 * found.drive.sample_time, list(found.over_time)
-    left = [_line(name, 1e3 * TIMES, found.over_time[name], names) for name in names]
-    right = [_line(name, FILTERS, found.over_filter[name], names) for name in names]
-    top = min(MOST_GAIN, 1.6)
-    one = "gain 1"
+    """Where the stiffest compensator's loop is stable, rings or creeps away."""
+    name, drive = found.time_map.name, found.drive
+    now = Curve(np.array([1e3 * drive.sample_time]), np.zeros(1), "this drive", NOW, "vertical")
+    advice = found.recommended[name]
+    safe: list[Curve] = []
+    if advice and advice.filter_hz:
+        safe = [Curve(np.array([advice.filter_hz]), np.array([advice.gain]), "recommended", SAFE, "points")]
     panels = (
         Panel(
-            [*left, Curve(np.array([1e3 * TIMES[0], 1e3 * TIMES[-1]]), np.ones(2), one, ONE),
-             Curve(np.array([now]), np.array([0.0]), "this drive", NOW, "vertical")],
-            "largest stable gain", "sample time (ms)", (1e3 * TIMES[0], 1e3 * TIMES[-1]), (-0.03, top),
-            "without filter", "log",
+            [*_areas(1e3 * TIMES, found.time_map), _one(1e3 * TIMES), now], "gain", "sample time (ms)",
+            (1e3 * float(TIMES[0]), 1e3 * float(TIMES[-1])), (0.0, float(GAINS[-1])), f"{name}, no filter", "log",
         ),
         Panel(
-            [*right, Curve(np.array([FILTERS[0], FILTERS[-1]]), np.ones(2), one, ONE)],
-            "largest stable gain", "corner of the filter (Hz)", (FILTERS[0], FILTERS[-1]), (-0.03, top),
-            f"at {now:g} ms", "log",
+            [*_areas(FILTERS, found.filter_map), _one(FILTERS), *safe], "gain", "corner of the filter (Hz)",
+            (float(FILTERS[0]), float(FILTERS[-1])), (0.0, float(GAINS[-1])),
+            f"{name}, {1e3 * drive.sample_time:g} ms", "log",
         ),
     )  # fmt: skip
-    alone = found.linear.at_one
-    if alone.stable:
-        advice = [f"{r.name} with gain {r.gain:g}" + (f" and {r.filter_hz:g} Hz" if r.filter_hz else "")
-                  for r in found.recommended.values() if r]  # fmt: skip
-        message = "stable below each line; safe: " + (", ".join(advice) or "none of them")
-    else:
-        message = f"the linear controller alone is unstable here ({alone.growth:+.0f}/s at {alone.frequency:.0f} Hz)"
-    return "Gain that feedback compensation bears", message, panels, 2.0
+    title = f"Which gain feedback of the {name} law bears"
+    return title, _message(found, name), panels, 2.0
 
 
-def _line(name: str, x: Array, margin: Array, names: Sequence[str]) -> Curve:
-    return Curve(x, np.minimum(margin, MOST_GAIN), name, style_of(name, names))
+def _areas(x: Array, region: Map) -> list[Curve]:
+    """One area for each kind of end, overlapping by nothing."""
+    stable = -region.growth / np.maximum(np.abs(region.growth), 1.0)
+    creeps = np.where((region.growth > 0.0) & (region.frequency < SLOW), 1.0, -1.0)
+    rings = np.where((region.growth > 0.0) & (region.frequency >= SLOW), 1.0, -1.0)
+    values = dict(zip(AREAS, (stable, rings, creeps)))
+    return [Curve(x, GAINS, name, style, "area", values[name]) for name, style in AREAS.items()]
+
+
+def _one(x: Array) -> Curve:
+    return Curve(np.array([x[0], x[-1]]), np.ones(2), "gain 1", ONE)
+
+
+def _message(found: Stability, name: str) -> str:
+    alone, advice = found.linear.at_one, found.recommended[name]
+    static = next(m.static for m in found.margins if m.name == name)
+    first = f"no stiffness is left from gain {static:.2f} on; "
+    if advice:
+        sieve = f"a filter of {advice.filter_hz:g} Hz" if advice.filter_hz else "no filter"
+        return f"{first}safe: gain {advice.gain:g} with {sieve}"
+    if not alone.stable:
+        return f"{first}the linear controller alone rings ({alone.growth:+.0f}/s at {alone.frequency:.0f} Hz)"
+    return f"{first}nothing tried keeps its margins"
