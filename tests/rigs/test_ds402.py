@@ -66,7 +66,9 @@ class Drive:
 
     def tell(self, *objects: tuple[int, int, str, int]) -> None:
         """Write objects of the drive."""
-        with canopen.Network().connect(**self.bus) as network:
+        network = canopen.Network()
+        network.NOTIFIER_CYCLE = 0.02
+        with network.connect(**self.bus):
             sdo = network.add_node(NODE, canopen.ObjectDictionary()).sdo
             for index, sub, form, value in objects:
                 sdo.download(index, sub, struct.pack(form, value))

@@ -94,7 +94,7 @@ class Settings:
     reset_fault : bool
         Reset a fault that the drive shows when it is opened.
     timeout : float
-        How long the answer to a SYNC is waited for, s.
+        How long the answer to a SYNC is waited for, s: so much later is a lost one known, and the stop begun.
     """
 
     bus: Mapping[str, Any]
@@ -363,7 +363,7 @@ class Ds402:
                 status, measured = self._cycle(word, 0.0)
             except MessageLost:
                 # The first answers may take longer while the drive starts its PDOs.
-                misses += 1
+                misses, self._lost = misses + 1, False
                 if misses > 20:
                     raise
                 continue
@@ -399,7 +399,9 @@ class Ds402:
                 self._heed(stale)
             self._send(word, torque)
             sent = time.monotonic_ns()
-            end = sent + int(1e9 * self.settings.timeout)
+            # Once an answer was missed the loop is stopping: its ramp does not wait for what may never come.
+            patience = 0.5 * self.sample_time if self._lost else self.settings.timeout
+            end = sent + int(1e9 * patience)
             answer = None
             while answer is None:
                 left = end - time.monotonic_ns()
