@@ -126,6 +126,16 @@ class Stream:
         if self._written // EXTENT != before:
             self._wanted.release()
 
+    def touch(self) -> None:
+        """Store into the next row, where there is time for it.
+
+        A page that the system has written to disk meanwhile is write-protected until the next store, which then takes
+        some µs.
+        """
+        extent, begin = divmod(self._written, EXTENT)
+        if extent < len(self._extents):
+            self._extents[extent][begin, -1] = 0.0
+
     def rows(self, begin: int, end: int) -> Array:
         """A copy of committed rows, shape (end - begin, columns)."""
         out = np.empty((end - begin, len(self.units)))
@@ -177,7 +187,8 @@ class Stream:
 
     def _extend(self) -> None:
         """Reserve one more extent and touch its pages, so that storing a row waits for nothing."""
-        rows = self._mapped() if self._file >= 0 else np.zeros((EXTENT, len(self.units)))
+        rows = self._mapped() if self._file >= 0 else np.empty((EXTENT, len(self.units)))
+        rows[...] = 0.0  # every page is there before a sample wants it
         self._places.append(rows.ctypes.data)
         self._extents.append(rows)
 
@@ -188,9 +199,7 @@ class Stream:
         _allocate(self._file, offset, size)
         mapped = mmap.mmap(self._file, size, offset=offset)
         self._maps.append(mapped)
-        rows = np.frombuffer(mapped, dtype="<f8").reshape(EXTENT, width)
-        rows[...] = 0.0
-        return rows
+        return np.frombuffer(mapped, dtype="<f8").reshape(EXTENT, width)
 
     def _reserve(self) -> None:
         """The thread: an extent ahead of the one that is written."""

@@ -331,6 +331,7 @@ class Loop:
         times[2] = time.thread_time_ns() - before
         if stream is not None and at[ROW] != self._scratch.ctypes.data:
             stream.commit()
+            stream.touch()
         times[1] = time.perf_counter_ns() - begin
         if self.realtime:
             times[0] = self._pace.wait()
