@@ -14,6 +14,9 @@ FURTHER = {
     "stickslip.study.result": ("StudyResult", "Run"),
     "stickslip.report": ("write",),
     "stickslip.report.law_pictures": ("draw_law",),
+    "stickslip.rigs.loop": ("Loop",),
+    "stickslip.rigs.rig": ("RigKind", "Limits", "Capabilities", "Watchdog", "setpoints"),
+    "stickslip.rigs.files": ("read_rig",),
     "stickslip.errors": (),
 }
 """Modules besides the package's own names, and what of them is shown; () shows the whole module."""

@@ -89,15 +89,21 @@ def rig_kind_names() -> tuple[str, ...]:
 
 
 def rig_kind(name: str) -> RigKind:
-    """The kind of rig of that name.
+    """The kind of rig of that name, or of the file of that path.
 
     Raises
     ------
-    UnknownName
+    UnknownName, InputError
     """
-    if name in importlib.import_module("stickslip.rigs").RIGS:
-        found: RigKind = importlib.import_module(f"stickslip.rigs.{name}").RIG
+    if name.endswith(".py"):
+        if not Path(name).is_file():
+            raise InputError(f"no file {name}; give the path of the rig's file")
+        found = getattr(_module_at(str(Path(name).resolve())), "RIG", None)
+        if found is None:
+            raise InputError(f"{name} defines no rig; end it with `RIG = RigKind(...)`")
         return found
+    if name in importlib.import_module("stickslip.rigs").RIGS:
+        return importlib.import_module(f"stickslip.rigs.{name}").RIG
     if name in (installed := _installed("stickslip.rigs")):
         return installed[name].load()
     raise UnknownName("rig", name, rig_kind_names())

@@ -1,5 +1,7 @@
 """Rigs described in TOML files: ``[rig]`` names the kind and what it needs, ``[rig.limits]`` what it allows.
 
+The kind is the name of a registered one, or the path of a file with ``RIG = RigKind(...)``.
+
 [rig]
 kind = "ds402"
 bus = {interface = "socketcan", channel = "can0"}
@@ -24,7 +26,7 @@ __all__ = ["limits_in", "read_rig"]
 
 
 def read_rig(path: str | os.PathLike[str]) -> Rig:
-    """The rig that a TOML file describes, not yet open.
+    """The rig that the TOML file at `path` describes, not yet open.
 
     Raises
     ------
@@ -32,7 +34,11 @@ def read_rig(path: str | os.PathLike[str]) -> Rig:
         Which key is wrong, and what is allowed.
     """
     with read_toml(Path(path)) as document, document.table("rig") as table:
-        kind = plugins.rig_kind(table.choice("kind", plugins.rig_kind_names()))
+        name = table.text("kind")
+        if name.endswith(".py"):
+            kind = plugins.rig_kind(str(table.document.locate(name)))
+        else:
+            kind = plugins.rig_kind(table.choice("kind", plugins.rig_kind_names()))
         with table.blamed():
             return kind.build(table)
 

@@ -183,10 +183,10 @@ class Loop:
     # ---- running -------------------------------------------------------------------------------------------
 
     def prepare(self, controller: Controller | PythonController | None) -> Control:
-        """Lay out and compile a controller before the rig is armed; `run` else does, with zero torque meanwhile."""
+        """Lay out and compile a `controller`, best before the rig is armed: an armed one has no torque meanwhile."""
         if id(controller) not in self._controls:
             compiled = controller if isinstance(controller, Controller) else None
-            control = control_of(compiled, self.limits, self.rig.sample_time)
+            control = self.meanwhile(lambda: control_of(compiled, self.limits, self.rig.sample_time))
             self._controls[id(controller)] = (controller, control)
         return self._controls[id(controller)][1]
 
@@ -224,8 +224,6 @@ class Loop:
                 f"setpoints have shape {wanted.shape}; give (n, {len(Setpoint._fields)}), see setpoints()"
             )
         begin = stream.count
-        if id(controller) not in self._controls:
-            self.meanwhile(lambda: self.prepare(controller))
         self._take_over(self.prepare(controller), travel)
         self._pace.restart()
         table = np.ascontiguousarray(wanted, dtype=np.float64)
@@ -241,7 +239,7 @@ class Loop:
         return stream.rows(begin, stream.count)
 
     def pause(self, seconds: float) -> Measurement:
-        """Ramp the torque to zero and let time pass; nothing is recorded meanwhile."""
+        """Ramp the torque to zero and let `seconds` pass; nothing is recorded meanwhile."""
         self._open_stream()
         self._ramp_down()
         if self.rig.capabilities.real_clock:
@@ -259,7 +257,7 @@ class Loop:
         -------
         What `work` returns.
         """
-        if not self.rig.capabilities.real_clock:
+        if self._stream is None or not self.rig.capabilities.real_clock:
             return work()
         self._ramp_down()
         with ThreadPoolExecutor(1) as pool:

@@ -85,7 +85,11 @@ def setpoints(
     torque: Any = 0.0,
     closed: Any = 0.0,
 ) -> Array:
-    """Setpoints of `count` samples, shape (count, 4): each argument a number or an array of that length."""
+    """Setpoints of `count` samples, shape (count, 4).
+
+    ``position`` (rad), ``velocity`` (rad/s), ``torque`` (N·m) and ``closed`` (0 or 1) are numbers or arrays of that
+    length; see `Setpoint`.
+    """
     table = np.empty((count, len(Setpoint._fields)))
     for i, column in enumerate((position, velocity, torque, closed)):
         table[:, i] = column
@@ -136,7 +140,7 @@ class Limits:
             raise ParameterError("limits: temperature = nan °C must be a number")
 
     def narrowed(self, wanted: Limits) -> Limits:
-        """Return `wanted`, which may not be wider than these.
+        """Return the limits `wanted`, which may not be wider than these.
 
         Raises
         ------
