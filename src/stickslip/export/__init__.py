@@ -26,6 +26,7 @@ TARGETS = (
     "table",
     "beckhoff",
     "linuxcnc",
+    "modelica",
 )
 
 

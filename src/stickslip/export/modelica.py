@@ -1,0 +1,83 @@
+"""Modelica: a package with the functions of a law and models of a contact.
+
+``Contact`` carries any law, by the law's own step at every sample. A law whose torque jumps at rest also comes as
+``Axis``, an inertia that it holds and releases with an event at every start and stop, so that no solver has to step
+over the jump.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from stickslip.export._analysis import merged
+from stickslip.export._modelica import functions, safe
+from stickslip.export._text import ascii_only, render
+from stickslip.export.golden import as_csv, golden
+from stickslip.export.job import Export, Job, counts_in
+from stickslip.export.target import Target
+from stickslip.spec import Field, Surroundings
+from stickslip.subset import law_layouts, named
+
+__all__ = ["TARGET", "write"]
+
+NOTE = (
+    "the grammar is checked and the functions are evaluated in our tests; not tried in Dymola or OpenModelica"
+)
+
+
+def write(job: Job) -> Export:
+    """The package, golden vectors, and how to use it."""
+    law, p = job.model.law, job.model.parameters
+    events = law.holding is not None and law.steady is not None and not law.state_fields
+    # The public ones first: they have the right to their names.
+    entries: dict[str, Any] = {"steady": law.steady} if law.steady else {}
+    entries |= {"holding": law.holding} if events else {}
+    trees = merged(named({**entries, "step": law.step}, law_layouts(law)))
+    parts = functions(trees, counts_in(job.model))
+    heads = {name: lines for name, _, lines in parts}
+    values: dict[str, Any] = {
+        "x": job.name,
+        "title": ascii_only(law.title).replace('"', "'").replace("\\", "/"),
+        "equation": textwrap.wrap(ascii_only(law.equation), 100, break_long_words=False),
+        "source": ascii_only("; ".join(law.source)),
+        "parameters": [*declared(law.fields, p, law.elements_in(p))],
+        "states": [*declared(law.state_fields, None, law.elements_in(p))] or ['Real none = 0.0 "this law has none";'],
+        "around": [f"Real {safe(n)} = {v!r};" for n, v in Surroundings()._asdict().items()],
+        "functions": [[ascii_only(line) for line in lines] for _, _, lines in parts],
+        "step": called("step", heads["step"], "last, velocity, samplePeriod, z, p, u"),
+        "outputs": "(torque, z)" if any("output State" in line for line in heads["step"]) else "torque",
+        "events": events,
+        "hold": [called("holding", heads["holding"], f"{side}, z, p, u") for side in ("1.0", "-1.0")] if events else [],
+        "note": NOTE,
+    }  # fmt: skip
+    files = {
+        f"{job.name}.mo": render("modelica.mo.j2", **values),
+        "golden.csv": as_csv(golden(job.model)),
+        "README.md": render("modelica_readme.md.j2", **values),
+    }
+    return Export(files, (NOTE,))
+
+
+def called(name: str, head: Sequence[str], given: str) -> str:
+    """A call of a function with those of the arguments that it takes."""
+    order = {"step": ("v0", "v1", "dt", "z", "p", "u"), "holding": ("direction", "z", "p", "u")}[name]
+    taken = {line.split()[2].rstrip(";").removesuffix("_in") for line in head if line.startswith("  input")}
+    names = dict(zip(order, given.split(", ")))
+    return f"{name}({', '.join(value for key, value in names.items() if safe(key) in taken or key in taken)})"
+
+
+def declared(fields: Sequence[Field], p: Any, elements: int) -> Iterable[str]:
+    """Components of a record with their values and meaning."""
+    for f in fields:
+        size = len(getattr(p, f.name)) if p is not None and f.per_element else elements
+        array = f"[{size}]" if f.per_element else ""
+        start: Any = [0.0] * size if f.per_element else 0.0
+        value = getattr(p, f.name) if p is not None else start
+        shown = "{" + ", ".join(map(repr, value)) + "}" if f.per_element else repr(value)
+        meaning = ascii_only(f"{f.par.meaning}, {f.par.unit}").replace('"', "'").replace("\\", "/")
+        yield f'Real {safe(f.name)}{array} = {shown} "{meaning}";'
+
+
+TARGET = Target("modelica", "Modelica package", write)
