@@ -145,3 +145,21 @@ def report_failures(failed: Sequence[tuple[str, str, Path]]) -> int:
     for key, why, path in failed:
         print(f"stickslip: {key}: {why}; its record until then is {path}", file=sys.stderr)
     return 1 if failed else 0
+
+
+def print_sweep(rows: Sequence[Mapping[str, Any]], metric: str, wall: float, written: Sequence[Path]) -> None:
+    """A line a run: percentiles of a metric, flagged and missing cases."""
+    width = max(24, *(len(_key(row)) for row in rows))
+    heads = ("5 %", "50 %", "95 %", "worst")
+    print(f"{metric:<{width}}" + "".join(f"{h:>12}" for h in heads) + f"{'flagged':>10}{'missing':>9}")
+    for row in rows:
+        cells = "".join(f"{row[f'{metric}_p{p}']:>12.4g}" for p in (5, 50, 95, 100))
+        flagged = f"{100.0 * row['flagged'] / max(1, row['cases']):.2f} %"
+        print(f"{_key(row):<{width}}{cells}{flagged:>10}{row[f'{metric}_missing']:>9}")
+    print(f"{sum(row['cases'] for row in rows)} closed loops, {wall:.1f} s")
+    for path in written:
+        print(path)
+
+
+def _key(row: Mapping[str, Any]) -> str:
+    return "/".join(row[part] for part in ("slip_rule", "reference", "friction", "controller"))

@@ -13,7 +13,7 @@ from stickslip.identify.estimate import Estimate
 from stickslip.model import Model
 from stickslip.simulation.steady import Steady
 
-__all__ = ["curve_band", "draw_models", "draw_values", "sliding_torque"]
+__all__ = ["curve_band", "draw_models", "draw_values", "sliding_torque", "spread_values"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -28,13 +28,18 @@ def draw_values(estimates: Sequence[Estimate], correlation: Array, count: int, s
 
     Positive ones are drawn log-normally, with the standard deviation that their 95 % interval has.
     """
+    z: Array = np.random.default_rng(seed).standard_normal((count, len(estimates)))
+    return spread_values(estimates, correlation, z)
+
+
+def spread_values(estimates: Sequence[Estimate], correlation: Array, z: Array) -> Array:
+    """What independent standard normal numbers `z`, shape (count, n), are as values of the estimates."""
     n = len(estimates)
     known = np.where(np.isfinite(correlation), correlation, np.eye(n)) if correlation.size else np.eye(n)
     known = 0.5 * (known + known.T)
     level, vectors = np.linalg.eigh(known)
-    z: Array = np.random.default_rng(seed).standard_normal((count, n))
     z = z * np.sqrt(np.maximum(level, 0.0)) @ vectors.T
-    out = np.empty((count, n))
+    out = np.empty((len(z), n))
     for i, e in enumerate(estimates):
         if e.value > 0.0 and e.lower > 0.0:
             spread = log_spread(e)

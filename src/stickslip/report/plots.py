@@ -118,6 +118,8 @@ class Panel:
         "linear" or "log".
     legend : str
         Where inside the axes its lines are named ("lower right"); empty: in the figure's one legend below.
+    y_names : sequence of str
+        What stands at y = 0, 1, 2 ..., from the top down, in place of numbers.
     """
 
     curves: Sequence[Curve]
@@ -129,6 +131,7 @@ class Panel:
     x_scale: str = "linear"
     legend: str = ""
     y_scale: str = "linear"
+    y_names: Sequence[str] = ()
 
 
 def envelope(x: Array, y: Array, bins: int = 380) -> tuple[Array, Array]:
@@ -218,7 +221,8 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
         top = head + height * i
         # Fixed margins: matplotlib's layout engines take longer than the drawing.
         foot = 0.2 if shared else 0.52  # Room for every panel's own label where the axes differ.
-        box = (0.14, 1.0 - (top + height + 0.06 - foot) / total, 0.83, (height - foot) / total)
+        left = 0.19 if panel.y_names else 0.14
+        box = (left, 1.0 - (top + height + 0.06 - foot) / total, 0.97 - left, (height - foot) / total)
         axes.append(figure.add_axes(box, sharex=axes[0] if axes and shared else None))
         _fill(axes[-1], panel, bare=shared and i < len(panels) - 1)
     handles = {line.get_label(): line for a in axes for line in a.get_lines() if line.get_label()[0] != "_"}
@@ -278,6 +282,10 @@ def _fill(axes: Any, panel: Panel, bare: bool) -> None:
     axes.set_yscale(panel.y_scale)
     for curve in panel.curves:
         _line(axes, curve)
+    if panel.y_names:
+        axes.set_yticks(range(len(panel.y_names)), panel.y_names)
+        axes.set_ylim(len(panel.y_names) - 0.5, -0.5)
+        axes.grid(visible=False, axis="y")
     axes.set_ylabel(panel.y_label)
     axes.yaxis.set_label_coords(-0.122, 0.5)
     if panel.x_limits:

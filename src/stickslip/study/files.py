@@ -25,11 +25,13 @@ from stickslip.study.result import Run
 __all__ = [
     "KEYS",
     "claim_folder",
+    "copy_inputs",
     "find_run",
     "keep_record",
     "metric_names",
     "prepared_folder",
     "read_manifest",
+    "unwritable",
     "write_manifest",
     "write_metrics",
 ]
@@ -177,7 +179,7 @@ def write_manifest(
 ) -> dict[str, Any]:
     """Write manifest.json and copy the study's inputs beside it, so that `stickslip rerun` needs nothing else."""
     try:
-        inputs = _copy_inputs(folder, study)
+        inputs = copy_inputs(folder, [(study.source.name, study.source), *study.files.items()])
         manifest: dict[str, Any] = {
             "study": study.name,
             "title": study.title,
@@ -209,12 +211,12 @@ def _entry(folder: Path, planned: PlannedRun, run: Run) -> dict[str, Any]:
     }
 
 
-def _copy_inputs(folder: Path, study: Study) -> list[dict[str, str]]:
-    """Copy the study and its files to inputs/; name, path as written and SHA-256 of each."""
+def copy_inputs(folder: Path, files: Sequence[tuple[str, Path]]) -> list[dict[str, str]]:
+    """Copy files to inputs/, the first under its own name; path as written, copy and SHA-256 of each."""
     target = folder / "inputs"
     target.mkdir(exist_ok=True)
     inputs: list[dict[str, str]] = []
-    for i, (written, path) in enumerate([(study.source.name, study.source), *study.files.items()]):
+    for i, (written, path) in enumerate(files):
         copy = target / (path.name if i == 0 else f"{i}-{path.name}")
         if copy.resolve() != path.resolve():
             shutil.copyfile(path, copy)

@@ -13,7 +13,7 @@ import stickslip
 
 __all__ = ["engine_hash", "file_hash", "source_hash", "versions"]
 
-WITHOUT_PHYSICS = ("analyse", "cli", "report", "study")
+WITHOUT_PHYSICS = ("analyse", "cli", "report", "study", "sweep")
 """Folders of the package that cannot change a run's numbers."""
 
 

@@ -1,0 +1,77 @@
+"""Run a study over many cases: numbers varied on a grid, by Sobol or Latin points, or as an identification doubts them.
+
+    stickslip sweep thesis-robustness      ships: friction and inertia up to 30 % off, for every compensator
+    stickslip sweep my.toml                your own; begin with a copy (`stickslip sweep thesis-robustness --print`)
+
+Writes DIR/data/ (a Parquet data set), manifest.json, summary.csv and figures. Finished blocks are kept: after an
+interruption, whatever it was, the same command goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+SUMMARY = "run a study over many cases: which compensator for how much uncertainty"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Sweep, output, where it runs."""
+    parser.add_argument(
+        "sweep", metavar="SWEEP", help="thesis-robustness, thesis-gain, or the path of a TOML file"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: sweep-SWEEP)")
+    parser.add_argument("--cases", type=int, metavar="N", help="another number of cases than the file's")
+    parser.add_argument(
+        "--jobs", type=int, default=0, metavar="N", help="blocks at a time (default: one a core)"
+    )
+    parser.add_argument("--processes", action="store_true", help="use processes instead of threads")
+    parser.add_argument(
+        "--scheduler", default="", metavar="URL", help="of Dask, tcp://host:8786: its workers run it"
+    )
+    parser.add_argument("--json", action="store_true", help="print the summary as JSON")
+    parser.add_argument("--no-report", action="store_true", help="leave the figures out")
+    parser.add_argument("--print", action="store_true", help="print the sweep's TOML and run nothing")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run, print the summary, draw the figures."""
+    from dataclasses import replace
+
+    from stickslip.cli import _output
+    from stickslip.errors import InputError
+    from stickslip.sweep import execute
+    from stickslip.sweep.plan import load
+    from stickslip.sweep.summary import summarise, write_summary
+
+    sweep = load(args.sweep)
+    if args.print:
+        print(sweep.source.read_text(encoding="utf-8"), end="")
+        return 0
+    if args.cases is not None:
+        if args.cases < 1 or sweep.drawn.method == "grid":
+            raise InputError(
+                f"--cases {args.cases}: at least 1, and not for a grid; change its points instead"
+            )
+        sweep = replace(sweep, drawn=replace(sweep.drawn, cases=args.cases))
+    out: Path = args.out or Path(f"sweep-{sweep.name}")
+    try:
+        with _output.progress_bar(sweep.name) as progress:
+            backend = "processes" if args.processes else "threads"
+            manifest = execute.run(sweep, out, args.jobs, backend, args.scheduler, progress)
+        rows = summarise(out, sweep)
+        written = [write_summary(out, sweep, rows), out / "manifest.json"]
+        if not args.no_report:
+            from stickslip.report.sweep_pictures import draw
+
+            _output.say("drawing figures ...")
+            written += draw(out, sweep)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            f"finished blocks are kept in {out}; run the same command again to go on"
+        ) from None
+    if args.json:
+        _output.print_json({"folder": str(out), "timings": manifest["timings"], "runs": rows})
+    else:
+        _output.print_sweep(rows, sweep.metrics[0], manifest["timings"]["wall_s"], written)
+    return 0

@@ -1,0 +1,232 @@
+"""Pictures of a sweep: which controller for how much uncertainty, percentiles, what matters most, which gain."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.report.plots import Curve, Panel, Style, scaled, style_of
+from stickslip.report.plots import draw as draw_panels
+from stickslip.study.plan import PlannedRun
+from stickslip.sweep.dataset import read
+from stickslip.sweep.gains import GAIN, recommended
+from stickslip.sweep.plan import Sweep
+from stickslip.sweep.sample import LEVEL, widest
+from stickslip.sweep.summary import influences, within
+
+__all__ = ["draw"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+LEVELS = 13
+HIGH = 95.0
+"""The percentile that a design is judged by."""
+BAND = Style("#0072B2", "-", 4.0)
+MEDIAN = Style("#000000", "-", 1.0)
+LOWER, HIGHER = Style("#0072B2", "-", 4.0), Style("#E69F00", "-", 4.0)
+WORDS = {
+    "position_rms": "RMS position error", "position_peak": "peak position error",
+    "second_half_position_rms": "RMS position error, second half", "velocity_rms": "RMS velocity error",
+    "torque_rms": "RMS motor torque",
+}  # fmt: skip
+UNITS = {"rad_s": "rad/s", "rad": "rad", "Nm": "N·m", "J": "J", "s": "s"}
+
+
+def draw(folder: Path, sweep: Sweep) -> list[Path]:
+    """Draw what the sweep's cases allow into ``figures/`` of its folder. Returns the PNG files."""
+    made: list[Path] = []
+    groups: dict[tuple[str, str, str], list[PlannedRun]] = {}
+    for run in sweep.runs:
+        groups.setdefault((run.slip_rule, run.reference, run.friction), []).append(run)
+    for (rule, reference, friction), runs in groups.items():
+        stem = f"{rule}-{reference}-{friction}"
+        target = folder / "figures"
+        made.append(_percentiles(target / f"percentiles-{stem}", folder, sweep, runs))
+        if GAIN in sweep.drawn.names:
+            made += [p for p in [_gains(target / f"gain-{stem}", folder, sweep, runs)] if p]
+        elif sweep.drawn.nested:
+            made.append(_uncertainty(target / f"uncertainty-{stem}", folder, sweep, runs))
+        made += [_tornado(target / f"tornado-{stem}-{run.controller}", folder, sweep, run) for run in runs]
+    return made
+
+
+def named(metric: str) -> tuple[str, str]:
+    """A metric in words, and its unit."""
+    for ending, unit in UNITS.items():
+        if metric.endswith(f"_{ending}"):
+            short = metric.removesuffix(f"_{ending}")
+            return WORDS.get(short, short.replace("_", " ")), unit
+    return metric.replace("_", " "), "-"
+
+
+def _columns(folder: Path, sweep: Sweep, run: PlannedRun) -> tuple[list[Array], Array]:
+    """What was drawn, and the sweep's first metric."""
+    names = [*sweep.drawn.names, sweep.metrics[0]]
+    found = read(folder, sweep, run, names)
+    return [found[name] for name in sweep.drawn.names], found[sweep.metrics[0]]
+
+
+def _saved(stem: Path, title: str, message: str, panels: list[Panel], height: float) -> Path:
+    draw_panels(stem, title, message, panels, height)
+    return stem.with_name(stem.name + ".png")
+
+
+# ---- which controller for how much uncertainty ----------------------------------------------------------------
+
+
+def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Path:
+    what, unit = named(sweep.metrics[0])
+    spreads = [s.name for s in sweep.drawn.spreads]
+    data: dict[str, tuple[Array, Array]] = {}
+    for run in runs:
+        drawn, values = _columns(folder, sweep, run)
+        data[run.controller] = drawn[sweep.drawn.names.index(LEVEL)], values
+    levels = np.linspace(0.0, 1.0, LEVELS + 1)[1:]
+    lines = {name: within(levels, off, values, HIGH) for name, (off, values) in data.items()}
+    factor, shown = scaled(
+        max(_or_zero(float(np.max(y[np.isfinite(y)], initial=0.0))) for y in lines.values()), unit
+    )
+    percent = 100.0 * widest(sweep.drawn.spreads)
+    families = {"feedforward": "FF-", "feedback": "FB-"}
+    panels: list[Panel] = []
+    for family, prefix in families.items():
+        members = [n for n in lines if n.startswith(prefix)]
+        rest = [n for n in lines if not n.startswith(tuple(families.values()))]
+        if members:
+            panels.append(
+                _lines(percent * levels, lines, [*rest, *members], factor, f"{what}, {shown}", family)
+            )
+    if not panels:
+        panels.append(_lines(percent * levels, lines, list(lines), factor, f"{what}, {shown}", ""))
+    message = (
+        f"{_choice(lines, percent)} 95th percentile where {', '.join(map(_symbol, spreads))} lie anywhere within that "
+        f"distance ({sweep.drawn.cases} cases)"
+    )
+    return _saved(stem, sweep.title, message, panels, 2.3)
+
+
+def _choice(lines: dict[str, Array], percent: float) -> str:
+    """Which controller to choose, in words: all of them, and those that compensate."""
+    third, last = LEVELS // 3, LEVELS - 1
+
+    def best(names: list[str]) -> str:
+        small, large = (min(names, key=lambda n: _or_inf(lines[n][i])) for i in (third, last))
+        if small == large:
+            return small
+        return f"{small} up to {percent * (third + 1) / LEVELS:.0f} %, {large} up to {percent:.0f} %"
+
+    said = f"Least error: {best(list(lines))}"
+    compensated = [n for n in lines if n.startswith(("FF-", "FB-"))]
+    return (
+        f"{said}; of the compensators: {best(compensated)}."
+        if 0 < len(compensated) < len(lines)
+        else f"{said}."
+    )
+
+
+def _lines(
+    levels: Array, lines: dict[str, Array], names: list[str], factor: float, label: str, note: str
+) -> Panel:
+    curves = [Curve(levels, factor * lines[n], n, style_of(n, list(lines))) for n in names]
+    return Panel(curves, label, "uncertainty of what varies, ±%", note=note, y_scale="log")
+
+
+def _or_zero(value: float) -> float:
+    return value if math.isfinite(value) else 0.0
+
+
+def _or_inf(value: float) -> float:
+    return value if math.isfinite(value) else math.inf
+
+
+# ---- percentiles ------------------------------------------------------------------------------------------------
+
+
+def _percentiles(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Path:
+    what, unit = named(sweep.metrics[0])
+    rows = [np.asarray(_columns(folder, sweep, run)[1]) for run in runs]
+    none = np.full(3, np.nan)
+    finite = [v[np.isfinite(v)] for v in rows]
+    spans = [np.percentile(v, [5, 50, 95]) if v.size else none for v in finite]
+    order = sorted(range(len(runs)), key=lambda i: _or_inf(spans[i][2]))
+    factor, shown = scaled(float(np.nanmax(spans)), unit)
+    curves: list[Curve] = []
+    for place, i in enumerate(order):
+        low, middle, high = factor * spans[i]
+        at = np.array([float(place), float(place)])
+        curves.append(
+            Curve(np.array([low, high]), at, "5 % to 95 % of the cases" if place == 0 else "", BAND)
+        )
+        curves.append(
+            Curve(np.array([middle]), at[:1], "median" if place == 0 else "", MEDIAN, "points")
+        )  # fmt: skip
+    message = f"{what} over {sweep.drawn.cases} cases each; best 95th percentile on top"
+    panel = Panel(curves, "", f"{what}, {shown}", y_names=[runs[i].controller for i in order], x_scale="log")
+    return _saved(stem, sweep.title, message, [panel], 0.7 + 0.17 * len(runs))
+
+
+# ---- what matters most ------------------------------------------------------------------------------------------
+
+
+def _tornado(stem: Path, folder: Path, sweep: Sweep, run: PlannedRun) -> Path:
+    what, unit = named(sweep.metrics[0])
+    drawn, values = _columns(folder, sweep, run)
+    names = [n for n in sweep.drawn.names if n != LEVEL]
+    pairs = influences([c for n, c in zip(sweep.drawn.names, drawn) if n != LEVEL], values)
+    known = values[np.isfinite(values)]
+    middle = float(np.median(known)) if known.size else math.nan
+    order = sorted(range(len(pairs)), key=lambda i: -max(abs(x - middle) for x in pairs[i]))
+    factor, shown = scaled(max(abs(x) for pair in pairs for x in pair), unit)
+    curves: list[Curve] = []
+    for place, i in enumerate(order):
+        for end, style, label in ((0, LOWER, "lowest tenth"), (1, HIGHER, "highest tenth")):
+            at = np.full(2, place + (0.13 if end else -0.13))
+            ends = factor * np.array([middle, pairs[i][end]])
+            curves.append(Curve(ends, at, label if place == 0 else "", style))
+    message = (
+        f"{run.controller}: median {what} over the cases with the lowest and the highest tenth of each number; "
+        f"{_symbol(names[order[0]])} matters most"
+    )
+    panel = Panel(
+        curves, "", f"{what}, {shown}", y_names=[_symbol(names[i]) for i in order]
+    )  # fmt: skip
+    return _saved(stem, sweep.title, message, [panel], 0.75 + 0.2 * len(pairs))
+
+
+SYMBOLS = {
+    "axis.inertia": "$J$", "friction.fs": "$F_S$", "friction.fc": "$F_C$", "friction.vs": "$v_s$",
+    "friction.sigma2": r"$\sigma_2$", "friction.sigma0": r"$\sigma_0$", "friction.sigma1": r"$\sigma_1$",
+    "friction.c": "$C$", "controller.gain": "gain", "controller.bandwidth_hz": "bandwidth",
+}  # fmt: skip
+
+
+def _symbol(name: str) -> str:
+    """A number as the field writes it."""
+    return SYMBOLS.get(name, name)
+
+
+# ---- which gain -------------------------------------------------------------------------------------------------
+
+
+def _gains(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Path | None:
+    what, unit = named(sweep.metrics[0])
+    found = {run.controller: recommended(folder, sweep, run) for run in runs if run.control.compensator}
+    found = {name: choice for name, choice in found.items() if choice.gains.size}
+    if not found:
+        return None
+    factor, shown = scaled(max(float(np.nanmax(c.high)) for c in found.values()), unit)
+    names = list(found)
+    curves = [Curve(c.gains, factor * c.high, n, style_of(n, names)) for n, c in found.items()]
+    marks = [
+        Curve(np.array([c.gain]), factor * np.array([c.least]), "", style_of(n, names), "points")
+        for n, c in found.items()
+    ]
+    said = ", ".join(f"{n} {c.gain:.2f}" for n, c in found.items())
+    panels = [Panel([*curves, *marks], f"{what}, {shown}", "gain of the compensator", y_scale="log")]
+    if all(c.hunting.size for c in found.values()):
+        hunts = [Curve(c.gains, 100.0 * c.hunting, n, style_of(n, names)) for n, c in found.items()]
+        panels.append(Panel(hunts, "cases that hunt, %", "gain of the compensator"))
+    message = f"recommended gain (least 95th percentile): {said}"
+    return _saved(stem, sweep.title, message, panels, 2.1)

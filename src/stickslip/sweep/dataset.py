@@ -1,0 +1,126 @@
+"""The data set of a sweep: one Parquet file a block, in folders named after the run's parts.
+
+``DIR/data/slip_rule=signed/reference=low/friction=nominal/controller=PD/part-000000.parquet``: what pandas, Polars,
+DuckDB and pyarrow read as one table. A file is written aside and renamed, and holds the fingerprint of its numbers, so
+that an interrupted sweep finds what it has, whatever stopped it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.study.files import unwritable
+from stickslip.study.plan import PlannedRun
+from stickslip.sweep.block import Block
+from stickslip.sweep.plan import BLOCK, Sweep
+
+__all__ = ["block_path", "has_block", "keep_block", "read", "room_for"]
+
+OVERHEAD = 4000
+"""Bytes that a file of a block takes besides its rows."""
+KEY = b"stickslip"
+
+
+def block_path(folder: Path, sweep: Sweep, run: int, start: int) -> Path:
+    """Where a block lies."""
+    p = sweep.runs[run]
+    parts = (f"slip_rule={p.slip_rule}", f"reference={p.reference}", f"friction={p.friction}",
+             f"controller={p.controller}")  # fmt: skip
+    return folder.joinpath("data", *parts, f"part-{start // BLOCK:06d}.parquet")
+
+
+def has_block(folder: Path, sweep: Sweep, run: int, start: int) -> bool:
+    """Whether the block lies there, whole, with these numbers."""
+    parquet: Any = importlib.import_module("pyarrow.parquet")
+    try:
+        found = parquet.read_schema(block_path(folder, sweep, run, start)).metadata[KEY]
+        return json.loads(found)["fingerprint"] == sweep.fingerprint(run)
+    except (OSError, ValueError, KeyError, TypeError):
+        return False  # Missing, cut off or written by something else: it is run again.
+
+
+def keep_block(folder: Path, sweep: Sweep, block: Block) -> None:
+    """Write a block.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    pyarrow: Any = importlib.import_module("pyarrow")
+    parquet: Any = importlib.import_module("pyarrow.parquet")
+    path = block_path(folder, sweep, block.run, block.start)
+    n = len(block.numbers)
+    columns: dict[str, Any] = {"case": pyarrow.array(range(block.start, block.start + n), pyarrow.int64())}
+    columns |= {name: _numbers(pyarrow, block.numbers[:, i]) for i, name in enumerate(sweep.drawn.names)}
+    columns |= {name: _numbers(pyarrow, block.metrics[:, i]) for i, name in enumerate(sweep.metrics)}
+    columns["flagged"] = pyarrow.array(block.flagged.tolist(), pyarrow.bool_())
+    columns["failure"] = pyarrow.array(block.failures, pyarrow.string())
+    table = pyarrow.Table.from_arrays(list(columns.values()), names=list(columns))
+    about = json.dumps({"fingerprint": sweep.fingerprint(block.run)}).encode()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Another command may write the same block; each has a draft of its own.
+        draft = path.with_suffix(f".{os.getpid()}.part")
+        parquet.write_table(table.replace_schema_metadata({KEY: about}), draft)
+        os.replace(draft, path)
+    except OSError as error:
+        raise unwritable(path, error) from None
+
+
+def _numbers(pyarrow: Any, values: Any) -> Any:
+    """Doubles; NaN becomes null."""
+    found = np.ascontiguousarray(values, dtype=np.float64)
+    known = np.packbits(~np.isnan(found), bitorder="little")
+    buffers = [pyarrow.py_buffer(known.tobytes()), pyarrow.py_buffer(found)]
+    return pyarrow.Array.from_buffers(pyarrow.float64(), found.size, buffers)
+
+
+def clear_drafts(folder: Path) -> None:
+    """Remove what a killed command left half written."""
+    for draft in (folder / "data").rglob("part-*.part"):
+        draft.unlink(missing_ok=True)
+
+
+def room_for(folder: Path, sweep: Sweep) -> None:
+    """Refuse a sweep whose data set the disk has no room for.
+
+    Raises
+    ------
+    InputError
+    """
+    import shutil
+
+    place = next(p for p in (folder, *folder.resolve().parents) if p.exists())
+    row = 8 * (1 + len(sweep.drawn.names) + len(sweep.metrics)) + 2
+    wanted = sweep.cases * row + -(-sweep.drawn.cases // BLOCK) * len(sweep.runs) * OVERHEAD
+    free = shutil.disk_usage(place).free
+    if wanted > free:
+        raise InputError(
+            f"{sweep.cases} cases take about {wanted / 1e9:.3g} GB and {place} has {free / 1e9:.3g} GB free; "
+            "run fewer, or choose another place with --out"
+        )
+
+
+def read(
+    folder: Path, sweep: Sweep, run: PlannedRun, columns: Sequence[str]
+) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+    """Columns of a run's cases, in order of the cases; NaN where there is no number."""
+    parquet: Any = importlib.import_module("pyarrow.parquet")
+    index = list(sweep.runs).index(run)
+    found: dict[str, list[Any]] = {name: [] for name in columns}
+    for start in range(0, sweep.drawn.cases, BLOCK):
+        path = block_path(folder, sweep, index, start)
+        if path.exists():
+            table = parquet.ParquetFile(path).read(columns=list(columns))
+            for name in columns:
+                found[name].append(table.column(name).to_numpy().astype(np.float64))
+    return {name: np.concatenate(parts) if parts else np.zeros(0) for name, parts in found.items()}

@@ -1,0 +1,250 @@
+"""Running a sweep: blocks through threads, processes or a Dask cluster, each kept as soon as it is done."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import json
+import os
+import tempfile
+import time
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from stickslip.errors import InputError
+from stickslip.study.files import copy_inputs, prepared_folder, unwritable
+from stickslip.study.provenance import engine_hash, versions
+from stickslip.study.study import interrupts_between_runs
+from stickslip.sweep import dataset
+from stickslip.sweep.block import Block, compute
+from stickslip.sweep.plan import BLOCK, Sweep, load
+
+__all__ = ["BACKENDS", "run"]
+
+BACKENDS = ("threads", "processes")
+MOST_TRIES = 5
+"""So often workers may be killed before the command gives up; what is done is kept."""
+Progress = Callable[[int, int], None]
+
+
+def run(
+    sweep: Sweep,
+    out: str | Path,
+    jobs: int = 0,
+    backend: str = "threads",
+    scheduler: str = "",
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Run a sweep, or what is missing of it, and write its data set and manifest.json.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    out : path
+        The folder to write to; made if missing.
+    jobs : int
+        Blocks at a time; 0 for one a core.
+    backend : {"threads", "processes"}
+    scheduler : str
+        Address of a Dask scheduler (tcp://host:8786), whose workers run the blocks instead.
+    progress : callable, optional
+        ``progress(finished, all)`` in closed loops.
+
+    Returns
+    -------
+    dict
+        The manifest.
+
+    Raises
+    ------
+    InputError
+        If the folder or the scheduler cannot be used, or workers are killed again and again.
+    """
+    if jobs < 0:
+        raise InputError(f"jobs = {jobs} must be at least 1")
+    folder = claim(Path(out), sweep)
+    dataset.room_for(folder, sweep)
+    for planned in sweep.runs:
+        planned.check()
+    dataset.clear_drafts(folder)
+    clock, cpu = time.perf_counter(), time.process_time()
+    missing = [b for b in sweep.blocks if not dataset.has_block(folder, sweep, *b)]
+    done, found = sweep.cases - sum(_size(sweep, b) for b in missing), len(sweep.blocks) - len(missing)
+    with interrupts_between_runs() as check:
+        for block in _computed(sweep, missing, jobs or os.cpu_count() or 1, backend, scheduler):
+            dataset.keep_block(folder, sweep, block)
+            done += len(block.numbers)
+            if progress:
+                progress(done, sweep.cases)
+            check()
+    timings = {
+        "wall_s": time.perf_counter() - clock, "cpu_s": time.process_time() - cpu, "jobs": jobs,
+        "blocks_computed": len(missing), "blocks_found": found,
+    }  # fmt: skip
+    return write_manifest(folder, sweep, timings)
+
+
+def claim(folder: Path, sweep: Sweep) -> Path:
+    """Prepare the folder, unless another sweep's results lie there.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        other = json.loads((folder / "manifest.json").read_text(encoding="utf-8")).get("sweep")
+    except (OSError, ValueError, AttributeError):
+        other = sweep.name
+    if other != sweep.name:
+        raise InputError(f"{folder} holds other results; choose another place with --out, or delete it")
+    return prepared_folder(folder)
+
+
+def _size(sweep: Sweep, block: tuple[int, int]) -> int:
+    return min(BLOCK, sweep.drawn.cases - block[1])
+
+
+# ---- where blocks are computed ---------------------------------------------------------------------------------
+
+
+def _computed(
+    sweep: Sweep, blocks: Sequence[tuple[int, int]], jobs: int, backend: str, scheduler: str
+) -> Iterator[Block]:
+    """The blocks as they get done; those of a killed worker are computed again."""
+    left, last = dict.fromkeys(blocks), ""
+    for _ in range(MOST_TRIES):
+        try:
+            for block in _once(sweep, list(left), jobs, backend, scheduler):
+                del left[block.run, block.start]
+                yield block
+            return
+        except _killed() as error:
+            last = type(error).__name__
+    raise InputError(f"workers were killed {MOST_TRIES} times ({last}); run the same command again to go on")
+
+
+def _killed() -> tuple[type[BaseException], ...]:
+    """What is raised where a worker was killed."""
+    loky: Any = importlib.import_module("joblib.externals.loky.process_executor")
+    kinds: list[type[BaseException]] = [loky.BrokenProcessPool]
+    with suppress(ImportError):
+        kinds.append(importlib.import_module("distributed").KilledWorker)
+    return tuple(kinds)
+
+
+def _once(
+    sweep: Sweep, blocks: Sequence[tuple[int, int]], jobs: int, backend: str, scheduler: str
+) -> Iterator[Block]:
+    if not blocks:
+        return
+    joblib: Any = importlib.import_module("joblib")
+    if not scheduler and (jobs == 1 or backend == "threads"):
+        tasks = (joblib.delayed(compute)(sweep, *block) for block in blocks)
+        yield from joblib.Parallel(jobs, backend="threading", return_as="generator_unordered")(tasks)
+        return
+    parcel = Parcel.of(sweep)
+    tasks = (joblib.delayed(compute_parcel)(parcel, *block) for block in blocks)
+    with _cluster(scheduler) as options:
+        yield from joblib.Parallel(
+            -1 if scheduler else jobs, return_as="generator_unordered", batch_size=1, **options
+        )(tasks)
+
+
+@contextmanager
+def _cluster(scheduler: str) -> Generator[dict[str, Any]]:
+    """Options of `joblib.Parallel` for local processes, or for the workers of a Dask scheduler."""
+    if not scheduler:
+        yield {"backend": "loky"}
+        return
+    try:
+        distributed: Any = importlib.import_module("distributed")
+    except ImportError:
+        raise InputError("--scheduler needs Dask; pip install 'stickslip[dask]'") from None
+    joblib: Any = importlib.import_module("joblib")
+    try:
+        client = distributed.Client(scheduler, timeout=10, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise InputError(
+            f"no Dask scheduler at {scheduler} ({error}); start one with `dask scheduler`"
+        ) from None
+    with client, joblib.parallel_config(backend="dask", client=client):
+        yield {}
+
+
+# ---- a sweep that travels --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """A sweep's files, so that another process or machine can load it.
+
+    Attributes
+    ----------
+    name : str
+        Of the sweep's own file.
+    files : tuple of (str, str, bytes)
+        Path as written, name and content, of that file and of all that it and its study refer to.
+    """
+
+    name: str
+    files: tuple[tuple[str, str, bytes], ...]
+
+    @staticmethod
+    def of(sweep: Sweep) -> Parcel:
+        """Pack a sweep."""
+        everything = {sweep.source.name: sweep.source, **sweep.study.files, **sweep.files}
+        named = ((w, f"{i}-{p.name}", p.read_bytes()) for i, (w, p) in enumerate(everything.items()))
+        return Parcel(sweep.source.name, tuple(named))
+
+    def load(self) -> Sweep:
+        """Unpack it, and load it from there."""
+        folder = Path(tempfile.mkdtemp(prefix="stickslip-sweep-"))
+        for _, name, content in self.files:
+            (folder / name).write_bytes(content)
+        moved = {written: folder / name for written, name, _ in self.files[1:]}
+        return load(folder / self.files[0][1], moved)
+
+
+@functools.lru_cache(maxsize=4)
+def _loaded(parcel: Parcel) -> Sweep:
+    return parcel.load()
+
+
+def compute_parcel(parcel: Parcel, run: int, start: int) -> Block:
+    """Compute a block in another process."""
+    return compute(_loaded(parcel), run, start)
+
+
+# ---- the manifest ------------------------------------------------------------------------------------------------
+
+
+def write_manifest(folder: Path, sweep: Sweep, timings: Mapping[str, Any]) -> dict[str, Any]:
+    """Write manifest.json and copy the sweep's inputs beside it."""
+    try:
+        everything = [(sweep.source.name, sweep.source), (sweep.study.source.name, sweep.study.source)]
+        manifest: dict[str, Any] = {
+            "sweep": sweep.name,
+            "title": sweep.title,
+            "written": datetime.now(UTC).isoformat(timespec="seconds"),
+            "versions": versions(),
+            "engine_sha256": engine_hash(),
+            "inputs": copy_inputs(folder, [*everything, *sweep.study.files.items(), *sweep.files.items()]),
+            "configuration": sweep.config,
+            "cases": sweep.drawn.cases,
+            "varied": list(sweep.drawn.names),
+            "metrics": list(sweep.metrics),
+            "timings": dict(timings),
+            "runs": [
+                {"run": p.key, "fingerprint": sweep.fingerprint(i)} for i, p in enumerate(sweep.runs)
+            ],
+        }  # fmt: skip
+        draft = folder / "manifest.json.part"
+        draft.write_text(json.dumps(manifest, indent=1, default=str), encoding="utf-8")
+        os.replace(draft, folder / "manifest.json")
+    except OSError as error:
+        raise unwritable(folder, error) from None
+    return manifest

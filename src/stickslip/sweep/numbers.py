@@ -1,0 +1,185 @@
+"""The numbers of a run by name: read, varied in one run, or laid out as columns of a batch.
+
+``axis.inertia``, ``friction.NAME``, ``law.NAME`` (of the compensator's law), ``reference.NAME`` and, of the controller,
+``controller.gain``, ``filter_hz``, ``bandwidth_hz``, ``damping``, ``kp``, ``ki``, ``kd``, ``kr``, ``torque_limit``,
+``sample_time``. An element of a list is ``friction.k[0]``. The machine varies under the controller as it was designed:
+gains follow ``bandwidth_hz`` and ``damping``, not the inertia.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.control.linear import Gains, place
+from stickslip.errors import UnknownName
+from stickslip.model import Model, Reference
+from stickslip.study.plan import PlannedRun
+
+__all__ = ["as_columns", "belongs", "poles", "value_of", "varied"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+FAMILIES = ("axis", "friction", "law", "controller", "reference")
+POLES = ("bandwidth_hz", "damping")
+SETTINGS = ("gain", "filter_hz", *POLES, *Gains._fields, "torque_limit", "sample_time")
+ELEMENT = re.compile(r"(.+)\[(\d+)\]")
+
+
+def parts(name: str) -> tuple[str, str, int | None]:
+    """Family, name, and element if one is meant."""
+    family, _, rest = name.partition(".")
+    match = ELEMENT.fullmatch(rest)
+    return (family, match[1], int(match[2])) if match else (family, rest, None)
+
+
+def poles(gains: Gains, inertia: float) -> tuple[str, float, float]:
+    """Kind, bandwidth (Hz) and damping ratio that `stickslip.control.linear.place` makes such gains of."""
+    if gains.ki > 0.0:
+        w = (gains.ki / inertia) ** (1.0 / 3.0)
+        return "PID", w / (2.0 * math.pi), 0.5 * (gains.kd / (inertia * w) - 1.0)
+    w = math.sqrt(gains.kp / inertia)
+    return ("PD" if gains.kr > 0.0 else "PR"), w / (2.0 * math.pi), 0.5 * gains.kd / (inertia * w)
+
+
+def known(run: PlannedRun) -> dict[str, Any]:
+    """Every number of a run, by name; those of lists as tuples."""
+    helper, gains = run.control.compensator, run.control.gains
+    found: dict[str, Any] = {"axis.inertia": run.axis.inertia}
+    found |= {f"friction.{k}": v for k, v in run.axis.friction.parameters._asdict().items()}
+    if helper:
+        found |= {f"law.{k}": v for k, v in helper.model.parameters._asdict().items()}
+        found["controller.gain"] = helper.gain
+        found["controller.filter_hz"] = helper.filter_hz or math.inf
+    if gains.kp > 0.0:
+        _, found["controller.bandwidth_hz"], found["controller.damping"] = poles(gains, run.axis.inertia)
+    found |= {f"controller.{k}": v for k, v in gains._asdict().items()}
+    found["controller.torque_limit"] = run.control.torque_limit
+    found["controller.sample_time"] = run.control.sample_time
+    return found | {f"reference.{k}": v for k, v in run.motion.parameters._asdict().items()}
+
+
+def belongs(run: PlannedRun, name: str) -> bool:
+    """Whether the run has that number; a controller without compensator has no ``law.fs``."""
+    family, rest, element = parts(name)
+    value = known(run).get(f"{family}.{rest}")
+    if element is not None:
+        return isinstance(value, tuple) and element < len(value)  # type: ignore[arg-type]
+    return value is not None
+
+
+def value_of(run: PlannedRun, name: str) -> Any:
+    """The number as the study has it, or a tuple.
+
+    Raises
+    ------
+    UnknownName
+    """
+    family, rest, element = parts(name)
+    names = known(run)
+    if f"{family}.{rest}" not in names or not belongs(run, name):
+        raise UnknownName(f"number of run {run.key}", name, names)
+    value = names[f"{family}.{rest}"]
+    return value if element is None else value[element]
+
+
+# ---- one run -----------------------------------------------------------------------------------------------
+
+
+def varied(run: PlannedRun, values: Mapping[str, Any]) -> PlannedRun:
+    """The run with other numbers.
+
+    Raises
+    ------
+    InputError
+        If a number is out of bounds.
+    """
+    sorted_: dict[str, dict[str, Any]] = {family: {} for family in FAMILIES}
+    for name, value in values.items():
+        family, rest, element = parts(name)
+        if element is not None:
+            whole = list(sorted_[family].get(rest, value_of(run, f"{family}.{rest}")))
+            whole[element] = value
+            value = whole
+        sorted_[family][rest] = value
+    motion = run.motion
+    if sorted_["reference"]:
+        motion = Reference(motion.kind, **{**motion.parameters._asdict(), **sorted_["reference"]})
+    axis = replace(
+        run.axis,
+        inertia=float(sorted_["axis"].get("inertia", run.axis.inertia)),
+        friction=with_values(run.axis.friction, sorted_["friction"]),
+    )
+    return replace(
+        run, axis=axis, motion=motion, control=_control(run, sorted_["controller"], sorted_["law"])
+    )
+
+
+def with_values(model: Model, values: Mapping[str, Any]) -> Model:
+    """The model with other parameters."""
+    return Model(model.law, **{**model.parameters._asdict(), **values}) if values else model
+
+
+def _control(run: PlannedRun, settings: Mapping[str, Any], law: Mapping[str, Any]) -> Any:
+    control, helper = run.control, run.control.compensator
+    own = {k: float(v) for k, v in settings.items()}
+    if helper:
+        hz = own.get("filter_hz", helper.filter_hz or math.inf)
+        helper = replace(
+            helper, model=with_values(helper.model, law), gain=own.get("gain", helper.gain),
+            filter_hz=hz if math.isfinite(hz) else None,
+        )  # fmt: skip
+    return replace(
+        control, gains=_gains(run, own), compensator=helper,
+        torque_limit=own.get("torque_limit", control.torque_limit),
+        sample_time=own.get("sample_time", control.sample_time),
+    )  # fmt: skip
+
+
+def _gains(run: PlannedRun, settings: Mapping[str, float]) -> Gains:
+    gains = run.control.gains
+    if any(name in settings for name in POLES):
+        kind, bandwidth, damping = poles(gains, run.axis.inertia)
+        gains = place(
+            kind, run.axis.inertia, settings.get("bandwidth_hz", bandwidth), settings.get("damping", damping)
+        )
+    return gains._replace(**{k: v for k, v in settings.items() if k in Gains._fields})
+
+
+# ---- columns of a batch ------------------------------------------------------------------------------------
+
+
+def as_columns(run: PlannedRun, values: Mapping[str, Array]) -> dict[str, Array]:
+    """The values as `stickslip.simulation.batch` names them; it says itself which it cannot vary.
+
+    Parameters
+    ----------
+    run : PlannedRun
+    values : mapping of str to array, shape (n,) or (n, elements)
+    """
+    out: dict[str, Array] = {}
+    settings: dict[str, Array] = {}
+    for name, column in values.items():
+        family, rest, element = parts(name)
+        if family in ("friction", "law"):
+            whole = f"{family}.{rest}"
+            if element is not None:
+                base = out.get(whole, np.tile(value_of(run, whole), (len(column), 1)))
+                base[:, element] = column
+                column = base
+            out[whole] = column
+        elif name == "axis.inertia":
+            out["inertia"] = column
+        elif family == "controller" and rest in (*POLES, *Gains._fields):
+            settings[rest] = column
+        else:
+            out["gain" if name == "controller.gain" else name] = column
+    if settings:
+        rows = zip(*settings.values())
+        gains = [_gains(run, dict(zip(settings, map(float, row)))) for row in rows]
+        out |= {field: np.array([getattr(g, field) for g in gains]) for field in Gains._fields}
+    return out

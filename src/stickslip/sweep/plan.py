@@ -1,0 +1,278 @@
+"""From a sweep's TOML file to the runs and cases it asks for."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.config import Table, read_toml
+from stickslip.errors import ConfigError, InputError, suggestion
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.identified_file import read_identified
+from stickslip.simulation._meter import METRICS
+from stickslip.study import plan as studies
+from stickslip.study.plan import PlannedRun, Study
+from stickslip.sweep.numbers import belongs, value_of, varied
+from stickslip.sweep.sample import LEVEL, METHODS, Drawn, Spread, count_of
+
+__all__ = ["BUILT_IN", "Sweep", "load"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+BUILT_IN = ("thesis-robustness", "thesis-gain")
+BLOCK = 256
+"""Cases in a file of the data set."""
+USUAL = ("position_rms_rad", "position_peak_rad", "velocity_rms_rad_s", "torque_rms_Nm")
+MOST_CASES = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep as its file describes it.
+
+    Attributes
+    ----------
+    runs : sequence of PlannedRun
+        Of the study; each is run in every case.
+    drawn : Drawn
+        The cases.
+    metrics : tuple of str
+    check : bool
+        Whether every case is run a second time, ten times less accurately, to flag those whose metrics are not sure.
+    study : Study
+    config : mapping
+        The sweep's TOML as read.
+    source : Path
+    files : mapping of str to Path
+        Files it refers to, by the path as written.
+    """
+
+    name: str
+    title: str
+    runs: Sequence[PlannedRun]
+    drawn: Drawn
+    metrics: tuple[str, ...]
+    check: bool
+    study: Study
+    config: Mapping[str, Any]
+    source: Path
+    files: Mapping[str, Path]
+
+    @property
+    def blocks(self) -> list[tuple[int, int]]:
+        """Run and first case of every block, in order."""
+        return [(i, at) for i in range(len(self.runs)) for at in range(0, self.drawn.cases, BLOCK)]
+
+    @property
+    def cases(self) -> int:
+        """Closed loops in all."""
+        return len(self.runs) * self.drawn.cases
+
+    def fingerprint(self, run: int) -> str:
+        """A hash of everything that determines the numbers of a run's cases."""
+        content = [
+            self.runs[run].fingerprint, asdict(self.drawn), self.metrics, self.check, BLOCK,
+        ]  # fmt: skip
+        return hashlib.sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
+
+    def values(self, run: PlannedRun, numbers: Array) -> dict[str, Array]:
+        """What the numbers drawn are in a run, by name, shape (n,) or (n, elements); only those that it has."""
+        out: dict[str, Array] = {}
+        for i, name in enumerate(self.drawn.names):
+            if not belongs(run, name):
+                continue
+            column = numbers[:, i]
+            if i < len(self.drawn.spreads) and self.drawn.spreads[i].factor:
+                base = value_of(run, name)
+                # A factor on a list multiplies every element.
+                column = np.multiply.outer(column, np.asarray(base, dtype=np.float64))
+            out[name] = np.ascontiguousarray(column, dtype=np.float64)
+        return out
+
+
+def load(sweep: str | Path, moved: Mapping[str, Path] | None = None) -> Sweep:
+    """Read a sweep: the path of a TOML file, or the name of one that ships with the package.
+
+    Parameters
+    ----------
+    sweep : str or Path
+    moved : mapping of str to Path, optional
+        Where files that the sweep and its study refer to lie now, by the path as written.
+
+    Raises
+    ------
+    ConfigError
+        One line that names the key, its value and what is allowed.
+    """
+    name = str(sweep)
+    path = Path(__file__).with_name(f"{name}.toml") if name in BUILT_IN else Path(sweep)
+    if name not in BUILT_IN and path.suffix != ".toml" and not path.exists():
+        raise ConfigError(
+            f"unknown sweep {name!r}; give the path of a TOML file, or one of {', '.join(BUILT_IN)}"
+        )
+    table = read_toml(path, f"{name}.toml" if name in BUILT_IN else "", moved)
+    with table:
+        return _sweep(path.stem, path, table, moved or {})
+
+
+def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sweep:
+    title = table.text("title", name)
+    study = _study(table, moved)
+    only = table.texts("only", _names(study)) if table.has("only") else []
+    runs = studies.select([*study.runs, *study.extras], only)
+    if not runs:
+        raise table.error("only", "selects no run of the study")
+    tolerance = table.positive("tolerance", "rad", 1e-7)
+    runs = [replace(r, numerics=replace(r.numerics, tolerance=tolerance, output=r.duration)) for r in runs]
+    metrics = table.texts("metrics", METRICS) if table.has("metrics") else list(USUAL)
+    check = table.choice("check", ("yes", "no"), "yes") == "yes"
+    drawn = _drawn(table)
+    found = Sweep(
+        name, title, runs, drawn, tuple(metrics), check, study, table.values, path, dict(table.document.files)
+    )
+    _check(found, table)
+    return found
+
+
+def _study(table: Table, moved: Mapping[str, Path]) -> Study:
+    named = table.text("study")
+    if named in studies.BUILT_IN:
+        return studies.load(named)
+    return studies.load(table.document.locate(named), moved)
+
+
+def _names(study: Study) -> list[str]:
+    runs = [*study.runs, *study.extras]
+    return list(dict.fromkeys(getattr(r, family) for family in studies.FAMILIES for r in runs))
+
+
+# ---- what varies ---------------------------------------------------------------------------------------------
+
+
+def _drawn(table: Table) -> Drawn:
+    method = table.choice("method", METHODS, "sobol")
+    spreads: list[Spread] = []
+    if table.has("vary"):
+        family = table.table("vary")
+        for name in list(family.values):
+            with family.table(name) as t:
+                spreads.append(_spread(name, t, method))
+        family.has("")
+    estimates, correlation = _estimates(table)
+    if not spreads and not estimates:
+        raise ConfigError(f'{table.label("vary")} is missing; give at least one [vary."friction.fs"]')
+    if method == "grid":
+        if estimates:
+            raise table.error("method", "cannot draw from a model's intervals; choose sobol or latin")
+        cases = count_of(spreads)
+        if table.has("cases"):
+            raise table.error("cases", "is what the points of a grid make; leave it out")
+    else:
+        cases = _whole(table, "cases")
+    if cases > MOST_CASES:
+        raise ConfigError(f"{table.label()}: {cases} cases are too many; keep below {MOST_CASES}")
+    seed = _whole(table, "seed", 1, least=0)
+    nested = table.choice("nested", ("yes", "no"), "no") == "yes"
+    if nested and (method == "grid" or not spreads):
+        raise table.error("nested", "needs ranges and the method sobol or latin")
+    return Drawn(method, tuple(spreads), cases, seed, estimates, correlation, nested)
+
+
+def _whole(table: Table, key: str, default: int | None = None, least: int = 1) -> int:
+    value = table.number(key, "", default, least)
+    if value != int(value):
+        raise table.error(key, "must be a whole number")
+    return int(value)
+
+
+def _spread(name: str, table: Table, method: str) -> Spread:
+    given = [key for key in ("scale", "range", "values") if table.has(key)]
+    if len(given) != 1:
+        raise ConfigError(f"{table.label()}: give one of scale = [0.7, 1.3], range = [...] or values = [...]")
+    key = given[0]
+    listed = Table({key: table.values[key]}, table.document, table.path).rest()[key]
+    if not isinstance(listed, list) or not listed:
+        raise table.error(key, "must be a list of numbers")
+    numbers = cast("list[float]", listed)
+    factor = key == "scale" or (
+        key == "values" and table.choice("of", ("value", "factor"), "value") == "factor"
+    )
+    if key == "values":
+        if method != "grid":
+            raise table.error(key, f"belongs to a grid; give scale or range for method {method!r}")
+        return Spread(name, min(numbers), max(numbers), factor, values=tuple(map(float, numbers)))
+    if len(numbers) != 2 or not numbers[0] < numbers[1]:
+        raise table.error(key, "is empty; give [low, high] with low below high")
+    logarithmic = table.choice("steps", ("linear", "logarithmic"), "linear") == "logarithmic"
+    if logarithmic and numbers[0] <= 0.0:
+        raise table.error(key, "has no logarithm; give positive numbers")
+    points = _whole(table, "points") if method == "grid" else 0
+    return Spread(name, float(numbers[0]), float(numbers[1]), factor, points, logarithmic=logarithmic)
+
+
+def _estimates(table: Table) -> tuple[tuple[Estimate, ...], tuple[tuple[float, ...], ...]]:
+    """What `model = "model.toml"` says is uncertain: the law's parameters and the inertia."""
+    if not table.has("model"):
+        return (), ()
+    found = read_identified(table.document.locate(table.text("model")))
+    law = {f.name for f in found.model.law.fields}
+    kept = [
+        i for i, e in enumerate(found.estimates) if e.name.partition("[")[0] in law or e.name == "inertia"
+    ]
+    if not kept:
+        raise table.error(
+            "model", "has no estimates with intervals; give a file that `stickslip identify` wrote"
+        )
+    matrix = found.correlation[np.ix_(kept, kept)]
+    return tuple(found.estimates[i] for i in kept), tuple(tuple(map(float, row)) for row in matrix)
+
+
+# ---- bad sweeps are told before anything runs ------------------------------------------------------------------
+
+
+def _check(sweep: Sweep, table: Table) -> None:
+    """Every number belongs to a run, and the runs at both ends of every range can be run."""
+    for name in sweep.drawn.names:
+        if name != LEVEL and not any(belongs(run, name) for run in sweep.runs):
+            allowed = list(dict.fromkeys(k for run in sweep.runs for k in _all_numbers(run)))
+            raise ConfigError(
+                f"{table.label('vary')}: no run has a number {name!r}; {suggestion(name, allowed)}"
+            )
+    for run in sweep.runs:
+        for numbers in _ends(sweep.drawn):
+            values = {k: _plain(v[0]) for k, v in sweep.values(run, numbers[None, :]).items()}
+            try:
+                varied(run, values)
+            except InputError as error:
+                raise ConfigError(
+                    f"{table.label('vary')}: run {run.key} at the end of a range: {error}"
+                ) from None
+
+
+def _all_numbers(run: PlannedRun) -> list[str]:
+    from stickslip.sweep.numbers import known
+
+    return list(known(run))
+
+
+def _ends(drawn: Drawn) -> list[Array]:
+    """Every number at its lowest and at its highest while the others are in the middle."""
+    middle = [0.5 * (s.low + s.high) for s in drawn.spreads] + [e.value for e in drawn.estimates]
+    middle += [1.0] if drawn.nested else []
+    out: list[Array] = []
+    for i, s in enumerate(drawn.spreads):
+        for end in (s.low, s.high):
+            numbers = np.array(middle)
+            numbers[i] = end
+            out.append(numbers)
+    return out or [np.array(middle)]
+
+
+def _plain(value: Any) -> Any:
+    """A number or a list of them, as Python has them."""
+    return value.tolist() if isinstance(value, np.ndarray) else float(value)

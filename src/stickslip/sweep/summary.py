@@ -1,0 +1,80 @@
+"""What a sweep's cases say together: percentiles of a metric for every run, flagged and failed shares."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.study.files import KEYS, unwritable
+from stickslip.sweep.dataset import read
+from stickslip.sweep.plan import Sweep
+
+__all__ = ["PERCENTILES", "influences", "summarise", "within", "write_summary"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+PERCENTILES = (5, 50, 95, 100)
+LEAST_CASES = 20
+"""Fewer cases than this say nothing of a percentile."""
+
+
+def summarise(folder: Path, sweep: Sweep) -> list[dict[str, Any]]:
+    """A row a run: its key, numbers of cases, flagged and failed ones, and percentiles of every metric."""
+    rows: list[dict[str, Any]] = []
+    for run in sweep.runs:
+        columns = read(folder, sweep, run, [*sweep.metrics, "flagged"])
+        first = columns[sweep.metrics[0]]
+        row: dict[str, Any] = {key: getattr(run, key) for key in KEYS}
+        row |= {"cases": first.size, "flagged": int(np.nansum(columns["flagged"]))}
+        for name in sweep.metrics:
+            values = columns[name][np.isfinite(columns[name])]
+            row[f"{name}_missing"] = int(first.size - values.size)
+            for p in PERCENTILES:
+                row[f"{name}_p{p}"] = float(np.percentile(values, p)) if values.size else float("nan")
+        rows.append(row)
+    return rows
+
+
+def write_summary(folder: Path, sweep: Sweep, rows: Sequence[Mapping[str, Any]]) -> Path:
+    """Write summary.csv, one row a run. Returns its path."""
+    path = folder / "summary.csv"
+    draft = folder / "summary.csv.part"
+    try:
+        with draft.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+        os.replace(draft, path)
+    except OSError as error:
+        raise unwritable(path, error) from None
+    return path
+
+
+# ---- what uncertainty does ---------------------------------------------------------------------------------------
+
+
+def within(levels: Array, off: Array, values: Array, percentile: float) -> Array:
+    """The percentile of a metric over the cases of each level, from the one before it; NaN where there are too few."""
+    out = np.full(levels.size, np.nan)
+    for i, level in enumerate(levels):
+        kept = values[(off > (levels[i - 1] if i else 0.0)) & (off <= level) & np.isfinite(values)]
+        if kept.size >= LEAST_CASES:
+            out[i] = np.percentile(kept, percentile)
+    return out
+
+
+def influences(drawn: Sequence[Array], values: Array) -> list[tuple[float, float]]:
+    """Median of a metric over the lowest and the highest tenth of each number, the others as they come."""
+    out: list[tuple[float, float]] = []
+    for column in drawn:
+        low, high = np.percentile(column, [10, 90])
+        known = np.isfinite(values)
+        out.append((
+            float(np.median(values[(column <= low) & known])) if np.any((column <= low) & known) else float("nan"),
+            float(np.median(values[(column >= high) & known])) if np.any((column >= high) & known) else float("nan"),
+        ))  # fmt: skip
+    return out

@@ -1,0 +1,280 @@
+"""Sweeps: what varies, which cases, the data set after any interruption, and bad ones told before anything runs."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow.dataset
+import pytest
+
+from stickslip.cli import main
+from stickslip.errors import ConfigError, InputError, UnknownName
+from stickslip.identify.estimate import Estimate
+from stickslip.sweep import block, dataset, execute, numbers, summary
+from stickslip.sweep.plan import load
+from stickslip.sweep.sample import Drawn, Spread
+
+SMALL = Path(__file__).with_name("small.toml")
+
+
+@pytest.fixture(scope="module")
+def small():
+    return load(SMALL)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(small, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    execute.run(small, folder, jobs=1)
+    return table(folder)
+
+
+def table(folder):
+    found = pyarrow.dataset.dataset(
+        folder / "data", partitioning="hive", exclude_invalid_files=True
+    ).to_table()
+    return found.sort_by([("controller", "ascending"), ("case", "ascending")])
+
+
+# ---- cases -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin"])
+def test_blocks_are_parts_of_the_whole(method):
+    drawn = Drawn(method, (Spread("a", 1.0, 2.0), Spread("b", 0.1, 10.0, logarithmic=True)), 600, 5)
+    whole = drawn.block(0, 600)
+    assert np.array_equal(whole[256:512], drawn.block(256, 512))
+    assert whole.min(axis=0) == pytest.approx([1.0, 0.1], rel=0.03)
+    assert whole.max(axis=0) == pytest.approx([2.0, 10.0], rel=0.03)
+    # Even in the logarithm: half of the cases lie below 1.
+    assert np.mean(whole[:, 1] < 1.0) == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_latin_hypercube_has_one_case_in_every_slice():
+    drawn = Drawn("latin", (Spread("a", 0.0, 1.0), Spread("b", 0.0, 1.0)), 50, 1)
+    for column in drawn.block(0, 50).T:
+        assert sorted(np.floor(column * 50).astype(int)) == list(range(50))
+
+
+def test_a_grid_has_every_point_with_every_other():
+    drawn = Drawn("grid", (Spread("a", 1.0, 3.0, points=3), Spread("b", 0.0, 0.0, values=(5.0, 7.0))), 6, 1)
+    assert drawn.block(0, 6).tolist() == [[1, 5], [1, 7], [2, 5], [2, 7], [3, 5], [3, 7]]
+    assert drawn.block(4, 6).tolist() == [[3, 5], [3, 7]]
+
+
+def test_a_nested_sweep_stays_within_the_level_that_it_drew():
+    drawn = Drawn("sobol", (Spread("a", 0.7, 1.3), Spread("b", 0.7, 1.3)), 512, 1, nested=True)
+    a, b, level = drawn.block(0, 512).T
+    assert np.all(np.maximum(abs(a - 1.0), abs(b - 1.0)) <= 0.3 * level + 1e-12)
+    assert np.mean(level < 0.25) == pytest.approx(0.25, abs=0.01)
+
+
+def test_a_model_is_drawn_with_its_intervals_and_correlation():
+    estimates = (
+        Estimate("fs", "N·m", "F_S", 0.3, 0.03, 0.3 * np.exp(-0.196), 0.3 * np.exp(0.196), True),
+        Estimate("inertia", "kg·m²", "J", 4e-4, 1e-5, 4e-4 * np.exp(-0.0196), 4e-4 * np.exp(0.0196), True),
+    )
+    drawn = Drawn("sobol", (), 4096, 1, estimates, ((1.0, 0.8), (0.8, 1.0)))
+    assert drawn.names == ("friction.fs", "axis.inertia")
+    logs = np.log(drawn.block(0, 4096) / [0.3, 4e-4])
+    assert logs.std(axis=0) == pytest.approx([0.1, 0.01], rel=0.02)
+    assert np.corrcoef(logs.T)[0, 1] == pytest.approx(0.8, abs=0.01)
+
+
+# ---- numbers -----------------------------------------------------------------------------------------------
+
+
+def test_numbers_of_a_run_are_read_and_varied(small):
+    run = small.runs[1]
+    assert numbers.value_of(run, "friction.k[1]") == 5e3
+    changed = numbers.varied(
+        run, {"friction.k[1]": 6e3, "law.fs": 0.4, "controller.gain": 0.7, "axis.inertia": 5e-4,
+              "controller.bandwidth_hz": 20.0, "reference.amplitude": 0.02},
+    )  # fmt: skip
+    assert changed.axis.friction.parameters.k == (1e4, 6e3)
+    assert changed.control.compensator.model.parameters.fs == 0.4
+    assert changed.control.compensator.gain == 0.7
+    assert changed.motion.parameters.amplitude == 0.02
+    kind, bandwidth, damping = numbers.poles(changed.control.gains, run.axis.inertia)
+    assert (kind, bandwidth, damping) == ("PD", pytest.approx(20.0), pytest.approx(1.0))
+    # The machine varies under the controller as it was designed.
+    only = numbers.varied(run, {"axis.inertia": 5e-4})
+    assert only.control.gains == run.control.gains
+    with pytest.raises(UnknownName, match="fss"):
+        numbers.value_of(run, "friction.fss")
+
+
+@pytest.mark.parametrize(
+    "name", ["friction.fc", "friction.k[0]", "axis.inertia", "controller.kd", "controller.damping"]
+)
+def test_a_batch_gives_what_the_loops_give_alone(small, name):
+    run = small.runs[1]
+    values = {name: numbers.value_of(run, name) * np.array([0.9, 1.1])}
+    together, _ = block.measured(run, values, small.metrics, 2)
+    alone = [block._alone(run, {name: float(v)}, small.metrics)[0] for v in values[name]]
+    assert together == pytest.approx(np.array(alone), rel=2e-4)
+    assert together[0] != pytest.approx(together[1], rel=1e-6)
+
+
+def test_a_case_out_of_bounds_is_a_failure_of_its_own(small):
+    found, why = block.measured(small.runs[0], {"friction.fs": np.array([0.3, -0.1])}, small.metrics, 2)
+    assert np.isfinite(found[0]).all()
+    assert np.isnan(found[1]).all()
+    assert why[0] == ""
+    assert "must be greater than 0" in why[1]
+
+
+def test_cases_are_flagged_where_a_metric_is_not_sure():
+    one = np.array([[1e-3, 5.0], [1e-3, 5.0], [1e-3, np.nan], [1e-10, 5.0]])
+    other = np.array([[1.02e-3, 5.0], [1.005e-3, 5.0], [1e-3, 5.0], [2e-10, 5.0]])
+    names = ("position_rms_rad", "reversals_per_s")
+    assert block.differ(one, other, names).tolist() == [True, False, True, False]
+
+
+# ---- the data set ------------------------------------------------------------------------------------------
+
+
+def test_the_data_set_holds_every_case_once(undisturbed, small):
+    assert undisturbed.num_rows == 2 * 600
+    assert undisturbed["case"].to_pylist() == 2 * list(range(600))
+    drawn = small.drawn.block(0, 600)
+    assert np.array_equal(undisturbed["friction.fs"].to_numpy()[:600], drawn[:, 0])
+    assert not any(undisturbed["failure"].to_pylist())
+    assert sum(undisturbed["flagged"].to_pylist()) == 0
+
+
+def test_what_is_missing_or_damaged_is_run_again(small, undisturbed, tmp_path):
+    execute.run(small, tmp_path, jobs=2)
+    parts = sorted((tmp_path / "data").rglob("*.parquet"))
+    kept = parts[1].stat().st_mtime_ns
+    parts[0].unlink()
+    parts[2].write_bytes(parts[2].read_bytes()[:500])
+    parts[3].with_name("part-000000.99.part").write_bytes(b"half")
+    manifest = execute.run(small, tmp_path, jobs=2)
+    assert manifest["timings"]["blocks_computed"] == 2
+    assert parts[1].stat().st_mtime_ns == kept
+    assert not list(tmp_path.rglob("*.part"))
+    assert table(tmp_path).equals(undisturbed)
+
+
+def test_another_range_is_another_sweep(small, tmp_path):
+    few = replace(small, drawn=replace(small.drawn, cases=10))
+    assert execute.run(few, tmp_path)["timings"]["blocks_computed"] == 2
+    assert execute.run(few, tmp_path)["timings"]["blocks_computed"] == 0
+    wider = replace(few, drawn=replace(few.drawn, seed=4))
+    assert execute.run(wider, tmp_path)["timings"]["blocks_computed"] == 2
+
+
+@pytest.mark.slow
+def test_processes_give_the_same_numbers(small, undisturbed, tmp_path):
+    execute.run(small, tmp_path, jobs=2, backend="processes")
+    assert table(tmp_path).equals(undisturbed)
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_the_same_numbers(small, undisturbed, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    local = {"host": "127.0.0.1", "dashboard_address": None, "local_directory": str(tmp_path / "dask")}
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, **local) as cluster:
+        execute.run(small, tmp_path / "out", scheduler=cluster.scheduler_address)
+    assert table(tmp_path / "out").equals(undisturbed)
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_not_there(small, tmp_path):
+    pytest.importorskip("distributed")
+    with pytest.raises(InputError, match="no Dask scheduler at"):
+        execute.run(small, tmp_path, scheduler="tcp://127.0.0.1:9")
+
+
+@pytest.mark.slow
+def test_killed_at_random_times_it_goes_on(small, undisturbed, tmp_path):
+    command = [
+        sys.executable,
+        "-m",
+        "stickslip",
+        "sweep",
+        str(SMALL),
+        "--out",
+        str(tmp_path),
+        "--no-report",
+        "--jobs",
+        "2",
+    ]
+    rng = np.random.default_rng(2)
+    for _ in range(4):
+        process = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=Path(__file__).parents[2]
+        )
+        time.sleep(rng.uniform(0.6, 2.5))
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+    execute.run(small, tmp_path)
+    assert table(tmp_path).equals(undisturbed)
+
+
+def test_percentiles_and_shares(small, tmp_path):
+    few = replace(small, drawn=replace(small.drawn, cases=40))
+    execute.run(few, tmp_path)
+    row = summary.summarise(tmp_path, few)[0]
+    values = dataset.read(tmp_path, few, few.runs[0], ["position_rms_rad"])["position_rms_rad"]
+    assert row["position_rms_rad_p95"] == np.percentile(values, 95)
+    assert row["cases"] == 40
+
+
+# ---- bad sweeps --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("scale = [0.8, 1.2]", "scale = [1.2, 0.8]", "is empty; give .low, high."),
+        ("scale = [0.8, 1.2]", "scale = [1.2, 1.2]", "is empty"),
+        ("scale = [0.8, 1.2]", "scale = [-0.8, 1.2]", "at the end of a range: .* must be greater than 0"),
+        ("scale = [0.8, 1.2]", "scale = [0.8, 1.2]\nrange = [1, 2]", "give one of scale"),
+        ("scale = [0.8, 1.2]", "values = [0.8, 1.2]", "belongs to a grid"),
+        ("scale = [0.8, 1.2]", "scal = [0.8, 1.2]", "give one of scale"),
+        ("scale = [0.8, 1.2]", 'scale = ["a", 1.2]', "must be a number"),
+        ('"position_rms_rad"', '"position_rms"', "did you mean"),
+        ("friction.fs", "friction.fss", "no run has a number"),
+        ("cases = 600", "cases = 0", "at least 1"),
+        ("cases = 600", "cases = 2.5", "whole number"),
+        ("cases = 600", "cases = 1e12", "too many"),
+        ("cases = 600", 'cases = 600\nmethod = "random"', "is not known"),
+        ("cases = 600", 'method = "grid"', "points"),
+        ("../data/small_study.toml", "nowhere.toml", "no file"),
+        ('"PD", "FF-lugre"', '"PDD"', "is not known"),
+    ],
+)
+def test_bad_sweeps_are_told(tmp_path, old, new, message):
+    text = SMALL.read_text().replace("../data", str(SMALL.parents[1] / "data"))
+    assert old in text or old.startswith("..")
+    text = text.replace(old.replace("../data", str(SMALL.parents[1] / "data")), new)
+    path = tmp_path / "bad.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=message):
+        load(path)
+
+
+def test_more_cases_than_the_disk_has_room_for(small, tmp_path):
+    huge = replace(small, drawn=replace(small.drawn, cases=10**12))
+    with pytest.raises(InputError, match="GB free"):
+        dataset.room_for(tmp_path, huge)
+
+
+def test_the_command_prints_and_draws(tmp_path, capsys):
+    assert main(["sweep", str(SMALL), "--out", str(tmp_path), "--cases", "60", "--jobs", "2"]) == 0
+    out = capsys.readouterr().out
+    assert "signed/sine/nominal/FF-lugre" in out
+    assert (tmp_path / "figures" / "percentiles-signed-sine-nominal.png").exists()
+    assert (
+        (tmp_path / "summary.csv")
+        .read_text()
+        .startswith("slip_rule,reference,friction,controller,cases,flagged")
+    )
+    assert main(["sweep", "no-such-sweep"]) == 2
