@@ -20,6 +20,7 @@ TARGETS = (
     "fmu",
     "fmu-axis",
     "urdf",
+    "mujoco",
     "bam",
     "isaac",
     "ros",

@@ -11,7 +11,7 @@ import ast
 import importlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,7 +21,7 @@ from stickslip import plugins
 from stickslip.errors import InputError, ParameterError
 from stickslip.export.job import CannotCarry, Job
 from stickslip.model import Model
-from stickslip.spec import Law, Mode, Surroundings
+from stickslip.spec import Bristle, Law, Mode, Surroundings
 from stickslip.subset import law_layouts, named
 
 __all__ = ["COULOMB", "STATIC", "STRIBECK", "Curve", "Form", "Nearest", "carried", "losses", "nearest"]
@@ -185,12 +185,15 @@ class Form:
     fit : callable
         ``fit(curve)``: values of that law's parameters, nearest to a sliding curve.
     keeps : frozenset of str
-        What it holds besides a symmetric sliding curve and the torque at rest: "memory", "slope" (through rest),
-        "direction", "position", "load", "temperature", "time".
+        What it holds besides a symmetric sliding curve and the torque at rest: "memory", "bristle" (the memory of a
+        law that is one bristle, and of no other), "slope" (through rest), "direction", "position", "load",
+        "temperature", "time".
     density : int
         How close the velocities must lie at which it is compared (`Curve`).
     tolerance : float
         Of the largest torque: a curve that differs by less counts as carried.
+    fixed : mapping
+        Parameters of that law which the target does not let one choose.
     """
 
     words: str
@@ -199,6 +202,7 @@ class Form:
     keeps: frozenset[str] = frozenset()
     density: int = 1
     tolerance: float = EXACT
+    fixed: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 def fit_coulomb(curve: Curve) -> dict[str, float]:
@@ -213,18 +217,20 @@ def fit_static(curve: Curve) -> dict[str, float]:
     return {"fs": max(sum(curve.rest) / 2.0, sliding["fc"], 1e-12 * curve.size), **sliding}
 
 
-def fit_stribeck(curve: Curve) -> dict[str, float]:
-    """Stribeck friction with any shape factor; slow velocities weigh as much as fast ones."""
+def fit_stribeck(curve: Curve, shape: float | None = None) -> dict[str, float]:
+    """Stribeck friction with any shape factor, or with this one; slow velocities weigh as much as fast ones."""
     optimize: Any = importlib.import_module("scipy.optimize")  # it carries no types
     v, target = np.append(curve.velocity, 0.0), np.append(curve.mean, sum(curve.rest) / 2.0)
     weight = np.ones_like(v)
 
     def parts(x: Array) -> tuple[list[float], Array]:
-        bend = np.exp(-np.power(v / math.exp(x[0]), x[1]))
+        bend = np.exp(-np.power(v / math.exp(x[0]), x[-1] if shape is None else shape))
         return _not_negative([np.ones_like(v), bend, v], target, weight)
 
-    starts = [(math.log(curve.top * share), shape) for share in (1e-3, 1e-2, 1e-1) for shape in (1.0, 2.0)]
+    shapes: list[list[float]] = [[1.0], [2.0]] if shape is None else [[]]
+    starts = [[math.log(curve.top * share), *s] for share in (1e-3, 1e-2, 1e-1) for s in shapes]
     bounds = ([math.log(1e-6 * curve.top), 0.2], [math.log(10.0 * curve.top), 20.0])
+    bounds = tuple(b[: len(starts[0])] for b in bounds)
 
     def residuals(x: Array) -> Array:
         return parts(x)[1]
@@ -235,7 +241,8 @@ def fit_stribeck(curve: Curve) -> dict[str, float]:
     best: Array = min(found, key=_cost).x
     (fc, rise, sigma2), _ = parts(best)
     return {
-        "fs": fc + rise, "fc": fc, "vs": math.exp(best[0]), "delta_s": float(best[1]), "sigma2": sigma2
+        "fs": fc + rise, "fc": fc, "vs": math.exp(best[0]),
+        "delta_s": float(best[-1]) if shape is None else shape, "sigma2": sigma2,
     }  # fmt: skip
 
 
@@ -373,7 +380,8 @@ def _same_names(curve: Curve, form: Form) -> dict[str, Any]:
     """The model's own values of the parameters that the form calls by the same names."""
     values: dict[str, Any] = curve.model.parameters._asdict()
     fields = (plugins.law(form.law) if isinstance(form.law, str) else form.law).fields
-    return {f.name: values.get(f.name, 0.0 if f.par.default is None else f.par.default) for f in fields}
+    same = {f.name: values.get(f.name, 0.0 if f.par.default is None else f.par.default) for f in fields}
+    return {**same, **form.fixed}
 
 
 def _compared(curve: Curve, model: Model, form: Form) -> Nearest:
@@ -400,7 +408,13 @@ def losses(curve: Curve, form: Form) -> list[str]:
     """What a form does not hold of a model, besides the shape of its sliding curve."""
     law = curve.given.law
     out: list[str] = []
-    if "memory" not in form.keeps and law.state_fields:
+    if "bristle" in form.keeps and not law.state_fields:
+        out.append("its rest without elasticity (a bristle bends)")
+    if (
+        "memory" not in form.keeps
+        and law.state_fields
+        and not ("bristle" in form.keeps and is_bristle(curve))
+    ):
         bends = [f.par.meaning for f in law.state_fields if not isinstance(f.par, Mode)]
         memory = "; non-local memory" if law.non_local_memory else ""
         out.append(f"pre-sliding and hysteresis ({', '.join(bends[:3]) or 'its states'}{memory})")
@@ -414,6 +428,12 @@ def losses(curve: Curve, form: Form) -> list[str]:
         out.append("the difference between the directions")
     read = surroundings_of(curve.given)
     return out + [words for name, words in DEPENDENCES.items() if name in read and name not in form.keeps]
+
+
+def is_bristle(curve: Curve) -> bool:
+    """Whether the law is one bristle (LuGre, Dahl), the dependences on its surroundings aside."""
+    modes = curve.model.law.modes
+    return modes is not None and isinstance(modes(curve.model.parameters), Bristle)
 
 
 def surroundings_of(model: Model) -> set[str]:

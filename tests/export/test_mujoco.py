@@ -1,0 +1,168 @@
+"""What is written for MuJoCo: read back, run, and held against the package's own run."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stickslip import plugins
+from stickslip.errors import InputError
+from stickslip.export._mujoco_run import drift, pulled
+from stickslip.export.job import CannotCarry, Job
+from stickslip.export.mujoco import holding_step, read, write, xml
+from stickslip.model import Model
+
+INERTIA = 3.8623e-4
+LUGRE = dict(plugins.law("lugre").example)
+positive = st.floats(1e-3, 1e3)
+
+
+def job(model, nearest=False, **wanted):
+    return Job(model, "axis", nearest=nearest, settings={"inertia": INERTIA, **wanted})
+
+
+def text_of(model, **wanted):
+    return write(job(model, **wanted)).files["axis.xml"]
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.1, 10.0), positive, st.floats(0.0, 10.0))
+def test_coulomb_friction_comes_back(fc, inertia, sigma2):
+    model = Model("coulomb", fc=fc, sigma2=sigma2)
+    text = xml(job(model, inertia=inertia), model)
+    assert read(text).as_dict() == model.as_dict()
+
+
+@settings(max_examples=25, deadline=None)
+@given(positive, st.floats(0.0, 10.0), positive, st.floats(1.0, 3.0), positive, st.floats(0.0, 1.0))
+def test_lugre_friction_comes_back(sigma0, sigma1, fc, rise, vs, sigma2):
+    p = {
+        "sigma0": sigma0,
+        "sigma1": sigma1,
+        "fc": fc,
+        "fs": fc * rise,
+        "vs": vs,
+        "sigma2": sigma2,
+        "delta_s": 2.0,
+    }
+    model = Model("lugre", **p)
+    assert read(xml(job(model), model)).parameters == model.parameters
+
+
+def test_a_joint_may_have_any_name():
+    text = text_of(Model("coulomb", fc=1.0), joint='a<b & "c"')
+    assert read(text, 'a<b & "c"').parameters.fc == 1.0
+    with pytest.raises(InputError, match="joint 'elbow'"):
+        read(text, "elbow")
+
+
+@pytest.mark.parametrize("text", ["", "<robot>", '<mujoco><joint name="a" damping="x"/></mujoco>'])
+def test_what_is_no_model_is_refused(text):
+    with pytest.raises(InputError, match=r"MJCF|cannot be read"):
+        read(text)
+
+
+def test_another_shape_factor_is_refused_and_offered_as_the_nearest():
+    model = Model("lugre", **{**LUGRE, "delta_s": 1.0})
+    with pytest.raises(CannotCarry, match=r"shape of its sliding curve.*--nearest"):
+        write(job(model))
+    found = read(write(job(model, nearest=True)).files["axis.xml"]).parameters
+    assert (found.sigma0, found.sigma1) == (LUGRE["sigma0"], LUGRE["sigma1"])
+
+
+def test_of_a_law_with_other_memory_the_stiffness_at_rest_is_kept():
+    law = plugins.law("gms")
+    model = Model(law, **dict(law.example))
+    with pytest.raises(CannotCarry, match="non-local memory"):
+        write(job(model))
+    found = read(write(job(model, nearest=True)).files["axis.xml"]).parameters
+    assert found.sigma0 == pytest.approx(sum(law.example["k"]), rel=1e-3)
+
+
+def test_a_timestep_that_cannot_hold_stiction_is_said_and_a_contact_that_it_holds_offered():
+    export = write(job(Model("lugre", **LUGRE)))
+    (note,) = export.notes
+    assert "does not hold this contact at rest" in note
+    assert "below 3.37e-06 s" in note
+    softer = read(write(job(Model("lugre", **LUGRE), contact="held")).files["axis.xml"])
+    assert holding_step(softer) > 0.002
+    assert softer.parameters.fs == LUGRE["fs"]
+    assert not write(job(Model("lugre", **LUGRE), timestep=3e-4, contact="held")).notes[0].startswith("at a")
+    with pytest.raises(InputError, match="identified or held"):
+        write(job(Model("lugre", **LUGRE), contact="soft"))
+
+
+# ---- in MuJoCo -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def engine():
+    mujoco = pytest.importorskip("mujoco")
+    if not hasattr(mujoco.mjtBias, "mjBIAS_DCMOTOR"):
+        pytest.skip("MuJoCo without the dcmotor actuator")
+    return mujoco
+
+
+@pytest.mark.parametrize(("sigma0", "sigma1"), [(3.5e4, 1.0), (3.5e4, 10.0), (1e3, 0.1), (1e3, 1.0)])
+def test_a_stuck_contact_decays_below_the_bound_and_grows_above_it(engine, sigma0, sigma1):
+    model = Model("lugre", **{**LUGRE, "sigma0": sigma0, "sigma1": sigma1})
+
+    def grows(step):
+        loaded = engine.MjModel.from_xml_string(xml(job(model, timestep=step), model))
+        data = engine.MjData(loaded)
+        data.qvel[0] = 1e-12
+        speeds = []
+        for _ in range(3000):
+            engine.mj_step(loaded, data)
+            speeds.append(abs(data.qvel[0]))
+        return max(speeds[-300:]) > max(speeds[:20])
+
+    bound = holding_step(model)
+    assert not grows(0.97 * bound)
+    assert grows(1.03 * bound)
+
+
+def test_the_written_constraint_holds_a_load_that_mujocos_own_lets_creep(engine):
+    text = text_of(Model("coulomb", fc=0.285, sigma2=0.018))
+    plain = text.replace("solreffriction", "user").split('user="')
+    plain = plain[0] + plain[1].split('0.001"', 1)[1]
+    held = drift(engine.MjModel.from_xml_string(text), 0.14)
+    crept = drift(engine.MjModel.from_xml_string(plain), 0.14)
+    assert held < 1e-3
+    assert crept > 0.1
+
+
+def test_a_contact_made_soft_enough_holds_its_load(engine):
+    law = Model("lugre", **LUGRE)
+    stiff, soft = (
+        drift(engine.MjModel.from_xml_string(text_of(law, contact=c)), 0.14) for c in ("identified", "held")
+    )
+    p = read(text_of(law, contact="held")).parameters
+    assert soft < 3.0 * 0.14 / p.sigma0
+    assert stiff > 0.1
+
+
+def shares(model, **wanted):
+    """Largest errors of the stick-slip run at three timesteps, per cent of the travel."""
+    order = job(model, **wanted)
+    return [
+        100.0 * run.share
+        for run in pulled(write(order).files["axis.xml"], model, INERTIA, wanted["timestep"])
+    ]
+
+
+def test_the_error_of_a_stick_slip_run_falls_with_the_timestep(engine):
+    first, second, third = shares(Model("coulomb", **plugins.law("coulomb").example), timestep=2e-3)
+    assert 0.1 > first > 2.0 * second > 4.0 * third
+    # A LuGre contact that a timestep of 0.5 ms holds: MuJoCo's error is of first order.
+    first, second, third = shares(Model("lugre", **{**LUGRE, "sigma0": 1e3, "sigma1": 1.0}), timestep=5e-4)
+    assert 1.0 > first > 3.0 * second > 9.0 * third
+
+
+def test_the_softened_contact_slips_as_ours_where_the_identified_one_does_not(engine):
+    model = Model("lugre", **LUGRE)
+    assert shares(model, timestep=2e-3, contact="held")[0] < 5.0 < shares(model, timestep=2e-3)[0]
+
+
+def test_the_readme_has_the_table(engine):
+    text = write(job(Model("coulomb", fc=0.285))).files["README.md"]
+    assert sum(line.startswith("| 0.") for line in text.splitlines()) == 3
