@@ -18,6 +18,7 @@ import nomenclature_page
 import reference_pages
 import sessions
 import study_page
+import target_pages
 from pages import DOCS, GENERATED, ROOT, write
 from sphinx.application import Sphinx
 from sphinx.util import logging
@@ -80,7 +81,7 @@ def package_hash() -> str:
 
 MAKERS = (
     law_pages.make, reference_pages.make, command_pages.make, nomenclature_page.make, api_pages.make,
-    example_pages.make, study_page.make, work_precision,
+    example_pages.make, study_page.make, target_pages.make, work_precision,
 )  # fmt: skip
 
 

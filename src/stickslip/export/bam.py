@@ -266,4 +266,5 @@ TARGET = Target(
         Setting("load_motor", 0.0, "growth of friction per torque of the motor, 1/(N·m)", 0.0, 1e6),
         Setting("load_external", 0.0, "growth of friction per torque from outside, 1/(N·m)", 0.0, 1e6),
     ),
+    tried="BAM 1.0.2",
 )

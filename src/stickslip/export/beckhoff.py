@@ -196,4 +196,5 @@ TARGET = Target(
         ),
         Setting("delay_cycles", 0.0, "delay of the values after a reversal, cycles", 0.0, 248.0),
     ),
+    tried="format checked, not tried on the vendor's hardware",
 )

@@ -228,4 +228,12 @@ def run(command: Sequence[str], folder: str) -> subprocess.CompletedProcess[str]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
-TARGET = Target("c99", "C99 header and source", write, check, precision=True, controller=True)
+TARGET = Target(
+    "c99",
+    "C99 header and source",
+    write,
+    check,
+    precision=True,
+    controller=True,
+    tried="gcc, clang: every bit",
+)

@@ -47,4 +47,5 @@ TARGET = Target(
         Setting("group", "axis", "name of the actuator group"),
         Setting("joints", ".*", "regular expression of the joints' names"),
     ),
+    tried="a YAML parser; not in the simulator",
 )

@@ -60,4 +60,10 @@ def check(job: Job, export: Export) -> Check:
     return Check(True, f"{values.text}; halcompile builds the component", values.numbers)
 
 
-TARGET = Target("linuxcnc", "LinuxCNC HAL component", write, check)
+TARGET = Target(
+    "linuxcnc",
+    "LinuxCNC HAL component",
+    write,
+    check,
+    tried="halcompile of LinuxCNC 2.9, gcc; not on a machine",
+)

@@ -116,4 +116,10 @@ def check(job: Job, export: Export) -> Check:
     )
 
 
-TARGET = Target("matlab", "MATLAB and Octave functions", write, check)
+TARGET = Target(
+    "matlab",
+    "MATLAB and Octave functions",
+    write,
+    check,
+    tried="Octave",
+)

@@ -80,4 +80,9 @@ def declared(fields: Sequence[Field], p: Any, elements: int) -> Iterable[str]:
         yield f'Real {safe(f.name)}{array} = {shown} "{meaning}";'
 
 
-TARGET = Target("modelica", "Modelica package", write)
+TARGET = Target(
+    "modelica",
+    "Modelica package",
+    write,
+    tried="a grammar of Modelica, an evaluator; Axis in rumoca",
+)

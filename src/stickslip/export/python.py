@@ -86,4 +86,10 @@ def check(job: Job, export: Export) -> Check:
     return Check(error == 0.0, f"at most {error:.3g} N·m off the definition", {"python": error})
 
 
-TARGET = Target("python", "Python, one file without dependencies", write, check)
+TARGET = Target(
+    "python",
+    "Python, one file without dependencies",
+    write,
+    check,
+    tried="Python: every bit",
+)

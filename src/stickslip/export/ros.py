@@ -51,4 +51,5 @@ TARGET = Target(
         Setting("joint", "joint", "name of the joint"),
         Setting("controller", "joint_trajectory_controller", "name of the controller"),
     ),
+    tried="a YAML parser; not on a robot",
 )

@@ -76,4 +76,9 @@ def _cleared(fields: Sequence[Field], elements: int) -> Iterable[str]:
             yield f"z.{safe(f.name)} := 0.0;"
 
 
-TARGET = Target("st", "IEC 61131-3 structured text, a function block", write)
+TARGET = Target(
+    "st",
+    "IEC 61131-3 structured text, a function block",
+    write,
+    tried="a grammar of IEC 61131-3, an evaluator; no vendor's tool",
+)

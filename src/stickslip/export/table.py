@@ -97,4 +97,5 @@ TARGET = Target(
     check,
     forms=(table_form(POINTS, both_directions=True),),
     settings=(Setting("points", float(POINTS), "at most so many points", 2.0, 10000.0),),
+    tried="read back",
 )

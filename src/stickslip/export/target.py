@@ -76,6 +76,8 @@ class Target:
         The laws that it has room for, the simplest first; empty where it carries any.
     settings : tuple of Setting
         What it asks for besides the model (``--set NAME=VALUE``).
+    tried : str
+        In what its output was tried.
     """
 
     name: str
@@ -86,6 +88,7 @@ class Target:
     controller: bool = False
     forms: tuple[Form, ...] = ()
     settings: tuple[Setting, ...] = ()
+    tried: str = ""
 
     @property
     def carries(self) -> str:

@@ -92,4 +92,5 @@ TARGET = Target(
     check,
     forms=(COULOMB,),
     settings=(Setting("joint", "joint", "name of the joint"),),
+    tried="MuJoCo",
 )
