@@ -18,7 +18,7 @@ from stickslip.errors import InputError, StickslipError
 __all__ = ["VERBS", "main", "parser_of"]
 
 VERBS = (
-    "study", "sweep", "simulate", "identify", "doctor", "analyse", "compare", "recommend", "demo",
+    "study", "sweep", "tune", "simulate", "identify", "doctor", "analyse", "compare", "recommend", "demo",
     "laws", "law", "cite", "rerun", "export", "version"
 )  # fmt: skip
 

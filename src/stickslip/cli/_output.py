@@ -163,3 +163,16 @@ def print_sweep(rows: Sequence[Mapping[str, Any]], metric: str, wall: float, wri
 
 def _key(row: Mapping[str, Any]) -> str:
     return "/".join(row[part] for part in ("slip_rule", "reference", "friction", "controller"))
+
+
+def print_tuned(data: Mapping[str, Any], percentile: float, written: Sequence[Path]) -> None:
+    """What was chosen for a run, before and after."""
+    print(f"{data['run']}: {data['tried']} settings tried")
+    for name, value in data["settings"].items():
+        print(f"    {name:<32}{data['before'][name]:>12.5g} -> {value:<12.5g}")
+    for name, value in data["metrics"].items():
+        print(
+            f"    {name:<32}{data['metrics_before'][name]:>12.5g} -> {value:<12.5g} {percentile:g} % of the cases below"
+        )
+    for path in written:
+        print(path)

@@ -48,6 +48,8 @@ def run(args: argparse.Namespace) -> int:
     if args.print:
         print(sweep.source.read_text(encoding="utf-8"), end="")
         return 0
+    if sweep.tuned:
+        raise InputError(f"{args.sweep} has a table [tune]; run `stickslip tune {args.sweep}`")
     if args.cases is not None:
         if args.cases < 1 or sweep.drawn.method == "grid":
             raise InputError(

@@ -16,8 +16,9 @@ from stickslip.sweep.gains import GAIN, recommended
 from stickslip.sweep.plan import Sweep
 from stickslip.sweep.sample import LEVEL, widest
 from stickslip.sweep.summary import influences, within
+from stickslip.sweep.tune import Tuned, front
 
-__all__ = ["draw"]
+__all__ = ["draw", "trade_off"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LEVELS = 13
@@ -230,3 +231,26 @@ def _gains(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Pa
         panels.append(Panel(hunts, "cases that hunt, %", "gain of the compensator"))
     message = f"recommended gain (least 95th percentile): {said}"
     return _saved(stem, sweep.title, message, panels, 2.1)
+
+
+# ---- what a setting costs ---------------------------------------------------------------------------------------
+
+
+def trade_off(stem: Path, sweep: Sweep, tuned: Tuned) -> Path:
+    """Draw the first two metrics of every setting tried, and those that no other beats. Returns the PNG file."""
+    (what, unit), (price, price_unit) = (named(name) for name in sweep.metrics[:2])
+    scores = tuned.scores[np.all(np.isfinite(tuned.scores), axis=1)]
+    x, x_shown = scaled(float(np.percentile(scores[:, 0], 90)), unit)
+    y, y_shown = scaled(float(np.percentile(scores[:, 1], 90)), price_unit)
+    best = front(scores)
+    curves = [
+        Curve(x * scores[:, 0], y * scores[:, 1], "settings tried", Style("#999999"), "open points"),
+        Curve(x * scores[best, 0], y * scores[best, 1], "not beaten in both", Style("#0072B2", "-", 1.2, "o")),
+        Curve(x * tuned.scores_before[:1], y * tuned.scores_before[1:2], "as it was", Style("#D55E00"), "points"),
+        Curve(x * tuned.scores_after[:1], y * tuned.scores_after[1:2], "chosen", Style("#000000"), "points"),
+    ]  # fmt: skip
+    chosen = ", ".join(f"{_symbol(n)} {v:.3g}" for n, v in zip(tuned.names, tuned.after))
+    over = f"{sweep.percentile:g}th percentiles over {sweep.drawn.cases} cases each"
+    message = f"{tuned.run.controller}: {chosen}; {over}"
+    panel = Panel(curves, f"{price}, {y_shown}", f"{what}, {x_shown}", x_scale="log")
+    return _saved(stem, sweep.title, message, [panel], 2.4)

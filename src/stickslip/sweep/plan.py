@@ -50,6 +50,8 @@ class Sweep:
     source : Path
     files : mapping of str to Path
         Files it refers to, by the path as written.
+    tuned, percentile
+        What `stickslip.sweep.tune` may choose, and the percentile over the cases that it judges by.
     """
 
     name: str
@@ -62,6 +64,8 @@ class Sweep:
     config: Mapping[str, Any]
     source: Path
     files: Mapping[str, Path]
+    tuned: tuple[Spread, ...] = ()
+    percentile: float = 95.0
 
     @property
     def blocks(self) -> list[tuple[int, int]]:
@@ -132,9 +136,14 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
     metrics = table.texts("metrics", METRICS) if table.has("metrics") else list(USUAL)
     check = table.choice("check", ("yes", "no"), "yes") == "yes"
     drawn = _drawn(table)
+    tuned = _spreads(table, "tune", drawn.method) if table.has("tune") else []
+    percentile = table.positive("percentile", "%", 95.0) if tuned else 95.0
+    if percentile > 100.0:
+        raise table.error("percentile", "must be at most 100 %")
     found = Sweep(
-        name, title, runs, drawn, tuple(metrics), check, study, table.values, path, dict(table.document.files)
-    )
+        name, title, runs, drawn, tuple(metrics), check, study, table.values, path, dict(table.document.files),
+        tuple(tuned), percentile,
+    )  # fmt: skip
     _check(found, table)
     return found
 
@@ -156,13 +165,7 @@ def _names(study: Study) -> list[str]:
 
 def _drawn(table: Table) -> Drawn:
     method = table.choice("method", METHODS, "sobol")
-    spreads: list[Spread] = []
-    if table.has("vary"):
-        family = table.table("vary")
-        for name in list(family.values):
-            with family.table(name) as t:
-                spreads.append(_spread(name, t, method))
-        family.has("")
+    spreads = _spreads(table, "vary", method) if table.has("vary") else []
     estimates, correlation = _estimates(table)
     if not spreads and not estimates:
         raise ConfigError(f'{table.label("vary")} is missing; give at least one [vary."friction.fs"]')
@@ -181,6 +184,15 @@ def _drawn(table: Table) -> Drawn:
     if nested and (method == "grid" or not spreads):
         raise table.error("nested", "needs ranges and the method sobol or latin")
     return Drawn(method, tuple(spreads), cases, seed, estimates, correlation, nested)
+
+
+def _spreads(table: Table, key: str, method: str) -> list[Spread]:
+    """The numbers of a table of ranges."""
+    family, found = table.table(key), list[Spread]()
+    for name in family.values:
+        with family.table(name) as t:
+            found.append(_spread(name, t, method))
+    return found
 
 
 def _whole(table: Table, key: str, default: int | None = None, least: int = 1) -> int:
@@ -237,7 +249,7 @@ def _estimates(table: Table) -> tuple[tuple[Estimate, ...], tuple[tuple[float, .
 
 def _check(sweep: Sweep, table: Table) -> None:
     """Every number belongs to a run, and the runs at both ends of every range can be run."""
-    for name in sweep.drawn.names:
+    for name in (*sweep.drawn.names, *(s.name for s in sweep.tuned)):
         if name != LEVEL and not any(belongs(run, name) for run in sweep.runs):
             allowed = list(dict.fromkeys(k for run in sweep.runs for k in _all_numbers(run)))
             raise ConfigError(

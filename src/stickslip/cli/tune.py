@@ -1,0 +1,85 @@
+"""Choose bandwidth, gain, filter of a controller for a machine that is not quite what was believed.
+
+    stickslip tune my.toml
+
+The file is a sweep's (`stickslip sweep thesis-robustness --print`) with a table of what may be chosen besides:
+
+    percentile = 95
+    [tune."controller.bandwidth_hz"]
+    range = [10.0, 60.0]
+    [tune."controller.gain"]
+    range = [0.5, 1.1]
+
+Found is the setting with the least 95th percentile of the first metric over all cases; the second metric shows its
+price. Writes DIR/...-tuned.json, ...-tried.csv and figures.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+SUMMARY = "choose a controller's settings for an uncertain machine"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """File, output."""
+    parser.add_argument("tune", metavar="TUNE.toml", help="a sweep with a table [tune]")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: tune-NAME)")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser.add_argument("--no-report", action="store_true", help="leave the figures out")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Search, print the settings, draw the trade-off."""
+    from stickslip.cli import _output
+    from stickslip.errors import InputError
+    from stickslip.study.files import prepared_folder
+    from stickslip.study.study import interrupts_between_runs
+    from stickslip.sweep.plan import load
+    from stickslip.sweep.tune import tune
+    from stickslip.sweep.tuned_files import write
+
+    sweep = load(args.tune)
+    if not sweep.tuned:
+        raise InputError(
+            f'{args.tune} has no table [tune]; give at least one [tune."controller.bandwidth_hz"]'
+        )
+    out: Path = prepared_folder(args.out or Path(f"tune-{sweep.name}"))
+    found: list[dict[str, Any]] = []
+    for planned in sweep.runs:
+        with _output.progress_bar(planned.key) as progress, interrupts_between_runs() as check:
+            tuned = tune(sweep, planned, _stopped_by(progress, check))
+        written = write(out, sweep, tuned)
+        if not args.no_report and len(sweep.metrics) > 1:
+            from stickslip.report.sweep_pictures import trade_off
+
+            written.append(trade_off(out / "figures" / f"trade-off-{planned.controller}", sweep, tuned))
+        data: dict[str, Any] = {
+            "run": planned.key,
+            "settings": dict(zip(tuned.names, tuned.after.tolist())),
+            "before": dict(zip(tuned.names, tuned.before.tolist())),
+            "metrics": dict(zip(sweep.metrics, tuned.scores_after.tolist())),
+            "metrics_before": dict(zip(sweep.metrics, tuned.scores_before.tolist())),
+            "tried": len(tuned.tried),
+        }
+        found.append(data)
+        if not args.json:
+            _output.print_tuned(data, sweep.percentile, written)
+    if args.json:
+        _output.print_json(found)
+    return 0
+
+
+def _stopped_by(
+    progress: Callable[[int, int], None], check: Callable[[], None]
+) -> Callable[[int, int], None]:
+    """Show how far it is, and let Ctrl-C end the search between two settings."""
+
+    def settings(tried: int, about: int) -> None:
+        progress(tried, about)
+        check()
+
+    return settings

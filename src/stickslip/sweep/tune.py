@@ -1,0 +1,137 @@
+"""Settings of a controller chosen for a machine that is not quite what was believed.
+
+The cases of a sweep stand for what is uncertain. A setting is as good as a percentile of the sweep's first metric over
+them; differential evolution looks for the best one within its ranges. Every setting tried is kept: with the second
+metric, they show what the first one costs.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.study.plan import PlannedRun
+from stickslip.sweep.block import measured
+from stickslip.sweep.numbers import belongs, value_of
+from stickslip.sweep.plan import Sweep
+
+__all__ = ["Tuned", "front", "tune"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+POPULATION, GENERATIONS = 6, 12
+MOST_CASES = 4096
+FAILED = 1e30
+"""What counts for a setting with which more cases fail than the percentile leaves out."""
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """What a search found for one run.
+
+    Attributes
+    ----------
+    run : PlannedRun
+    names : tuple of str
+        The numbers chosen.
+    before, after : array, shape (names,)
+        As the study has them (NaN where it has none); the best found.
+    scores_before, scores_after : array, shape (metrics,)
+        Percentiles of the sweep's metrics.
+    tried, scores : array, shape (n, names), (n, metrics)
+        Every setting, and its percentiles.
+    """
+
+    run: PlannedRun
+    names: tuple[str, ...]
+    before: Array
+    after: Array
+    scores_before: Array
+    scores_after: Array
+    tried: Array
+    scores: Array
+
+
+def tune(sweep: Sweep, run: PlannedRun, progress: Callable[[int, int], None] | None = None) -> Tuned:
+    """Choose the numbers of ``sweep.tuned`` for a run.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    run : PlannedRun
+        One of the sweep's.
+    progress : callable, optional
+        ``progress(settings tried, about how many)``.
+
+    Raises
+    ------
+    InputError
+        If nothing is to be chosen, there are too many cases, or no setting lets enough cases run to their end.
+    """
+    spreads = tuple(s for s in sweep.tuned if belongs(run, s.name))
+    if not spreads:
+        raise InputError(
+            f'run {run.key} has none of the numbers to tune; give [tune."controller.bandwidth_hz"]'
+        )
+    if sweep.drawn.cases > MOST_CASES:
+        raise InputError(f"cases = {sweep.drawn.cases} are too many for every setting; {MOST_CASES} at most")
+    uncertain = sweep.values(run, sweep.drawn.block(0, sweep.drawn.cases))
+    bases = [value_of(run, s.name) if s.factor else 1.0 for s in spreads]
+    tried, scores = list[Array](), list[Array]()
+    about = POPULATION * len(spreads) * (GENERATIONS + 1)
+
+    def score(numbers: Array) -> Array:
+        settings = {s.name: np.full(sweep.drawn.cases, x) for s, x in zip(spreads, numbers)}
+        found, _ = measured(run, uncertain | settings, sweep.metrics, sweep.drawn.cases)
+        return percentiles(found, sweep.percentile)
+
+    def objective(u: Array) -> float:
+        numbers = np.array([b * float(s.at(np.asarray(x))) for s, b, x in zip(spreads, bases, u)])
+        tried.append(numbers)
+        scores.append(score(numbers))
+        if progress:
+            progress(len(tried), max(about, len(tried)))
+        return _finite(float(scores[-1][0]))
+
+    optimize: Any = importlib.import_module("scipy.optimize")
+    optimize.differential_evolution(
+        objective, [(0.0, 1.0)] * len(spreads), popsize=POPULATION, maxiter=GENERATIONS, tol=1e-3, polish=False,
+        init="sobol", rng=np.random.default_rng(sweep.drawn.seed),
+    )  # fmt: skip
+    every = np.array(scores)
+    best = int(np.argmin([_finite(x) for x in every[:, 0]]))
+    if not math.isfinite(every[best, 0]):
+        raise InputError(f"run {run.key}: with no setting do enough cases run to their end; widen the ranges")
+    before = np.array([float(value_of(run, s.name)) for s in spreads])
+    as_it_was, _ = measured(run, uncertain, sweep.metrics, sweep.drawn.cases)
+    return Tuned(
+        run, tuple(s.name for s in spreads), before, tried[best], percentiles(as_it_was, sweep.percentile), every[best],
+        np.array(tried), every,
+    )  # fmt: skip
+
+
+def _finite(value: float) -> float:
+    return value if math.isfinite(value) else FAILED
+
+
+def percentiles(found: Array, percentile: float) -> Array:
+    """A percentile of each metric over the cases, shape (metrics,); a failed case is worse than any other."""
+    ordered = np.sort(np.where(np.isnan(found), math.inf, found), axis=0)
+    return ordered[math.ceil(percentile / 100.0 * len(ordered)) - 1]
+
+
+def front(scores: Array) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Which settings no other one beats in both of the first two metrics, in order of the first, shape (n,)."""
+    order = np.lexsort((scores[:, 1], scores[:, 0]))
+    kept: list[int] = []
+    least = math.inf
+    for i in order:
+        if scores[i, 1] < least:
+            kept.append(int(i))
+            least = float(scores[i, 1])
+    return np.array(kept, dtype=np.int64)

@@ -1,0 +1,47 @@
+"""The files of `stickslip tune`: what was chosen, and every setting tried."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from pathlib import Path
+
+from stickslip.study.files import unwritable
+from stickslip.sweep.plan import Sweep
+from stickslip.sweep.tune import Tuned
+
+__all__ = ["write"]
+
+
+def write(folder: Path, sweep: Sweep, tuned: Tuned) -> list[Path]:
+    """Write CONTROLLER-tuned.json and CONTROLLER-tried.csv; returns their paths."""
+    stem = tuned.run.key.replace("/", "-")
+    table, chosen = folder / f"{stem}-tried.csv", folder / f"{stem}-tuned.json"
+    heads = [*tuned.names, *(f"{name}_p{sweep.percentile:g}" for name in sweep.metrics)]
+    try:
+        with table.with_suffix(".part").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(heads)
+            writer.writerows([*a, *b] for a, b in zip(tuned.tried.tolist(), tuned.scores.tolist()))
+        os.replace(table.with_suffix(".part"), table)
+        content = {
+            "run": tuned.run.key,
+            "percentile": sweep.percentile,
+            "settings": dict(zip(tuned.names, tuned.after.tolist())),
+            "gains": tuned_gains(tuned),
+            "metrics": dict(zip(sweep.metrics, tuned.scores_after.tolist())),
+            "metrics_before": dict(zip(sweep.metrics, tuned.scores_before.tolist())),
+        }
+        chosen.with_suffix(".part").write_text(json.dumps(content, indent=1), encoding="utf-8")
+        os.replace(chosen.with_suffix(".part"), chosen)
+    except OSError as error:
+        raise unwritable(folder, error) from None
+    return [table, chosen]
+
+
+def tuned_gains(tuned: Tuned) -> dict[str, float]:
+    """The linear gains of the chosen setting, for the drive."""
+    from stickslip.sweep.numbers import varied
+
+    return varied(tuned.run, dict(zip(tuned.names, tuned.after.tolist()))).control.gains._asdict()

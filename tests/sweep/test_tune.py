@@ -1,0 +1,95 @@
+"""Tuning: the best of what was tried, better than a grid of settings, worse nowhere than it says."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip.cli import main
+from stickslip.errors import ConfigError, InputError
+from stickslip.sweep import tune as tuning
+from stickslip.sweep.block import measured
+from stickslip.sweep.plan import load
+
+SMALL = Path(__file__).with_name("small_tune.toml")
+
+
+@pytest.fixture(scope="module")
+def found():
+    sweep = load(SMALL)
+    return sweep, tuning.tune(sweep, sweep.runs[0])
+
+
+def score(sweep, settings):
+    values = sweep.values(sweep.runs[0], sweep.drawn.block(0, sweep.drawn.cases))
+    fixed = {name: np.full(sweep.drawn.cases, x) for name, x in settings.items()}
+    metrics, _ = measured(sweep.runs[0], values | fixed, sweep.metrics, sweep.drawn.cases)
+    return np.sort(metrics[:, 0])[5]  # the sixth of eight: the 75th percentile
+
+
+def test_it_beats_every_point_of_a_grid(found):
+    sweep, tuned = found
+    grid = [
+        score(sweep, {"controller.gain": g, "controller.bandwidth_hz": b})
+        for g in np.linspace(0.0, 1.5, 7)
+        for b in np.linspace(20.0, 40.0, 4)
+    ]
+    assert tuned.scores_after[0] <= 1.02 * min(grid)
+    assert tuned.scores_after[0] < tuned.scores_before[0]
+    assert tuned.scores_after[0] == score(sweep, dict(zip(tuned.names, tuned.after)))
+    assert np.all((tuned.tried >= [0.0, 20.0]) & (tuned.tried <= [1.5, 40.0]))
+
+
+def test_the_same_again(found):
+    sweep, tuned = found
+    assert np.array_equal(tuning.tune(sweep, sweep.runs[0]).after, tuned.after)
+
+
+def test_a_failed_case_counts_as_the_worst():
+    found = np.array([[1.0], [2.0], [np.nan], [3.0]])
+    assert tuning.percentiles(found, 75.0)[0] == 3.0
+    assert np.isinf(tuning.percentiles(found, 90.0)[0])
+
+
+def test_no_other_beats_the_front():
+    rng = np.random.default_rng(1)
+    scores = rng.uniform(size=(50, 2))
+    kept = set(tuning.front(scores).tolist())
+    for i, one in enumerate(scores):
+        beaten = any(np.all(other < one) for other in scores)
+        assert (i in kept) == (not beaten)
+
+
+def test_the_command_writes_and_draws(tmp_path, capsys):
+    text = (
+        SMALL.read_text().replace("../data", str(SMALL.parents[1] / "data")).replace("cases = 8", "cases = 2")
+    )
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    assert main(["tune", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert "controller.bandwidth_hz" in capsys.readouterr().out
+    chosen = json.loads((tmp_path / "out" / "signed-sine-nominal-FF-lugre-tuned.json").read_text())
+    assert 0.0 <= chosen["settings"]["controller.gain"] <= 1.5
+    assert chosen["gains"]["kd"] == chosen["gains"]["kr"] > 0.0
+    assert (tmp_path / "out" / "figures" / "trade-off-FF-lugre.png").exists()
+
+
+def test_what_cannot_be_tuned(tmp_path, capsys):
+    assert main(["sweep", str(SMALL)]) == 2
+    assert "stickslip tune" in capsys.readouterr().err
+    assert main(["tune", str(SMALL.with_name("small.toml"))]) == 2
+    assert "has no table [tune]" in capsys.readouterr().err
+    text = SMALL.read_text().replace("../data", str(SMALL.parents[1] / "data"))
+    for old, new, message in (
+        ("percentile = 75", "percentile = 101", "at most 100"),
+        ('tune."controller.gain"', 'tune."controller.gian"', "no run has a number"),
+    ):
+        path = tmp_path / "bad.toml"
+        path.write_text(text.replace(old, new))
+        with pytest.raises(ConfigError, match=message):
+            load(path)
+    path.write_text(text.replace("cases = 8", "cases = 100000"))
+    sweep = load(path)
+    with pytest.raises(InputError, match="too many for every setting"):
+        tuning.tune(sweep, sweep.runs[0])
