@@ -15,6 +15,7 @@ python-can (LGPL).
 
 from __future__ import annotations
 
+import contextlib
 import math
 import struct
 import time
@@ -24,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from stickslip.config import Table
 from stickslip.errors import DriveFault, InputError, MessageLost, RigError
+from stickslip.rigs import cia402 as cia
 from stickslip.rigs.files import limits_in
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
 
@@ -31,41 +33,6 @@ if TYPE_CHECKING:
     import canopen
 
 __all__ = ["RIG", "Ds402", "Settings"]
-
-# ---- objects: CiA 301 and CiA 402 (IEC 61800-7-201) -------------------------------------------------------------
-DEVICE_TYPE, CONSUMER_HEARTBEAT = 0x1000, 0x1016
-RPDO, RPDO_MAP, TPDO, TPDO_MAP = 0x1400, 0x1600, 0x1800, 0x1A00
-ABORT_OPTION, ERROR_CODE = 0x6007, 0x603F
-CONTROLWORD, STATUSWORD, MODE, MODE_SHOWN, MODES = 0x6040, 0x6041, 0x6060, 0x6061, 0x6502
-POSITION, TARGET_TORQUE, RATED_TORQUE, TORQUE, ENCODER = 0x6064, 0x6071, 0x6076, 0x6077, 0x608F
-PROFILE = 402
-HOMING, CYCLIC_TORQUE = 6, 10  # modes of operation
-DISABLE_VOLTAGE_COMMAND = 2  # of the abort option code
-SYNCHRONOUS = 1  # transmission type: at every SYNC
-OFF = 1 << 31  # of a PDO's COB-ID: it does not exist
-
-# ---- the state machine of CiA 402 -------------------------------------------------------------------------------
-SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP, DISABLE, RESET = 0x06, 0x07, 0x0F, 0x02, 0x00, 0x80
-STATES = {
-    "switch on disabled": (0x4F, 0x40),
-    "ready to switch on": (0x6F, 0x21),
-    "switched on": (0x6F, 0x23),
-    "operation enabled": (0x6F, 0x27),
-    "quick stop active": (0x6F, 0x07),
-    "fault reaction active": (0x4F, 0x0F),
-    "fault": (0x4F, 0x08),
-    "not ready to switch on": (0x4F, 0x00),
-}
-"""State: mask and value of the statusword"""
-NEXT = {
-    "switch on disabled": SHUTDOWN,
-    "ready to switch on": SWITCH_ON,
-    "switched on": ENABLE,
-    "quick stop active": DISABLE,
-}
-"""The controlword that leads from a state towards operation enabled"""
-HOMED, HOMING_ERROR = 1 << 12, 1 << 13  # of the statusword in homing mode
-UNKNOWN_FAULT = 0xFFFF
 
 COMMAND, ANSWER = struct.Struct("<Hh"), struct.Struct("<Hih")
 FORMATS = {1: "<B", 2: "<H", 4: "<I"}
@@ -172,10 +139,10 @@ class Ds402:
         DriveFault
             If the drive has left "operation enabled" without a fault.
         """
-        status, measured = self._cycle(ENABLE, torque)
-        state = state_of(status)
+        status, measured = self._cycle(cia.ENABLE, torque)
+        state = cia.state_of(status)
         if state in ("fault", "fault reaction active"):
-            return measured._replace(status=float(self._error or UNKNOWN_FAULT))
+            return measured._replace(status=float(self._error or cia.UNKNOWN_FAULT))
         if state != "operation enabled":
             raise DriveFault(
                 f"{self.name}: the drive is in state {state!r} (statusword 0x{status:04X})", measured.time
@@ -193,7 +160,7 @@ class Ds402:
 
     def quick_stop(self) -> None:
         """Tell the drive to stop by itself (605Ah says how); no answer is waited for."""
-        self._send(QUICK_STOP, 0.0)
+        self._send(cia.QUICK_STOP, 0.0)
 
     def close(self) -> None:
         """Zero torque, disable the drive, disconnect. A drive that does not answer is told to stop all the same."""
@@ -203,7 +170,7 @@ class Ds402:
         try:
             if self._armed:
                 self._armed = False
-                for word in (QUICK_STOP if self._lost else ENABLE, SHUTDOWN, DISABLE):
+                for word in (cia.QUICK_STOP if self._lost else cia.ENABLE, cia.SHUTDOWN, cia.DISABLE):
                     network.send_message(0x200 + self.settings.node, COMMAND.pack(word, 0))
                     network.send_message(0x80, b"")
             network.send_message(0, bytes([0x80, self.settings.node]))
@@ -272,14 +239,14 @@ class Ds402:
     def _check(self) -> None:
         """The drive is one, can do cyclic torque, is without fault, and homed where a position is limited."""
         self._bus().send_message(0, bytes([0x80, self.settings.node]))
-        if (kind := self._read(DEVICE_TYPE) & 0xFFFF) != PROFILE:
+        if (kind := self._read(cia.DEVICE_TYPE) & 0xFFFF) != cia.PROFILE:
             raise InputError(
-                f"{self.name}: its device type says profile {kind}, not CiA {PROFILE}; check the node"
+                f"{self.name}: its device type says profile {kind}, not CiA {cia.PROFILE}; check the node"
             )
-        if not self._read(MODES) >> (CYCLIC_TORQUE - 1) & 1:
+        if not self._read(cia.MODES) >> (cia.CYCLIC_TORQUE - 1) & 1:
             raise InputError(f"{self.name}: the drive has no cyclic synchronous torque mode (6502h)")
-        self._rated = 1e-3 * self._read(RATED_TORQUE)  # mN·m
-        increments, turns = self._read(ENCODER, 1), self._read(ENCODER, 2)
+        self._rated = 1e-3 * self._read(cia.RATED_TORQUE)  # mN·m
+        increments, turns = self._read(cia.ENCODER, 1), self._read(cia.ENCODER, 2)
         if not self._rated > 0.0 or increments == 0:
             raise InputError(
                 f"{self.name}: rated torque (6076h) or encoder resolution (608Fh) is 0; set them"
@@ -295,25 +262,27 @@ class Ds402:
 
     def _reset(self) -> None:
         """Reset a fault, where that is asked for; else refuse the drive."""
-        if state_of(self._read(STATUSWORD)) != "fault":
+        if cia.state_of(self._read(cia.STATUSWORD)) != "fault":
             return
-        code = self._read(ERROR_CODE)
+        code = self._read(cia.ERROR_CODE)
         if not self.settings.reset_fault:
             raise DriveFault(
                 f"{self.name}: the drive shows fault 0x{code:04X}; mend its cause, or set reset_fault"
             )
-        self._write(CONTROLWORD, 0, 0, 2)
-        self._write(CONTROLWORD, 0, RESET, 2)
-        self._await(STATUSWORD, lambda word: state_of(word) != "fault", f"fault 0x{code:04X} does not reset")
-        self._write(CONTROLWORD, 0, 0, 2)
+        self._write(cia.CONTROLWORD, 0, 0, 2)
+        self._write(cia.CONTROLWORD, 0, cia.RESET, 2)
+        self._await(
+            cia.STATUSWORD, lambda word: cia.state_of(word) != "fault", f"fault 0x{code:04X} does not reset"
+        )
+        self._write(cia.CONTROLWORD, 0, 0, 2)
         self._error = 0
 
     def _demand_homed(self) -> None:
         """In homing mode the statusword tells whether the position is known."""
-        self._write(MODE, 0, HOMING, 1)
-        self._await(MODE_SHOWN, lambda mode: mode == HOMING, "it does not enter homing mode")
-        status = self._read(STATUSWORD)
-        if not status & HOMED or status & HOMING_ERROR:
+        self._write(cia.MODE, 0, cia.HOMING, 1)
+        self._await(cia.MODE_SHOWN, lambda mode: mode == cia.HOMING, "it does not enter homing mode")
+        status = self._read(cia.STATUSWORD)
+        if not status & cia.HOMED or status & cia.HOMING_ERROR:
             raise InputError(
                 f"{self.name}: the position is limited, but the drive is not homed; home it first"
             )
@@ -327,25 +296,35 @@ class Ds402:
     def _configure(self) -> None:
         """PDOs, the watchdog, and the mode."""
         node = self.settings.node
-        self._pdo(RPDO, RPDO_MAP, 0x200 + node, {CONTROLWORD: 16, TARGET_TORQUE: 16})
-        self._pdo(TPDO, TPDO_MAP, 0x180 + node, {STATUSWORD: 16, POSITION: 32, TORQUE: 16})
+        self._pdo(cia.RPDO, cia.RPDO_MAP, 0x200 + node, {cia.CONTROLWORD: 16, cia.TARGET_TORQUE: 16})
+        self._pdo(
+            cia.TPDO, cia.TPDO_MAP, 0x180 + node, {cia.STATUSWORD: 16, cia.POSITION: 32, cia.TORQUE: 16}
+        )
         milliseconds = math.ceil(1e3 * self.settings.watchdog_time - 1e-6)
         watched = self.settings.watchdog
-        self._write(ABORT_OPTION, 0, DISABLE_VOLTAGE_COMMAND if watched != "none" else 0, 2)
-        if watched == "rpdo":
-            self._write(RPDO, 5, milliseconds, 2)
-        elif watched == "heartbeat":
-            self._write(CONSUMER_HEARTBEAT, 1, OWN_NODE << 16 | milliseconds, 4)
+        self._write(cia.ABORT_OPTION, 0, cia.DISABLE_VOLTAGE_COMMAND if watched != "none" else 0, 2)
+        self._watch(cia.RPDO, 5, milliseconds, 2, watched == "rpdo")
+        self._watch(cia.CONSUMER_HEARTBEAT, 1, OWN_NODE << 16 | milliseconds, 4, watched == "heartbeat")
         self._beat_every = max(1, int(0.3 * self.settings.watchdog_time / self.sample_time))
-        self._write(MODE, 0, CYCLIC_TORQUE, 1)
-        self._await(MODE_SHOWN, lambda mode: mode == CYCLIC_TORQUE, "it does not enter cyclic torque mode")
-        self._last = signed(self._read(POSITION))
+        self._write(cia.MODE, 0, cia.CYCLIC_TORQUE, 1)
+        self._await(
+            cia.MODE_SHOWN, lambda mode: mode == cia.CYCLIC_TORQUE, "it does not enter cyclic torque mode"
+        )
+        self._last = cia.signed(self._read(cia.POSITION))
         self._turned = self._last
+
+    def _watch(self, index: int, sub: int, value: int, size: int, wanted: bool) -> None:
+        """Set a watchdog of the drive, or switch off what an earlier session left of it."""
+        if wanted:
+            self._write(index, sub, value, size)
+            return
+        with contextlib.suppress(InputError):  # a drive need not have the other one
+            self._write(index, sub, 0, size)
 
     def _pdo(self, parameters: int, mapping: int, cob: int, objects: Mapping[int, int]) -> None:
         """Map objects (index to bits) into the first PDO of a kind; CiA 301, 7.5.2.36."""
-        self._write(parameters, 1, cob | OFF, 4)
-        self._write(parameters, 2, SYNCHRONOUS, 1)
+        self._write(parameters, 1, cob | cia.OFF, 4)
+        self._write(parameters, 2, cia.SYNCHRONOUS, 1)
         self._write(mapping, 0, 0, 1)
         for place, (index, bits) in enumerate(objects.items(), 1):
             self._write(mapping, place, index << 16 | bits, 4)
@@ -357,7 +336,7 @@ class Ds402:
     def _enable(self) -> Measurement:
         """Walk the state machine to "operation enabled", a SYNC every sample time."""
         end = time.monotonic() + 1.0
-        word, misses = DISABLE, 0
+        word, misses = cia.DISABLE, 0
         while True:
             try:
                 status, measured = self._cycle(word, 0.0)
@@ -367,7 +346,7 @@ class Ds402:
                 if misses > 20:
                     raise
                 continue
-            state = state_of(status)
+            state = cia.state_of(status)
             if state == "operation enabled":
                 self._armed, self._lost = True, False
                 return measured
@@ -375,7 +354,7 @@ class Ds402:
                 raise DriveFault(f"{self.name}: fault 0x{self._error:04X} while it is enabled", measured.time)
             if time.monotonic() > end:
                 raise DriveFault(f"{self.name}: the drive stays in state {state!r} while it is enabled")
-            word = NEXT.get(state, DISABLE)
+            word = cia.NEXT.get(state, cia.DISABLE)
             self._armed = True
             time.sleep(self.sample_time)
 
@@ -421,7 +400,7 @@ class Ds402:
                 1e-9 * (sent - self._begin),
             )
         status, position, per_mille = ANSWER.unpack(answer)
-        self._turned += signed((position - self._last) & 0xFFFFFFFF)
+        self._turned += cia.signed((position - self._last) & 0xFFFFFFFF)
         self._last = position
         return status, Measurement(
             1e-9 * (sent - self._begin), self._count * self._turned, 1e-3 * per_mille * self._rated
@@ -434,16 +413,6 @@ class Ds402:
         if message.arbitration_id == 0x80 + self.settings.node and len(message.data) >= 2:
             self._on_emergency(0, message.data, 0.0)
         return None
-
-
-def state_of(status: int) -> str:
-    """The state that a statusword tells."""
-    return next((name for name, (mask, value) in STATES.items() if status & mask == value), f"0x{status:04X}")
-
-
-def signed(value: int) -> int:
-    """32 bits as a signed number."""
-    return (value ^ 0x80000000) - 0x80000000
 
 
 def whole(value: Any) -> Any:

@@ -24,30 +24,15 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.sampled import Memory
-from stickslip.errors import (
-    DriveFault,
-    InputError,
-    Interrupted,
-    LimitCrossed,
-    RigError,
-)
+from stickslip.errors import InputError, Interrupted, RigError
 from stickslip.record import Record
 from stickslip.rigs import safety
-from stickslip.rigs._control import (
-    COLUMNS,
-    REASON,
-    ROW,
-    SETPOINT,
-    STATE,
-    UNITS,
-    Control,
-    addresses,
-    control_of,
-    decide_at,
-)  # fmt: skip
+from stickslip.rigs._control import COLUMNS, REASON, STATE, UNITS, Control, control_of
 from stickslip.rigs.pace import Account, Pace, soft_real_time
-from stickslip.rigs.rig import LIMIT_UNITS, BlockRig, Limits, Measurement, Rig, Setpoint, setpoints
-from stickslip.rigs.safety import ASKED, REASONS, RUNNING, STATUS, STOPPED, STOPPING, Bounds, Safety
+from stickslip.rigs.reasons import crossed, told
+from stickslip.rigs.rig import BlockRig, Limits, Measurement, Rig, Setpoint, setpoints
+from stickslip.rigs.safety import ASKED, RUNNING, STOPPED, STOPPING, Bounds, Safety
+from stickslip.rigs.step import Step
 from stickslip.stream import Stream
 
 __all__ = ["Loop", "PythonController"]
@@ -122,7 +107,7 @@ class Loop:
         self._undo = ExitStack()
         self._scratch = np.zeros(len(COLUMNS))
         self._wanted = np.zeros(len(Setpoint._fields))
-        self._addresses = addresses(self._control)
+        self._step = Step(self._control)
 
     # ---- arming and disarming ------------------------------------------------------------------------------
 
@@ -130,7 +115,7 @@ class Loop:
         with ExitStack() as undo:
             self._stream = Stream(UNITS, self._path, self._described(), self._absent())
             undo.callback(self._end_record)
-            self._warm()
+            self._step.rehearse()  # compiles what the loop calls before anything moves
             if self.realtime:
                 self._pace.granted = undo.enter_context(soft_real_time())
             self._hear_signals(undo)
@@ -152,13 +137,6 @@ class Loop:
         able = self.rig.capabilities
         lacks = {"sensor_torque": not able.torque_sensor, "temperature": not able.temperature}
         return [name for name, missing in lacks.items() if missing]
-
-    def _warm(self) -> None:
-        """Compile what the loop calls before anything moves."""
-        idle = self._control._replace(safety=np.zeros(len(Safety._fields)))
-        at = addresses(idle)
-        at[SETPOINT], at[ROW] = self._wanted.ctypes.data, self._scratch.ctypes.data
-        decide_at(at)
 
     def _hear_signals(self, undo: ExitStack) -> None:
         """SIGINT and SIGTERM end the run by its ramp; only the main thread may ask to hear them."""
@@ -300,7 +278,7 @@ class Loop:
         control.safety[ORIGIN] = control.measured[POSITION]
         if self._fault is None:
             control.safety[STATE] = RUNNING
-        self._control, self._addresses = control, addresses(control)
+        self._control, self._step = control, Step(control)
 
     # ---- samples -------------------------------------------------------------------------------------------
 
@@ -320,19 +298,18 @@ class Loop:
     def _sample(self, stream: Stream | None, setpoint: int, times: Any) -> None:
         """One sample: control, record, keep pace, exchange. No exception leaves it: each is a reason to stop."""
         begin = time.perf_counter_ns()
-        at = self._addresses
-        at[SETPOINT], at[ROW] = setpoint, self._row(stream)
+        row = self._row(stream)
         if self._signal:
             self._ask(Interrupted(f"{signal.Signals(self._signal).name} asked for the end"))
         before = time.thread_time_ns()
-        torque = decide_at(at)
+        torque = self._step.decide(setpoint, row)
         times[2] = time.thread_time_ns() - before
-        if stream is not None and at[ROW] != self._scratch.ctypes.data:
+        if stream is not None and row != self._scratch.ctypes.data:
             stream.commit()
             stream.touch()
         times[1] = time.perf_counter_ns() - begin
         if self.realtime:
-            times[0] = self._pace.wait()
+            times[0] = self._pace.wait(self._step.rehearse)
         measured = self._control.measured
         try:
             measured[:] = self.rig.exchange(torque)
@@ -409,29 +386,12 @@ class Loop:
     def _error(self, stream: Stream) -> BaseException:
         """What is raised once the torque is zero."""
         s, at = self._control.safety, float(self._control.measured[TIME])
-        reason = REASONS[int(s[REASON])]
         if self._fault is None:
-            self._fault = self._crossed(reason, float(s[VALUE]), at)
-        fault = self._fault
-        if not isinstance(fault, RigError):
-            if isinstance(fault, InputError) or not isinstance(fault, Exception):
-                return fault
-            told = RigError(f"{type(fault).__name__} in the loop: {fault}; the torque was ramped to zero")
-            told.__cause__ = fault
-            fault = self._fault = told
-        if math.isnan(fault.time):
-            fault.time = at
-        if fault.record is None:
-            fault.record = stream.record()
+            self._fault = crossed(self.rig.name, self.limits, int(s[REASON]), float(s[VALUE]), at)
+        fault = self._fault = told(self._fault)
+        if isinstance(fault, RigError):
+            if math.isnan(fault.time):
+                fault.time = at
+            if fault.record is None:
+                fault.record = stream.record()
         return fault
-
-    def _crossed(self, reason: str, value: float, at: float) -> RigError:
-        where = f"at t = {at:.3f} s; the torque was ramped to zero"
-        if self._control.safety[REASON] == STATUS:
-            return DriveFault(
-                f"{self.rig.name} reports fault 0x{int(value) if value == value else 0:04X} {where}"
-            )
-        if limit := self.limits.text(reason):
-            unit = LIMIT_UNITS[reason]
-            return LimitCrossed(f"{reason} = {value:g} {unit} is beyond its limit {limit} {where}")
-        return LimitCrossed(f"position or torque is {value:g}, {reason}, {where}")

@@ -97,8 +97,12 @@ class Pace:
         self._taken.append(table)
         return table
 
-    def wait(self) -> int:
-        """Wait for the deadline; returns by how much it is late, ns."""
+    def wait(self, rehearse: Callable[[], object]) -> int:
+        """Wait for the deadline; returns by how much it is late, ns.
+
+        While it is waited for awake, `rehearse` is called: what the sample will run is then in the processor's caches,
+        which other processes have used meanwhile.
+        """
         now = time.monotonic_ns()
         if self._due == 0:
             self._due = now + self._period
@@ -107,6 +111,7 @@ class Pace:
             self._due = now
         elif self._due - now > AWAKE:
             time.sleep(1e-9 * (self._due - now - AWAKE))
+            rehearse()
         while now < self._due:
             now = time.monotonic_ns()
         late = now - self._due
