@@ -59,3 +59,16 @@ def test_the_whole_package_is_modelica(law):
     parser = pytest.importorskip("pymoca.parser")
     text = modelica.write(Job(Model(law, **dict(law.example)), "x")).files["x.mo"]
     assert parser.parse(text) is not None
+
+
+@pytest.mark.parametrize("law", ["coulomb", "static", "stribeck_plain", "karnopp"])
+def test_the_axis_holds_and_slides_as_the_law_does_and_a_wrong_one_is_seen(law):
+    pytest.importorskip("rumoca")
+    right = Job(Model(law, **dict(registered_law(law).example)), "x")
+    wrong = Job(Model(law, **{k: 1.05 * v for k, v in registered_law(law).example.items()}), "x")
+    assert modelica.check(right, modelica.write(right)).passed
+    assert not modelica.check(right, modelica.write(wrong)).passed
+
+
+def registered_law(name):
+    return next(law for law in registered() if law.name == name)

@@ -7,21 +7,29 @@ over the jump.
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+import math
 import textwrap
 from collections.abc import Iterable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
+
+import numpy as np
 
 from stickslip.export._analysis import merged
 from stickslip.export._modelica import functions, safe
 from stickslip.export._text import ascii_only, render
 from stickslip.export.golden import as_csv, golden
-from stickslip.export.job import Export, Job, counts_in
+from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
 __all__ = ["TARGET", "write"]
 
+Array = np.ndarray[Any, np.dtype[np.float64]]
 NOTE = (
     "the grammar is checked and the functions are evaluated in our tests; not tried in Dymola or OpenModelica"
 )
@@ -80,9 +88,77 @@ def declared(fields: Sequence[Field], p: Any, elements: int) -> Iterable[str]:
         yield f'Real {safe(f.name)}{array} = {shown} "{meaning}";'
 
 
+# ---- the check -------------------------------------------------------------------------------------------------
+
+DURATION, STEP = 1.0, 1e-4
+"""s, of the trial of an axis, and of our own integration."""
+BOUND = 1e-3
+"""Largest error of the velocity, of the largest velocity: the solver's tolerance and our steps."""
+TRIAL = """
+model Trial
+  {x}.Axis axis(inertia = {inertia!r});
+equation
+  axis.drive = {drive!r}*sin(20.0*time);
+end Trial;
+"""
+
+
+def check(job: Job, export: Export) -> Check:
+    """Simulate the axis with events in rumoca, where that is installed, and compare it with our own steps."""
+    text = str(export.files[f"{job.name}.mo"])
+    if "model Axis" not in text:
+        return Check(None, f"this law comes without an axis to simulate; {NOTE}")
+    if importlib.util.find_spec("rumoca") is None:
+        return Check(None, "rumoca is not installed (pip install rumoca)")
+    rumoca: Any = importlib.import_module("rumoca")
+    law, p = job.model.law, job.model.parameters
+    assert law.holding is not None
+    drive = 1.8 * max(law.holding(1.0, law.state(p), p, Surroundings()), 1e-3)
+    inertia = drive / 100.0
+    with TemporaryDirectory() as folder:
+        Path(folder, "trial.mo").write_text(text + TRIAL.format(x=job.name, inertia=inertia, drive=drive))
+        try:
+            model = rumoca.Session().load(str(Path(folder, "trial.mo")), model="Trial")
+            result = model.simulate(t=(0.0, DURATION), dt=0.01)
+        except rumoca.RumocaError as error:
+            kind = None if "unsupported" in str(error) else False
+            return Check(kind, f"rumoca: {' '.join(str(error).split())[:200]}")
+    velocity = np.asarray(dict(zip(result.names, result.to_numpy()))["axis.velocity"])
+    expected = held_and_released(job, inertia, drive)
+    error = float(np.max(np.abs(np.interp(np.asarray(result.time), expected[0], expected[1]) - velocity)))
+    share = error / float(np.max(np.abs(expected[1])))
+    return Check(
+        share <= BOUND, f"rumoca: velocity {share:.2g} of its largest off our own steps", {"rumoca": share}
+    )
+
+
+def held_and_released(job: Job, inertia: float, amplitude: float) -> tuple[Array, Array]:
+    """Times, s, and velocities, rad/s, of the trial: midpoint steps; at rest what the contact withstands holds it."""
+    law, p = job.model.law, job.model.parameters
+    assert law.holding is not None
+    assert law.steady is not None
+    hold, steady, z, around = law.holding, law.steady, law.state(p), Surroundings()
+    time = np.arange(0.0, DURATION + 0.5 * STEP, STEP)
+    velocity, v = np.zeros(time.size), 0.0
+
+    def rate(t: float, v: float, side: float) -> float:
+        return (amplitude * math.sin(20.0 * t) - steady(side * max(side * v, 1e-12), p)) / inertia
+
+    for i, t in enumerate(time[:-1]):
+        drive = amplitude * math.sin(20.0 * t)
+        side = math.copysign(1.0, v if v != 0.0 else drive)
+        if v != 0.0 or side * drive > hold(side, z, p, around):
+            middle = v + 0.5 * STEP * rate(t, v, side)
+            v = v + STEP * rate(t + 0.5 * STEP, middle, side)
+            v = 0.0 if v * side <= 0.0 else v
+        velocity[i + 1] = v
+    return time, velocity
+
+
 TARGET = Target(
     "modelica",
     "Modelica package",
     write,
+    check,
     tried="a grammar of Modelica, an evaluator; Axis in rumoca",
 )
