@@ -19,7 +19,7 @@ __all__ = ["VERBS", "main", "parser_of"]
 
 VERBS = (
     "study", "sweep", "tune", "simulate", "identify", "doctor", "analyse", "compare", "recommend", "demo",
-    "laws", "law", "cite", "rerun", "export", "version"
+    "rig", "laws", "law", "cite", "rerun", "export", "version"
 )  # fmt: skip
 
 

@@ -1,0 +1,176 @@
+"""Run procedures on a rig: a virtual machine, or a real one described in a TOML file.
+
+stickslip rig list
+stickslip rig run breakaway --rig thesis-dry --out breakaway.npz
+stickslip rig run sliding --rig thesis-grease --set velocities=5,1,0.2 --without cogging
+stickslip rig run track --rig thesis-dry --set compensator=feedforward --set model=lugre
+stickslip rig run inertia --rig my_machine.toml --dry-run
+stickslip rig commission --rig thesis-dry --out commissioned
+
+A rig is the name of a machine of the library, the TOML file of a machine, or a TOML file with a table [rig] (`kind`,
+and what that kind of rig needs). --dry-run says how far, how fast, how strong and how long, and moves nothing. The
+record is a .npz file that `stickslip identify` and `stickslip doctor` read.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from stickslip.rigs.procedures.base import Performed, Plan
+    from stickslip.rigs.rig import Rig
+
+SUMMARY = "run identification procedures on a virtual or real machine"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Actions and their options."""
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    run_one = actions.add_parser("run", help="perform one procedure")
+    run_one.add_argument("procedure", metavar="NAME", help="`stickslip rig list` names them")
+    run_one.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="an option")
+    run_one.add_argument("--out", type=Path, metavar="FILE.npz", help="the record (default: NAME.npz)")
+    run_one.add_argument("--stream", type=Path, metavar="FILE", help="also write every sample as it comes")
+    actions.add_parser("list", help="list machines, procedures and imperfections")
+    for action in (run_one,):
+        action.add_argument("--rig", required=True, metavar="RIG", help="a machine's name or a TOML file")
+        action.add_argument(
+            "--without", action="append", default=[], metavar="NAME", help="an imperfection to switch off"
+        )
+        action.add_argument("--dry-run", action="store_true", help="say what would be done")
+        action.add_argument("--no-watchdog", action="store_true", help="arm a rig that declares no watchdog")
+        action.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do what was asked; 1 where a check failed."""
+    if args.action == "list":
+        return listed()
+    return performed(args)
+
+
+def listed() -> int:
+    """Machines, procedures, imperfections."""
+    from stickslip.machines.machine import IMPERFECTIONS, library, machine
+    from stickslip.plugins import rig_kind_names
+    from stickslip.rigs.procedures import PROCEDURES, procedure
+
+    print("machines (--rig):")
+    for name in library():
+        print(f"  {name:14} {machine(name).title}")
+    print("procedures:")
+    for name in PROCEDURES:
+        print(f"  {name:14} {procedure(name).title}")
+    print("kinds of rig ([rig] kind = ...):")
+    print(f"  {', '.join(rig_kind_names())}")
+    print("imperfections of a virtual machine (--without):")
+    print(f"  {', '.join(IMPERFECTIONS)}")
+    return 0
+
+
+def rig_of(args: argparse.Namespace) -> Rig:
+    """The rig of --rig, without what --without names.
+
+    Raises
+    ------
+    InputError
+    """
+    from stickslip import plugins
+    from stickslip.config import read_toml
+    from stickslip.errors import InputError
+    from stickslip.rigs.virtual import virtual_rig
+
+    name = str(args.rig)
+    if name.endswith(".toml"):
+        top = read_toml(Path(name))
+        if top.has("rig"):
+            if args.without:
+                raise InputError("--without is for virtual machines; write it into the file's [rig]")
+            table = dict(top.table("rig").values)
+            return plugins.rig_kind(str(table.pop("kind", ""))).build(table)
+    return virtual_rig(name, args.without)
+
+
+def performed(args: argparse.Namespace) -> int:
+    """`stickslip rig run`."""
+    from stickslip.cli import _output
+    from stickslip.errors import InputError
+    from stickslip.rigs.procedures import procedure
+    from stickslip.rigs.procedures.base import perform
+    from stickslip.study.files import prepared_folder, unwritable
+
+    kind = procedure(args.procedure)
+    chosen = kind.with_options(pairs(args.set))
+    rig = rig_of(args)
+    out: Path = args.out or Path(f"{args.procedure}.npz")
+    plan = chosen.plan(rig)
+    if args.dry_run:
+        return told(plan, rig, args)
+    if out.is_dir():
+        raise InputError(f"--out {out} is a folder; give the name of a file")
+    prepared_folder(out.parent)
+    result = perform(chosen, rig, path=args.stream, progress=_output.say, without_watchdog=args.no_watchdog)
+    try:
+        result.record.save(out)
+    except OSError as error:
+        raise unwritable(out, error) from None
+    return shown(result, out, args)
+
+
+def told(plan: Plan, rig: Rig, args: argparse.Namespace) -> int:
+    """The plan, and whether the rig allows it."""
+    from stickslip.cli import _output
+
+    plan.within(rig)
+    if args.json:
+        _output.print_json({"rig": rig.name, **vars(plan)})
+        return 0
+    print(f"{args.procedure} on {rig.name}")
+    for line in plan.text:
+        print(f"  {line}")
+    print(f"travel  up to {plan.travel:.4g} rad")
+    print(f"speed   up to {plan.speed:.4g} rad/s of {rig.limits.speed:.4g}")
+    print(f"torque  up to {plan.torque:.4g} N·m of {rig.limits.torque:.4g}")
+    print(f"time    up to {clock(plan.duration)}, and {clock(plan.pauses)} at rest")
+    return 0
+
+
+def clock(seconds: float) -> str:
+    """A time for people."""
+    return f"{seconds:.3g} s" if seconds < 120.0 else f"{seconds / 60.0:.3g} min"
+
+
+def shown(result: Performed, out: Path, args: argparse.Namespace) -> int:
+    """Checks and where the record lies."""
+    from dataclasses import asdict
+
+    from stickslip.cli import _output
+
+    if args.json:
+        data: dict[str, Any] = {"record": str(out), "checks": [asdict(c) for c in result.checks]}
+        _output.print_json({**data, "passed": result.passed})
+    else:
+        for check in result.checks:
+            print(f"{'ok    ' if check.passed else 'FAILED'} {check.name}: {check.text}")
+        print(f"record: {out} ({len(result.record)} rows)")
+    return 0 if result.passed else 1
+
+
+def pairs(given: list[str]) -> dict[str, str]:
+    """NAME=VALUE.
+
+    Raises
+    ------
+    InputError
+    """
+    from stickslip.errors import InputError
+
+    out: dict[str, str] = {}
+    for pair in given:
+        name, equals, value = pair.partition("=")
+        if not equals:
+            raise InputError(f"--set {pair!r} must be NAME=VALUE")
+        out[name.strip()] = value.strip()
+    return out

@@ -1,0 +1,32 @@
+"""What is run on a rig: one file a procedure. `PROCEDURES` names them; `procedure` looks one up.
+
+To add one, write its file with ``PROCEDURE = YourProcedure`` (`stickslip.rigs.procedures.base` says what it must
+do) and add its name to this tuple.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+from stickslip.errors import UnknownName
+
+if TYPE_CHECKING:
+    from stickslip.rigs.procedures.base import Procedure
+
+__all__ = ["PROCEDURES", "procedure"]
+
+PROCEDURES = ("inertia", "breakaway", "sliding", "presliding", "stickslip", "attraction", "track", "repeat")
+
+
+def procedure(name: str) -> type[Procedure]:
+    """The procedure of that name.
+
+    Raises
+    ------
+    UnknownName
+    """
+    if name not in PROCEDURES:
+        raise UnknownName("procedure", name, PROCEDURES)
+    found: type[Procedure] = importlib.import_module(f"stickslip.rigs.procedures.{name}").PROCEDURE
+    return found

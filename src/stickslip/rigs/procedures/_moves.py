@@ -1,0 +1,120 @@
+"""What procedures have in common: moves, the loop that holds a motion, a first idea of the inertia."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from typing import Any
+
+import numpy as np
+
+from stickslip.control.controller import Controller
+from stickslip.control.linear import place
+from stickslip.errors import RigError
+from stickslip.rigs.procedures.base import POSITION, Step
+from stickslip.rigs.rig import Rig, setpoints
+
+__all__ = ["brake", "holder", "move", "now", "rough_inertia", "smooth", "uniform"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+ROOM = 0.95
+"""Of the rig's torque limit, which controllers and ramps use."""
+PUSH = 0.15
+"""Of the torque limit, which planned accelerations use."""
+
+
+def now(rig: Rig, seconds: float = 0.05) -> Step:
+    """A step that only looks where the axis is."""
+    return Step(setpoints(max(2, round(seconds / rig.sample_time))))
+
+
+def holder(rig: Rig, inertia: float, bandwidth: float) -> Controller:
+    """A PID that follows positions (thesis eq. 3.15; damping 0.85 as in Table 6), within the torque limit."""
+    gains = place("PID", inertia, bandwidth, 0.85)
+    return Controller(gains, None, ROOM * rig.limits.torque, rig.sample_time)
+
+
+def smooth(begin: float, end: float, count: int, sample_time: float) -> tuple[Array, Array]:
+    """Position and velocity of a move from rest to rest with the least jerk (Flash and Hogan 1985)."""
+    s = np.arange(1, count + 1) / count
+    shape = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    slope = 30.0 * s**2 * (1.0 - s) ** 2 / (count * sample_time)
+    return begin + (end - begin) * shape, (end - begin) * slope
+
+
+def move(rig: Rig, controller: Controller, begin: float, end: float, inertia: float) -> Step:
+    """A closed-loop move as fast as `PUSH` and a third of the speed limit allow, at least 0.3 s."""
+    distance = abs(end - begin)
+    by_torque = math.sqrt(5.8 * distance * inertia / (PUSH * rig.limits.torque))
+    by_speed = 1.9 * distance / (0.33 * rig.limits.speed)
+    count = max(2, round(max(by_torque, by_speed, 0.3) / rig.sample_time))
+    position, velocity = smooth(begin, end, count, rig.sample_time)
+    return Step(setpoints(count, position=position, velocity=velocity, closed=1.0), controller)
+
+
+def brake(rig: Rig, controller: Controller, begin: float, speed: float, inertia: float) -> Step:
+    """A closed-loop stop from a speed."""
+    count = max(2, round(max(abs(speed) * inertia / (PUSH * rig.limits.torque), 0.1) / rig.sample_time))
+    t = rig.sample_time * np.arange(1, count + 1)
+    end = count * rig.sample_time
+    position = begin + speed * (t - 0.5 * t**2 / end)
+    return Step(setpoints(count, position=position, velocity=speed * (1.0 - t / end), closed=1.0), controller)
+
+
+def uniform(
+    rig: Rig, begin: float, speed: float, travel: float, inertia: float
+) -> tuple[Array, Array, float]:
+    """Setpoints that speed up, and those at a constant speed over a travel; and where they end, rad."""
+    dt = rig.sample_time
+    rise = max(2, round(max(abs(speed) * inertia / (PUSH * rig.limits.torque), 0.1) / dt))
+    t = dt * np.arange(1, rise + 1)
+    ramp = setpoints(
+        rise, position=begin + 0.5 * speed * t**2 / (rise * dt), velocity=speed * t / (rise * dt), closed=1.0
+    )
+    start = begin + 0.5 * speed * rise * dt
+    count = max(2, math.ceil(travel / (abs(speed) * dt)))
+    t = dt * np.arange(1, count + 1)
+    level = setpoints(count, position=start + speed * t, velocity=speed, closed=1.0)
+    return ramp, level, start + speed * count * dt
+
+
+def rough_inertia(rig: Rig) -> Generator[Step, Array, tuple[float, float]]:
+    """A first idea of the inertia and of the torque that moves the axis, without knowing anything.
+
+    A ramp finds the torque at which it moves; a push of twice that and the coasting after it give two accelerations,
+    whose sum is the push over the inertia, whatever friction is.
+    """
+    dt, top = rig.sample_time, ROOM * rig.limits.torque
+    rows = yield Step(setpoints(round(2.0 / dt), torque=np.linspace(0.0, top, round(2.0 / dt))), travel=0.05)
+    moved = abs(float(rows[-1, POSITION] - rows[0, POSITION]))
+    if moved < 0.04:
+        raise RigError(
+            f"{rig.name} does not move at {top:.3g} N·m; loosen its brake or raise its torque limit"
+        )
+    torque = top * len(rows) / round(2.0 / dt)
+    yield Step(setpoints(round(0.5 / dt)), pause=0.2)
+    push = min(2.0 * torque, top)
+    run = yield Step(setpoints(round(1.0 / dt), torque=push), travel=0.3)
+    coast = yield Step(setpoints(max(20, round(0.6 / dt))))
+    inertia = push / (_acceleration(run[len(run) // 4 :, POSITION], dt) + _braking(coast[:, POSITION], dt))
+    yield Step(setpoints(round(0.1 / dt)), pause=0.5)
+    return inertia, torque
+
+
+def _acceleration(position: Array, dt: float) -> float:
+    t = dt * np.arange(position.size)
+    return max(2.0 * float(_parabola(t, position)[0]), 1e-9)
+
+
+def _braking(position: Array, dt: float) -> float:
+    """Deceleration while it coasts, from the part before it stops."""
+    total = float(position[-1] - position[0])
+    moving = np.flatnonzero(np.abs(position - position[0]) < 0.85 * abs(total))
+    part = position[: max(int(moving[-1]) + 1 if moving.size else 0, 6)]
+    t = dt * np.arange(part.size)
+    return max(-2.0 * float(_parabola(t, part)[0]), 0.0)
+
+
+def _parabola(t: Any, position: Array) -> Array:
+    return np.asarray(np.polyfit(t, position - position[0], 2), dtype=np.float64)

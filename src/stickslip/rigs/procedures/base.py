@@ -1,0 +1,316 @@
+"""What a procedure is, and how one is performed.
+
+A procedure says beforehand what it will do (`Procedure.plan`), generates its steps one by one from what the rig
+measured so far (`Procedure.steps`), and judges what was recorded (`Procedure.checks`). Its options are the fields of a
+dataclass, in SI units, so that the command line and files set them by name.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, cast
+
+import numpy as np
+
+from stickslip.control.controller import Controller
+from stickslip.errors import InputError, RigError, suggestion
+from stickslip.record import Record
+from stickslip.rigs._control import COLUMNS, UNITS
+from stickslip.rigs.loop import Loop
+from stickslip.rigs.rig import Rig
+
+__all__ = ["Check", "CheckFailed", "Performed", "Plan", "Procedure", "Step", "Steps", "perform"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+KEPT = (
+    "position", "motor_torque", "torque_command", "sensor_torque", "temperature", "position_reference",
+    "velocity_reference", "torque_setpoint", "compensation_torque",
+)  # fmt: skip
+"""Channels of a procedure's record. The loop's raw velocity, a difference of two counts, is left to the loop's own."""
+TIME, POSITION = COLUMNS.index("time"), COLUMNS.index("position")
+
+
+class CheckFailed(RigError):
+    """A run was completed, but is not what it should be; its record is kept."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a procedure will do.
+
+    Attributes
+    ----------
+    duration : float
+        Longest time with the loop running, s; ramps that end at a break-away may be shorter.
+    pauses : float
+        Time that passes at rest besides, s.
+    travel, speed, torque : float
+        Greatest displacement from where it begins (rad), speed (rad/s) and torque (N·m) that it asks for.
+    text : tuple of str
+        What happens, a line each.
+    """
+
+    duration: float
+    travel: float
+    speed: float
+    torque: float
+    text: tuple[str, ...] = ()
+    pauses: float = 0.0
+
+    def within(self, rig: Rig) -> None:
+        """Refuse a plan beyond the rig's limits.
+
+        Raises
+        ------
+        InputError
+        """
+        limits = rig.limits
+        for what, value, limit, unit in (
+            ("torque", self.torque, limits.torque, "N·m"), ("speed", self.speed, limits.speed, "rad/s"),
+        ):  # fmt: skip
+            if value > limit:
+                raise InputError(
+                    f"the plan asks for a {what} of {value:.4g} {unit}; {rig.name} allows {limit:.4g}; ask for less"
+                )
+        room = limits.position[1] - limits.position[0]
+        if self.travel > room:
+            raise InputError(
+                f"the plan travels {self.travel:.4g} rad; {rig.name} has {room:.4g}; ask for less"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A segment of the loop.
+
+    ``wanted`` are its setpoints, ``keep`` says whether the record holds it (every ``average`` samples as their mean),
+    ``pause`` is a rest before it (s), ``travel`` ends it early.
+    """
+
+    wanted: Array
+    controller: Controller | None = None
+    keep: bool = False
+    average: int = 1
+    pause: float = 0.0
+    travel: float = math.inf
+    label: str = ""
+
+
+Steps = Generator[Step, Array, None]
+"""Steps, each answered by the rows that were recorded (`stickslip.rigs._control.COLUMNS`)."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One acceptance check: whether it passed, and a sentence with its number."""
+
+    name: str
+    passed: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class Procedure:
+    """Base of every procedure; its fields are its options."""
+
+    name: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+
+    def plan(self, rig: Rig) -> Plan:
+        """What it will do on this rig."""
+        raise NotImplementedError
+
+    def steps(self, rig: Rig) -> Steps:
+        """Its steps."""
+        raise NotImplementedError
+
+    def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
+        """Whether the record is what it should be."""
+        raise NotImplementedError
+
+    def finished(self, record: Record) -> Record:
+        """The record as identification takes it."""
+        return record
+
+    def options(self) -> dict[str, Any]:
+        """Options as plain data."""
+        return {f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)}
+
+    @classmethod
+    def with_options(cls, given: Mapping[str, str]) -> Procedure:
+        """This procedure with options as people write them: numbers, words, numbers with commas between.
+
+        Raises
+        ------
+        InputError
+            For an option that it has not, or a value of another kind.
+        """
+        known = {f.name: f for f in dataclasses.fields(cls)}
+        values: dict[str, Any] = {}
+        for name, text in given.items():
+            if name not in known:
+                raise InputError(f"{cls.name} has no option {name!r}; {suggestion(name, known)}")
+            values[name] = _parsed(name, text, known[name].default)
+        return cls(**values)
+
+
+def _plain(value: Any) -> Any:
+    return list(cast("tuple[float, ...]", value)) if isinstance(value, tuple) else value
+
+
+def _parsed(name: str, text: str, like: Any) -> Any:
+    try:
+        if isinstance(like, str):
+            return text
+        if isinstance(like, tuple):
+            return tuple(float(x) for x in text.split(","))
+        if isinstance(like, int):
+            return int(text)
+        number = float(text)
+        if not math.isfinite(number):
+            raise ValueError
+        return number
+    except ValueError:
+        kind = "numbers with commas between" if isinstance(like, tuple) else "a number"
+        raise InputError(f"{name} = {text!r} must be {kind}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class Performed:
+    """What a procedure recorded, with the verdicts of its checks."""
+
+    record: Record
+    checks: tuple[Check, ...]
+    plan: Plan
+    segments: tuple[tuple[str, int, int], ...] = field(default=())
+    """Label, first and last row (exclusive) of every step that was kept."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check passed."""
+        return all(c.passed for c in self.checks)
+
+    def insist(self) -> Performed:
+        """This, or the first check that failed as an error.
+
+        Raises
+        ------
+        CheckFailed
+        """
+        for check in self.checks:
+            if not check.passed:
+                raise CheckFailed(f"{check.name}: {check.text}", record=self.record)
+        return self
+
+    def part(self, label: str) -> Record:
+        """The rows of one step."""
+        for name, begin, end in self.segments:
+            if name == label:
+                channels = {k: v[begin:end] for k, v in self.record.channels.items()}
+                return Record(self.record.time[begin:end], channels, self.record.units, self.record.meta)
+        raise InputError(f"no step {label!r}; {suggestion(label, [s[0] for s in self.segments])}")
+
+
+def perform(
+    procedure: Procedure,
+    rig: Rig,
+    *,
+    path: str | os.PathLike[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+    without_watchdog: bool = False,
+) -> Performed:
+    """Perform a procedure on a rig.
+
+    Parameters
+    ----------
+    procedure : Procedure
+    rig : Rig
+    path : path, optional
+        Where every sample is written as it comes (`stickslip.stream`). Without it a virtual rig's samples that are not
+        kept are forgotten after each step, so that long runs need little memory.
+    progress : callable, optional
+        Called with the label of every step that has one.
+    without_watchdog : bool
+        As `Loop`.
+
+    Raises
+    ------
+    InputError
+        If the plan exceeds the rig's limits.
+    RigError
+        If the run was stopped.
+    """
+    plan = procedure.plan(rig)
+    plan.within(rig)
+    meta = {"procedure": procedure.name, "options": procedure.options()}
+    described: Any = getattr(rig, "machine", None)
+    if described is not None:
+        meta["machine"] = described.as_dict()
+    kept = _run(procedure, rig, path, meta, progress, without_watchdog)
+    record = _record(rig, [rows for _, rows in kept], meta)
+    ends = np.cumsum([len(rows) for _, rows in kept]).tolist()
+    segments = tuple((label, end - len(rows), end) for (label, rows), end in zip(kept, ends, strict=True))
+    record = procedure.finished(record)
+    checks = procedure.checks(record, rig)
+    told = {"checks": [dataclasses.asdict(c) for c in checks], "segments": [list(s) for s in segments]}
+    record = Record(record.time, record.channels, record.units, {**record.meta, **told})
+    return Performed(record, checks, plan, segments)
+
+
+def _run(
+    procedure: Procedure, rig: Rig, path: Any, meta: Mapping[str, Any], progress: Any, without_watchdog: bool
+) -> list[tuple[str, Array]]:
+    kept: list[tuple[str, Array]] = []
+    steps = procedure.steps(rig)
+    try:
+        step = next(steps)
+        # With nothing written, the loop is begun anew after a pause, and what was not kept is forgotten.
+        single = path is not None or rig.capabilities.real_clock
+        while True:
+            with Loop(rig, path=path, meta=meta, without_watchdog=without_watchdog) as loop:
+                while True:
+                    rows = _one(loop, step, kept, progress)
+                    step = steps.send(rows)
+                    if not single and step.pause > 0.0:
+                        break
+    except StopIteration:
+        return kept
+
+
+def _one(loop: Loop, step: Step, kept: list[tuple[str, Array]], progress: Any) -> Array:
+    if step.label and progress is not None:
+        progress(step.label)
+    if step.controller is not None:
+        loop.prepare(step.controller)
+    if step.pause > 0.0:
+        loop.pause(step.pause)
+    rows = loop.run(step.wanted, step.controller, travel=step.travel)
+    if step.keep:
+        kept.append((step.label, averaged(rows, step.average)))
+    return rows
+
+
+def averaged(rows: Array, count: int) -> Array:
+    """Means of `count` rows; the last, incomplete ones are dropped."""
+    if count <= 1:
+        return np.array(rows)
+    whole = len(rows) // count
+    return rows[: whole * count].reshape(whole, count, -1).mean(axis=1)
+
+
+def _record(rig: Rig, parts: Sequence[Array], meta: Mapping[str, Any]) -> Record:
+    if not parts:
+        raise InputError("the procedure kept no step")
+    rows = np.concatenate(parts)
+    able = rig.capabilities
+    lacks = {"sensor_torque": not able.torque_sensor, "temperature": not able.temperature}
+    names = [n for n in KEPT if not lacks.get(n, False)]
+    channels = {n: np.ascontiguousarray(rows[:, COLUMNS.index(n)]) for n in names}
+    return Record(
+        np.ascontiguousarray(rows[:, TIME]), channels, {n: UNITS[n] for n in names},
+        {"rig": rig.name, "sample_time": rig.sample_time, **meta},
+    )  # fmt: skip

@@ -1,0 +1,196 @@
+"""Inertia: a random current of two amplitudes over a running speed (thesis 4.2).
+
+The thesis excites the axis from rest, and finds its responses apart at low frequencies, where friction's sign changes.
+Here the axis runs, so that it never does: a damping loop holds the mean speed, and a run that slows to less than the
+least speed is refused. Power grows with the frequency up to the band's end, which moves the speed less than white
+noise does. Where the rig's torque or speed leaves no room for the currents asked for, all are lowered alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Gains
+from stickslip.errors import RigError
+from stickslip.record import Record
+from stickslip.rigs._control import COLUMNS
+from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, rough_inertia, uniform
+from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.rig import Rig, setpoints
+
+__all__ = ["PROCEDURE", "Inertia"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+TORQUE = COLUMNS.index("motor_torque")
+SLOW = 0.02
+"""s over which a speed is taken to see whether it reverses."""
+DAMPING = 20.0
+"""Hz, where the damping loop and the inertia's own impedance are equal."""
+BIAS = 0.6
+"""Of the torque limit, which running may take; else it runs slower."""
+CREST = 2.2
+"""Largest value of the noise over its RMS."""
+
+
+@dataclass(frozen=True)
+class Inertia(Procedure):
+    """Options of the procedure.
+
+    ``current`` in A RMS, one record part each, ``torque_constant`` in N·m/A, ``band`` in Hz, ``speed`` the mean and
+    ``least`` the least speed in rad/s (speed 0: chosen, at most half of what the rig allows), ``duration`` of each
+    part in s.
+    """
+
+    name: ClassVar[str] = "inertia"
+    title: ClassVar[str] = "inertia from random currents over a running speed (4.2)"
+
+    current: tuple[float, ...] = (0.8, 1.6)
+    torque_constant: float = 0.22
+    band: float = 50.0
+    lowest: float = 0.4
+    speed: float = 0.0
+    least: float = 2.0
+    duration: float = 120.0
+    seed: int = 1
+
+    def plan(self, rig: Rig) -> Plan:
+        """All parts one after the other."""
+        v = self.speed or 0.5 * rig.limits.speed
+        total = len(self.current) * (self.duration + 12.0) + 12.0
+        each = ", ".join(f"{c:g}" for c in self.current)
+        return Plan(
+            total, v * total, 2.0 * v if not self.speed else min(2.0 * v, rig.limits.speed),
+            ROOM * rig.limits.torque,
+            (
+                "ramp the torque until the axis moves, push it and let it coast: a first idea of the inertia",
+                f"random currents of {each} A RMS, or as much as the limits leave room for, up to {self.band:g} Hz "
+                f"over at most {v:.3g} rad/s, {self.duration:g} s each",
+            ),
+            3.0 * len(self.current),
+        )  # fmt: skip
+
+    def steps(self, rig: Rig) -> Steps:
+        """A first idea, then speed up, excite, stop, for each current."""
+        inertia, _ = yield from rough_inertia(rig)
+        follow = holder(rig, inertia, 8.0)
+        speed, bias = yield from self._running(rig, follow, inertia)
+        for place, current in enumerate(self.current):
+            yield from self._part(rig, follow, inertia, speed, bias, place, current)
+
+    def _running(
+        self, rig: Rig, follow: Controller, inertia: float
+    ) -> Generator[Step, Array, tuple[float, float]]:
+        """The speed to run at and the torque that this takes: the fastest that leaves room for the noise."""
+        found: tuple[float, float] | None = None
+        speed = self.speed or 2.0 * self.least
+        while True:
+            rows = yield now(rig)
+            ramp, level, end = uniform(rig, float(rows[-1, POSITION]), speed, speed, inertia)
+            yield Step(ramp, follow)
+            rows = yield Step(level, follow)
+            bias = float(np.mean(rows[len(rows) // 2 :, TORQUE]))
+            yield brake(rig, follow, end, speed, inertia)
+            yield Step(setpoints(round(0.2 / rig.sample_time)), pause=0.5)
+            if self.speed or (bias > BIAS * ROOM * rig.limits.torque and found is None):
+                return speed, bias
+            if bias > BIAS * ROOM * rig.limits.torque:
+                assert found is not None
+                return found
+            found = speed, bias
+            if speed >= 0.5 * rig.limits.speed:
+                return found
+            speed = min(1.5 * speed, 0.5 * rig.limits.speed)
+
+    def _part(
+        self, rig: Rig, follow: Controller, inertia: float, v: float, bias: float, place: int, current: float
+    ) -> Steps:
+        dt = rig.sample_time
+        room = ROOM * rig.limits.torque - bias
+        if room <= 0.0:
+            raise RigError(
+                f"{rig.name}: running at {v:.3g} rad/s takes all of its torque; give a lower speed"
+            )
+        kd = inertia * 2.0 * math.pi * DAMPING
+        rms = self._applied(room, inertia, kd, v) * current / max(self.current)
+        damp = Controller(Gains(2.0 * kd, 0.0, kd, kd), None, 0.4 * room, dt)
+        rows = yield Step(setpoints(round(0.05 / dt)), pause=1.0)
+        ramp, level, end = uniform(rig, float(rows[-1, POSITION]), v, v, inertia)
+        yield Step(np.concatenate([ramp, level]), follow)
+        count = round(self.duration / dt)
+        t = dt * np.arange(1, count + 1)
+        wanted = setpoints(
+            count,
+            position=end + v * t,
+            velocity=v,
+            torque=bias + self.noise(count, dt, rms, place),
+            closed=1.0,
+        )
+        rows = yield Step(wanted, damp, keep=True, label=f"{rms / self.torque_constant:.3g} A RMS")
+        yield brake(rig, follow, float(rows[-1, POSITION]), v, inertia)
+        yield Step(setpoints(round(0.2 / dt)))
+
+    def _applied(self, room: float, inertia: float, kd: float, v: float) -> float:
+        """The largest RMS torque: as asked for, within 0.6 of the room, and with speeds that stay above the least."""
+        corner = inertia * 2.0 * math.pi * self.band
+        # Variance of the speed of an inertia with damping kd under noise whose power grows with the frequency.
+        spread = math.log1p((corner / kd) ** 2) / corner**2
+        slowest = (v - self.least) / 4.0 / math.sqrt(spread)
+        return min(max(self.current) * self.torque_constant, 0.6 * room / CREST, slowest)
+
+    def noise(self, count: int, dt: float, rms: float, place: int) -> Array:
+        """Noise with power in proportion to the frequency up to the band's end, its peaks at most `CREST` times RMS."""
+        rng = np.random.default_rng((self.seed, place))
+        f = np.fft.rfftfreq(count, dt)
+        inside = (f <= self.band) & (f >= 0.5 * self.lowest)
+        noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(count)) * np.sqrt(f) * inside, count)
+        for _ in range(20):
+            noise /= float(np.sqrt(np.mean(noise**2)))
+            noise = np.fft.irfft(np.fft.rfft(np.clip(noise, -0.9 * CREST, 0.9 * CREST)) * inside, count)
+        noise /= float(np.sqrt(np.mean(noise**2)))
+        return rms * np.clip(noise, -CREST, CREST)
+
+    def finished(self, record: Record) -> Record:
+        """The measured current belongs to the sample that ended: it is moved to the row in which that began."""
+        channels = dict(record.channels)
+        for name in ("motor_torque", "sensor_torque"):
+            if name in channels:
+                moved = channels[name].copy()
+                moved[:-1] = channels[name][1:]
+                channels[name] = moved
+        return Record(
+            record.time, channels, record.units, {**record.meta, "torque": "held from each row's time on"}
+        )
+
+    def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
+        """The speed never fell below the least one; and what current that took."""
+        lowest = float(np.min(slopes(record, SLOW)))
+        excited = record["torque_setpoint"]
+        parts = np.array_split(excited, len(self.current))
+        applied = ", ".join(f"{float(np.std(p)) / self.torque_constant:.3g}" for p in parts)
+        asked = ", ".join(f"{c:g}" for c in self.current)
+        return (
+            Check(
+                "reversal", lowest >= self.least,
+                f"the lowest speed over {1e3 * SLOW:g} ms was {lowest:.3g} rad/s, at least {self.least:g} is needed so "
+                "that friction keeps its sign; if it fails, raise speed or lower current",
+            ),
+            Check("current", True, f"{applied} A RMS applied of {asked} asked for"),
+        )  # fmt: skip
+
+
+def slopes(record: Record, window: float) -> Array:
+    """Speed over a window, rad/s, inside each stretch without a gap."""
+    time, position = record.time, record["position"]
+    dt = float(np.median(np.diff(time)))
+    k = max(1, round(window / dt))
+    width = time[k:] - time[:-k]
+    return ((position[k:] - position[:-k]) / width)[width < 1.5 * k * dt]
+
+
+PROCEDURE = Inertia

@@ -1,0 +1,70 @@
+"""Pre-sliding: a slow sinusoidal torque below break-away, three cycles (thesis 4.3.1.1.3, eqs. 4.2 and 4.6)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from stickslip.record import Record
+from stickslip.rigs.procedures._moves import now
+from stickslip.rigs.procedures.base import Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.rig import Rig, setpoints
+
+__all__ = ["PROCEDURE", "Presliding"]
+
+
+@dataclass(frozen=True)
+class Presliding(Procedure):
+    """Options of the procedure.
+
+    ``amplitude`` in N·m (thesis: 0.18 dry, 0.13 greased), ``frequency`` in Hz, ``cycles``, and ``average``, the samples
+    of one row of the record.
+    """
+
+    name: ClassVar[str] = "presliding"
+    title: ClassVar[str] = "hysteresis of torque over displacement below break-away (4.3.1.1.3)"
+
+    amplitude: float = 0.18
+    frequency: float = 0.1
+    cycles: float = 3.0
+    average: int = 50
+    farthest: float = 0.01
+
+    def plan(self, rig: Rig) -> Plan:
+        """The cycles."""
+        seconds = self.cycles / self.frequency
+        return Plan(
+            seconds + 1.0, self.farthest, 2.0 * math.pi * self.frequency * self.farthest, self.amplitude,
+            (f"{self.cycles:g} cycles of {self.amplitude:g} N·m at {self.frequency:g} Hz, the loop open",), 1.0,
+        )  # fmt: skip
+
+    def steps(self, rig: Rig) -> Steps:
+        """From rest, without a loop."""
+        yield now(rig)
+        count = round(self.cycles / self.frequency / rig.sample_time)
+        t = rig.sample_time * np.arange(1, count + 1)
+        torque = self.amplitude * np.sin(2.0 * math.pi * self.frequency * t)
+        # Beyond the travel the axis has broken away, and the step ends.
+        yield Step(
+            setpoints(count, torque=torque), keep=True, average=self.average, pause=1.0, travel=self.farthest,
+            label=f"{self.amplitude:g} N·m",
+        )  # fmt: skip
+        yield Step(setpoints(round(0.2 / rig.sample_time)))
+
+    def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
+        """It moved by more than an encoder shows as noise, and did not break away."""
+        moved = float(np.ptp(record["position"]))
+        full = float(record.time[-1] - record.time[0]) >= 0.98 * self.cycles / self.frequency
+        return (
+            Check("moved", moved > 1e-5, f"moved by {moved:.3g} rad"),
+            Check(
+                "stuck", full and moved < self.farthest,
+                f"moved by {moved:.3g} rad; {self.amplitude:g} N·m must stay below break-away: lower amplitude",
+            ),
+        )  # fmt: skip
+
+
+PROCEDURE = Presliding

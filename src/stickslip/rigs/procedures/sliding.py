@@ -1,0 +1,113 @@
+"""Sliding: the velocities of thesis (4.1) and (4.3), from the greatest, 380 degrees each, both directions.
+
+A PID holds each velocity as a ramp of position (the thesis used an H-infinity controller). The torque of a revolution
+is averaged by `stickslip.identify.segments`; the first 20 degrees are its transient.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from stickslip.record import Record
+from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, uniform
+from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.rig import Rig, setpoints
+
+__all__ = ["DRY", "GREASED", "PROCEDURE", "Sliding"]
+
+DRY = (1.4, 1.2, 1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.08, 0.06, 0.04, 0.02)
+"""rad/s, thesis eq. 4.1"""
+GREASED = (
+    25.0, 20.0, 15.0, 10.0, 5.0, 3.0, 2.0, 1.9, 1.8, 1.6, 1.4, 1.2, 1.1, 1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4,
+    0.3, 0.2, 0.1, 0.08, 0.06, 0.04, 0.02, 0.01, 0.005,
+)  # fmt: skip
+"""rad/s, thesis eq. 4.3"""
+ROWS = 2000
+"""Rows of a velocity's record, about."""
+
+
+@dataclass(frozen=True)
+class Sliding(Procedure):
+    """Options of the procedure.
+
+    ``velocities`` in rad/s, ``degrees`` of each run, ``inertia`` in kg·m² and ``bandwidth`` in Hz of the loop.
+    """
+
+    name: ClassVar[str] = "sliding"
+    title: ClassVar[str] = "friction at constant velocities, both directions (4.3.1.1.2)"
+
+    velocities: tuple[float, ...] = DRY
+    degrees: float = 380.0
+    inertia: float = 4.3e-4
+    bandwidth: float = 10.0
+
+    @property
+    def speeds(self) -> tuple[float, ...]:
+        """From the greatest, rad/s."""
+        return tuple(sorted((abs(v) for v in self.velocities), reverse=True))
+
+    def plan(self, rig: Rig) -> Plan:
+        """Every velocity in both directions."""
+        travel = math.radians(self.degrees)
+        rise = [max(v * self.inertia / (0.15 * rig.limits.torque), 0.1) for v in self.speeds]
+        total = 2.0 * sum(travel / v + 2.0 * r + 0.3 for v, r in zip(self.speeds, rise, strict=True))
+        return Plan(
+            total, travel + max(v * r for v, r in zip(self.speeds, rise, strict=True)), max(self.speeds),
+            ROOM * rig.limits.torque,
+            (
+                f"{len(self.speeds)} velocities from {max(self.speeds):g} to {min(self.speeds):g} rad/s, "
+                f"{self.degrees:g} degrees forth and back each",
+            ),
+            0.5 * 2 * len(self.speeds),
+        )  # fmt: skip
+
+    def steps(self, rig: Rig) -> Steps:
+        """Forth and back with each velocity."""
+        loop = holder(rig, self.inertia, self.bandwidth)
+        travel = math.radians(self.degrees)
+        for speed in self.speeds:
+            for direction in (1.0, -1.0):
+                rows = yield Step(setpoints(2), pause=0.5)
+                begin, v = float(rows[-1, POSITION]), direction * speed
+                ramp, level, _ = uniform(rig, begin, v, travel, self.inertia)
+                yield Step(ramp, loop)
+                rows = yield Step(
+                    level, loop, keep=True, average=max(1, len(level) // ROWS), label=f"{v:g} rad/s"
+                )
+                yield brake(rig, loop, float(level[-1, 0]), v, self.inertia)
+        yield now(rig)
+
+    def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
+        """The mean speed of the last revolution was held within 1 %; its ripple is reported."""
+        out: list[Check] = []
+        wanted = record["velocity_reference"]
+        edges = np.flatnonzero(np.abs(np.diff(wanted)) > 1e-9 * np.abs(wanted[:-1])) + 1
+        parts = [p for p in np.split(np.arange(len(record)), edges) if p.size > 2]
+        for rows in parts:
+            out.append(self._held(record, rows))
+        return tuple(out)
+
+    def _held(self, record: Record, rows: np.ndarray) -> Check:  # type: ignore[type-arg]
+        time, position, wanted = (
+            record.time[rows],
+            record["position"][rows],
+            record["velocity_reference"][rows],
+        )
+        far = np.abs(position - position[0]) >= math.radians(max(self.degrees - 360.0, 0.0))
+        t, x, v = time[far], position[far], float(wanted[0])
+        if t.size < 3:
+            return Check(f"{v:g} rad/s", False, "the axis did not travel a revolution")
+        mean = float((x[-1] - x[0]) / (t[-1] - t[0]))
+        ripple = float(np.std(np.diff(x) / np.diff(t)))
+        return Check(
+            f"{v:g} rad/s", abs(mean / v - 1.0) <= 0.01,
+            f"mean speed of a revolution {mean:.5g} rad/s, ripple {ripple:.2g} rad/s RMS over "
+            f"{1e3 * float(np.median(np.diff(t))):.3g} ms",
+        )  # fmt: skip
+
+
+PROCEDURE = Sliding

@@ -1,0 +1,63 @@
+"""Stick-slip: a sinusoidal torque that breaks away in both directions, the loop open (thesis 4.3.1.1.4)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from stickslip.record import Record
+from stickslip.rigs.procedures._moves import now
+from stickslip.rigs.procedures.base import Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.rig import Rig, setpoints
+
+__all__ = ["PROCEDURE", "Stickslip"]
+
+
+@dataclass(frozen=True)
+class Stickslip(Procedure):
+    """Options: ``amplitude`` in N·m (thesis: 0.45 dry, 0.35 greased), ``frequency`` in Hz, ``cycles``."""
+
+    name: ClassVar[str] = "stickslip"
+    title: ClassVar[str] = "open-loop response that sticks and slips (4.3.1.1.4)"
+
+    amplitude: float = 0.45
+    frequency: float = 1.0
+    cycles: float = 5.0
+
+    def plan(self, rig: Rig) -> Plan:
+        """The cycles; the speed is what friction leaves of the torque, which is not known beforehand."""
+        seconds = self.cycles / self.frequency
+        return Plan(
+            seconds + 1.0, 0.5 * rig.limits.speed * seconds, 0.0, self.amplitude,
+            (f"{self.cycles:g} cycles of {self.amplitude:g} N·m at {self.frequency:g} Hz, the loop open",), 1.0,
+        )  # fmt: skip
+
+    def steps(self, rig: Rig) -> Steps:
+        """From rest, without a loop."""
+        yield now(rig)
+        count = round(self.cycles / self.frequency / rig.sample_time)
+        t = rig.sample_time * np.arange(count)
+        torque = self.amplitude * np.sin(2.0 * math.pi * self.frequency * t)
+        yield Step(setpoints(count, torque=torque), keep=True, pause=1.0, label=f"{self.amplitude:g} N·m")
+        yield Step(setpoints(round(0.5 / rig.sample_time)))
+
+    def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
+        """It slipped in both directions, and stuck in between."""
+        position = record["position"]
+        k = max(1, round(0.02 / rig.sample_time))
+        speed = (position[k:] - position[:-k]) / (k * rig.sample_time)
+        stuck = float(np.mean(np.abs(speed) < 0.01))
+        return (
+            Check(
+                "slipped", bool(np.max(speed) > 0.05 and np.min(speed) < -0.05),
+                f"speeds from {np.min(speed):.3g} to {np.max(speed):.3g} rad/s; both directions must slip, else "
+                "raise amplitude",
+            ),
+            Check("stuck", stuck > 0.05, f"stuck for {100 * stuck:.3g} % of the time"),
+        )  # fmt: skip
+
+
+PROCEDURE = Stickslip

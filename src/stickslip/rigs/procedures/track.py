@@ -1,0 +1,143 @@
+"""Track: the thesis's three references with any linear controller and compensator (4.3.1.2, 4.3.2.2)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.controller import Controller
+from stickslip.control.linear import LINEAR, Gains, place
+from stickslip.errors import InputError, UnknownName
+from stickslip.model import Model, Reference
+from stickslip.record import Record
+from stickslip.rigs.procedures._moves import ROOM
+from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.rig import Rig, setpoints
+
+__all__ = ["PROCEDURE", "REFERENCES", "Track"]
+
+REFERENCES = {
+    "low": (Reference("sine", amplitude=0.01, frequency=0.4), 5.0),
+    "high": (Reference("sine", amplitude=0.5, frequency=0.1), 20.0),
+    "step": (Reference("step", amplitude=0.01, tau=0.02), 3.0),
+}
+"""Thesis eqs. 3.23 and 3.24, and figure 3.17's step; with their durations, s."""
+COMPENSATORS = {"feedforward": Feedforward, "feedback": Feedback}
+
+
+@dataclass(frozen=True)
+class Track(Procedure):
+    """Options of the procedure.
+
+    ``reference`` is low, high or step; ``linear`` PD, PID or PR with ``bandwidth`` (Hz), ``damping`` and ``inertia``
+    (kg·m²) of its placement; ``compensator`` none, feedforward or feedback with ``model``, a model.toml or the name of
+    one of the machine's, its ``gain`` and ``filter`` (Hz, 0: the machine's);
+    ``duration`` in s (0: the reference's own).
+    """
+
+    name: ClassVar[str] = "track"
+    title: ClassVar[str] = "follow one of the thesis's references (4.3.1.2)"
+
+    reference: str = "low"
+    linear: str = "PD"
+    bandwidth: float = 25.0
+    damping: float = 1.0
+    inertia: float = 3.8623e-4
+    compensator: str = "none"
+    model: str = ""
+    gain: float = 1.0
+    filter: float = 0.0
+    duration: float = 0.0
+    wait: float = 1.0
+
+    @property
+    def wanted(self) -> tuple[Reference, float]:
+        """Reference and duration, s."""
+        if self.reference not in REFERENCES:
+            raise UnknownName("reference", self.reference, REFERENCES)
+        reference, seconds = REFERENCES[self.reference]
+        return reference, self.duration or seconds
+
+    def controller(self, rig: Rig) -> Controller:
+        """The controller with its compensator.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown or the model is missing.
+        """
+        if self.linear not in LINEAR:
+            raise UnknownName("linear controller", self.linear, LINEAR)
+        gains: Gains = place(self.linear, self.inertia, self.bandwidth, self.damping)
+        limit = ROOM * rig.limits.torque
+        if self.compensator == "none":
+            return Controller(gains, None, limit, rig.sample_time)
+        if self.compensator not in COMPENSATORS:
+            raise UnknownName("compensator", self.compensator, ("none", *COMPENSATORS))
+        machine: Any = getattr(rig, "machine", None)
+        corner = self.filter or (machine.filter if machine is not None else 0.0)
+        helper = COMPENSATORS[self.compensator](self.law(rig), self.gain, corner or None)
+        return Controller(gains, helper, limit, rig.sample_time)
+
+    def law(self, rig: Rig) -> Model:
+        """The compensator's model."""
+        machine: Any = getattr(rig, "machine", None)
+        known: dict[str, Model] = dict(machine.models) if machine is not None else {}
+        if self.model in known:
+            return known[self.model]
+        if self.model.endswith(".toml"):
+            return Model.from_file(self.model)
+        raise InputError(
+            f"model = {self.model!r}: give a model.toml or one of {', '.join(known) or 'none that the machine has'}"
+        )
+
+    def samples(self, rig: Rig) -> Any:
+        """Positions and velocities of the reference, shape (n, 2)."""
+        reference, seconds = self.wanted
+        t = rig.sample_time * np.arange(round(seconds / rig.sample_time))
+        return reference.sample(t)[:, :2]
+
+    def plan(self, rig: Rig) -> Plan:
+        """The reference."""
+        samples = self.samples(rig)
+        self.controller(rig)
+        words = f"{self.linear} {self.bandwidth:g} Hz"
+        if self.compensator != "none":
+            words += f" with {self.compensator} {self.model}"
+        return Plan(
+            len(samples) * rig.sample_time + 0.1, float(np.ptp(samples[:, 0])),
+            float(np.max(np.abs(samples[:, 1]))), ROOM * rig.limits.torque,
+            (f"follow {self.reference} for {len(samples) * rig.sample_time:g} s: {words}",), self.wait,
+        )  # fmt: skip
+
+    def steps(self, rig: Rig) -> Steps:
+        """From where the axis stands, as the reference's zero."""
+        rows = yield Step(setpoints(round(0.05 / rig.sample_time)), pause=self.wait)
+        samples = self.samples(rig)
+        wanted = setpoints(
+            len(samples),
+            position=float(rows[-1, POSITION]) + samples[:, 0],
+            velocity=samples[:, 1],
+            closed=1.0,
+        )
+        yield Step(wanted, self.controller(rig), keep=True, label=self.reference)
+
+    def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
+        """The error and the torque's saturation; both are what is looked for, so that neither fails."""
+        error = record["position_reference"] - record["position"]
+        rms, worst = math.sqrt(float(np.mean(error**2))), float(np.max(np.abs(error)))
+        cut = float(np.mean(np.abs(record["torque_command"]) >= 0.999 * ROOM * rig.limits.torque))
+        return (
+            Check(
+                "tracking", True,
+                f"error {rms:.4g} rad RMS, {worst:.4g} at most; torque at its limit {100 * cut:.3g} %",
+            ),
+        )  # fmt: skip
+
+
+PROCEDURE = Track

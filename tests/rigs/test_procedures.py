@@ -1,0 +1,171 @@
+"""Procedures: what they plan, record and refuse; the identification takes their records as they are."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip.cli import main
+from stickslip.errors import InputError, UnknownName
+from stickslip.identify.axis_trial import trial_of
+from stickslip.identify.breakaway import find_breaks
+from stickslip.identify.inertia import inertia
+from stickslip.identify.segments import sliding_points
+from stickslip.machines.machine import machine
+from stickslip.machines.servo import ServoAxis
+from stickslip.record import Record
+from stickslip.rigs.procedures import PROCEDURES, procedure
+from stickslip.rigs.procedures.base import CheckFailed, perform
+from stickslip.rigs.virtual import VirtualRig, virtual_rig
+
+SHORT = {
+    "inertia": {"duration": "25"},
+    "breakaway": {"interval": "60"},
+    "sliding": {"velocities": "5,1,0.3"},
+    "presliding": {"frequency": "0.5", "amplitude": "0.15"},
+    "stickslip": {"cycles": "3"},
+    "attraction": {"cycles": "4"},
+    "track": {"compensator": "feedforward", "model": "lugre"},
+    "repeat": {"times": "2", "interval": "60", "bandwidth": "10", "damping": "0.85"},
+}
+
+GREASED = {"stickslip": {"amplitude": "0.35"}, "attraction": {"mean": "0.3", "swing": "0.15"}}
+
+
+def run(name, rig, **options):
+    if "grease" in rig.name:
+        options = {**GREASED.get(name, {}), **options}
+    return perform(procedure(name).with_options({**SHORT[name], **options}), rig)
+
+
+@pytest.mark.parametrize("name", PROCEDURES)
+@pytest.mark.parametrize("where", ["thesis-dry", "thesis-grease"])
+def test_every_procedure_keeps_to_its_plan_and_passes_its_checks(name, where, tmp_path):
+    rig = virtual_rig(where)
+    before = rig.open().time
+    result = run(name, rig)
+    plan = result.plan
+    assert result.passed, result.checks
+    spent = rig.open().time - before
+    assert spent <= plan.duration + plan.pauses + 30.0
+    record = result.record
+    assert np.abs(record["torque_command"]).max() <= max(plan.torque, 0.0) + 1e-9
+    assert record.meta["procedure"] == name
+    assert record.meta["machine"]["name"] == where
+    assert np.all(np.diff(record.time) > 0.0)
+    path = record.save(tmp_path / "r.npz")
+    assert Record.load(path).meta == record.meta
+
+
+@pytest.mark.parametrize("where", ["thesis-dry", "thesis-grease"])
+def test_inertia_is_recovered(where):
+    result = run("inertia", virtual_rig(where))
+    axis = ServoAxis()
+    found = inertia([trial_of(result.part(label), axis) for label, *_ in result.segments], axis)
+    assert found["inertia"].value == pytest.approx(4.2757e-4, rel=0.03)
+
+
+def test_inertia_refuses_a_run_that_slows_down_too_far():
+    result = run("inertia", virtual_rig("thesis-grease"), speed="2.2")
+    assert not result.passed
+    with pytest.raises(CheckFailed, match="friction keeps its sign"):
+        result.insist()
+
+
+def test_breaks_are_found_at_every_angle_and_direction():
+    record = run("breakaway", virtual_rig("thesis-grease")).record
+    breaks = find_breaks(record)
+    assert sum(b.direction > 0 for b in breaks) == 6
+    assert sum(b.direction < 0 for b in breaks) == 6
+    angles = sorted(math.degrees(b.angle) % 360.0 for b in breaks if b.direction > 0)
+    assert np.diff(angles) == pytest.approx(60.0, abs=3.0)
+
+
+def test_sliding_points_are_those_of_the_ideal_machine():
+    m = machine("ideal")
+    points, _ = sliding_points(run("sliding", VirtualRig(m)).record)
+    assert len(points) == 6
+    for v, torque in zip(points.velocity, points.torque, strict=True):
+        truth = m.clutch.law.steady(v, m.clutch.parameters)
+        assert torque == pytest.approx(truth, rel=2e-3)
+
+
+def test_presliding_that_breaks_away_is_refused():
+    result = run("presliding", virtual_rig("thesis-dry"), amplitude="0.5")
+    assert not result.passed
+    with pytest.raises(CheckFailed, match="lower amplitude"):
+        result.insist()
+
+
+def test_repeat_spreads_by_drift_only_little():
+    result = run("repeat", virtual_rig("thesis-grease"))
+    assert len(result.segments) == 2
+    assert result.record.time[-1] - result.record.time[0] > 60.0
+
+
+def test_a_plan_beyond_the_limits_is_refused_before_anything_moves():
+    rig = virtual_rig("thesis-dry")
+    with pytest.raises(InputError, match="speed of 60 rad/s"):
+        run("sliding", rig, velocities="60")
+    assert rig.open().time == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "says"),
+    [
+        ("sliding", {"velocitys": "1"}, "did you mean 'velocities'"),
+        ("sliding", {"velocities": "a"}, "numbers with commas"),
+        ("track", {"model": "gsm"}, "give a model.toml or one of"),
+        ("track", {"compensator": "both"}, "compensator 'both'"),
+        ("track", {"reference": "slow"}, "reference 'slow'"),
+    ],
+)
+def test_options_that_make_no_sense(name, options, says):
+    with pytest.raises(InputError, match=says):
+        run(name, virtual_rig("thesis-dry"), **options)
+    with pytest.raises(UnknownName):
+        procedure("breakaways")
+
+
+def test_command_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["rig", "list"]) == 0
+    assert "thesis-grease" in capsys.readouterr().out
+    assert main(["rig", "run", "sliding", "--rig", "thesis-dry", "--dry-run"]) == 0
+    out = capsys.readouterr().out
+    for word in ("travel", "speed", "torque", "time"):
+        assert word in out
+    assert not Path("sliding.npz").exists()
+    code = main(
+        ["rig", "run", "presliding", "--rig", "thesis-dry", "--without", "cogging", "--set", "frequency=1"]
+    )
+    assert code == 0
+    assert Record.load("presliding.npz").meta["machine"]["without"] == ["cogging"]
+    assert (
+        main(
+            [
+                "rig",
+                "run",
+                "presliding",
+                "--rig",
+                "thesis-dry",
+                "--set",
+                "amplitude=0.6",
+                "--set",
+                "frequency=1",
+            ]
+        )
+        == 1
+    )
+    for bad in (
+        ["rig", "run", "presliding", "--rig", "nowhere"],
+        ["rig", "run", "presliding", "--rig", "thesis-dry", "--without", "nothing"],
+        ["rig", "run", "preslidng", "--rig", "thesis-dry"],
+        ["rig", "run", "presliding", "--rig", "none.toml"],
+        ["rig", "run", "presliding", "--rig", "thesis-dry", "--set", "amplitude"],
+    ):
+        assert main(bad) == 2
+        assert len(capsys.readouterr().err.strip().splitlines()) == 1
