@@ -33,8 +33,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     run_one.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="an option")
     run_one.add_argument("--out", type=Path, metavar="FILE.npz", help="the record (default: NAME.npz)")
     run_one.add_argument("--stream", type=Path, metavar="FILE", help="also write every sample as it comes")
+    whole = actions.add_parser("commission", help="every procedure in turn, to a model.toml and a report")
+    whole.add_argument(
+        "--out", type=Path, default=Path("commission"), metavar="DIR", help="folder (commission)"
+    )
     actions.add_parser("list", help="list machines, procedures and imperfections")
-    for action in (run_one,):
+    for action in (run_one, whole):
         action.add_argument("--rig", required=True, metavar="RIG", help="a machine's name or a TOML file")
         action.add_argument(
             "--without", action="append", default=[], metavar="NAME", help="an imperfection to switch off"
@@ -48,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     """Do what was asked; 1 where a check failed."""
     if args.action == "list":
         return listed()
-    return performed(args)
+    return commissioned(args) if args.action == "commission" else performed(args)
 
 
 def listed() -> int:
@@ -77,19 +81,16 @@ def rig_of(args: argparse.Namespace) -> Rig:
     ------
     InputError
     """
-    from stickslip import plugins
     from stickslip.config import read_toml
     from stickslip.errors import InputError
+    from stickslip.rigs.files import read_rig
     from stickslip.rigs.virtual import virtual_rig
 
     name = str(args.rig)
-    if name.endswith(".toml"):
-        top = read_toml(Path(name))
-        if top.has("rig"):
-            if args.without:
-                raise InputError("--without is for virtual machines; write it into the file's [rig]")
-            table = dict(top.table("rig").values)
-            return plugins.rig_kind(str(table.pop("kind", ""))).build(table)
+    if name.endswith(".toml") and read_toml(Path(name)).has("rig"):
+        if args.without:
+            raise InputError("--without is for virtual machines; write it into the file's [rig]")
+        return read_rig(name)
     return virtual_rig(name, args.without)
 
 
@@ -134,6 +135,47 @@ def told(plan: Plan, rig: Rig, args: argparse.Namespace) -> int:
     print(f"speed   up to {plan.speed:.4g} rad/s of {rig.limits.speed:.4g}")
     print(f"torque  up to {plan.torque:.4g} N·m of {rig.limits.torque:.4g}")
     print(f"time    up to {clock(plan.duration)}, and {clock(plan.pauses)} at rest")
+    return 0
+
+
+def commissioned(args: argparse.Namespace) -> int:
+    """`stickslip rig commission`."""
+    from stickslip.cli import _output
+    from stickslip.commission.commission import commission, planned
+    from stickslip.errors import InputError
+    from stickslip.identify.model_file import versions, write_model
+    from stickslip.report.identified import Source, write_identification
+    from stickslip.study.files import prepared_folder
+
+    rig = rig_of(args)
+    if args.dry_run:
+        total = 0.0
+        for plan in planned(rig):
+            total += plan.duration + plan.pauses
+            print("\n".join(plan.text))
+        print(f"time    up to {clock(total)}")
+        return 0
+    if args.out.is_file():
+        raise InputError(f"--out {args.out} is a file; give a folder")
+    folder: Path = prepared_folder(args.out)
+    found = commission(rig, folder=folder, progress=_output.say, without_watchdog=args.no_watchdog)
+    model = write_model(folder / "model.toml", found.result)
+    sources = [Source(s.name, s.performed.record) for s in found.stages]
+    report = write_identification(
+        folder / "report.html",
+        found.result,
+        sources,
+        title=f"Commissioning of {rig.name}",
+        versions=versions(),
+    )
+    if args.json:
+        _output.print_json({**found.result.as_dict(), "folder": str(folder)})
+        return 0
+    print(f"inertia    {found.inertia:.5g} kg·m²")
+    print(f"stiffness  {found.stiffness:.4g} N·m/rad before sliding, as the encoder sees it")
+    for note in found.result.notes:
+        print(f"- {note}")
+    print(f"model: {model}\nreport: {report}\nrecords: {folder}")
     return 0
 
 

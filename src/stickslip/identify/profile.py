@@ -77,7 +77,9 @@ def profiles_of(
     if lags > 0:
         robust = np.diag(inverse @ long_run(best.jacobian * best.residuals[:, None], lags) @ inverse)
         with np.errstate(invalid="ignore", divide="ignore"):
-            target = np.where(seen, quantile(noise) * robust / np.diag(inverse), target)
+            # Negative where rounding decides: then the noise alone counts.
+            ratio = quantile(noise) * robust / np.diag(inverse)
+            target = np.where(seen & (ratio > 0.0), ratio, target)
     reach: dict[tuple[int, float], float] = {}
     family = [best.u]
     # A second round goes on from fits met on other profiles that lie beyond what the first one reached.

@@ -52,7 +52,7 @@ class Sliding(Procedure):
 
     def plan(self, rig: Rig) -> Plan:
         """Every velocity in both directions."""
-        travel = math.radians(self.degrees)
+        travel = math.radians(self.degrees + 3.0)
         rise = [max(v * self.inertia / (0.15 * rig.limits.torque), 0.1) for v in self.speeds]
         total = 2.0 * sum(travel / v + 2.0 * r + 0.3 for v, r in zip(self.speeds, rise, strict=True))
         return Plan(
@@ -68,7 +68,8 @@ class Sliding(Procedure):
     def steps(self, rig: Rig) -> Steps:
         """Forth and back with each velocity."""
         loop = holder(rig, self.inertia, self.bandwidth)
-        travel = math.radians(self.degrees)
+        # A little more, so that what is left after the transient is a whole revolution in the averaged rows too.
+        travel = math.radians(self.degrees + 3.0)
         for speed in self.speeds:
             for direction in (1.0, -1.0):
                 rows = yield Step(setpoints(2), pause=0.5)

@@ -18,7 +18,10 @@ __all__ = ["PROCEDURE", "Stickslip"]
 
 @dataclass(frozen=True)
 class Stickslip(Procedure):
-    """Options: ``amplitude`` in N·m (thesis: 0.45 dry, 0.35 greased), ``frequency`` in Hz, ``cycles``."""
+    """Options: ``amplitude`` in N·m (thesis: 0.45 dry, 0.35 greased), ``frequency`` in Hz, ``cycles``.
+
+    ``average`` is the number of samples of a row: single counts would look like motion and rest in turn.
+    """
 
     name: ClassVar[str] = "stickslip"
     title: ClassVar[str] = "open-loop response that sticks and slips (4.3.1.1.4)"
@@ -26,6 +29,7 @@ class Stickslip(Procedure):
     amplitude: float = 0.45
     frequency: float = 1.0
     cycles: float = 5.0
+    average: int = 4
 
     def plan(self, rig: Rig) -> Plan:
         """The cycles; the speed is what friction leaves of the torque, which is not known beforehand."""
@@ -41,14 +45,21 @@ class Stickslip(Procedure):
         count = round(self.cycles / self.frequency / rig.sample_time)
         t = rig.sample_time * np.arange(count)
         torque = self.amplitude * np.sin(2.0 * math.pi * self.frequency * t)
-        yield Step(setpoints(count, torque=torque), keep=True, pause=1.0, label=f"{self.amplitude:g} N·m")
+        yield Step(
+            setpoints(count, torque=torque),
+            keep=True,
+            average=self.average,
+            pause=1.0,
+            label=f"{self.amplitude:g} N·m",
+        )
         yield Step(setpoints(round(0.5 / rig.sample_time)))
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
         """It slipped in both directions, and stuck in between."""
         position = record["position"]
-        k = max(1, round(0.02 / rig.sample_time))
-        speed = (position[k:] - position[:-k]) / (k * rig.sample_time)
+        width = self.average * rig.sample_time
+        k = max(1, round(0.02 / width))
+        speed = (position[k:] - position[:-k]) / (k * width)
         stuck = float(np.mean(np.abs(speed) < 0.01))
         return (
             Check(

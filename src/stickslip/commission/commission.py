@@ -1,0 +1,349 @@
+"""Commissioning: procedures in order, an identification after each, at the end one model.
+
+Each stage takes from those before it only what they identified: the inertia sets the loops, the break-away torque the
+amplitudes of the pre-sliding and stick-slip stages, the running torque the velocities. Nothing is known of the machine
+but its rig's limits.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.commission.curve import fitted_curve, moving
+from stickslip.errors import InputError, LimitCrossed
+from stickslip.identify.attraction import largest_without_overshoot
+from stickslip.identify.axis_trial import trial_of
+from stickslip.identify.breakaway import identify_breakaway
+from stickslip.identify.estimate import Estimate, Identification, Picture
+from stickslip.identify.hysteresis import Loop as Hysteresis
+from stickslip.identify.inertia import inertia
+from stickslip.identify.lugre_dynamics import Response, identify_lugre_dynamics
+from stickslip.identify.presliding import identify_presliding
+from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
+from stickslip.rigs.procedures.attraction import Attraction
+from stickslip.rigs.procedures.base import Performed, Plan, Procedure, perform
+from stickslip.rigs.procedures.breakaway import Breakaway
+from stickslip.rigs.procedures.inertia import Inertia
+from stickslip.rigs.procedures.presliding import Presliding
+from stickslip.rigs.procedures.sliding import Sliding
+from stickslip.rigs.procedures.stickslip import Stickslip
+from stickslip.rigs.rig import Rig
+from stickslip.simulation.driven import Mechanics
+
+__all__ = ["VELOCITIES", "Commissioned", "Stage", "commission", "planned"]
+
+VELOCITIES = (25.0, 18.0, 10.0, 5.0, 3.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.06, 0.04, 0.02)
+"""rad/s; those that the rig can run at are taken."""
+BELOW, BEYOND = 0.55, 1.25
+"""Of the break-away torque: amplitudes that stick, and that slip."""
+FASTEST, LAG = 1e4, 5e-3
+"""N·m/s up to which C is looked for, and the lag in s that stands in where none overshoots."""
+LEAST = 0.01
+"""Of the amplitude of the pre-sliding loop, below which an element is not resolved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One procedure with what was identified from its record; `found` is None where that was impossible, and `note`
+    says why."""
+
+    name: str
+    performed: Performed
+    found: Identification | None
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Commissioned:
+    """What is known of the machine in the end.
+
+    Attributes
+    ----------
+    stages : tuple of Stage
+    inertia : float
+        kg·m²
+    model : Model
+        GMS: its sliding curve is the mean of both directions, its springs are what the encoder sees.
+    lugre : Model or None
+        LuGre with sigma0 and sigma1 from the stick-slip response.
+    stiffness : float
+        Total pre-sliding stiffness at the encoder, N·m/rad: contact and shaft in series.
+    result : Identification
+        All of it, for `stickslip.identify.model_file.write_model` and the report.
+    """
+
+    stages: tuple[Stage, ...]
+    inertia: float
+    model: Model
+    lugre: Model | None
+    stiffness: float
+    result: Identification
+
+    def stage(self, name: str) -> Stage:
+        """One stage by its procedure's name."""
+        return next(s for s in self.stages if s.name == name)
+
+
+@dataclass
+class _Course:
+    """What the stages have in common, and what they know so far."""
+
+    rig: Rig
+    folder: Path | None
+    progress: Callable[[str], None]
+    without_watchdog: bool
+    stages: list[Stage] = field(default_factory=list[Stage])
+
+    def run(self, procedure: Procedure, *, insist: bool = True) -> Performed:
+        """Perform, save, and insist on the checks."""
+        self.progress(f"{procedure.name}: {'; '.join(procedure.plan(self.rig).text)}")
+        done = perform(procedure, self.rig, without_watchdog=self.without_watchdog)
+        if self.folder is not None:
+            done.record.save(self.folder / f"{procedure.name}.npz")
+        return done.insist() if insist else done
+
+    def add(self, name: str, done: Performed, found: Identification | None, note: str = "") -> None:
+        """Keep a stage."""
+        self.stages.append(Stage(name, done, found, note))
+
+
+def planned(rig: Rig, velocities: tuple[float, ...] = VELOCITIES, duration: float = 60.0) -> tuple[Plan, ...]:
+    """The plans of all stages, with what is known before the first of them."""
+    speeds = tuple(v for v in velocities if v <= 0.5 * rig.limits.speed)
+    stages: tuple[Procedure, ...] = (
+        Inertia(duration=duration), Breakaway(), Sliding(velocities=speeds), Presliding(), Stickslip(), Attraction(),
+    )  # fmt: skip
+    return tuple(s.plan(rig) for s in stages)
+
+
+def commission(
+    rig: Rig,
+    *,
+    folder: Path | None = None,
+    progress: Callable[[str], None] | None = None,
+    velocities: tuple[float, ...] = VELOCITIES,
+    duration: float = 60.0,
+    interval: float = 10.0,
+    without_watchdog: bool = False,
+) -> Commissioned:
+    """Commission a rig.
+
+    Parameters
+    ----------
+    rig : Rig
+    folder : Path, optional
+        Where the record of every stage is saved.
+    progress : callable, optional
+        Called with a line per stage.
+    velocities : tuple of float
+        Of the sliding stage, rad/s; those beyond the running speed that the inertia stage found are left out.
+    duration : float
+        Of each part of the inertia stage, s.
+    interval : float
+        Between the angles of the break-away stage, degrees.
+    without_watchdog : bool
+        Arm a rig that declares no watchdog.
+
+    Raises
+    ------
+    InputError, RigError
+        If a stage that the others rest on cannot be performed or identified.
+    """
+    course = _Course(rig, folder, progress or (lambda _: None), without_watchdog)
+    j, top = _inertia(course, duration)
+    fs = _breakaway(course, j, interval)
+    sliding, curve = _sliding(course, j, fs, tuple(v for v in velocities if v <= 1.05 * top))
+    stuck = _presliding(course, fs, sliding)
+    _attraction(course, j)
+    lugre = _stickslip(course, j, fs, sliding)
+    return _joined(course, j, curve, stuck, lugre)
+
+
+# ---- stages ---------------------------------------------------------------------------------------------------
+
+
+def _inertia(course: _Course, duration: float) -> tuple[float, float]:
+    """Inertia, and the speed at which the axis ran."""
+    done = course.run(Inertia(duration=duration))
+    axis = ServoAxis()
+    found = inertia([trial_of(done.part(label), axis, name=label) for label, *_ in done.segments], axis)
+    course.add("inertia", done, found)
+    return found["inertia"].value, float(np.max(done.record["velocity_reference"]))
+
+
+def _breakaway(course: _Course, j: float, interval: float) -> float:
+    """Mean break-away torque of both directions."""
+    done = course.run(Breakaway(inertia=j, interval=interval))
+    found = identify_breakaway(done.record)
+    course.add("breakaway", done, found)
+    return float(np.mean([e.value for e in found.estimates if e.name.startswith("fs_")]))
+
+
+def _sliding(
+    course: _Course, j: float, fs: float, velocities: tuple[float, ...]
+) -> tuple[Mapping[str, float], Identification]:
+    """A Stribeck curve for the methods that need one, and the best curve."""
+    if len(velocities) < 3:
+        raise InputError(
+            f"sliding: the rig runs at {velocities} only of the velocities asked for; give slower ones"
+        )
+    done = course.run(Sliding(velocities=velocities, inertia=j), insist=False)
+    points, notes = moving(done.record)
+    plain, chosen = fitted_curve(points, fs, notes)
+    course.add("sliding", done, chosen)
+    return plain, chosen
+
+
+def _presliding(course: _Course, fs: float, sliding: Mapping[str, float]) -> Identification:
+    """Elements of GMS from a loop below break-away; a loop that breaks away is made smaller."""
+    share = BELOW
+    while True:
+        done = course.run(Presliding(amplitude=share * fs), insist=False)
+        if done.passed or share < 0.2:
+            break
+        share *= 0.75
+    done.insist()
+    level = {**sliding, "fs": fs, "fc": fs, "sigma2": 0.0}
+    found = identify_presliding(Hysteresis.of(done.record, "motor_torque"), level, elements=3, offset=True)
+    found = resolved(found, share * fs)
+    course.add("presliding", done, found)
+    return found
+
+
+def resolved(found: Identification, amplitude: float) -> Identification:
+    """Without the elements that carry less than `LEAST` of the loop: their stiffness is that of the noise."""
+    assert found.model is not None
+    p: Any = found.model.parameters
+    keep = [i for i in range(len(p.k)) if p.alpha[i] * p.fs >= LEAST * amplitude]
+    if len(keep) == len(p.k):
+        return found
+    total = math.fsum(p.alpha[i] for i in keep)
+    values: dict[str, Any] = p._asdict()
+    values |= {"k": [p.k[i] for i in keep], "alpha": [p.alpha[i] / total for i in keep]}
+    gone = ", ".join(
+        f"{p.k[i]:.3g} N·m/rad up to {p.alpha[i] * p.fs:.2g} N·m" for i in range(len(p.k)) if i not in keep
+    )
+    note = f"Left out, since the loop does not resolve them: elements of {gone}."
+    estimates = tuple(e for e in found.estimates if not e.name.startswith(("k[", "alpha[")))
+    estimates += tuple(
+        dataclasses.replace(found[f"{n}[{i}]"], name=f"{n}[{keep.index(i)}]")
+        for n in ("k", "alpha")
+        for i in keep
+        if f"{n}[{i}]" in [e.name for e in found.estimates]
+    )
+    return dataclasses.replace(
+        found, model=Model(found.model.law, {}, **values), estimates=estimates, notes=(*found.notes, note),
+        correlation=np.eye(len(estimates)),
+    )  # fmt: skip
+
+
+def _attraction(course: _Course, j: float) -> None:
+    """Recorded for the report; C itself follows the thesis's rule (4.3.1.1.5)."""
+    mean = 0.3
+    done = course.run(Attraction(inertia=j, mean=mean, swing=0.5 * mean), insist=False)
+    course.add(
+        "attraction",
+        done,
+        None,
+        "what depends on the angle hides the lag: C by the thesis's rule (4.3.1.1.5)",
+    )
+
+
+def _stickslip(course: _Course, j: float, fs: float, sliding: Mapping[str, float]) -> Identification | None:
+    """LuGre's sigma0 and sigma1; the amplitude is lowered where the axis would run too fast."""
+    amplitude = BEYOND * max(fs, sliding["fs"], sliding["fc"])
+    for _ in range(5):
+        try:
+            done = course.run(Stickslip(amplitude=amplitude), insist=False)
+        except LimitCrossed:
+            amplitude *= 0.93
+            continue
+        try:
+            found = identify_lugre_dynamics(Response.of(done.record), j, sliding)
+        except InputError as error:
+            course.add("stickslip", done, None, str(error))
+            return None
+        course.add("stickslip", done, found)
+        return found
+    return None
+
+
+# ---- the whole ------------------------------------------------------------------------------------------------
+
+
+def _joined(
+    course: _Course, j: float, curve: Identification, stuck: Identification, lugre: Identification | None
+) -> Commissioned:
+    """One GMS law from the curve, the springs and the rule for C."""
+    assert curve.model is not None
+    assert stuck.model is not None
+    springs: Any = stuck.model.parameters
+    values: dict[str, Any] = {
+        **curve.model.parameters._asdict(),
+        "k": list(springs.k),
+        "alpha": list(springs.alpha),
+    }
+    plain: dict[str, Any] = {k: listed(v) for k, v in values.items()}
+    model = Model(curve.model.law, {}, **plain)
+    c, said = largest_without_overshoot(model, upper=FASTEST)
+    if c >= FASTEST:
+        c = math.fsum(springs.alpha) * stuck_level(stuck) / LAG
+        said = (
+            f"No C overshoots up to {FASTEST:g} N·m/s (thesis 4.3.1.1.5): C is that of a lag of {1e3 * LAG:g} ms.",
+        )
+    model = Model(curve.model.law, {}, **{**plain, "c": c})
+    stiffness = math.fsum(springs.k)
+    return Commissioned(
+        tuple(course.stages), j, model, lugre.model if lugre else None, stiffness,
+        _result(course, model, j, stiffness, said),
+    )  # fmt: skip
+
+
+def listed(value: Any) -> Any:
+    """Tuples as lists, as `Model` takes them."""
+    return list(cast("tuple[float, ...]", value)) if isinstance(value, tuple) else value
+
+
+def stuck_level(stuck: Identification) -> float:
+    """The torque that the springs carry together, N·m."""
+    assert stuck.model is not None
+    return float(stuck.model.parameters.fs)
+
+
+def _result(
+    course: _Course, model: Model, j: float, stiffness: float, said: tuple[str, ...]
+) -> Identification:
+    estimates: list[Estimate] = []
+    pictures: list[Picture] = []
+    notes: list[str] = [
+        f"Total pre-sliding stiffness at the encoder: {stiffness:.4g} N·m/rad. It is that of the contact in series "
+        "with all that twists between the encoder and the contact; the springs of the model are this.",
+        "The sliding curve is the mean of both directions.",
+        *said,
+    ]
+    misfit: dict[str, float] = {}
+    for stage in course.stages:
+        failed = [c for c in stage.performed.checks if not c.passed]
+        notes += [f"{stage.name}: {c.name}: {c.text}" for c in failed]
+        if stage.found is None:
+            notes.append(f"{stage.name}: {stage.note}.")
+            continue
+        estimates += [
+            dataclasses.replace(e, name=e.name if e.name == "inertia" else f"{stage.name}.{e.name}")
+            for e in stage.found.estimates
+        ]
+        pictures += stage.found.pictures
+        notes += [f"{stage.name}: {n}" for n in stage.found.notes]
+        misfit |= {f"{stage.name}_{k}": float(v) for k, v in stage.found.misfit.items()}
+    return Identification(
+        "commission", model, tuple(estimates), np.eye(len(estimates)), misfit, tuple(notes), (), tuple(pictures),
+        {"axis": ServoAxis(), "mechanics": Mechanics(j), "stiffness": stiffness},
+    )  # fmt: skip

@@ -1,0 +1,117 @@
+"""The sliding curve of a commissioned machine: the points at which it really slid, and the curve that holds them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.estimate import Identification
+from stickslip.identify.segments import Segment, constant_velocity_segments
+from stickslip.identify.sliding import SlidingPoints, choose_sliding, identify_sliding
+from stickslip.model import Model
+from stickslip.record import Record
+from stickslip.simulation.steady import Steady
+
+__all__ = ["fitted_curve", "moving"]
+
+RIPPLE = 0.5
+"""Of the velocity: a motion that ripples by more, over a hundredth of a revolution, sticks and slips."""
+CLOSE = 0.015
+"""Largest error of a curve by parameters; beyond it the curve is the table of the points."""
+ELEMENTS = {"k": [300.0], "alpha": [1.0], "c": 50.0}
+
+
+def moving(record: Record) -> tuple[SlidingPoints, list[str]]:
+    """Mean torque per speed, both directions folded; without the speeds at which the axis stuck and slipped."""
+    segments = constant_velocity_segments(record)
+    slid = [s for s in segments if ripple(record, s) <= RIPPLE]
+    left = sorted({round(abs(s.velocity), 4) for s in segments} - {round(abs(s.velocity), 4) for s in slid})
+    by_speed: dict[float, list[float]] = {}
+    for s in slid:
+        by_speed.setdefault(float(f"{abs(s.velocity):.2g}"), []).append(math.copysign(s.torque, 1.0))
+    if len(by_speed) < 3:
+        raise InputError("sliding: the axis slid steadily at fewer than 3 speeds; run it faster")
+    speeds = np.array(sorted(by_speed))
+    torque = np.array([float(np.mean(by_speed[v])) for v in speeds.tolist()])
+    notes = [f"{len(slid)} runs at {speeds.size} speeds, mean of both directions."]
+    if left:
+        notes.append(f"Stuck and slipped, left out: {', '.join(f'{v:g}' for v in left)} rad/s.")
+    return SlidingPoints(speeds, torque), notes
+
+
+def ripple(record: Record, s: Segment) -> float:
+    """Deviation of the speed over a hundredth of a revolution, over the mean speed."""
+    inside = (record.time >= s.start) & (record.time <= s.end)
+    t, x = record.time[inside], record["position"][inside]
+    window = max(0.0628 / abs(s.velocity), 2.0 * float(np.median(np.diff(t))))
+    grid = np.arange(t[0], t[-1], window)
+    speed = np.diff(np.interp(grid, t, x)) / window
+    return float(np.std(speed) / abs(s.velocity)) if speed.size > 2 else 0.0
+
+
+def fitted_curve(
+    slid: SlidingPoints, fs: float, notes: list[str]
+) -> tuple[Mapping[str, float], Identification]:
+    """A Stribeck curve, as some methods need one, and the curve that is nearest: by parameters, else the table.
+
+    The mean break-away torque `fs` counts as the torque at zero velocity (thesis 4.3.1.1.2).
+    """
+    points = SlidingPoints(np.array([0.0]), np.array([fs])) + slid
+    level, fast = float(np.median(points.torque)), float(np.max(points.velocity))
+    stribeck = Model(
+        "gms", {}, **ELEMENTS, fs=float(points.torque[0]), fc=level, vs=0.1, delta_s=1.0, sigma2=0.01
+    )
+    plain = identify_sliding(points, stribeck, starts=20)
+    assert plain.model is not None
+    p: Any = plain.model.parameters
+    simple = {n: float(getattr(p, n)) for n in ("fs", "fc", "vs", "delta_s", "sigma2")}
+    best = plain
+    if error(plain, slid) > CLOSE:
+        templates = {"stribeck": stribeck, **_flexible(level, fast)}
+        _, best, _ = choose_sliding(points, templates, starts=20)
+    if best.model is None or error(best, slid) > CLOSE:
+        best = _table(slid, fs, best)
+    return simple, dataclasses.replace(best, notes=(*notes, *best.notes))
+
+
+def _flexible(level: float, fast: float) -> dict[str, Model]:
+    """Thesis eqs. 4.4 and 4.5, on the scales of the points."""
+    viscous: dict[str, Any] = {"sigma2": 0.01 * level / fast, "fv2": 0.1 * level, "delta_v": 0.5}
+    choices = {"viscous": "power"}
+    return {
+        "eq. 4.4": Model(
+            "gms", {"curve": "double_exponential", **choices}, **ELEMENTS, alpha0=0.5 * level, alpha1=0.3 * level,
+            alpha2=0.3 * level, v1=0.1, v2=0.3, **viscous,
+        ),
+    }  # fmt: skip
+
+
+def error(found: Identification, points: SlidingPoints) -> float:
+    """Largest relative error of a curve at the points."""
+    if found.model is None:
+        return math.inf
+    model = found.model
+    steady = Steady(model.law, points.velocity, points.side)
+    torque = steady.torque(np.array(model.law.pack(model.parameters)))
+    return float(np.max(np.abs(torque / points.torque - 1.0)))
+
+
+def _table(points: SlidingPoints, fs: float, tried: Identification) -> Identification:
+    """The points themselves, joined by a monotone cubic; break-away at rest, constant beyond the fastest."""
+    model = Model(
+        "gms", {"curve": "table"}, **ELEMENTS, sigma2=0.0, curve_velocity=[0.0, *points.velocity.tolist()],
+        curve_torque=[fs, *points.torque.tolist()],
+    )  # fmt: skip
+    note = (
+        f"No curve by parameters came within {100 * CLOSE:g} % of every point (nearest "
+        f"{100 * error(tried, points):.2g} %): the curve is the table of the points."
+    )
+    return dataclasses.replace(
+        tried, model=model, notes=(note,), estimates=(), correlation=np.eye(0), measure_next=(),
+        misfit={"rms_Nm": 0.0, "points": float(len(points))},
+    )  # fmt: skip
