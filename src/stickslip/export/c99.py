@@ -100,7 +100,7 @@ def write(job: Job) -> Export:
         **common,
         functions=code,
         extremes=[n for n in ("min", "max") if f"{job.name}_{n}(" in text],
-        init=[*given(law.fields, p._asdict(), "p", dialect)],
+        identified=[*initial(law.fields, p._asdict(), dialect)],
         reset=[*cleared(law, dialect)],
     )
     rows = [", ".join(repr(float(x)) for x in row) for row in zip(*vectors)]
@@ -171,6 +171,17 @@ def given(fields: Sequence[Field], values: Mapping[str, Any], owner: str, dialec
             yield f"{owner}->{safe(f.name)}{place} = {dialect.number(float(x))};"
     if not fields:
         yield f"{owner}->none = 0;"
+
+
+def initial(fields: Sequence[Field], values: Mapping[str, Any], dialect: Dialect) -> Iterable[Mapping[str, str]]:
+    """The initial value of each field of a constant structure, and its meaning."""
+    for f in fields:
+        value = values[f.name]
+        numbers = ", ".join(dialect.number(float(x)) for x in (value if f.per_element else (value,)))
+        about = ascii_only(f"{f.name}: {f.par.meaning}, {f.par.unit}")
+        yield {"value": f"{{ {numbers} }}" if f.per_element else numbers, "about": about}
+    if not fields:
+        yield {"value": "0", "about": "this law has none"}
 
 
 def cleared(law: Law, dialect: Dialect) -> Iterable[str]:

@@ -47,18 +47,18 @@ def steady(v: float, p: Any) -> float:
     return 0.0
 
 
-def relax(v0: float, v1: float, dt: float, z: float, p: Any) -> float:
-    """Deflection after `dt` at velocities of one sign, rad: exact where v is constant.
+def relax(v0: float, v1: float, dt: float, z: float, end: float, p: Any) -> float:
+    """Deflection after `dt` at velocities of one sign, rad: exact where v is constant; `end` is s(v1), N·m.
 
     With q = |v|/s the equation reads dz/dt = sigma0 q (z_ss - z); z_ss is taken linear in time and the
     exponent by Simpson's rule, so that the bristle follows its steady value however large sigma0 q dt is.
     """
     vm = 0.5 * (v0 + v1)
-    s0 = sliding(v0, p)
-    s1 = s0
+    s0 = end
+    s1 = end
     exponent = p.sigma0 * dt * abs(v0) / s0
     if v0 != v1:
-        s1 = sliding(v1, p)
+        s0 = sliding(v0, p)
         exponent = p.sigma0 * dt / 6.0 * (abs(v0) / s0 + 4.0 * abs(vm) / sliding(vm, p) + abs(v1) / s1)
     if vm < 0.0:
         s0 = -s0
@@ -73,13 +73,14 @@ def relax(v0: float, v1: float, dt: float, z: float, p: Any) -> float:
 
 def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
     """Torque at the end of the step, N·m; advances z.z. A reversal inside the step is cut at v = 0."""
+    s1 = sliding(v1, p)
     if v0 * v1 < 0.0:
         part = dt * v0 / (v0 - v1)
-        z.z = relax(v0, 0.0, part, z.z, p)
-        z.z = relax(0.0, v1, dt - part, z.z, p)
+        z.z = relax(v0, 0.0, part, z.z, sliding(0.0, p), p)
+        z.z = relax(0.0, v1, dt - part, z.z, s1, p)
     else:
-        z.z = relax(v0, v1, dt, z.z, p)
-    dz = v1 - p.sigma0 * abs(v1) / sliding(v1, p) * z.z
+        z.z = relax(v0, v1, dt, z.z, s1, p)
+    dz = v1 - p.sigma0 * abs(v1) / s1 * z.z
     return p.sigma0 * z.z + p.sigma1 * dz + viscous(v1, p)
 
 
