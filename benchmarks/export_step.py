@@ -1,7 +1,8 @@
 """Nanoseconds a step of the exported C against hand-written C of the same equations, interleaved in one run.
 
-``python benchmarks/export_step.py [COMPILER]``: LuGre, GMS with 4 elements and Stribeck friction (`hand_written.c`), both
-compiled with -O2, over the same steps; the median of 41 alternating blocks, and the largest difference of the torques.
+``python benchmarks/export_step.py [COMPILER]``: LuGre, GMS with 4 elements and Stribeck friction (`hand_written.c`),
+both compiled with -O2, over the same steps; the median of 41 alternating blocks, and the largest difference of the
+torques.
 """
 
 from __future__ import annotations
@@ -49,7 +50,12 @@ MAIN = """
 #include <time.h>
 {declared}
 static double v0[{n}], v1[{n}], dt[{n}], ours[{n}], hand[{n}];
-static double now(void) {{ struct timespec t; clock_gettime(CLOCK_MONOTONIC, &t); return 1e9 * (double)t.tv_sec + (double)t.tv_nsec; }}
+static double now(void)
+{{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return 1e9 * (double)t.tv_sec + (double)t.tv_nsec;
+}}
 int main(void)
 {{
     x_parameters p;
@@ -80,7 +86,8 @@ def measured(name: str, compiler: str) -> tuple[float, float, float]:
     """Nanoseconds a step, exported and by hand, and the largest difference in N·m."""
     law = plugins.law(name)
     values = {
-        k: ", ".join(map(repr, v)) if isinstance(v, (list, tuple)) else repr(v) for k, v in law.example.items()
+        k: ", ".join(map(repr, v)) if isinstance(v, (list, tuple)) else repr(v)
+        for k, v in law.example.items()
     }
     declared, call, cleared = HAND[name]
     with TemporaryDirectory() as folder:
@@ -88,11 +95,15 @@ def measured(name: str, compiler: str) -> tuple[float, float, float]:
             Path(folder, file).write_text(str(text))
         for file in ("hand_written.c", "hand_written.h"):
             Path(folder, file).write_text((HERE / file).read_text())
-        text = MAIN.format(declared=declared.format(**values), call=call, cleared=cleared, n=STEPS, blocks=BLOCKS)
+        text = MAIN.format(
+            declared=declared.format(**values), call=call, cleared=cleared, n=STEPS, blocks=BLOCKS
+        )
         Path(folder, "main.c").write_text(text)
         sources = ["x.c", "hand_written.c", "main.c"]
         subprocess.run([compiler, "-std=c99", "-O2", *sources, "-lm", "-o", "run"], cwd=folder, check=True)
-        done = subprocess.run(["./run"], cwd=folder, input=motion(), capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            ["./run"], cwd=folder, input=motion(), capture_output=True, text=True, check=True
+        )
     rows = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
     return statistics.median(rows[:, 0]), statistics.median(rows[:, 1]), float(rows[:, 2].max())
 
@@ -110,7 +121,9 @@ def main() -> None:
     print(f"{compiler} -std=c99 -O2, {STEPS} steps, median of {BLOCKS} blocks")
     for name in HAND:
         ours, hand, off = measured(name, compiler)
-        print(f"{name:<15} exported {ours:6.1f} ns, by hand {hand:6.1f} ns: {ours / hand:.2f} times, {off:.1e} N·m apart")
+        print(
+            f"{name:<15} exported {ours:6.1f} ns, by hand {hand:6.1f} ns: {ours / hand:.2f} times, {off:.1e} N·m apart"
+        )
 
 
 if __name__ == "__main__":

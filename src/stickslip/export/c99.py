@@ -173,7 +173,9 @@ def given(fields: Sequence[Field], values: Mapping[str, Any], owner: str, dialec
         yield f"{owner}->none = 0;"
 
 
-def initial(fields: Sequence[Field], values: Mapping[str, Any], dialect: Dialect) -> Iterable[Mapping[str, str]]:
+def initial(
+    fields: Sequence[Field], values: Mapping[str, Any], dialect: Dialect
+) -> Iterable[Mapping[str, str]]:
     """The initial value of each field of a constant structure, and its meaning."""
     for f in fields:
         value = values[f.name]
