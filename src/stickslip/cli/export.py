@@ -204,6 +204,7 @@ def store(export: Export, folder: Path) -> list[str]:
     for name, content in export.files.items():
         path = folder / name
         try:
+            path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content if isinstance(content, bytes) else content.encode())
         except OSError as error:
             raise unwritable(path, error) from None

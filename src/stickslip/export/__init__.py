@@ -14,6 +14,7 @@ __all__ = ["TARGETS", "target_named"]
 
 TARGETS = (
     "c99",
+    "arduino",
     "python",
     "matlab",
     "st",
