@@ -23,9 +23,11 @@ pytest.importorskip("msgpack")
 
 from test_loop import sine  # noqa: E402
 
+from stickslip.control.compensators.feedforward import Feedforward  # noqa: E402
 from stickslip.control.controller import Controller  # noqa: E402
 from stickslip.control.linear import pd  # noqa: E402
 from stickslip.errors import DriveFault, InputError, MessageLost, RigError  # noqa: E402
+from stickslip.model import Model  # noqa: E402
 from stickslip.record import Record  # noqa: E402
 from stickslip.rigs.ds402 import Ds402, Settings  # noqa: E402
 from stickslip.rigs.files import read_rig  # noqa: E402
@@ -178,6 +180,24 @@ def test_without_a_watchdog_it_does_not_arm(drive):
         Loop(rig)
     with Loop(rig, without_watchdog=True) as loop:
         assert len(loop.run(setpoints(10))) == 10
+
+
+def test_the_drive_is_served_while_a_controller_is_compiled(drive, tmp_path):
+    """A law that no cache knows takes far longer to compile than the drive's watchdog waits."""
+    text = Path(__file__).with_name("brittle.py").read_text()
+    law = tmp_path / "fresh.py"
+    law.write_text(
+        text.replace("p.vmax - abs(v1)", f"p.vmax + {time.time_ns()}.0 - abs(v1)").replace(
+            '"brittle"', '"fresh"'
+        )
+    )
+    helper = Feedforward(Model(str(law), fc=1e-9, vmax=1.0))
+    begin = time.monotonic()
+    with Loop(Ds402(drive.settings(watchdog_time=0.15))) as loop:
+        loop.run(setpoints(20, torque=0.1))
+        rows = loop.run(sine(100, 0.1), Controller(pd(5.0, 0.05), helper, torque_limit=0.9))
+    assert len(rows) == 100
+    assert time.monotonic() - begin > 0.15 + 0.12, "compiling took no time: the test shows nothing"
 
 
 def test_quick_stop(drive):

@@ -138,6 +138,18 @@ def test_a_signal_ends_the_run_by_its_ramp(blocks, number, tmp_path):
     assert len(Record.load(tmp_path / "run.stream")) == len(rig.torques)
 
 
+def test_a_signal_between_two_runs_is_not_lost(tmp_path):
+    def work(loop: Loop) -> None:
+        loop.run(setpoints(50, torque=0.3))
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    rig = AxisRig()
+    with pytest.raises(Interrupted, match="SIGTERM"), Loop(rig, path=tmp_path / "run.stream") as loop:
+        work(loop)
+    assert rig.torques[-1] == 0.0
+    assert Record.load(tmp_path / "run.stream").meta["ended"] == "SIGTERM asked for the end"
+
+
 def test_real_time_is_kept_and_accounted_for(tmp_path):
     with Loop(AxisRig(), realtime=True, path=tmp_path / "run.stream") as loop:
         loop.run(sine(10), PD)

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from stickslip.errors import InputError, StickslipError
+from stickslip.errors import InputError, Interrupted, StickslipError
 
 __all__ = ["VERBS", "main", "parser_of"]
 
@@ -38,6 +38,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _dispatch(list(sys.argv[1:] if argv is None else argv))
     except InputError as error:
         return _complain(error, 2)
+    except Interrupted as error:
+        return _complain(error, 130)
     except StickslipError as error:
         return _complain(error, 1)
     except KeyboardInterrupt as stop:

@@ -125,9 +125,13 @@ class Loop:
             self._undo = undo.pop_all()
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         with self._undo:
             self._ramp_down()
+            if self._signal and self._fault is None:
+                self._fault = self._interrupted()  # it came between two runs
+        if kind is None and isinstance(self._fault, Interrupted):
+            raise self._fault
 
     def _described(self) -> dict[str, Any]:
         plain = self.limits.plain()
@@ -145,6 +149,9 @@ class Loop:
         for number in (signal.SIGINT, signal.SIGTERM):
             undo.callback(signal.signal, number, signal.getsignal(number))
             signal.signal(number, self._on_signal)
+
+    def _interrupted(self) -> Interrupted:
+        return Interrupted(f"{signal.Signals(self._signal).name} asked for the end")
 
     def _on_signal(self, number: int, _: object) -> None:
         self._signal = number
@@ -201,8 +208,8 @@ class Loop:
             raise InputError(
                 f"setpoints have shape {wanted.shape}; give (n, {len(Setpoint._fields)}), see setpoints()"
             )
-        begin = stream.count
         self._take_over(self.prepare(controller), travel)
+        begin = stream.count
         self._pace.restart()
         table = np.ascontiguousarray(wanted, dtype=np.float64)
         python = controller if callable(controller) else None
@@ -300,7 +307,7 @@ class Loop:
         begin = time.perf_counter_ns()
         row = self._row(stream)
         if self._signal:
-            self._ask(Interrupted(f"{signal.Signals(self._signal).name} asked for the end"))
+            self._ask(self._interrupted())
         before = time.thread_time_ns()
         torque = self._step.decide(setpoint, row)
         times[2] = time.thread_time_ns() - before
@@ -352,7 +359,7 @@ class Loop:
             stream.commit(count)
             done += count
         if self._signal:
-            self._ask(Interrupted(f"{signal.Signals(self._signal).name} asked for the end"))
+            self._ask(self._interrupted())
         if stream.fault is not None:
             self._ask(stream.fault)
 
