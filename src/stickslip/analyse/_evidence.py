@@ -162,4 +162,12 @@ QUANTITIES: dict[str, Quantity] = {
     "late low": Quantity("least error at steady state", "rad", lambda e, c: e.motion(c).low),
     "late high": Quantity("greatest error at steady state", "rad", lambda e, c: e.motion(c).high),
     "offset": _metric("steady_state_error_rad", "steady-state error", "rad"),
+    "shake": _metric("position_above_20Hz_rms_rad", "oscillation above 20 Hz", "rad"),
+    "late shake": _metric("late_oscillation_rad", "oscillation at the end", "rad"),
+    "near": _metric("near_zero_rms_rad", "error near zero velocity", "rad"),
+    "away": _metric("away_rms_rad", "error away from it", "rad"),
+    "smooth": _metric("smooth_error_rms_rad", "error below 20 Hz", "rad"),
+    "sticking": _metric("sticking_share", "time stuck", ""),
+    "response": _metric("response_time_s", "response time", "s"),
+    "strongest": _metric("strongest_Hz", "strongest oscillation at", "Hz"),
 }
