@@ -1,6 +1,7 @@
 """Run a study: controllers compared over references and frictions.
 
     stickslip study thesis           the thesis's simulation study, which ships with the package
+    stickslip study thesis-rig       its experiments (chapter 4) on virtual machines, its statements checked
     stickslip study my.toml          your own; begin with a copy of thesis.toml (`stickslip study thesis --print`)
 
 Writes DIR/metrics.csv, metrics.parquet, records/, manifest.json and report.html. Finished runs are kept: after an
@@ -18,7 +19,7 @@ SUMMARY = "run a study: controllers compared over references and frictions"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Study, output, selection."""
-    parser.add_argument("study", metavar="STUDY", help="thesis, or the path of a TOML file")
+    parser.add_argument("study", metavar="STUDY", help="thesis, thesis-rig, or the path of a TOML file")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: study-STUDY)")
     parser.add_argument(
         "--only", metavar="PARTS", help="run only what has these in its name: low,step or FF-lugre,signed"
@@ -26,11 +27,27 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at a time (default 1)")
     parser.add_argument("--json", action="store_true", help="print the results as JSON instead of a table")
     parser.add_argument("--no-report", action="store_true", help="leave figures and report.html out")
+    parser.add_argument(
+        "--seeds",
+        type=int,
+        default=20,
+        metavar="N",
+        help="thesis-rig: further starts of every run (default 20)",
+    )
+    parser.add_argument(
+        "--no-ablation",
+        action="store_true",
+        help="thesis-rig: leave out the runs without one imperfection each",
+    )
     parser.add_argument("--print", action="store_true", help="print the study's TOML and run nothing")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run, print the table, write the report."""
+    if args.study == "thesis-rig":
+        from stickslip.cli import _rig_study
+
+        return _rig_study.run(args)
     from stickslip.cli import _output
     from stickslip.errors import InputError
     from stickslip.report import write

@@ -9,8 +9,11 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import multiprocessing
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -123,23 +126,25 @@ def _seeded(plant: Machine, seed: int) -> Machine:
 
 
 def all_cases(only: Sequence[str] = ()) -> list[Case]:
-    """Every run of chapter 4, or those whose group or controller is named in `only`.
+    """Every run of chapter 4, or those whose friction, reference, group or controller is named in `only`.
 
     Raises
     ------
     UnknownName
     """
     found = [case for group in GROUPS for case in _cases(group.friction, group)]
-    groups, controllers = {c.group.name for c in found}, {c.controller for c in found}
+    parts = [(c.group.friction, c.group.reference, c.group.name, c.controller) for c in found]
+    families = [set(family) for family in zip(*parts)]
+    known = set[str]().union(*families)
     for name in only:
-        if name not in groups | controllers | set(MACHINES):
-            raise UnknownName("part of a run's name", name, sorted(groups | controllers | set(MACHINES)))
-    wanted = [set(only) & family for family in (set(MACHINES), groups, controllers)]
+        if name not in known:
+            raise UnknownName("part of a run's name", name, sorted(known))
+    wanted = [family & set(only) for family in families]
     return [
-        c for c in found
-        if all(not names or name in names
-               for names, name in zip(wanted, (c.group.friction, c.group.name, c.controller), strict=True))
-    ]  # fmt: skip
+        case
+        for case, names in zip(found, parts, strict=True)
+        if all(not some or name in some for some, name in zip(wanted, names, strict=True))
+    ]
 
 
 def _cases(friction: str, group: Any) -> Iterator[Case]:
@@ -171,9 +176,10 @@ def run_rig_study(
     only: Sequence[str] = (),
     seeds: int = 20,
     ablation: bool = True,
+    jobs: int = 1,
     progress: Progress | None = None,
 ) -> RigResult:
-    """Run the study and write metrics.csv, records/ and manifest.json.
+    """Run the study and write metrics.csv, records/ and manifest.json; finished variants are kept for the next call.
 
     Parameters
     ----------
@@ -184,6 +190,8 @@ def run_rig_study(
         Further starts of every run: other noise and another angle.
     ablation : bool
         Every run once more for each imperfection, without it.
+    jobs : int
+        Processes.
     progress : callable, optional
         ``progress(finished, all)``
 
@@ -200,31 +208,64 @@ def run_rig_study(
     names += [f"seed {i}" for i in range(1, seeds + 1)]
     folder = Path(out)
     prepared_folder(folder / "records")
+    prepared_folder(folder / "variants")
     clock, runs = time.perf_counter(), list[RigRun]()
-    for name in names:
-        plants = {friction: variant(machine(file), name) for friction, file in MACHINES.items()}
-        for case in cases:
-            record, stopped = run_case(plants[case.group.friction], case)
-            if name == NOMINAL:
-                record.save(record_path(folder, case.key))
-            found = tracking_metrics(record, case.control.torque_limit)
-            runs.append(RigRun(name, case.key, found, stopped))
-            if progress:
-                progress(len(runs), len(names) * len(cases))
+    work = [(name, tuple(only), str(folder)) for name in names]
+    if jobs == 1:
+        found = map(_variant_runs, work)
+    else:
+        pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+        found = pool.map(_variant_runs, work)
+    for some in found:
+        runs += some
+        if progress:
+            progress(len(runs), len(names) * len(cases))
     manifest = _manifest(only, seeds, ablation, len(runs), time.perf_counter() - clock)
     result = RigResult(folder, tuple(runs), manifest)
     _write(result)
     return result
 
 
-def _manifest(only: Sequence[str], seeds: int, ablation: bool, count: int, wall: float) -> dict[str, Any]:
+def _variant_runs(work: tuple[str, tuple[str, ...], str]) -> list[RigRun]:
+    """Every run of one variant, or those that an earlier call left; records of the nominal ones are kept."""
+    name, only, folder = work
+    kept = Path(folder) / "variants" / f"{name.replace(' ', '-')}.json"
+    mark = fingerprint(only)
+    if kept.exists() and (found := json.loads(kept.read_text(encoding="utf-8")))["fingerprint"] == mark:
+        return [RigRun(**run) for run in found["runs"]]
+    plants = {friction: variant(machine(file), name) for friction, file in MACHINES.items()}
+    runs: list[RigRun] = []
+    for case in all_cases(only):
+        record, stopped = run_case(plants[case.group.friction], case)
+        if name == NOMINAL:
+            record.save(record_path(Path(folder), case.key))
+        runs.append(RigRun(name, case.key, tracking_metrics(record, case.control.torque_limit), stopped))
+    draft = kept.with_suffix(f".{os.getpid()}")
+    draft.write_text(json.dumps({"fingerprint": mark, "runs": [vars(r) for r in runs]}), encoding="utf-8")
+    os.replace(draft, kept)
+    return runs
+
+
+def fingerprint(only: Sequence[str]) -> str:
+    """Of what the numbers depend on: the package's version, the machines, the cases, the metrics."""
+    cases = [(c.key, repr(c.control), repr(c.reference), c.duration) for c in all_cases(only)]
+    said = json.dumps([stickslip.__version__, machine_files(), cases, METRICS])
+    return hashlib.sha256(said.encode()).hexdigest()
+
+
+def machine_files() -> dict[str, str]:
+    """SHA-256 of the machines' files."""
     place = Path(machines.__file__).parent / "library"
+    return {
+        file: hashlib.sha256((place / f"{file}.toml").read_bytes()).hexdigest() for file in MACHINES.values()
+    }
+
+
+def _manifest(only: Sequence[str], seeds: int, ablation: bool, count: int, wall: float) -> dict[str, Any]:
     return {
         "study": "thesis-rig",
         "version": stickslip.__version__,
-        "machines": {
-            file: hashlib.sha256((place / f"{file}.toml").read_bytes()).hexdigest() for file in MACHINES.values()
-        },
+        "machines": machine_files(),
         "only": list(only), "seeds": seeds, "ablation": ablation, "runs": count, "wall_s": wall,
     }  # fmt: skip
 
