@@ -23,6 +23,7 @@ pytest.importorskip("msgpack")
 
 from test_loop import sine  # noqa: E402
 
+from stickslip.cli import main  # noqa: E402
 from stickslip.control.compensators.feedforward import Feedforward  # noqa: E402
 from stickslip.control.controller import Controller  # noqa: E402
 from stickslip.control.linear import pd  # noqa: E402
@@ -282,6 +283,42 @@ def test_from_a_file(drive, tmp_path):
     )
     with Loop(read_rig(path)) as loop:
         assert len(loop.run(setpoints(10))) == 10
+
+
+def test_a_procedure_from_the_command_line(drive, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("drive.toml").write_text(
+        f"""
+        [rig]
+        kind = "ds402"
+        node = {NODE}
+        bus = {{interface = "udp_multicast", channel = "{CHANNEL}", port = {drive.port}, hop_limit = 0}}
+        watchdog_time = 0.2
+        timeout = 0.1
+        [rig.limits]
+        torque = 1.0
+        speed = 60.0
+        """
+    )
+    command = [
+        "rig",
+        "run",
+        "presliding",
+        "--rig",
+        "drive.toml",
+        "--set",
+        "frequency=4",
+        "--stream",
+        "a.stream",
+    ]
+    assert main([*command, "--limit", "torque=0.5"]) == 0
+    out = capsys.readouterr().out
+    assert "deadlines missed" in out
+    assert "ok     moved" in out
+    assert Record.load("a.stream").meta["limits"]["torque"] == 0.5
+    assert Record.load("presliding.npz").meta["loop"]["samples"] > 500
+    assert main([*command[:-1], "b.stream", "--limit", "torque=0.1"]) == 2
+    assert "allows 0.1" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from stickslip.errors import InputError, Interrupted, LimitCrossed, RigError
 from stickslip.readers import read
 from stickslip.record import Record
 from stickslip.rigs._control import COLUMNS
+from stickslip.rigs.limited import limited
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Limits, Measurement, Setpoint, setpoints
 
@@ -177,6 +179,24 @@ def test_what_is_refused():
         loop.run(setpoints(5), Controller(pd(1.0, 0.1), sample_time=2e-3))
     with pytest.raises(InputError, match="shape"), Loop(AxisRig()) as loop:
         loop.run(np.zeros((5, 3)))
+
+
+def test_a_rig_under_narrower_limits():
+    rig = limited(AxisRig(), {"torque": 0.5, "lowest_position": -0.2, "stop_time": 0.01})
+    assert rig.limits == replace(LIMITS, torque=0.5, position=(-0.2, 20.0), stop_time=0.01)
+    assert rig.machine.name == "ideal"
+    with pytest.raises(LimitCrossed, match=r"position = -0.2.* limit -0.2 to 20"), Loop(rig) as loop:
+        loop.run(sine(1000), replace(PD, torque_limit=0.45))
+    same = AxisRig()
+    assert limited(same, {}) is same
+    for values, message in (
+        ({"torque": 1.5}, "wider than the rig's 1"),
+        ({"colour": 1.0}, "no limit 'colour'"),
+        ({"speed": -1.0}, "greater than 0"),
+        ({"lowest_position": -21.0}, "wider"),
+    ):
+        with pytest.raises(InputError, match=message):
+            limited(AxisRig(), values)
 
 
 def test_an_existing_record_is_not_overwritten(tmp_path):

@@ -5,6 +5,7 @@ stickslip rig run breakaway --rig thesis-dry --out breakaway.npz
 stickslip rig run sliding --rig thesis-grease --set velocities=5,1,0.2 --without cogging
 stickslip rig run track --rig thesis-dry --set compensator=feedforward --set model=lugre
 stickslip rig run inertia --rig my_machine.toml --dry-run
+stickslip rig run breakaway --rig drive.toml --limit torque=0.5 --stream breakaway.stream
 stickslip rig commission --rig thesis-dry --out commissioned
 
 A rig is the name of a machine of the library, the TOML file of a machine, or a TOML file with a table [rig] (`kind`,
@@ -32,6 +33,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     run_one.add_argument("procedure", metavar="NAME", help="`stickslip rig list` names them")
     run_one.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="an option")
     run_one.add_argument("--out", type=Path, metavar="FILE.npz", help="the record (default: NAME.npz)")
+    run_one.add_argument(
+        "--realtime", action="store_true", help="keep pace with the clock on a virtual rig too"
+    )
     run_one.add_argument("--stream", type=Path, metavar="FILE", help="also write every sample as it comes")
     whole = actions.add_parser("commission", help="every procedure in turn, to a model.toml and a report")
     whole.add_argument(
@@ -43,6 +47,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         action.add_argument(
             "--without", action="append", default=[], metavar="NAME", help="an imperfection to switch off"
         )
+        action.add_argument(
+            "--limit", action="append", default=[], metavar="NAME=VALUE",
+            help="a narrower limit than the rig's: torque, speed, lowest_position, highest_position, temperature, "
+            "following_error, stop_time (SI units)",
+        )  # fmt: skip
         action.add_argument("--dry-run", action="store_true", help="say what would be done")
         action.add_argument("--no-watchdog", action="store_true", help="arm a rig that declares no watchdog")
         action.add_argument("--json", action="store_true", help="print the result as JSON")
@@ -75,7 +84,7 @@ def listed() -> int:
 
 
 def rig_of(args: argparse.Namespace) -> Rig:
-    """The rig of --rig, without what --without names.
+    """The rig of --rig, without what --without names, within --limit.
 
     Raises
     ------
@@ -84,14 +93,15 @@ def rig_of(args: argparse.Namespace) -> Rig:
     from stickslip.config import read_toml
     from stickslip.errors import InputError
     from stickslip.rigs.files import read_rig
+    from stickslip.rigs.limited import limited
     from stickslip.rigs.virtual import virtual_rig
 
     name = str(args.rig)
     if name.endswith(".toml") and read_toml(Path(name)).has("rig"):
         if args.without:
             raise InputError("--without is for virtual machines; write it into the file's [rig]")
-        return read_rig(name)
-    return virtual_rig(name, args.without)
+        return limited(read_rig(name), numbers(args.limit))
+    return limited(virtual_rig(name, args.without), numbers(args.limit))
 
 
 def performed(args: argparse.Namespace) -> int:
@@ -112,7 +122,10 @@ def performed(args: argparse.Namespace) -> int:
     if out.is_dir():
         raise InputError(f"--out {out} is a folder; give the name of a file")
     prepared_folder(out.parent)
-    result = perform(chosen, rig, path=args.stream, progress=_output.say, without_watchdog=args.no_watchdog)
+    result = perform(
+        chosen, rig, path=args.stream, progress=_output.say, without_watchdog=args.no_watchdog,
+        realtime=args.realtime or None,
+    )  # fmt: skip
     try:
         result.record.save(out)
     except OSError as error:
@@ -196,11 +209,33 @@ def shown(result: Performed, out: Path, args: argparse.Namespace) -> int:
     else:
         for check in result.checks:
             print(f"{'ok    ' if check.passed else 'FAILED'} {check.name}: {check.text}")
+        if "loop" in result.record.meta:
+            from stickslip.rigs.pace import Account
+
+            print(*Account(**result.record.meta["loop"]).lines(), sep="\n")
         print(f"record: {out} ({len(result.record)} rows)")
     return 0 if result.passed else 1
 
 
-def pairs(given: list[str]) -> dict[str, str]:
+def numbers(given: list[str]) -> dict[str, float]:
+    """NAME=NUMBER.
+
+    Raises
+    ------
+    InputError
+    """
+    from stickslip.errors import InputError
+
+    out: dict[str, float] = {}
+    for name, text in pairs(given, "--limit").items():
+        try:
+            out[name] = float(text)
+        except ValueError:
+            raise InputError(f"--limit {name}={text!r} must be a number") from None
+    return out
+
+
+def pairs(given: list[str], option: str = "--set") -> dict[str, str]:
     """NAME=VALUE.
 
     Raises
@@ -213,6 +248,6 @@ def pairs(given: list[str]) -> dict[str, str]:
     for pair in given:
         name, equals, value = pair.partition("=")
         if not equals:
-            raise InputError(f"--set {pair!r} must be NAME=VALUE")
+            raise InputError(f"{option} {pair!r} must be NAME=VALUE")
         out[name.strip()] = value.strip()
     return out

@@ -21,6 +21,7 @@ from stickslip.errors import InputError, RigError, suggestion
 from stickslip.record import Record
 from stickslip.rigs._control import COLUMNS, UNITS
 from stickslip.rigs.loop import Loop
+from stickslip.rigs.pace import Account
 from stickslip.rigs.rig import Rig
 
 __all__ = ["Check", "CheckFailed", "Performed", "Plan", "Procedure", "Step", "Steps", "perform"]
@@ -222,6 +223,7 @@ def perform(
     path: str | os.PathLike[str] | None = None,
     progress: Callable[[str], None] | None = None,
     without_watchdog: bool = False,
+    realtime: bool | None = None,
 ) -> Performed:
     """Perform a procedure on a rig.
 
@@ -234,8 +236,8 @@ def perform(
         kept are forgotten after each step, so that long runs need little memory.
     progress : callable, optional
         Called with the label of every step that has one.
-    without_watchdog : bool
-        As `Loop`.
+    without_watchdog, realtime
+        As `Loop`. In real time the record's ``meta["loop"]`` tells how time was kept.
 
     Raises
     ------
@@ -250,7 +252,9 @@ def perform(
     described: Any = getattr(rig, "machine", None)
     if described is not None:
         meta["machine"] = described.as_dict()
-    kept = _run(procedure, rig, path, meta, progress, without_watchdog)
+    kept, account = _run(procedure, rig, path, meta, progress, without_watchdog, realtime)
+    if account is not None:
+        meta["loop"] = account.plain()
     record = _record(rig, [rows for _, rows in kept], meta)
     ends = np.cumsum([len(rows) for _, rows in kept]).tolist()
     segments = tuple((label, end - len(rows), end) for (label, rows), end in zip(kept, ends, strict=True))
@@ -262,23 +266,29 @@ def perform(
 
 
 def _run(
-    procedure: Procedure, rig: Rig, path: Any, meta: Mapping[str, Any], progress: Any, without_watchdog: bool
-) -> list[tuple[str, Array]]:
+    procedure: Procedure, rig: Rig, path: Any, meta: Mapping[str, Any], progress: Any, without_watchdog: bool,
+    realtime: bool | None,
+) -> tuple[list[tuple[str, Array]], Account | None]:  # fmt: skip
+    """The rows that are kept, by their step's label, and in real time how time was kept."""
     kept: list[tuple[str, Array]] = []
     steps = procedure.steps(rig)
+    paced = rig.capabilities.real_clock or bool(realtime)
+    loop: Loop | None = None
     try:
         step = next(steps)
         # With nothing written, the loop is begun anew after a pause, and what was not kept is forgotten.
-        single = path is not None or rig.capabilities.real_clock
+        single = path is not None or paced
         while True:
-            with Loop(rig, path=path, meta=meta, without_watchdog=without_watchdog) as loop:
+            with Loop(
+                rig, path=path, meta=meta, without_watchdog=without_watchdog, realtime=realtime
+            ) as loop:
                 while True:
                     rows = _one(loop, step, kept, progress)
                     step = steps.send(rows)
                     if not single and step.pause > 0.0:
                         break
     except StopIteration:
-        return kept
+        return kept, loop.account() if loop is not None and paced else None
 
 
 def _one(loop: Loop, step: Step, kept: list[tuple[str, Array]], progress: Any) -> Array:
