@@ -30,9 +30,7 @@ from stickslip.subset import law_layouts, named
 __all__ = ["TARGET", "write"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-NOTE = (
-    "the grammar is checked and the functions are evaluated in our tests; not tried in Dymola or OpenModelica"
-)
+NOTE = "grammar and functions are checked in our tests, Axis is run in rumoca; not tried in Dymola or OpenModelica"
 
 
 def write(job: Job) -> Export:
