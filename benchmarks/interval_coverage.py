@@ -78,6 +78,20 @@ def study(seed: int) -> list[Row]:
     ]  # fmt: skip
 
 
+def kept(path: Path | None) -> list[Row]:
+    """The rows that an earlier run left."""
+    if path is None or not path.exists():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        return [
+            Row(
+                int(r["seed"]), r["family"], int(r["slow_levels"]), r["name"], float(r["truth"]), float(r["value"]),
+                float(r["lower"]), float(r["upper"]), r["identified"] == "True", float(r["seconds"]),
+            )
+            for r in csv.DictReader(file)
+        ]  # fmt: skip
+
+
 def verdict(name: str, good: bool, text: str) -> bool:
     """Print a bar."""
     print(f"  {'PASS' if good else 'FAIL'}  {name}: {text}")
@@ -127,12 +141,16 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0, help="seed of the first record")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--short", action="store_true", help="20 records")
-    parser.add_argument("--rows", type=Path, help="write every row to this CSV file")
+    parser.add_argument(
+        "--rows", type=Path, help="write every row to this CSV file; seeds that it holds are not run again"
+    )
     options = parser.parse_args()
     count = 20 if options.short else options.records
-    rows: list[Row] = []
+    wanted = range(options.first, options.first + count)
+    rows = [r for r in kept(options.rows) if r.seed in wanted]
+    done = {r.seed for r in rows}
     with ProcessPoolExecutor(options.jobs) as pool:
-        for found in pool.map(study, range(options.first, options.first + count)):
+        for found in pool.map(study, [s for s in wanted if s not in done]):
             rows += found
             if options.rows and found:
                 fresh = not options.rows.exists()

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.identify.axis_prediction import axis_prediction, encoder_resolution
+from stickslip.identify.axis_inverse import inverse_dynamics
+from stickslip.identify.axis_prediction import axis_prediction, encoder_resolution, held_torque
 from stickslip.identify.axis_trial import trial_of
+from stickslip.identify.jackknife import leave_blocks_out
 from stickslip.machines.servo import ServoAxis
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -46,7 +48,7 @@ def test_inertia_and_friction_of_one_record(generator: Any) -> None:
 def test_same_seed_same_numbers(generator: Any) -> None:
     case = generator.make(0, "coulomb")
     trials = [trial_of(case.record, AXIS)]
-    one, two = (axis_prediction(trials, AXIS, case.model.law, draws=4, seed=3) for _ in range(2))
+    one, two = (axis_prediction(trials, AXIS, case.model.law, seed=3) for _ in range(2))
     assert [e.as_dict() for e in one.estimates] == [e.as_dict() for e in two.estimates]
 
 
@@ -63,6 +65,34 @@ def test_a_record_without_drive_is_refused(generator: Any) -> None:
     closed = replace(t, drive=None, reference=t.position, loop=generator.Loop(kp=1.0))
     with pytest.raises(InputError, match="drive's signal"):
         axis_prediction([closed], AXIS, case.model.law)
+
+
+def test_leaving_blocks_out_matches_the_plain_covariance_of_independent_noise() -> None:
+    rng = np.random.default_rng(1)
+    moments = np.zeros((3, 3))
+    design = rng.standard_normal((400, 3)) @ np.diag([1.0, 2.0, 0.5])
+    plain = np.linalg.inv(design.T @ design)
+    for _ in range(60):
+        r = rng.standard_normal(400)
+        r -= design @ np.linalg.lstsq(design, r, rcond=None)[0]
+        moments += leave_blocks_out(design, r, np.arange(400) // 10, np.zeros((3, 3))).covariance / 60
+    assert np.diag(moments) == pytest.approx(np.diag(plain), rel=0.15)
+
+
+def test_a_block_that_tells_everything_leaves_few_degrees_of_freedom() -> None:
+    design = np.full((100, 1), 1e-6)
+    design[:10] = 1.0
+    found = leave_blocks_out(design, np.ones(100), np.arange(100) // 10, 1e-3 * np.eye(1))
+    assert found.freedom(np.ones(1)) == pytest.approx(1.0, abs=1e-6)
+    even = leave_blocks_out(np.ones((100, 1)), np.ones(100), np.arange(100) // 10, np.zeros((1, 1)))
+    assert even.freedom(np.ones(1)) == pytest.approx(10.0)
+
+
+def test_torque_at_rest_is_the_static_torque_where_the_axis_sticks(generator: Any) -> None:
+    case = generator.make(5016)  # a Stribeck contact that sticks and slips on its slow levels
+    trial = trial_of(case.record, AXIS)
+    found = held_torque([trial], AXIS, inverse_dynamics([trial], AXIS))
+    assert found == pytest.approx(case.truth["fs"], rel=0.05)
 
 
 @pytest.mark.slow

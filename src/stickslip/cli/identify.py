@@ -92,6 +92,10 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
     parser.add_argument(
         "--load", action="store_true", help="friction that grows with the load of the gearing"
     )
+    parser.add_argument(
+        "--intervals", choices=("covariance", "prediction"), default="covariance",
+        help="prediction: slower, and honest for Fs and vs under coloured noise",
+    )  # fmt: skip
     parser.add_argument("--robust", action="store_true", help="outliers count linearly")
 
 
@@ -183,7 +187,7 @@ def whole_axis(records: Sequence[Record], args: argparse.Namespace) -> Identific
         fitted, axis, args.law or list(AUTOMATIC), validation=held, free=[n.partition("=")[0] for n in args.free],
         frozen=[n.partition("=")[0] for n in args.freeze], values=given,
         extras=Extras(harmonics=args.harmonics, load=args.load), per_direction=args.per_direction,
-        robust=args.robust,
+        robust=args.robust, intervals=args.intervals,
     )  # fmt: skip
 
 

@@ -8,18 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from stickslip import plugins
-from stickslip.errors import InputError
+from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics
 from stickslip.identify.axis_output import Extras, OutputError, output_error
+from stickslip.identify.axis_prediction import axis_prediction
 from stickslip.identify.axis_problem import measured
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.prediction_error import PredictionError
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
@@ -30,6 +32,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 AUTOMATIC = ("coulomb", "stribeck", "lugre")
 """Laws among which the held-out error chooses where none is named."""
+MISSING = "Not identified:"
+INTERVALS = ("covariance", "prediction")
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
 BLOCKS = 20
@@ -75,6 +79,7 @@ def identify_axis(
     per_direction: bool = False,
     robust: bool = False,
     profiles: bool = False,
+    intervals: str = "covariance",
 ) -> Identification:
     """Identify an axis by output error.
 
@@ -93,6 +98,9 @@ def identify_axis(
         As in `stickslip.identify.axis_output.output_error`.
     per_direction : bool
         Whether the inverse dynamics reported beside it has friction of its own for each direction.
+    intervals : {"covariance", "prediction"}
+        From the covariance of the output error: fast, and too narrow for what only break-away tells (Fs, vs); or
+        law, estimates and intervals from the prediction error (`stickslip.identify.axis_prediction`).
 
     Returns
     -------
@@ -107,6 +115,8 @@ def identify_axis(
     """
     if not laws:
         raise InputError("no law to identify; name at least one")
+    if intervals not in INTERVALS:
+        raise UnknownName("source of intervals", intervals, INTERVALS)
     found = [plugins.law(x) if isinstance(x, str) else x for x in laws]
     options: dict[str, Any] = {
         "free": free, "frozen": frozen, "values": values, "extras": extras, "robust": robust, "profiles": profiles
@@ -124,7 +134,13 @@ def identify_axis(
         options["values"] = candidates[place].start
         notes = [*notes, sentence_on(candidates, chosen.name)]
     result = output_error(trials, axis, chosen, inverse, **options)
-    return assembled(result, inverse, validation, candidates, notes)
+    found_axis = assembled(result, inverse, validation, candidates, notes)
+    if intervals == "covariance":
+        return found_axis
+    given = {k: v for k, v in dict[str, Any](values or {}).items() if k in frozen or k in free}
+    return with_prediction(found_axis, axis_prediction(
+        trials, axis, chosen, first=inverse, values=given, free=free, frozen=frozen, extras=extras,
+    ))  # fmt: skip
 
 
 def first_look(
@@ -250,18 +266,14 @@ def assembled(
         misfit["inverse_dynamics_relative"] = inverse.relative_error
     if validation:
         misfit |= {f"held_out_{k}": v for k, v in result.held_out(validation).items()}
-    missing = [e.name for e in result.estimates if not e.identified]
-    notes = list(notes)
-    if missing:
-        notes.append(f"Not identified: {', '.join(missing)}; their values are one choice among many.")
     return Identification(
         "axis",
         result.model,
         result.estimates,
         result.fit.correlation,
         misfit,
-        tuple(notes),
-        measure_next=advice(result),
+        (*notes, *missing_note(result.estimates)),
+        measure_next=advice(result.estimates, result.problem.law),
         details={
             "mechanics": result.mechanics, "inverse": inverse, "output": result, "candidates": tuple(candidates),
             "axis": result.problem.axis,
@@ -269,11 +281,28 @@ def assembled(
     )  # fmt: skip
 
 
-def advice(result: OutputError) -> tuple[str, ...]:
+def with_prediction(found: Identification, result: PredictionError) -> Identification:
+    """The same with law, estimates and intervals of the prediction error; the misfits stay the output error's."""
+    estimates = tuple(replace(e, unit=found.details["axis"].unit(e.unit)) for e in result.estimates)
+    kept = [n for n in found.notes if not n.startswith(MISSING)]
+    said = "Values and intervals are the prediction error's; the misfits are those of the output error."
+    return replace(
+        found, model=result.model, estimates=estimates, correlation=result.correlation(),
+        notes=(*kept, said, *missing_note(estimates)), measure_next=advice(estimates, result.model.law),
+        details={**found.details, "mechanics": result.mechanics, "prediction": result},
+    )  # fmt: skip
+
+
+def missing_note(estimates: Sequence[Estimate]) -> tuple[str, ...]:
+    """What is not identified, in a sentence."""
+    missing = [e.name for e in estimates if not e.identified]
+    return (f"{MISSING} {', '.join(missing)}; their values are one choice among many.",) if missing else ()
+
+
+def advice(estimates: Sequence[Estimate], law: Law) -> tuple[str, ...]:
     """What to measure to settle what is not identified."""
-    missing = {e.name.partition("[")[0] for e in result.estimates if not e.identified}
+    missing = {e.name.partition("[")[0] for e in estimates if not e.identified}
     out: list[str] = []
-    law = result.problem.law
     units = {f.name: f.par.unit for f in law.fields}
     if any(units.get(n) == "rad/s" for n in missing):
         out.append(

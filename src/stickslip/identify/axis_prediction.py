@@ -15,13 +15,11 @@ from stickslip.identify.axis_output import Extras, laid_out, starting_models
 from stickslip.identify.axis_problem import Problem
 from stickslip.identify.axis_start import steady_fit
 from stickslip.identify.axis_trial import Trial
-from stickslip.identify.prediction_error import (
-    BAND,
-    Motion,
-    PredictionError,
-    explored,
-    prediction_error,
-)
+from stickslip.identify.corrections import BAND, DIFFERENCE, Criterion, Motion
+from stickslip.identify.optimum import cost_of
+from stickslip.identify.prediction_error import PredictionError, prediction_error
+from stickslip.identify.secant import descend_by_secants
+from stickslip.identify.vector import Vector
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
@@ -33,8 +31,12 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 SLOWER = (0.02, 0.1, 0.5)
 """Parts of the usual speed at which a Stribeck effect is looked for."""
 WORSE = 1.1
-DESCENTS, STEPS = 2, 6
-"""Starts from which a few steps are taken, and how many."""
+DESCENTS, HOPS, EVALUATIONS = 6, 3, 60
+"""Starts from which a few steps are taken; hops from the best of them; simulations that each may take."""
+HOP = 0.4
+"""Standard deviation of a hop in the law's coordinates; a tenth of it in the others."""
+RESTING, SLOWEST = 0.02, 1e-3
+"""s of rest after which a torque counts as withstood; and the part of the usual speed that counts as creeping."""
 LEVELS = 24
 """Groups of speeds, from slow to fast, in which friction is averaged to start from."""
 
@@ -49,7 +51,6 @@ def axis_prediction(
     free: Sequence[str] = (),
     frozen: Sequence[str] = (),
     extras: Extras = Extras(),  # noqa: B008 (frozen)
-    draws: int = 12,
     seed: int = 0,
 ) -> PredictionError:
     """Identify an axis by what an observer has to correct (`stickslip.identify.prediction_error`).
@@ -64,8 +65,8 @@ def axis_prediction(
         Where the search starts; found here where it is not given.
     values, free, frozen, extras
         As in `stickslip.identify.axis_output.output_error`.
-    draws, seed : int
-        Imitated records for the intervals, and the seed of their noise.
+    seed : int
+        Of the search's hops and of the noise that intervals come from.
 
     Returns
     -------
@@ -83,40 +84,67 @@ def axis_prediction(
     given = dict(values or {})
     band = min(BAND, *(0.1 / t.period for t in trials))
     motions = [motion_of(t) for t in trials]
-    tried: list[tuple[float, Problem, float]] = []
-    for model in starting_points(trials, law, start, given):
+    tried: list[tuple[float, Criterion, float]] = []
+    for model in starting_points(trials, axis, law, start, given):
         vector, inertia = laid_out(trials, axis, law, start, model, given, free, frozen, extras)
         problem = Problem.of(
             trials, axis, law, vector, inertia=inertia, harmonic_period=extras.harmonic_period
         )
-        _, cost = explored(motions, law, vector, problem.mechanics, inertia=inertia, band=band, iterations=0)
+        criterion = Criterion.first(motions, law, vector, problem.mechanics, inertia, band)
+        cost = cost_of(criterion.residuals(vector.start))
         if math.isfinite(cost):
-            tried.append((cost, problem, inertia))
+            tried.append((cost, criterion, inertia))
     if not tried:
         raise InputError(
             f"{law.name}: no simulation from the starting values succeeds; give others by `values`"
         )
     tried.sort(key=lambda entry: entry[0])
-    best: tuple[float, Array, Problem, float] | None = None
-    for _, problem, inertia in tried[:DESCENTS]:
-        u, cost = explored(
-            motions, law, problem.vector, problem.mechanics, inertia=inertia, band=band, iterations=STEPS
-        )
-        if best is None or cost < best[0]:
-            best = cost, u, problem, inertia
-    assert best is not None
-    _, u, problem, inertia = best
+    reached = [
+        (*descended(criterion, criterion.vector.start), criterion, inertia)
+        for _, criterion, inertia in tried[:DESCENTS]
+    ]
+    best = min(reached, key=lambda entry: entry[0])
+    # Outliers would choose among hops by plain squares: from here on the likelihood that weighs them decides.
+    adapted = best[2].adapted(best[1])
+    best = (*descended(adapted, best[1]), adapted, best[3])
+    rng = np.random.default_rng(seed)
+    for _ in range(HOPS):
+        cost, u, criterion, inertia = best
+        there = hop(criterion.vector, u, {f.name for f in law.fields}, rng)
+        if math.isfinite(cost_of(criterion.residuals(there))):
+            best = min(best, (*descended(criterion, there), criterion, inertia), key=lambda entry: entry[0])
+    _, u, criterion, inertia = best
     return prediction_error(
-        motions, law, problem.vector, problem.mechanics, inertia=inertia, start=u, signed_scale=abs(start.coulomb),
-        band=band, draws=draws, seed=seed,
+        motions, law, criterion.vector, criterion.mechanics, inertia=inertia, start=u,
+        signed_scale=abs(start.coulomb), band=band, seed=seed,
     )  # fmt: skip
+
+
+def descended(criterion: Criterion, start: Array) -> tuple[float, Array]:
+    """Sum of squares and coordinates that a few steps from a start reach."""
+    vector = criterion.vector
+    u, cost = descend_by_secants(
+        criterion.residuals, start, vector.lower, vector.upper, evaluations=EVALUATIONS, tolerance=1e-3,
+        difference=DIFFERENCE,
+    )  # fmt: skip
+    return cost, u
+
+
+def hop(vector: Vector, u: Array, law: set[str], rng: np.random.Generator) -> Array:
+    """Somewhere near, mostly in the law's parameters: a static torque and velocity may hide behind a ridge."""
+    own = np.array(
+        [p.name.partition("[")[0] in law for p in vector.free if vector.coordinate_of(p.name) is not None]
+    )
+    own = np.concatenate([own, np.ones(u.size - own.size, dtype=np.bool_)])
+    there = u + HOP * np.where(own, 1.0, 0.1) * rng.standard_normal(u.size)
+    return np.clip(there, vector.lower, vector.upper)
 
 
 def motion_of(trial: Trial) -> Motion:
     """The trial on a regular grid, its drive's signal as it acts."""
-    t, q, u, rate = uniform(trial)
+    t, q, u, _ = uniform(trial)
     supply = 1.0 if trial.supply is None else np.interp(t, trial.time, trial.supply)
-    return Motion(t, q, supply * u, encoder_resolution(q), 0.5 / rate)
+    return Motion(t, q, supply * u, encoder_resolution(q))
 
 
 def encoder_resolution(position: Array) -> float:
@@ -132,24 +160,47 @@ def encoder_resolution(position: Array) -> float:
 
 
 def starting_points(
-    trials: Sequence[Trial], law: Law, first: InverseDynamics, given: Mapping[str, Any]
+    trials: Sequence[Trial], axis: ServoAxis, law: Law, first: InverseDynamics, given: Mapping[str, Any]
 ) -> list[Model]:
     """Examples on this axis's scales, as they are and with their steady torque fitted to the measured levels.
 
-    The levels of a motion that sticks and slips mislead; the simulation decides.
+    The levels of a motion that sticks and slips mislead: there the torque that was withstood at rest takes the place
+    of the slowest. The simulation decides.
     """
     held = [f.name for f in law.fields if f.name in given]
     slower = [replace(first, velocity=part * first.velocity) for part in SLOWER]
     examples = [m for f in slower for m in starting_models(trials, law, f, given)]
     fitted = [fitted_to_levels(m, first, held) for m in examples]
     least = min(misfit for _, misfit in fitted)
-    return examples + [m for m, misfit in fitted if misfit <= WORSE * least]
+    held_at = held_torque(trials, axis, first)
+    sticking = (
+        [fitted_to_levels(m, first, held, held_at)[0] for m in examples] if held_at > first.coulomb else []
+    )
+    return examples + [m for m, misfit in fitted if misfit <= WORSE * least] + sticking
 
 
-def fitted_to_levels(model: Model, first: InverseDynamics, held: Sequence[str]) -> tuple[Model, float]:
+def held_torque(trials: Sequence[Trial], axis: ServoAxis, first: InverseDynamics) -> float:
+    """Torque that the contact withstood at rest, N·m: where the position stays within two counts for a while."""
+    level = 0.0
+    for trial in trials:
+        motion = motion_of(trial)
+        reach = max(1, round(RESTING / float(motion.time[1] - motion.time[0])))
+        moved = np.abs(motion.position[reach:] - motion.position[:-reach])
+        still = moved <= max(2.0 * motion.count, RESTING * SLOWEST * float(np.std(first.velocity)))
+        gain, _ = axis.drive_gains(trial.quantity)
+        if np.any(still):
+            torque = np.abs(gain * motion.torque[reach:][still] - first.offset)
+            level = max(level, float(np.quantile(torque, 0.98)))
+    return level
+
+
+def fitted_to_levels(
+    model: Model, first: InverseDynamics, held: Sequence[str], held_torque: float = 0.0
+) -> tuple[Model, float]:
     """The model with its steady torque fitted to the friction that the inverse dynamics leaves at every speed.
 
-    Returns it with the sum of absolute differences, N·m.
+    A `held_torque` counts as that of a creeping motion, instead of the slowest levels. Returns the model with the sum
+    of absolute differences, N·m.
     """
     v = first.velocity
     friction = first.residual + np.sign(v) * first.coulomb + first.viscous * v
@@ -157,6 +208,9 @@ def fitted_to_levels(model: Model, first: InverseDynamics, held: Sequence[str]) 
     groups = [g for g in np.array_split(order, LEVELS) if g.size]
     speed = np.array([float(np.median(np.abs(v[g]))) for g in groups])
     torque = np.array([float(np.median(np.sign(v[g]) * friction[g])) for g in groups])
+    if held_torque > 0.0:
+        slow = max(1, LEVELS // 8)
+        speed[:slow], torque[:slow] = SLOWEST * float(np.std(v)), held_torque
     out = steady_fit(model, speed, torque, held)
     steady = model.law.steady
     if steady is None:

@@ -1,79 +1,58 @@
-"""Honest intervals for an axis: what an observer must correct, whitened, and what the method itself gets wrong.
+"""Honest intervals for an axis: what an observer must correct, whitened, with a spread that leaves stretches out.
 
-The simulated axis is pulled towards the measured position by a spring and damper (an observer); the pull is the
-torque that the model lacks. Its spectrum is that of the disturbance, of the torque's noise and of the encoder, so
-that an autoregression of it gives the weights (prediction-error method: Ljung 1999, chapters 7 and 9). It needs no
-knowledge of the controller.
+The simulated axis is driven by the recorded torque and pulled towards the measured position by a spring and damper
+(an observer). The pull is the torque that the model lacks: disturbance, noise of the torque, rounding of the encoder.
+An autoregression of it gives the weights (prediction-error method: Ljung 1999, chapters 7 and 9). It needs no
+knowledge of the controller. Three things keep the truth near the minimum:
 
-The filter that makes a velocity of counted positions rounds the corners where a contact breaks away, which draws
-static and Coulomb torque down in proportion to its length. Two lengths, one twice the other, tell how much, and the
-estimate is extrapolated to none (Richardson). The intervals come from the same estimate on records whose truth is
-known: the fitted axis itself, moved as measured, with the encoder's counts and with the corrections again as noise,
-their signs drawn anew (dependent wild bootstrap: Shao 2010; Efron and Tibshirani 1993, chapter 6).
+- Torque and position enter as they were recorded. A filter would round the corners at which a contact breaks away.
+- The spring is slack within half a count: a contact at rest is pulled by no rounding.
+- Where the disturbance decides whether the contact sticks, measured and simulated motion part for a while. Such
+  outliers are few and large; Student's distribution weighs them (Lange, Little and Taylor 1989).
+
+The residuals are correlated and uneven for the same reason, so that the covariance comes from leaving stretches of
+time out (`stickslip.identify.jackknife`), and the quantile from the degrees of freedom that this has. What the
+linearisation does not see, contacts that stick or slip by chance, is added from the steps that the estimate takes
+when the corrections are given to the torque once more as noise (dependent wild bootstrap: Shao 2010), and from what
+a slower observer and a stricter view of outliers would have found: neither is better founded than the other.
 """
 
 from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
 from stickslip.identify.axis_start import feasible
+from stickslip.identify.corrections import BAND, Criterion, MakeMechanics, Motion, prepare, student_weight
 from stickslip.identify.estimate import Estimate
+from stickslip.identify.jackknife import BlockCovariance, leave_blocks_out
 from stickslip.identify.noise import Noise
-from stickslip.identify.optimum import descend
+from stickslip.identify.optimum import Optimum
 from stickslip.identify.uncertainty import interval_of, verdict_on
 from stickslip.identify.vector import Vector
-from stickslip.simulation.driven import Course, Drive, Mechanics
+from stickslip.model import Model
+from stickslip.simulation.driven import Mechanics
 from stickslip.spec import Law
 
-__all__ = ["Motion", "PredictionError", "explored", "prediction_error"]
+__all__ = ["PredictionError", "prediction_error"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-MakeMechanics = Callable[[Mapping[str, float]], Mechanics]
 
-BAND = 40.0
-"""Hz up to which corrections count, where the sample rate allows it."""
-SMOOTHING = (5.0, 2.5)
-"""Corners of the filters on position and torque, in bands: the sharper one, and that which tells its error."""
-STEPS = 5.0
-"""Simulated steps per period of that corner."""
-ORDER = 16
-"""Order of the autoregression."""
-FIRST = np.array([1.0, -0.9])
-"""The whitening filter before the corrections are known."""
-MEMORY = 0.15
-"""s over which the bootstrap's signs stay alike."""
+SLOWER, STRICTER = 0.5, 3.0
+"""Other choices that would do as well: an observer this much slower, degrees of freedom this few."""
+BLOCK = 0.25
+"""s of a stretch that is left out: some correlation times of the disturbance."""
 REACH = 3.0
 """Coordinates (factors of e) by which what the data leave open may lie elsewhere."""
-EDGE = 0.15
-"""s at both ends that filters spoil."""
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """A record of equally spaced samples.
-
-    Attributes
-    ----------
-    time, position, torque : array, shape (n,)
-        s, rad, N·m (m, N); a signal that the axis's ``drive_gain`` turns into torque will do.
-    count : float
-        Resolution of the position, rad (m); 0 for none.
-    delay : float
-        s from a sample's time to the middle of the torque's action: half a sample for a command that is held.
-    """
-
-    time: Array
-    position: Array
-    torque: Array
-    count: float = 0.0
-    delay: float = 0.0
+DRAWS = 16
+"""Times that the corrections are shaken."""
+MEMORY = 0.15
+"""s over which they are shaken alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,14 +61,18 @@ class PredictionError:
 
     Attributes
     ----------
+    vector : Vector
     u : array, shape (p,)
-        Coordinates of the estimate, the method's own error taken off.
-    spread : array, shape (p, p)
-        Covariance of the coordinates.
-    bias : array, shape (p,)
-        The filter's error, taken off.
-    remaining : array, shape (p,)
-        Mean error of the imitated estimates.
+        Coordinates of the estimate.
+    model : Model
+    mechanics : Mechanics
+        Law and axis there.
+    cost : float
+        Sum of squares at it, outliers weighed.
+    spread : BlockCovariance
+        Of the coordinates, by leaving stretches out.
+    beside : array, shape (p, p)
+        What is added to its covariance: from noise, and from other choices that would do as well.
     estimates : tuple of Estimate
     corrections : tuple of array
         Per motion the torque that the model lacks, N·m, in the band.
@@ -97,116 +80,21 @@ class PredictionError:
 
     vector: Vector
     u: Array
-    spread: Array
-    bias: Array
-    remaining: Array
+    model: Model
+    mechanics: Mechanics
+    cost: float
+    spread: BlockCovariance
+    beside: Array
     estimates: tuple[Estimate, ...]
     corrections: tuple[Array, ...]
 
-
-# ---- one motion ----------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """A motion behind the filter, its observer and the filter of its corrections."""
-
-    motion: Motion
-    course: Course
-    drive: Drive
-    position: Array
-    velocity: Array
-    low_pass: Any
-    stride: int
-    edge: int
-
-    def correction(self, mechanics: Mechanics, parameters: Any) -> Array:
-        """Torque that the model lacks, N·m, in the band, shape (m,)."""
-        signal: Any = importlib.import_module("scipy.signal")  # it carries no types
-
-        raw = self.course.run(mechanics, parameters)[:, 3]
-        if not np.all(np.isfinite(raw)):
-            return np.full(raw[self.edge : -self.edge : self.stride].shape, math.nan)
-        return signal.sosfiltfilt(self.low_pass, raw)[self.edge : -self.edge : self.stride]
-
-
-def prepare(motion: Motion, law: Law, inertia: float, band: float, smoothing: float) -> Prepared:
-    """Filter position and torque alike, and lay the observer out."""
-    signal: Any = importlib.import_module("scipy.signal")  # it carries no types
-
-    dt = float(np.median(np.diff(motion.time)))
-    rate = 1.0 / dt
-    corner = min(smoothing * band, 0.08 * smoothing * rate)
-    smooth = signal.butter(4, corner, fs=rate, output="sos")
-    q: Array = signal.sosfiltfilt(smooth, motion.position)
-    torque: Array = signal.sosfiltfilt(smooth, motion.torque)
-    v = np.gradient(q, dt)
-    skip = max(1, int(rate / (STEPS * SMOOTHING[0] / smoothing * corner)))
-    t = motion.time[::skip]
-    torque = np.asarray(np.interp(t - motion.delay, motion.time, torque), dtype=np.float64)
-    omega = 2.0 * math.pi * band
-    q, v, step = q[::skip], v[::skip], skip * dt
-    drive = Drive(
-        t, torque, "linear", start=(float(q[0]), float(v[0])), position=q, velocity=v,
-        pull=(inertia * omega**2, 2.0 * inertia * omega), max_step=step,
-    )  # fmt: skip
-    low_pass = signal.butter(4, band, fs=1.0 / step, output="sos")
-    stride = max(1, int(1.0 / (3.0 * band * step)))
-    return Prepared(motion, Course(law, drive), drive, q, v, low_pass, stride, max(1, int(EDGE / step)))
-
-
-def imitation(
-    prepared: Prepared, law: Law, mechanics: Mechanics, parameters: Any, noise: Array
-) -> tuple[Motion, Array]:
-    """A record of the model itself that moves as the measured one, and the noise-free torque it needs.
-
-    The observer's pull is part of the torque that moves it: the motion is exactly the model's.
-    """
-    m = prepared.motion
-    pulled = Drive(
-        m.time, m.torque, "held", position=np.interp(m.time, prepared.drive.time, prepared.position),
-        velocity=np.interp(m.time, prepared.drive.time, prepared.velocity), pull=prepared.drive.pull,
-        start=prepared.drive.start, max_step=float(m.time[1] - m.time[0]),
-    )  # fmt: skip
-    out = Course(law, pulled).run(mechanics, parameters)
-    position = m.count * np.floor(out[:, 0] / m.count + 0.5) if m.count > 0.0 else out[:, 0]
-    needed = m.torque + out[:, 3] / mechanics.drive_gain
-    return replace(
-        m,
-        position=position,
-        torque=needed + noise / mechanics.drive_gain,
-        delay=0.5 * (m.time[1] - m.time[0]),
-    ), out[:, 3]
-
-
-# ---- noise -----------------------------------------------------------------------------------------------------
-
-
-def autoregression(e: Sequence[Array], order: int) -> Array:
-    """Coefficients (1, a_1 ... a_p) of the filter that whitens the series: Yule and Walker's equations."""
-    linalg: Any = importlib.import_module("scipy.linalg")  # it carries no types
-
-    r = np.zeros(order + 1)
-    for x in e:
-        spectrum = np.abs(np.fft.rfft(x, 2 * x.size)) ** 2
-        r += np.fft.irfft(spectrum)[: order + 1]
-    r[0] *= 1.0 + 1e-8
-    return np.concatenate([[1.0], -linalg.solve_toeplitz(r[:order], r[1:])])
-
-
-def whitened(filter_: Array, e: Array) -> Array:
-    """The series behind the filter, without the values that its start spoils."""
-    signal: Any = importlib.import_module("scipy.signal")  # it carries no types
-
-    return signal.lfilter(filter_, [1.0], e)[filter_.size - 1 :]
-
-
-def random_signs(rng: np.random.Generator, n: int, memory: float) -> Array:
-    """A smooth Gaussian series of unit variance that forgets within `memory` samples, shape (n,)."""
-    ndimage: Any = importlib.import_module("scipy.ndimage")  # it carries no types
-
-    x: Array = ndimage.gaussian_filter1d(rng.standard_normal(n), memory / 2.0, mode="wrap")
-    return x / math.sqrt(float(np.mean(x * x)))
+    def correlation(self) -> Array:
+        """Of the estimates, in their order, shape (free parameters, free parameters)."""
+        change = self.vector.jacobian(self.u)
+        covariance = change @ (self.spread.covariance + self.beside) @ change.T
+        std = np.sqrt(np.diag(covariance))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return covariance / np.outer(std, std)
 
 
 # ---- the method ------------------------------------------------------------------------------------------------
@@ -222,8 +110,7 @@ def prediction_error(
     start: Array | None = None,
     signed_scale: float | Mapping[str, float] = math.nan,
     band: float = BAND,
-    draws: int = 12,
-    rounds: int = 3,
+    rounds: int = 2,
     seed: int = 0,
 ) -> PredictionError:
     """Estimate mechanics and law from torque and motion, with intervals that hold for coloured noise.
@@ -244,12 +131,10 @@ def prediction_error(
         As in `stickslip.identify.uncertainty.fit`.
     band : float
         Hz up to which corrections count.
-    draws : int
-        Imitated records for error and spread.
     rounds : int
         Times that weights and parameters are found in turn.
     seed : int
-        Of the imitated noise.
+        Of the noise with which the corrections are shaken.
 
     Returns
     -------
@@ -260,122 +145,120 @@ def prediction_error(
     InputError
         If a motion is too short for the band, or the model gives no finite values at the start.
     """
-    prepared, blurred = (
-        [prepare(checked(m, band), law, inertia, band, smoothing) for m in motions] for smoothing in SMOOTHING
-    )
-
-    def corrections(u: Array, records: Sequence[Prepared]) -> list[Array]:
-        return corrected(records, law, vector, mechanics, u)
-
-    u, weights = vector.start if start is None else start, FIRST
+    criterion = Criterion.first(motions, law, vector, mechanics, inertia, band)
+    u = vector.start if start is None else start
     optimum = None
-    for turn in range(rounds):
-
-        def residuals(x: Array, weights: Array = weights) -> Array:
-            return np.concatenate([whitened(weights, e) for e in corrections(x, prepared)])
-
-        last = turn == rounds - 1
-        optimum = descend(
-            residuals, u, vector.lower, vector.upper, iterations=25, tolerance=1e-6 if last else 1e-3
-        )
+    for _ in range(rounds):
+        criterion = criterion.adapted(u)
+        optimum = criterion.descend(u, 12, 1e-4)
         u = optimum.u
-        if not last:
-            weights = autoregression(corrections(u, prepared), ORDER)
     assert optimum is not None
-    # A coordinate that the data leave open is held within REACH of where it is, so that no step runs away with it.
-    variance = optimum.cost / max(optimum.residuals.size - u.size, 1)
-    ridge = variance / REACH**2
-    inverse = np.linalg.inv(optimum.jacobian.T @ optimum.jacobian + ridge * np.eye(u.size))
-    newton = -inverse @ optimum.jacobian.T
-
-    def step(records: Sequence[Prepared]) -> Array:
-        """How far these records would move the estimate: one step of Gauss and Newton."""
-        return newton @ np.concatenate([whitened(weights, e) for e in corrections(u, records)])
-
-    rng = np.random.default_rng(seed)
-    parameters, axis = feasible(law, vector.law_parameters(u)), mechanics(vector.named(u))
-    lacking = [imitation(r, law, axis, parameters, np.zeros(r.motion.time.size))[1] for r in prepared]
-    errors: list[Array] = []
-    for _ in range(draws):
-        copies: list[Motion] = []
-        for r, missing in zip(prepared, lacking, strict=True):
-            dt = float(r.motion.time[1] - r.motion.time[0])
-            noise = missing * random_signs(rng, missing.size, MEMORY / dt)
-            copies.append(imitation(r, law, axis, parameters, noise)[0])
-        sharp, blunt = (step([prepare(m, law, inertia, band, s) for m in copies]) for s in SMOOTHING)
-        errors.append(2.0 * sharp - blunt)
-    found = np.array(errors)
-    bias = step(blurred) - step(prepared)
-    own = found.mean(axis=0)
-    spread = np.cov(found, rowvar=False).reshape(u.size, u.size) * (1.0 + 1.0 / draws)
-    spread = spread + ridge * variance * inverse @ inverse
-    # What is taken off is itself uncertain: half of the filter's error; of the imitations' all, for these follow
-    # the filtered motion and show only part of it, and half of it is taken off.
-    spread = spread + 0.25 * np.outer(bias, bias) + np.outer(own, own)
-    better = np.clip(u - bias - 0.5 * own, vector.lower, vector.upper)
-    estimates = estimates_of(vector, better, spread, draws, signed_scale)
-    return PredictionError(vector, better, spread, bias, own, estimates, tuple(corrections(u, prepared)))
-
-
-def corrected(
-    records: Sequence[Prepared], law: Law, vector: Vector, mechanics: MakeMechanics, u: Array
-) -> list[Array]:
-    """Torque that the model lacks on every record; not a number where the law refuses the parameters."""
-    parameters = feasible(law, vector.law_parameters(u))
-    if parameters is None:
-        return [np.full(r.drive.time[r.edge : -r.edge : r.stride].shape, math.nan) for r in records]
-    return [r.correction(mechanics(vector.named(u)), parameters) for r in records]
-
-
-def explored(
-    motions: Sequence[Motion], law: Law, vector: Vector, mechanics: MakeMechanics, *, inertia: float, band: float,
-    iterations: int,
-) -> tuple[Array, float]:  # fmt: skip
-    """Coordinates and sum of squares after a few steps from the vector's start: for choosing among starts."""
-    records = [prepare(checked(m, band), law, inertia, band, SMOOTHING[0]) for m in motions]
-
-    def residuals(u: Array) -> Array:
-        return np.concatenate([whitened(FIRST, e) for e in corrected(records, law, vector, mechanics, u)])
-
-    if iterations == 0:
-        r = residuals(vector.start)
-        return vector.start, float(r @ r)
-    found = descend(
-        residuals, vector.start, vector.lower, vector.upper, iterations=iterations, tolerance=1e-3
+    spread = spread_of(criterion, optimum)
+    slow = [prepare(m, law, inertia, band, SLOWER) for m in motions]
+    others = [replace(criterion, records=slow), replace(criterion, freedom=STRICTER)]
+    moved = [c.adapted(u).descend(u, 6, 1e-3).u - u for c in others]
+    beside = shaken_steps(criterion, optimum, motions, inertia, band, np.random.default_rng(seed))
+    beside = beside + sum(np.outer(d, d) for d in moved)
+    estimates = estimates_of(vector, u, spread, beside, signed_scale)
+    accepted = feasible(law, vector.law_parameters(u))
+    assert accepted is not None
+    model = Model(law, **accepted._asdict())
+    named = mechanics(vector.named(u))
+    return PredictionError(
+        vector, u, model, named, optimum.cost, spread, beside, estimates, tuple(criterion.corrections(u))
     )
-    return found.u, found.cost
 
 
-def checked(motion: Motion, band: float) -> Motion:
-    """Refuse what the filters cannot work on."""
-    steps = np.diff(motion.time)
-    if motion.time.size < 200 or np.ptp(steps) > 1e-3 * float(np.median(steps)):
-        raise InputError(
-            f"{motion.time.size} samples between {steps.min():.3g} and {steps.max():.3g} s apart: this method needs at "
-            "least 200 that are equally spaced; resample the record"
-        )
-    if 1.0 / float(np.median(steps)) < 3.0 * band:
-        raise InputError(f"a band of {band:g} Hz needs a sample rate of {3.0 * band:g} Hz; give a lower band")
-    return motion
+def spread_of(criterion: Criterion, optimum: Optimum) -> BlockCovariance:
+    """How far the estimate moves when a stretch of a record is left out."""
+    rows: list[Any] = []
+    first = 0
+    for record in criterion.records:
+        n = record.nothing().size - criterion.whitening.size + 1
+        dt = float(record.course.drive.time[1] - record.course.drive.time[0]) * record.stride
+        count = max(2, round(n * dt / BLOCK))
+        rows.append(first + (np.arange(n) * count) // n)
+        first += count
+    r, jacobian = weighted(criterion, optimum)
+    return leave_blocks_out(jacobian, r, np.concatenate(rows), ridge_of(r, optimum.u.size))
+
+
+def ridge_of(r: Array, size: int) -> Array:
+    """A coordinate that the data leave open is held within `REACH` of where it is, shape (p, p)."""
+    variance = float(r @ r) / max(r.size - size, 1)
+    return variance / REACH**2 * np.eye(size)
+
+
+def shaken_steps(
+    criterion: Criterion, optimum: Optimum, motions: Sequence[Motion], inertia: float, band: float,
+    rng: np.random.Generator,
+) -> Array:  # fmt: skip
+    """Mean square of the steps of Gauss and Newton from the minimum on records with the corrections as noise.
+
+    Returns
+    -------
+    array, shape (p, p)
+    """
+    u, vector = optimum.u, criterion.vector
+    r, jacobian = weighted(criterion, optimum)
+    newton = -np.linalg.solve(jacobian.T @ jacobian + ridge_of(r, u.size), jacobian.T)
+    parameters, axis = feasible(criterion.law, vector.law_parameters(u)), criterion.mechanics(vector.named(u))
+    lacking = [x.course.run(axis, parameters)[:, 3] / axis.drive_gain for x in criterion.records]
+    steps: list[Array] = []
+    for _ in range(DRAWS):
+        records = [
+            prepare(replace(m, torque=m.torque + e * random_signs(rng, m.time)), criterion.law, inertia, band)
+            for m, e in zip(motions, lacking, strict=True)
+        ]
+        step = newton @ replace(criterion, records=records).weighed(u)
+        if np.all(np.isfinite(step)):
+            steps.append(step - newton @ r)
+    found = np.array(steps).reshape(-1, u.size)
+    return found.T @ found / max(len(steps), 1)
+
+
+def random_signs(rng: np.random.Generator, time: Array) -> Array:
+    """A smooth Gaussian series of unit variance that forgets within `MEMORY`, shape (n,)."""
+    ndimage: Any = importlib.import_module("scipy.ndimage")  # it carries no types
+
+    samples = MEMORY / float(time[1] - time[0])
+    x: Array = ndimage.gaussian_filter1d(rng.standard_normal(time.size), samples / 2.0, mode="wrap")
+    return x / math.sqrt(float(np.mean(x * x)))
+
+
+def weighted(criterion: Criterion, optimum: Optimum) -> tuple[Array, Array]:
+    """Residuals and their Jacobian, each row times the square root of its weight at the minimum."""
+    n = criterion.freedom
+    x = criterion.white(optimum.u) / criterion.scale
+    # From the Jacobian of the transformed residuals back to that of the plain ones.
+    slope = np.full(x.shape, math.sqrt((n + 1.0) / n))
+    far = np.abs(x) > 1e-6
+    transformed = np.sqrt((n + 1.0) * np.log1p(x[far] ** 2 / n))
+    slope[far] = student_weight(x[far], n) * np.abs(x[far]) / transformed
+    root = np.sqrt(student_weight(x, n))
+    return root * x, optimum.jacobian * (root / slope)[:, None]
 
 
 def estimates_of(
-    vector: Vector, u: Array, spread: Array, draws: int, signed_scale: float | Mapping[str, float]
+    vector: Vector,
+    u: Array,
+    spread: BlockCovariance,
+    beside: Array,
+    signed_scale: float | Mapping[str, float],
 ) -> tuple[Estimate, ...]:
     """Estimates with 95 % intervals from Student's quantile, in coordinates, and verdicts."""
     from scipy import special
 
-    width = float(special.stdtrit(max(draws - 1, 1), 0.975))
     values = vector.values(u)
-    noise = Noise(1.0, "residual", float(draws - 1))
     change = vector.jacobian(u)
     out: list[Estimate] = []
     for k, p in enumerate(vector.free):
-        used = change[k] != 0.0
-        variance = float(change[k, used] @ spread[np.ix_(used, used)] @ change[k, used])
+        variance = float(change[k] @ (spread.covariance + beside) @ change[k])
         std = math.sqrt(variance) if variance >= 0.0 else math.inf
+        dof = max(spread.freedom(change[k]) - 1.0, 1.0)
+        width = float(special.stdtrit(dof, 0.975))
         low, high = interval_of(p, float(values[k]), width * std, None)
         scale = signed_scale.get(p.name, math.nan) if isinstance(signed_scale, Mapping) else signed_scale
-        why = verdict_on(p, float(values[k]), low, high, noise, scale)
+        why = verdict_on(p, float(values[k]), low, high, Noise(1.0, "residual", dof), scale)
         out.append(Estimate(p.name, p.par.unit, p.par.symbol, float(values[k]), std, low, high, not why, why))
     return tuple(out)

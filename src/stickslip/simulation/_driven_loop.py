@@ -13,8 +13,8 @@ from stickslip.simulation._driven_step import BACK_EMF, BACKLASH, DRIVE_GAIN, IN
 # ---- the drive's numbers ----------------------------------------------------------------------------------
 (
     KIND, KP, KI, KD, KR, SPAN, LIMIT, CONTROL_PERIOD, MAX_STEP, TRACK_KP, TRACK_KD, SIGNAL_GAIN, START_POSITION,
-    START_VELOCITY, COUNT, DRIVE,
-) = range(16)  # fmt: skip
+    START_VELOCITY, COUNT, TRACK_SLACK, TRACK_FORGETS, DRIVE,
+) = range(18)  # fmt: skip
 HELD, LINEAR, FEEDBACK = 0.0, 1.0, 2.0  # KIND
 SPEED_LIMIT = 1e9  # rad/s, beyond which a simulation has diverged
 
@@ -23,7 +23,7 @@ TIME, SIGNAL, SUPPLY, POSITION, VELOCITY, SIGNALS = range(6)
 OUT_POSITION, OUT_VELOCITY, OUT_DRIVE, OUT_CORRECTION, OUTS = range(5)
 
 # ---- what a sampled controller remembers ------------------------------------------------------------------
-LAST, BEFORE_LAST, LAST_REFERENCE, ERROR_SUM, LAST_ERROR, STARTED, MEMORY = range(7)
+LAST, BEFORE_LAST, LAST_REFERENCE, ERROR_SUM, LAST_ERROR, STARTED, TRACKED, LAGGED, MEMORY = range(9)
 
 
 @kernel()
@@ -69,6 +69,17 @@ def counted(c: Any, position: float) -> float:
 
 
 @kernel()
+def pull(c: Any, m: Any, signals: Any, k: int, y: float, dt: float) -> float:
+    """What the observer adds: it sees positions only, and none of them finer than the encoder's step."""
+    away = signals[k, POSITION] - y
+    beyond = away - limited(away, c[TRACK_SLACK])
+    slower = signals[k, VELOCITY] - (y - m[TRACKED]) / dt
+    m[LAGGED] += c[TRACK_FORGETS] * (slower - m[LAGGED])
+    m[TRACKED] = y
+    return c[TRACK_KP] * beyond + c[TRACK_KD] * m[LAGGED]
+
+
+@kernel()
 def command(c: Any, m: Any, signals: Any, k: int, y: float, dt: float) -> float:
     """What the drive is told at a sample: the recorded signal, or the controller's answer to it."""
     if c[KIND] == FEEDBACK:
@@ -101,6 +112,7 @@ def follow(
     state, m = np.zeros(2), np.zeros(MEMORY)
     state[0], state[1] = c[START_POSITION], c[START_VELOCITY]
     y = state[0]
+    m[TRACKED] = y - state[1] * (signals[1, TIME] - signals[0, TIME])
     rows = signals.shape[0]
     loss = n[BACK_EMF]
     for k in range(rows):
@@ -116,7 +128,7 @@ def follow(
         h = dt / acts / substeps
         for act in range(acts):
             u = command(c, m, signals, k, y, dt / acts)
-            push = c[TRACK_KP] * (signals[k, POSITION] - y) + c[TRACK_KD] * (signals[k, VELOCITY] - state[1])
+            push = pull(c, m, signals, k, y, dt)
             if act == 0:
                 out[k, OUT_DRIVE], out[k, OUT_CORRECTION] = u, push
             if k == rows - 1:

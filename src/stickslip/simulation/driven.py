@@ -131,7 +131,12 @@ class Drive:
         Factor on the signal, or on the controller's output before its limit.
     position, velocity : array, shape (n,), or None
         A measured motion that the axis is pulled towards, as an observer, with ``pull`` = (N·m/rad, N·m·s/rad); the
-        pull is the column ``correction`` of the result.
+        pull is the column ``correction`` of the result. `velocity` is compared with the mean over the last step.
+    slack : float
+        Distance from the measured position, rad, within which the spring does not pull: half an encoder's count.
+    forgets : float
+        Share of the damper's memory that every sample replaces, 1 for none: it damps the velocity behind a
+        first-order low-pass, so that an encoder's counts do not shake the axis.
     disturbance : array, shape (n,), or None
         A torque on the axis, held from sample to sample.
     max_step : float
@@ -148,6 +153,8 @@ class Drive:
     position: Array | None = None
     velocity: Array | None = None
     pull: tuple[float, float] = (0.0, 0.0)
+    slack: float = 0.0
+    forgets: float = 1.0
     disturbance: Array | None = None
     max_step: float = 1e-3
 
@@ -185,6 +192,7 @@ class Drive:
         c[loop.SPAN], c[loop.LIMIT], c[loop.CONTROL_PERIOD] = k.velocity_span, k.limit, k.period
         c[loop.COUNT] = k.count
         c[loop.TRACK_KP], c[loop.TRACK_KD] = self.pull
+        c[loop.TRACK_SLACK], c[loop.TRACK_FORGETS] = self.slack, self.forgets
         c[loop.START_POSITION], c[loop.START_VELOCITY] = self.start
         return c
 
