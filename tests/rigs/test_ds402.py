@@ -240,7 +240,7 @@ def test_after_kill_9_the_drive_takes_the_torque_away_within_20_ms(drive, tmp_pa
     code = VICTIM.format(
         tests=str(Path(__file__).parent), bus=drive.bus, node=NODE, watchdog=watchdog, path=str(path)
     )
-    for _ in range(3):
+    for _ in range(2):
         with contextlib.suppress(FileNotFoundError):
             path.unlink()
         process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
@@ -307,7 +307,7 @@ def test_a_procedure_from_the_command_line(drive, tmp_path, monkeypatch, capsys)
         "--rig",
         "drive.toml",
         "--set",
-        "frequency=4",
+        "frequency=1",
         "--stream",
         "a.stream",
     ]
