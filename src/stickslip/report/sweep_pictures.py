@@ -79,7 +79,6 @@ def _saved(stem: Path, title: str, message: str, panels: list[Panel], height: fl
 
 def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Path:
     what, unit = named(sweep.metrics[0])
-    spreads = [s.name for s in sweep.drawn.spreads]
     data: dict[str, tuple[Array, Array]] = {}
     for run in runs:
         drawn, values = _columns(folder, sweep, run)
@@ -102,22 +101,26 @@ def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun])
     if not panels:
         panels.append(_lines(percent * levels, lines, list(lines), factor, f"{what}, {shown}", ""))
     message = (
-        f"{_choice(lines, percent)} 95th percentile where {', '.join(map(_symbol, spreads))} lie anywhere within that "
-        f"distance ({sweep.drawn.cases} cases)"
+        f"{_choice(lines, percent)} 95th percentile over {sweep.drawn.cases} cases, every number that varies anywhere "
+        "within that distance"
     )
     return _saved(stem, sweep.title, message, panels, 2.3)
 
 
 def _choice(lines: dict[str, Array], percent: float) -> str:
     """Which controller to choose, in words: all of them, and those that compensate."""
-    third, last = LEVELS // 3, LEVELS - 1
 
     def best(names: list[str]) -> str:
-        small, large = (min(names, key=lambda n: _or_inf(lines[n][i])) for i in (third, last))
-        if small == large:
-            return small
-        return f"{small} up to {percent * (third + 1) / LEVELS:.0f} %, {large} up to {percent:.0f} %"
+        each = {i: min(names, key=lambda n: _or_inf(lines[n][i])) for i in known}
+        first, last = each[known[0]], each[known[-1]]
+        if first == last:
+            return first
+        until = next(i for i in known if each[i] != first)
+        return f"{first} up to {percent * until / LEVELS:.0f} %, {last} at {percent * (known[-1] + 1) / LEVELS:.0f} %"
 
+    known = [i for i in range(LEVELS) if any(math.isfinite(y[i]) for y in lines.values())]
+    if not known:
+        return "Too few cases to choose by."
     said = f"Least error: {best(list(lines))}"
     compensated = [n for n in lines if n.startswith(("FF-", "FB-"))]
     return (
@@ -175,7 +178,12 @@ def _tornado(stem: Path, folder: Path, sweep: Sweep, run: PlannedRun) -> Path:
     what, unit = named(sweep.metrics[0])
     drawn, values = _columns(folder, sweep, run)
     names = [n for n in sweep.drawn.names if n != LEVEL]
-    pairs = influences([c for n, c in zip(sweep.drawn.names, drawn) if n != LEVEL], values)
+    columns = [c for n, c in zip(sweep.drawn.names, drawn) if n != LEVEL]
+    if sweep.drawn.nested:
+        # Within the range that its case drew; else its ends would stand for much uncertainty in all of the others.
+        middles = [0.5 * (s.low + s.high) for s in sweep.drawn.spreads]
+        columns = [(c - m) / drawn[-1] for c, m in zip(columns, middles)]
+    pairs = influences(columns, values)
     known = values[np.isfinite(values)]
     middle = float(np.median(known)) if known.size else math.nan
     order = sorted(range(len(pairs)), key=lambda i: -max(abs(x - middle) for x in pairs[i]))
