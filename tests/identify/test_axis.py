@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from stickslip import law_names
-from stickslip.errors import InputError, ParameterError
+from stickslip.errors import InputError, ParameterError, UnknownName
+from stickslip.identify.axis import identify_axis
 from stickslip.identify.axis_inverse import correlation_lags, inverse_dynamics
 from stickslip.identify.axis_output import Extras, output_error
 from stickslip.identify.axis_start import dimensions, starts
@@ -174,3 +175,17 @@ def test_position_dependent_torque_is_found() -> None:
     found = output_error([trial], AXIS, law("coulomb"), first, extras=Extras(harmonics=1))
     # There is none: its amplitude is within what noise makes.
     assert math.hypot(found.fit.values["cos[0]"], found.fit.values["sin[0]"]) < 0.05 * cases.FC
+
+
+def test_intervals_of_the_prediction_error_hold_the_truth() -> None:
+    trial = cases.trial("coulomb", noise=2e-3)
+    found = identify_axis([trial], AXIS, ["coulomb"], intervals="prediction")
+    for name, truth in (("inertia", cases.INERTIA), ("fc", cases.FC), ("sigma2", cases.SIGMA2)):
+        e = found[name]
+        width = e.upper - e.lower
+        # Two widths: an interval of 95 % that fails here is wrong, not unlucky.
+        assert e.lower - width < truth < e.upper + width
+    assert found.model is not None
+    assert found.model.parameters.fc == found["fc"].value
+    with pytest.raises(UnknownName, match="source of intervals"):
+        identify_axis([trial], AXIS, ["coulomb"], intervals="guess")

@@ -56,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
             "stribeck",
             "--loop",
             LOOP,
+            "--intervals",
+            "prediction",
             "--out",
             str(args.out),
         ],

@@ -33,6 +33,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 AUTOMATIC = ("coulomb", "stribeck", "lugre")
 """Laws among which the held-out error chooses where none is named."""
 MISSING = "Not identified:"
+NARROW = "Intervals come from the covariance of the output error:"
 INTERVALS = ("covariance", "prediction")
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
@@ -272,7 +273,7 @@ def assembled(
         result.estimates,
         result.fit.correlation,
         misfit,
-        (*notes, *missing_note(result.estimates)),
+        (*notes, *narrow_note(result), *missing_note(result.estimates)),
         measure_next=advice(result.estimates, result.problem.law),
         details={
             "mechanics": result.mechanics, "inverse": inverse, "output": result, "candidates": tuple(candidates),
@@ -284,13 +285,23 @@ def assembled(
 def with_prediction(found: Identification, result: PredictionError) -> Identification:
     """The same with law, estimates and intervals of the prediction error; the misfits stay the output error's."""
     estimates = tuple(replace(e, unit=found.details["axis"].unit(e.unit)) for e in result.estimates)
-    kept = [n for n in found.notes if not n.startswith(MISSING)]
+    kept = [n for n in found.notes if not n.startswith((MISSING, NARROW))]
     said = "Values and intervals are the prediction error's; the misfits are those of the output error."
     return replace(
         found, model=result.model, estimates=estimates, correlation=result.correlation(),
         notes=(*kept, said, *missing_note(estimates)), measure_next=advice(estimates, result.model.law),
         details={**found.details, "mechanics": result.mechanics, "prediction": result},
     )  # fmt: skip
+
+
+def narrow_note(result: OutputError) -> tuple[str, ...]:
+    """That the intervals are too narrow where the law has a velocity of its own that only break-away tells."""
+    if result.problem.law.velocity_scale is None or any(t.drive is None for t in result.problem.trials):
+        return ()
+    return (
+        f"{NARROW} too narrow for what only slow motion and break-away tell, such as a Stribeck velocity; "
+        "--intervals prediction gives honest ones.",
+    )
 
 
 def missing_note(estimates: Sequence[Estimate]) -> tuple[str, ...]:
