@@ -100,8 +100,10 @@ def test_pendulum_and_cogging_are_separated_from_friction() -> None:
 
 
 def test_held_out_rows_are_simulated_but_not_fitted() -> None:
-    early, late = cases.trial("coulomb").split(0.3)
-    assert early.rows.sum() + late.rows.sum() == early.time.size
+    whole = cases.trial("coulomb")
+    early, late = whole.split(0.3)
+    assert early.rows.sum() + late.rows.sum() == late.time.size == whole.time.size
+    assert early.time[-1] < late.time[late.rows][0]
     found = output_error([early], AXIS, law("coulomb"), inverse_dynamics([early], AXIS))
     held_out = found.held_out([late])
     assert held_out["drive_relative"] == pytest.approx(found.errors["drive_relative"], rel=0.5)

@@ -16,9 +16,9 @@ import numpy as np
 from stickslip import plugins
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics
-from stickslip.identify.axis_output import Extras, OutputError, output_error
+from stickslip.identify.axis_output import OutputError, output_error
 from stickslip.identify.axis_prediction import axis_prediction
-from stickslip.identify.axis_problem import measured
+from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, fitted_axis
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.prediction_error import PredictionError
@@ -120,7 +120,7 @@ def identify_axis(
         raise UnknownName("source of intervals", intervals, INTERVALS)
     found = [plugins.law(x) if isinstance(x, str) else x for x in laws]
     options: dict[str, Any] = {
-        "free": free, "frozen": frozen, "values": values, "extras": extras, "robust": robust, "profiles": profiles
+        "free": free, "frozen": frozen, "values": values, "extras": extras, "robust": robust
     }  # fmt: skip
     inverse, notes = first_look(trials, axis, extras, per_direction)
     candidates: list[Candidate] = []
@@ -134,7 +134,7 @@ def identify_axis(
         chosen = found[place]
         options["values"] = candidates[place].start
         notes = [*notes, sentence_on(candidates, chosen.name)]
-    result = output_error(trials, axis, chosen, inverse, **options)
+    result = output_error(trials, axis, chosen, inverse, profiles=profiles, **options)
     found_axis = assembled(result, inverse, validation, candidates, notes)
     if intervals == "covariance":
         return found_axis
@@ -188,43 +188,38 @@ def compared(
             if k in names or k not in all_names
         }
         try:
-            result = output_error(fitted, axis, law, inverse, **own)
+            result = fitted_axis(fitted, axis, law, inverse, **own)
         except InputError as error:
             out.append(Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), {}, str(error)))
             continue
         weights = weights or result.problem.weights
-        misfits = misfits_on(result, held)
+        misfits = result.misfits(held)
         size = np.array([weights[s] for s in result.problem.signals])
         squares = np.concatenate([np.sum((m / size) ** 2, axis=1) for m in misfits])
         score = np.array([float(np.mean(part)) for part in np.array_split(squares, BLOCKS)])
         out.append(
-            Candidate(law.name, result.fit.vector.size, result.held_out(held), score, fitted_values(result))
+            Candidate(
+                law.name,
+                result.problem.vector.size,
+                errors_of(held, result.problem.signals, misfits),
+                score,
+                fitted_values(result),
+            )
         )
     if all(c.failure for c in out):
         raise InputError("; ".join(c.failure for c in out))
     return out
 
 
-def fitted_values(result: OutputError) -> dict[str, Any]:
+def fitted_values(result: FittedAxis) -> dict[str, Any]:
     """Every value of a fit, those of elements as lists."""
     plain = {
         k: v
-        for k, v in result.fit.values.items()
+        for k, v in result.problem.vector.named(result.u).items()
         if "[" not in k or k.startswith(("cos", "sin", "friction_"))
     }
     law = result.model.as_dict()
     return plain | {f.name: law[f.name] for f in result.problem.law.fields}
-
-
-def misfits_on(result: OutputError, held: Sequence[Trial]) -> list[Array]:
-    """Simulated minus measured signals of held-out records."""
-    runs = result.simulated(held)
-    return [
-        np.column_stack(
-            [run[:, {"position": 0, "drive": 2}[s]] - measured(t, s) for s in result.problem.signals]
-        )[t.rows]
-        for run, t in zip(runs, held, strict=True)
-    ]
 
 
 def chosen_of(candidates: Sequence[Candidate]) -> int:

@@ -144,14 +144,31 @@ def starts(
                 part * travel / own_length,
                 share * speed / max(own_velocity, 1e-12),
             )
-            values.update(known)
             try:
+                values |= viscous_ones(Model(law, **values), viscous, 3.0 * speed) | known
                 model = Model(law, **values)
                 out.append(steady_fit(model, v, curve, list(known)) if law.steady else model)
             except ParameterError:
                 continue
     if not out:
         raise InputError(f"{law.name}: its example cannot be carried over to this axis; give starting values")
+    return out
+
+
+def viscous_ones(model: Model, viscous: float, v: float) -> dict[str, float]:
+    """The parameters that are slopes of the steady torque over the velocity, and the slope that was found; none for 0.
+
+    Left to the fit of the curve, a Stribeck effect that rises would take the slope over.
+    """
+    law, p, out = model.law, model.parameters, dict[str, float]()
+    for f in law.fields:
+        if law.steady is None or viscous <= 0.0 or f.per_element or dimensions_of(f.par.unit) != (1, -1, 1):
+            continue
+        value = float(getattr(p, f.name))
+        more = max(abs(value), viscous)
+        rise = law.steady(v, p._replace(**{f.name: value + more})) - law.steady(v, p)
+        if abs(rise - more * v) <= 1e-6 * more * v:
+            out[f.name] = viscous
     return out
 
 
@@ -183,7 +200,7 @@ def length_of(law: Law, p: Any, torque: float) -> float:
 def steady_fit(model: Model, v: Array, curve: Array, held: Sequence[str]) -> Model:
     """The model with its steady torque fitted to a curve; what the curve does not tell stays near where it was."""
     law = model.law
-    names = [f.name for f in law.fields if not f.per_element and dimensions_or_none(f.par.unit)]
+    names = [f.name for f in law.fields if not f.per_element and dimensions_of(f.par.unit) is not None]
     if law.steady is None or not names:
         return model
     frozen = [f.name for f in law.fields if f.name not in names or f.name in (*held, *frozen_by_default(law))]
@@ -205,10 +222,9 @@ def steady_fit(model: Model, v: Array, curve: Array, held: Sequence[str]) -> Mod
     return model if p is None else Model(law, **p._asdict())
 
 
-def dimensions_or_none(unit: str) -> bool:
-    """Whether a unit is one that the dimensional analysis reads."""
+def dimensions_of(unit: str) -> tuple[int, int, int] | None:
+    """As `dimensions`; None for a unit that it does not read."""
     try:
-        dimensions(unit)
+        return dimensions(unit)
     except InputError:
-        return False
-    return True
+        return None

@@ -132,10 +132,17 @@ class Trial:
         return float(line[0]), float(line[1])
 
     def split(self, share: float) -> tuple[Trial, Trial]:
-        """This trial fitted on its first part, and the same trial looked at in the last `share` of its time."""
+        """The first part of this trial, and the whole of it looked at in the last `share` of its time."""
         border = self.time[0] + (1.0 - share) * (self.time[-1] - self.time[0])
         early = self.time < border
-        return replace(self, used=self.rows & early), replace(self, used=self.rows & ~early)
+        return self.until(int(np.sum(early))), replace(self, used=self.rows & ~early)
+
+    def until(self, rows: int) -> Trial:
+        """Its first rows, at least as many as a trial needs."""
+        end = max(rows, FEWEST)
+        arrays = ("time", "position", "drive", "reference", "supply", "used")
+        cut = {n: None if (a := getattr(self, n)) is None else a[:end] for n in arrays}
+        return replace(self, **cut)
 
 
 def trial_of(

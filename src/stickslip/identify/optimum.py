@@ -170,6 +170,13 @@ class Quadratic:
         left, sizes, right = np.linalg.svd(both[:, :-1], full_matrices=False)
         return Quadratic(sizes, right, left.T @ both[:, -1])
 
+    @staticmethod
+    def normal(scaled_jacobian: Array, r: Array) -> Quadratic:
+        """From the normal equations: half the digits at a tenth of the time, enough for an inexact Jacobian."""
+        values, vectors = np.linalg.eigh(scaled_jacobian.T @ scaled_jacobian)
+        sizes = np.sqrt(np.maximum(values, 1e-16 * max(float(values[-1]), 1e-300)))
+        return Quadratic(sizes, vectors.T, vectors.T @ (scaled_jacobian.T @ r) / sizes)
+
     def step(self, damping: float) -> Array:
         """The damped step, in scaled coordinates."""
         return -(self.right.T @ (self.sizes * self.pull / (self.sizes**2 + damping)))
@@ -194,12 +201,16 @@ class Step:
 def downhill(
     residuals: Residuals, u: Array, cost: float, model: Quadratic, places: Sequence[int], scale: Array,
     damping: float, lower: Array, upper: Array, tolerance: float, tries: int = MOST_TRIES,
+    longest: float = math.inf,
 ) -> Step:  # fmt: skip
-    """The first step that lowers the cost, damped more with every failure; the last failure where none does."""
+    """The first step that lowers the cost, damped more with every failure; the last failure where none does.
+
+    No coordinate goes farther than `longest`.
+    """
     growth, tried = 2.0, 0
     while True:
         trial = u.copy()
-        trial[places] += model.step(damping) / scale
+        trial[places] += np.clip(model.step(damping) / scale, -longest, longest)
         trial = np.clip(trial, lower, upper)
         r = residuals(trial)
         new, expected = cost_of(r), model.expected(damping)

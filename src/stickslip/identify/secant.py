@@ -19,19 +19,24 @@ __all__ = ["descend_by_secants", "forward_differences"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-TRIES = 3
+TRIES = 2
 """Damped steps that may fail on a Jacobian kept by secants before it is taken anew."""
+
+WIDTH, NARROWEST = 3.0, 1e-3
+"""Differences are as wide as changes the residuals by so many of their root mean squares in all, so that what is
+rough below that does not matter; and at least this part of the widest."""
+LONGEST = 0.5
+"""Change of a coordinate in one step: beyond a factor of 1.6 a linear model of a simulation says little."""
 
 
 def forward_differences(
-    residuals: Residuals, u: Array, r: Array, lower: Array, upper: Array, difference: float = STEP
+    residuals: Residuals, u: Array, r: Array, lower: Array, upper: Array, widths: Array
 ) -> Array:
     """Jacobian at u, where the residuals are r, by one-sided differences inside the bounds, shape (n, p)."""
     jacobian = np.zeros((r.size, u.size))
     for i in range(u.size):
-        h = difference * max(1.0, abs(float(u[i])))
         there = u.copy()
-        there[i] = u[i] + h if u[i] + h <= upper[i] else max(u[i] - h, lower[i])
+        there[i] = u[i] + widths[i] if u[i] + widths[i] <= upper[i] else max(u[i] - widths[i], lower[i])
         width = float(there[i] - u[i])
         if width != 0.0:
             jacobian[:, i] = (residuals(there) - r) / width
@@ -63,7 +68,7 @@ def descend_by_secants(
     tolerance : float
         Relative decrease of the sum of squares below which it ends, on a fresh Jacobian.
     difference : float
-        Of coordinates, for the Jacobian; relative above 1.
+        Of coordinates, for the first Jacobian; relative above 1. Later ones are narrower where that tells enough.
 
     Returns
     -------
@@ -117,9 +122,11 @@ class Secants:
 
     def refresh(self) -> None:
         """Take the Jacobian anew."""
-        self.jacobian = forward_differences(
-            self.residuals, self.u, self.r, self.lower, self.upper, self.difference
-        )
+        widths = self.difference * np.maximum(1.0, np.abs(self.u))
+        if self.scale.any():
+            known = WIDTH * math.sqrt(self.cost / self.r.size) / np.maximum(self.scale, 1e-300)
+            widths = np.clip(known, NARROWEST * widths, widths)
+        self.jacobian = forward_differences(self.residuals, self.u, self.r, self.lower, self.upper, widths)
         self.spent, self.fresh = self.spent + self.u.size, True
         self.scale = np.maximum(self.scale, np.linalg.norm(self.jacobian, axis=0))
 
@@ -130,10 +137,10 @@ class Secants:
         places = np.flatnonzero((self.scale > 0.0) & ~blocked)
         if not places.size:
             return 0.0
-        model = Quadratic.of(self.jacobian[:, places] / self.scale[places], self.r)
+        model = Quadratic.normal(self.jacobian[:, places] / self.scale[places], self.r)
         there = downhill(
             self.residuals, self.u, self.cost, model, places.tolist(), self.scale[places], self.damping, self.lower,
-            self.upper, tolerance, MOST_TRIES if self.fresh else TRIES,
+            self.upper, tolerance, MOST_TRIES if self.fresh else TRIES, LONGEST,
         )  # fmt: skip
         self.spent += there.evaluations
         gain = self.cost - there.cost
