@@ -167,7 +167,7 @@ def fitted_axis(
 def rows_until(trial: Trial, part: float) -> int:
     """Rows in which a part of the whole way is travelled."""
     way: Array = np.cumsum(np.abs(np.diff(trial.position)))
-    return int(np.searchsorted(way, part * way[-1])) + 2
+    return int(np.sum(way < part * float(way[-1]))) + 2
 
 
 def descended(
