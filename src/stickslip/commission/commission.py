@@ -42,7 +42,7 @@ __all__ = ["VELOCITIES", "Commissioned", "Stage", "commission", "planned"]
 
 VELOCITIES = (25.0, 18.0, 10.0, 5.0, 3.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.06, 0.04, 0.02)
 """rad/s; those that the rig can run at are taken."""
-BELOW, BEYOND = 0.55, 1.25
+BELOW, BEYOND = 0.6, 1.25
 """Of the break-away torque: amplitudes that stick, and that slip."""
 FASTEST, LAG = 1e4, 5e-3
 """N·m/s up to which C is looked for, and the lag in s that stands in where none overshoots."""
@@ -132,6 +132,7 @@ def commission(
     velocities: tuple[float, ...] = VELOCITIES,
     duration: float = 60.0,
     interval: float = 10.0,
+    lugre_too: bool = True,
     without_watchdog: bool = False,
 ) -> Commissioned:
     """Commission a rig.
@@ -149,6 +150,8 @@ def commission(
         Of each part of the inertia stage, s.
     interval : float
         Between the angles of the break-away stage, degrees.
+    lugre_too : bool
+        Whether LuGre's dynamics are identified as well, from a stick-slip response: the longest of the computations.
     without_watchdog : bool
         Arm a rig that declares no watchdog.
 
@@ -163,7 +166,7 @@ def commission(
     sliding, curve = _sliding(course, j, fs, tuple(v for v in velocities if v <= 1.05 * top))
     stuck = _presliding(course, fs, sliding)
     _attraction(course, j)
-    lugre = _stickslip(course, j, fs, sliding)
+    lugre = _stickslip(course, j, fs, sliding) if lugre_too else None
     return _joined(course, j, curve, stuck, lugre)
 
 
@@ -191,9 +194,9 @@ def _sliding(
     course: _Course, j: float, fs: float, velocities: tuple[float, ...]
 ) -> tuple[Mapping[str, float], Identification]:
     """A Stribeck curve for the methods that need one, and the best curve."""
-    if len(velocities) < 3:
+    if len(velocities) < 5:
         raise InputError(
-            f"sliding: the rig runs at {velocities} only of the velocities asked for; give slower ones"
+            f"sliding: the rig runs at {velocities} only of the velocities asked for; give five slower ones"
         )
     done = course.run(Sliding(velocities=velocities, inertia=j), insist=False)
     points, notes = moving(done.record)
@@ -262,7 +265,7 @@ def _stickslip(course: _Course, j: float, fs: float, sliding: Mapping[str, float
     amplitude = BEYOND * max(fs, sliding["fs"], sliding["fc"])
     for _ in range(5):
         try:
-            done = course.run(Stickslip(amplitude=amplitude), insist=False)
+            done = course.run(Stickslip(amplitude=amplitude, cycles=2.0), insist=False)
         except LimitCrossed:
             amplitude *= 0.93
             continue

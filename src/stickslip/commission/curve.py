@@ -34,8 +34,8 @@ def moving(record: Record) -> tuple[SlidingPoints, list[str]]:
     by_speed: dict[float, list[float]] = {}
     for s in slid:
         by_speed.setdefault(float(f"{abs(s.velocity):.2g}"), []).append(math.copysign(s.torque, 1.0))
-    if len(by_speed) < 3:
-        raise InputError("sliding: the axis slid steadily at fewer than 3 speeds; run it faster")
+    if len(by_speed) < 4:
+        raise InputError("sliding: the axis slid steadily at fewer than 4 speeds; run it faster")
     speeds = np.array(sorted(by_speed))
     torque = np.array([float(np.mean(by_speed[v])) for v in speeds.tolist()])
     notes = [f"{len(slid)} runs at {speeds.size} speeds, mean of both directions."]
@@ -67,16 +67,25 @@ def fitted_curve(
         "gms", {}, **ELEMENTS, fs=float(points.torque[0]), fc=level, vs=0.1, delta_s=1.0, sigma2=0.01
     )
     plain = identify_sliding(points, stribeck, starts=20)
-    assert plain.model is not None
-    p: Any = plain.model.parameters
-    simple = {n: float(getattr(p, n)) for n in ("fs", "fc", "vs", "delta_s", "sigma2")}
     best = plain
     if error(plain, slid) > CLOSE:
         templates = {"stribeck": stribeck, **_flexible(level, fast)}
         _, best, _ = choose_sliding(points, templates, starts=20)
     if best.model is None or error(best, slid) > CLOSE:
         best = _table(slid, fs, best)
-    return simple, dataclasses.replace(best, notes=(*notes, *best.notes))
+    return simple(slid, fs), dataclasses.replace(best, notes=(*notes, *best.notes))
+
+
+def simple(slid: SlidingPoints, fs: float) -> dict[str, float]:
+    """Break-away, Coulomb and viscous torque, joined at the slowest speed: a curve that every method takes."""
+    slope, level = np.polyfit(slid.velocity, slid.torque, 1, w=1.0 / np.sqrt(slid.velocity)).tolist()
+    return {
+        "fs": fs,
+        "fc": float(level),
+        "vs": float(slid.velocity[0]),
+        "delta_s": 2.0,
+        "sigma2": max(float(slope), 0.0),
+    }
 
 
 def _flexible(level: float, fast: float) -> dict[str, Model]:

@@ -30,6 +30,9 @@ Rows = np.ndarray[Any, np.dtype[np.intp]]
 
 OFFSET = Par("N·m", "T_0", "torque that acts besides friction")
 
+ELASTIC = 0.95
+"""Correlation of torque and displacement above which a loop is nearly elastic."""
+
 
 @dataclass(frozen=True, eq=False)
 class Loop:
@@ -67,7 +70,8 @@ class Loop:
 
     def righted(self) -> tuple[Loop, tuple[str, ...]]:
         """This loop, or with the torque's sign changed where it would feed energy in; and a note that says so."""
-        if self.work >= 0.0:
+        # A loop that is nearly elastic does no work to speak of: there the sign of its stiffness decides.
+        if self.work >= 0.0 or float(np.corrcoef(self.position, self.torque)[0, 1]) > ELASTIC:
             return self, ()
         note = "The torque does work with the motion, which friction cannot: its sign was changed."
         return replace(self, torque=-self.torque), (note,)

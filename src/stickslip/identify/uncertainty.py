@@ -175,7 +175,8 @@ def covariance_of(vector: Vector, best: Optimum, noise: Noise, lags: int) -> tup
         for j in range(change.shape[0]):
             used = np.outer(change[i], change[j]) != 0.0
             covariance[i, j] = float(np.sum(np.where(used, np.outer(change[i], change[j]) * spread, 0.0)))
-    std = np.sqrt(np.diag(covariance))
+    variance = np.diag(covariance)  # where one is negative, rounding decides
+    std = np.sqrt(np.where(variance >= 0.0, variance, np.nan))
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance / np.outer(std, std)
     return covariance, correlation

@@ -82,7 +82,8 @@ class Breakaway(Procedure):
                     setpoints(count, torque=direction * ramp), travel=self.travel, keep=True,
                     label=f"{math.degrees(goal - origin):.0f} degrees {'+' if direction > 0 else '-'}",
                 )  # fmt: skip
-                rows = yield Step(setpoints(round(0.15 / dt)), keep=True)
+                # It springs back when the torque goes, which is no break-away: not kept.
+                rows = yield Step(setpoints(round(0.15 / dt)))
 
     def finished(self, record: Record) -> Record:
         """As it is: without the loop's velocity, whose single counts would hide rest."""

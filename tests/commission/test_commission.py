@@ -1,0 +1,98 @@
+"""Commissioning knows nothing of the machine and recovers what was put in."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip.commission.commission import commission
+from stickslip.identify.segments import constant_velocity_segments
+from stickslip.machines.contact import Contact
+from stickslip.machines.encoder import Encoder
+from stickslip.machines.machine import Machine, machine
+from stickslip.machines.motor import Amplifier, Harmonics
+from stickslip.model import Model
+from stickslip.rigs.virtual import VirtualRig
+
+OTHER = Machine(
+    "other",
+    1.3e-3,
+    Contact(
+        Model(
+            "gms",
+            k=[900.0, 300.0],
+            alpha=[0.5, 0.5],
+            c=60.0,
+            fs=0.5,
+            fc=0.42,
+            vs=0.05,
+            delta_s=1.5,
+            sigma2=0.01,
+        ),
+        Harmonics((1.0, 4.0), (0.08, 0.04), (0.3, 1.1)),
+    ),
+    amplifier=Amplifier(0.5, 8.0, 800.0, current_noise=0.003, monitor_noise=0.004),
+    encoder=Encoder(400000.0, 2e-6, 60.0),
+    limits={"torque": 3.0, "following_error": 1.0},
+    seed=5,
+)
+"""A rigid machine that is not in the library: three times the inertia, another motor, encoder and friction."""
+
+
+def mean_truth(m, record):
+    """Speed and mean torque of both directions: averaged over the angle and over the record's own time and warmth."""
+    clutch, bearings, drift, heat = m.clutch, m.contact.bearings, m.contact.drift, m.contact.heat
+    found = {}
+    for s in constant_velocity_segments(record):
+        rows = (record.time >= s.start) & (record.time <= s.end)
+        factor = 1.0 - drift.change * np.expm1(-record.time[rows] / drift.time)
+        factor = factor * np.exp(heat.coefficient * (record["temperature"][rows] - heat.reference))
+        friction = abs(clutch.law.steady(s.velocity, clutch.parameters)) * factor.mean()
+        friction += bearings.coulomb + bearings.viscous * abs(s.velocity)
+        found.setdefault(float(f"{abs(s.velocity):.2g}"), []).append(friction)
+    return {v: float(np.mean(t)) for v, t in found.items()}
+
+
+def held_to_the_bars(m, done):
+    """J within 3 %, the curve within 3 %, stiffness within 10 %, the map of break-away correlated above 0.9."""
+    assert done.inertia == pytest.approx(m.inertia, rel=0.03)
+    assert done.stiffness == pytest.approx(m.visible_stiffness, rel=0.10)
+    truth = mean_truth(m, done.stage("sliding").performed.record)
+    assert len(truth) >= 3
+    for v, torque in truth.items():
+        assert done.model.law.steady(v, done.model.parameters) == pytest.approx(torque, rel=0.03), v
+    breaks = done.stage("breakaway").found.details["breaks"]
+    for direction in (1, -1):
+        near = [b for b in breaks if b.direction == direction]
+        level = abs(m.clutch.law.steady(direction * 1e-6, m.clutch.parameters))
+        true = [
+            level * (1.0 + m.contact.ripple.at(b.angle)) - direction * m.cogging.at(b.angle) for b in near
+        ]
+        assert np.corrcoef(true, [b.torque for b in near])[0, 1] > 0.9
+
+
+def test_a_machine_that_is_not_in_the_library(tmp_path):
+    done = commission(
+        VirtualRig(OTHER),
+        folder=tmp_path,
+        velocities=(5.0, 3.0, 1.0, 0.5, 0.2),
+        duration=25.0,
+        interval=30.0,
+        lugre_too=False,
+    )
+    held_to_the_bars(OTHER, done)
+    assert {p.stem for p in tmp_path.glob("*.npz")} == {
+        "inertia", "breakaway", "sliding", "presliding", "attraction"
+    }  # fmt: skip
+    assert "as the encoder sees it" in done.result.notes[0] or "at the encoder" in done.result.notes[0]
+    assert math.isfinite(done.model.parameters.c)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["thesis-dry", "thesis-grease"])
+def test_the_thesis_machines(name):
+    m = replace(machine(name), seed=11)
+    held_to_the_bars(m, commission(VirtualRig(m), lugre_too=False))
