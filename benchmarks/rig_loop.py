@@ -20,6 +20,7 @@ from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.machine import machine
+from stickslip.record import Record
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Capabilities, setpoints
 from stickslip.rigs.virtual import VirtualRig
@@ -62,6 +63,8 @@ def main() -> None:
         print(*account.lines(), f"granted: {', '.join(account.granted)}", sep="\n")
         for kind in (VirtualRig, OneByOne):
             path = Path(folder) / f"{kind.__name__}.stream"
+            with Loop(kind(plant)) as loop:
+                loop.run(wanted[:100], controller)  # compiles
             with Loop(kind(plant), path=path) as loop:
                 loop.prepare(controller)
                 begin = time.perf_counter()
@@ -69,6 +72,9 @@ def main() -> None:
                 took = time.perf_counter() - begin
             way = "blocks" if kind is VirtualRig else "exchange"
             print(f"{way}: {t.size / took:,.0f} samples/s, {args.seconds / took:.0f} times real time")
+        a, b = (Record.load(Path(folder) / f"{kind.__name__}.stream") for kind in (VirtualRig, OneByOne))
+        same = np.array_equal(a.time, b.time) and all(np.array_equal(a[n], b[n]) for n in a.channels)
+        print(f"records of both: {'identical, bit for bit' if same else 'DIFFERENT'}")
 
 
 if __name__ == "__main__":
