@@ -81,4 +81,11 @@ def check(job: Job, export: Export) -> Check:
     return Check(ran.returncode == 0, f"g++: at most {error:.3g} N·m off the definition", {"g++": error})
 
 
-TARGET = Target("arduino", "Arduino library, single precision", write, check, controller=True)
+TARGET = Target(
+    "arduino",
+    "Arduino library, single precision",
+    write,
+    check,
+    controller=True,
+    tried="g++ and arm-none-eabi-g++; not on a board",
+)

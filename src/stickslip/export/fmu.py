@@ -101,4 +101,10 @@ def check(job: Job, export: Export) -> Check:
     return Check(worst == 0.0, f"FMPy: valid; at most {worst:.3g} N·m off the definition", errors)
 
 
-TARGET = Target("fmu", "FMI 2.0 and 3.0 co-simulation unit of a contact that is moved", write, check)
+TARGET = Target(
+    "fmu",
+    "FMI 2.0 and 3.0 co-simulation unit of a contact that is moved",
+    write,
+    check,
+    tried="FMPy: every bit; libcosim (FMI 2.0); FMU manipulation toolbox",
+)

@@ -143,4 +143,5 @@ TARGET = Target(
     write,
     check,
     settings=(Setting("inertia", None, "inertia of the axis, kg·m²", lower=1e-15),),
+    tried="FMPy: the motion of `drive_axis` to the bit; FMU manipulation toolbox",
 )

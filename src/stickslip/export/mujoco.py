@@ -215,4 +215,5 @@ TARGET = Target(
         Setting("joint", "joint", "name of the joint"),
         Setting("contact", "identified", "identified, or held: no stiffer than the timestep holds at rest"),
     ),
+    tried="MuJoCo 4.0",
 )
