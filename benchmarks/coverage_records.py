@@ -99,8 +99,11 @@ def law_of(rng: np.random.Generator, family: str, inertia: float, sliding: Mappi
     return Model(family, fc=fc, sigma2=sigma2, sigma0=fc / log_uniform(rng, 1e-4, 1e-3))
 
 
-def make(seed: int, family: str = "") -> Case:
-    """The record of a seed; its family goes round with the seed unless it is given."""
+def make(seed: int, family: str = "", *, repeat: int = 0, coulomb: float = 1.0) -> Case:
+    """The record of a seed; its family goes round with the seed unless it is given.
+
+    Another `repeat` is the same motion of the same axis with other noise; `coulomb` is a factor on its Coulomb torque.
+    """
     rng = np.random.default_rng([2026, seed])
     family = family or FAMILIES[seed % len(FAMILIES)]
     inertia, fc = log_uniform(rng, 3e-4, 5e-3), log_uniform(rng, 0.1, 0.6)
@@ -113,6 +116,8 @@ def make(seed: int, family: str = "") -> Case:
     }
     offset = fc * rng.uniform(-0.1, 0.1)
     friction = law_of(rng, family, inertia, sliding)
+    if coulomb != 1.0:
+        friction = Model(friction.law, **{**friction.parameters._asdict(), "fc": coulomb * fc})
     levels = np.geomspace(vs * log_uniform(rng, 0.15, 2.0), top, int(rng.integers(6, 10)))
     velocity = programme(
         rng.permutation(levels), rng.uniform(0.4, 0.9, levels.size), fc * rng.uniform(0.5, 2.0) / inertia,
@@ -122,6 +127,8 @@ def make(seed: int, family: str = "") -> Case:
     time = PERIOD * np.arange(position.size)
     gains = place(("PD", "PID")[int(rng.integers(2))], inertia, rng.uniform(10.0, 25.0), 1.0)
     count = 2.0 * math.pi / float(rng.choice(COUNTS))
+    if repeat:
+        rng = np.random.default_rng([2026, seed, repeat])
     disturbance = coloured(rng, time.size, fc * rng.uniform(0.005, 0.02), log_uniform(rng, 2e-3, 3e-2))
     noise = coloured(rng, time.size, fc * rng.uniform(0.003, 0.01), log_uniform(rng, 1e-3, 5e-3))
     out = drive_axis(

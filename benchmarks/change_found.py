@@ -1,0 +1,73 @@
+"""Does `stickslip compare` call a change only where there is one, and find 10 % of Coulomb friction?
+
+Every axis of `coverage_records.py` is recorded twice as it is, with other noise, and once with its Coulomb torque
+raised; the records are identified by the prediction error and compared.
+
+    python benchmarks/change_found.py [--records 40] [--first 0] [--jobs 2]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+sys.path.insert(0, str(Path(__file__).parent))
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+from coverage_records import make  # noqa: E402
+from stickslip.errors import StickslipError  # noqa: E402
+from stickslip.identify.axis import identify_axis  # noqa: E402
+from stickslip.identify.axis_trial import trial_of  # noqa: E402
+from stickslip.identify.drift import compare_models  # noqa: E402
+from stickslip.identify.identified_file import read_identified  # noqa: E402
+from stickslip.identify.model_file import write_model  # noqa: E402
+from stickslip.machines.servo import ServoAxis  # noqa: E402
+
+RAISED = 1.1
+
+
+def study(seed: int) -> tuple[bool, bool] | None:
+    """Whether a change is called between two records of one axis, and after the Coulomb torque rose."""
+    axis = ServoAxis(drive_side="load")
+    cases = [make(seed), make(seed, repeat=1), make(seed, repeat=2, coulomb=RAISED)]
+    with TemporaryDirectory() as folder:
+        found: list[Path] = []
+        for i, case in enumerate(cases):
+            try:
+                result = identify_axis(
+                    [trial_of(case.record, axis)], axis, [case.model.law], intervals="prediction"
+                )
+            except StickslipError as error:
+                print(f"seed {seed} ({case.family}): {error}", file=sys.stderr)
+                return None
+            found.append(write_model(Path(folder) / f"{i}.toml", result, data=[], law=case.family))
+        first, again, raised = (read_identified(path) for path in found)
+        return compare_models(first, again).changed, compare_models(first, raised).changed
+
+
+def main() -> int:
+    """Count."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--records", type=int, default=40, help="axes, each recorded three times")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    options = parser.parse_args()
+    alarms, hits, count = 0, 0, 0
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for found in pool.map(study, range(options.first, options.first + options.records)):
+            if found is None:
+                continue
+            count, alarms, hits = count + 1, alarms + found[0], hits + found[1]
+            print(f"{count} axes: {alarms} false alarms, {hits} rises of {RAISED - 1:.0%} found", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
