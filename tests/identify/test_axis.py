@@ -97,6 +97,10 @@ def test_pendulum_and_cogging_are_separated_from_friction() -> None:
     assert found.fit.values["gravity"] == pytest.approx(0.2, rel=0.02)
     assert found.fit.values["gravity_angle"] == pytest.approx(0.1, abs=0.02)
     assert found.fit.values["inertia"] == pytest.approx(2e-3, rel=0.03)
+    angle = next(e for e in found.estimates if e.name == "gravity_angle")
+    # A phase has no relative width: 5 % of a radian, whatever the friction is.
+    assert angle.identified == (0.5 * (angle.upper - angle.lower) <= 0.05)
+    assert angle.identified
 
 
 def test_held_out_rows_are_simulated_but_not_fitted() -> None:

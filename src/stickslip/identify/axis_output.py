@@ -121,14 +121,22 @@ def judged(found: FittedAxis, profiles: bool = False) -> OutputError:
     lags = width * max(correlation_lags(residual[:, i]) for i in range(width)) + width - 1
     result = fit(
         problem.residuals, problem.vector, starts=u[None, :], profiles=profiles, lags=lags, tolerance=TOLERANCE,
-        signed_scale=scale_of(problem, u),
+        signed_scale=scales_of(problem, u),
     )  # fmt: skip
     misfits = problem.misfits(result.u)
     assert misfits is not None
     return OutputError(problem, result.u, result, errors_of(problem.trials, problem.signals, misfits))
 
 
-def scale_of(problem: Problem, u: Array) -> float:
-    """Torque that signed parameters are compared with: the law's own at slow motion, N·m."""
+def scales_of(problem: Problem, u: Array) -> dict[str, float]:
+    """What the half-width of each signed parameter is compared with.
+
+    Torques with the law's own at slow motion; an angle has no relative width, and is compared with a radian (a
+    position on a linear axis with the range travelled), shares with the whole.
+    """
     speeds = np.concatenate([np.abs(np.diff(t.position) / np.diff(t.time)) for t in problem.trials])
-    return level_of(problem.law, problem.model(u).parameters, 0.1 * float(np.sqrt(np.mean(speeds**2))))
+    torque = level_of(problem.law, problem.model(u).parameters, 0.1 * float(np.sqrt(np.mean(speeds**2))))
+    travel = max(float(np.ptp(t.position)) for t in problem.trials)
+    length = 1.0 if problem.axis.motion == "rotary" else travel
+    sizes = {"rad": length, "m": length, "-": 1.0}
+    return {p.name: sizes.get(p.par.unit, torque) for p in problem.vector.free}
