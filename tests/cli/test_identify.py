@@ -183,3 +183,29 @@ def test_what_a_method_lacks_is_one_line(
     complaint = capsys.readouterr().err.strip().splitlines()[-1]
     assert message in complaint
     assert "Traceback" not in complaint
+
+
+def test_break_away_from_ramps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Ramps in both directions up to 0.4 N·m; the axis breaks away at 0.3 and 0.33 N·m."""
+    dt, rate = 1e-3, 0.2
+    torque, position, here = [np.zeros(200)], [np.zeros(200)], 0.0
+    for k in range(8):
+        side, level = (1.0, 0.3) if k % 2 == 0 else (-1.0, 0.33)
+        up = np.arange(0.0, level + 0.02, rate * dt)
+        moved = np.cumsum(np.where(up > level, 2.0, 0.0)) * dt
+        torque += [side * up, np.zeros(400)]
+        position += [here + side * moved, np.full(400, here + side * moved[-1])]
+        here += side * float(moved[-1])
+    table = np.column_stack(
+        [np.zeros(sum(map(len, torque))), np.concatenate(position), np.concatenate(torque)]
+    )
+    table[:, 0] = dt * np.arange(len(table))
+    path = tmp_path / "ramps.csv"
+    np.savetxt(path, table, delimiter=",", comments="", header="time [s],position [rad],motor_torque [N·m]",
+               encoding="utf-8", fmt="%.7f")  # fmt: skip
+    assert main(["identify", str(path), "--method", "breakaway", "--out", str(tmp_path / "o"), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    values = sorted(e["value"] for e in printed["estimates"] if e["unit"] == "N·m")
+    assert any(v == pytest.approx(0.3, abs=0.01) for v in values)
+    assert any(v == pytest.approx(0.33, abs=0.01) for v in values)
+    assert (tmp_path / "o" / "report.html").exists()
