@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from stickslip.analyse.rig_claims import CLAIMS, MAIN, Claim, View, judge
+from stickslip.analyse.rig_claims import CLAIMS, MAIN, WHY, Claim, View, judge
 
 __all__ = ["Judged", "judged_over", "main_share"]
 
@@ -40,10 +40,10 @@ class Judged:
         """Why it does not hold."""
         if self.holds is not False:
             return ""
+        why = WHY.get(self.claim.id, "")
         if not self.turned:
-            return self.claim.why or "No single imperfection decides it."
-        single = f"It holds without {', or without '.join(self.turned)}."
-        return f"{self.claim.why} {single}".strip()
+            return why or "No single imperfection decides it."
+        return f"{why} It holds without {', or without '.join(self.turned)}.".strip()
 
 
 def judged_over(view: View, variants: Sequence[str]) -> list[Judged]:

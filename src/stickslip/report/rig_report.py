@@ -66,21 +66,23 @@ def _drawn(result: RigResult, group: Group, keys: Sequence[str], stem: Path) -> 
 def _panel(result: RigResult, group: Group, names: Sequence[str], note: str) -> Panel:
     start, end = WINDOWS[group.reference]
     curves: list[Curve] = []
+    reference: Curve | None = None
     for name in names:
         record = result.record(f"{group.name}/{name}")
         time = record.time - record.time[0]
         inside = (time >= start) & (time <= end)
         if not np.any(inside):
             continue
-        if not curves:
+        if name == names[-1]:  # over the others
             wanted = 1e3 * record["position_reference"][inside]
-            curves.append(Curve(*envelope(time[inside], wanted), "reference", REFERENCE))
+            reference = Curve(*envelope(time[inside], wanted), "reference", REFERENCE)
         path = 1e3 * record["position"][inside]
         style = style_of("gms10" if name.endswith("gms10") else name, ("gms10",))
         curves.append(
             Curve(*envelope(time[inside], path, 260), name.removeprefix("FF-").removeprefix("FB-"), style)
         )
     travel = 1e3 * {"low": 0.02, "high": 1.0, "step": 0.01}[group.reference]
+    curves += [reference] if reference else []
     return Panel(curves, "position (mrad)", "time (s)", (start, end), (-0.45 * travel, 1.45 * travel), note)
 
 
