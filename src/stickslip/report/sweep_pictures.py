@@ -233,10 +233,7 @@ def _gains(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Pa
         for n, c in found.items()
     ]
     said = ", ".join(f"{n} {c.gain:.2f}" for n, c in found.items())
-    panels = [Panel([*curves, *marks], f"{what}, {shown}", "gain of the compensator", y_scale="log")]
-    if all(c.hunting.size for c in found.values()):
-        hunts = [Curve(c.gains, 100.0 * c.hunting, n, style_of(n, names)) for n, c in found.items()]
-        panels.append(Panel(hunts, "cases that hunt, %", "gain of the compensator"))
+    panels = [Panel([*curves, *marks], f"{what}, {shown}", "gain of the compensator")]
     message = f"recommended gain (least 95th percentile): {said}"
     return _saved(stem, sweep.title, message, panels, 2.1)
 
