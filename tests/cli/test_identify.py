@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import sys
 import tomllib
@@ -208,4 +209,24 @@ def test_break_away_from_ramps(tmp_path: Path, capsys: pytest.CaptureFixture[str
     values = sorted(e["value"] for e in printed["estimates"] if e["unit"] == "N·m")
     assert any(v == pytest.approx(0.3, abs=0.01) for v in values)
     assert any(v == pytest.approx(0.33, abs=0.01) for v in values)
+    assert (tmp_path / "o" / "report.html").exists()
+
+
+def test_inertia_from_a_frequency_response(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """White torque, held from sample to sample, on 4e-3 kg·m² with 0.02 N·m·s/rad."""
+    dt, count, inertia, damping = 1e-3, 80000, 4e-3, 0.02
+    torque = np.random.default_rng(4).normal(0.0, 0.5, count)
+    position, q, v = np.zeros(count), 0.0, 0.0
+    keep = math.exp(-damping / inertia * dt)
+    for k in range(count):
+        position[k] = q
+        end = keep * v + (1.0 - keep) * torque[k] / damping
+        q += dt * torque[k] / damping - inertia / damping * (end - v)
+        v = end
+    path = tmp_path / "noise.csv"
+    np.savetxt(path, np.column_stack([dt * np.arange(count), position, torque]), delimiter=",", comments="",
+               header="time [s],position [rad],motor_torque [N·m]", encoding="utf-8", fmt="%.9f")  # fmt: skip
+    assert main(["identify", str(path), "--method", "inertia", "--out", str(tmp_path / "o"), "--json"]) == 0
+    found = {e["name"]: e for e in json.loads(capsys.readouterr().out)["estimates"]}
+    assert found["inertia"]["value"] == pytest.approx(inertia, rel=0.02)
     assert (tmp_path / "o" / "report.html").exists()
