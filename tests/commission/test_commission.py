@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from stickslip.commission.commission import commission
+from stickslip.identify.model_file import write_model
 from stickslip.identify.segments import constant_velocity_segments
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine, machine
 from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
+from stickslip.report.identified import Source, write_identification
 from stickslip.rigs.virtual import VirtualRig
 
 OTHER = Machine(
@@ -89,6 +91,11 @@ def test_a_machine_that_is_not_in_the_library(tmp_path):
     }  # fmt: skip
     assert "as the encoder sees it" in done.result.notes[0] or "at the encoder" in done.result.notes[0]
     assert math.isfinite(done.model.parameters.c)
+    again = Model.from_file(write_model(tmp_path / "model.toml", done.result))
+    assert again.parameters == done.model.parameters
+    sources = [Source(s.name, s.performed.record) for s in done.stages]
+    report = write_identification(tmp_path / "report.html", done.result, sources, title="Commissioning")
+    assert "Total pre-sliding stiffness" in report.read_text()
 
 
 @pytest.mark.slow

@@ -348,5 +348,5 @@ def _result(
         misfit |= {f"{stage.name}_{k}": float(v) for k, v in stage.found.misfit.items()}
     return Identification(
         "commission", model, tuple(estimates), np.eye(len(estimates)), misfit, tuple(notes), (), tuple(pictures),
-        {"axis": ServoAxis(), "mechanics": Mechanics(j), "stiffness": stiffness},
+        {"mechanics": Mechanics(j), "stiffness": stiffness},
     )  # fmt: skip
