@@ -166,6 +166,17 @@ def test_a_sliding_curve(steps: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     assert Model.from_file(tmp_path / "model.toml").parameters.delta_s == 2.0
 
 
+def test_sliding_without_a_law_chooses_among_the_curves_of_the_thesis(
+    steps: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", str(steps), "--method", "sliding", "--out", str(tmp_path), "--no-report"]) == 0
+    printed = capsys.readouterr().out
+    assert "Chosen: Stribeck (eq. 2.6)" in printed
+    for tried in ("Coulomb with viscous", "eq. 4.4", "eq. 4.5"):
+        assert tried in printed
+    assert Model.from_file(tmp_path / "model.toml").law.name == "stribeck_plain"
+
+
 @pytest.mark.parametrize(
     ("extra", "message"),
     [

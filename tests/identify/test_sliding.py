@@ -9,7 +9,8 @@ import pytest
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
 from stickslip.errors import InputError
 from stickslip.identify.segments import constant_velocity_segments, sliding_points
-from stickslip.identify.sliding import SlidingPoints, choose_sliding, identify_sliding
+from stickslip.identify.sliding import SlidingPoints, identify_sliding
+from stickslip.identify.sliding_choice import candidates, choose_sliding
 from stickslip.report.identification import draw_identification
 
 TABLE_1 = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
@@ -104,6 +105,61 @@ def test_a_curve_is_chosen_by_what_it_predicts() -> None:
     line = 0.285 + 0.018 * v + noise
     assert choose_sliding(SlidingPoints(v, line), templates)[0] == "Coulomb"
     assert set(result.details["comparison"]) == set(templates)
+
+
+GREASE = Model(  # thesis Table 10, eq. 4.5
+    "stribeck_plain", {"curve": "double_stribeck", "viscous": "power"}, beta0=80.7454, beta1=-80.4742, beta2=-80.5930,
+    beta3=0.7884, beta4=0.7871, v1=0.1755, v2=0.1758, sigma2=-0.0054, fv2=0.0791, delta_v=0.3768,
+)  # fmt: skip
+GREASE_VELOCITIES = np.array([  # (4.3)
+    25, 20, 15, 10, 5, 3, 2, 1.9, 1.8, 1.6, 1.4, 1.2, 1.1, 1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.08,
+    0.06, 0.04, 0.02, 0.01, 0.005,
+])  # fmt: skip
+
+
+def test_without_templates_the_grease_of_the_thesis_takes_equation_4_5() -> None:
+    """Thesis 4.3.2.1.2: eqs. 2.6 and 4.4 are not flexible enough for the curve of figure 4.33."""
+    v = GREASE_VELOCITIES
+    torque = friction(v, GREASE) + np.random.default_rng(0).normal(0.0, 1e-3, v.size)
+    name, result, table = choose_sliding(SlidingPoints(v, torque), noise=1e-3, starts=10)
+    assert name == result.details["chosen"] == "two Stribeck curves (eq. 4.5)"
+    assert set(table) == set(candidates(v, torque))
+    assert table["Stribeck (eq. 2.6)"]["cross_validated_Nm"] > 5 * table[name]["cross_validated_Nm"]
+    assert all(tried in result.notes[-1] for tried in table)
+
+
+def test_twins_of_a_speed_are_left_out_together() -> None:
+    """A curve with a parameter per speed would else be told every point by its twin in the other direction."""
+    v = np.array([0.1, -0.1001, 0.0, 0.0, 0.2, 0.1])
+    labels = SlidingPoints(v, np.ones(6)).speeds().tolist()
+    assert labels[0] == labels[1] == labels[5]
+    assert len({labels[0], labels[2], labels[3], labels[4]}) == 4
+
+
+def test_a_frozen_parameter_stays_in_every_candidate() -> None:
+    v = VELOCITIES[1:]
+    torque = friction(v)
+    laws = {n: m for n, m in candidates(v, torque, {"sigma2": 0.05}).items() if "4." not in n}
+    _, result, table = choose_sliding(SlidingPoints(v, torque), laws, noise=1e-3, frozen=["sigma2"], starts=5)
+    assert result.model is not None
+    assert result.model.parameters.sigma2 == 0.05
+    assert table["Coulomb with viscous"]["parameters"] == 1
+    assert "viscous (eq. 2.3)" not in table  # nothing of it is free
+    assert "viscous (eq. 2.3)" in result.notes[-1]
+
+
+@pytest.mark.parametrize(
+    ("template", "untouched"), [(GUESS, ["sigma0", "sigma1"]), (PLANT, ["k", "alpha", "c"])]
+)
+def test_what_sliding_does_not_touch_is_never_called_found(template: Model, untouched: list[str]) -> None:
+    result = identify_sliding(SlidingPoints(VELOCITIES, friction(VELOCITIES)), template, noise=1e-6, starts=5)
+    assert result.details["untouched"] == untouched
+    assert {e.name for e in result.estimates} == set(TABLE_1)
+    assert any(all(name in note for name in untouched) for note in result.notes)
+    frozen = identify_sliding(
+        SlidingPoints(VELOCITIES, friction(VELOCITIES)), template, noise=1e-6, starts=2, frozen=untouched
+    )
+    assert frozen.details["untouched"] == []
 
 
 def test_bad_points_get_one_clear_error() -> None:

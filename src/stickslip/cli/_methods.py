@@ -96,20 +96,27 @@ def breakaway(records: Sequence[Record], args: argparse.Namespace) -> Identifica
 
 
 def sliding(records: Sequence[Record], args: argparse.Namespace) -> Identification:
-    """A curve through the torques at constant velocities; of several laws, one is chosen."""
+    """A curve through the torques at constant velocities; of several laws, or where none is named, one is chosen."""
     from stickslip.identify.segments import sliding_points
-    from stickslip.identify.sliding import choose_sliding, identify_sliding
+    from stickslip.identify.sliding import identify_sliding
+    from stickslip.identify.sliding_choice import candidates, choose_sliding
 
     points, notes = sliding_points(records, torque=torque_channel(records, args))
-    laws: list[str] = args.law or ["coulomb", "stribeck"]
-    templates = {name: template(name, points.velocity, points.torque, args) for name in laws}
-    if len(templates) > 1:
-        chosen, found, _ = choose_sliding(points, templates, noise=args.noise)
-        found = replace(found, details={**found.details, "chosen": chosen})
+    frozen = [n.partition("=")[0] for n in args.freeze]
+    if not args.law:
+        templates = candidates(points.velocity, points.torque, given(args))
     else:
-        frozen = [n.partition("=")[0] for n in args.freeze]
+        templates = {name: template(name, points.velocity, points.torque, args) for name in args.law}
+    if len(templates) > 1:
+        found = choose_sliding(points, templates, noise=args.noise, frozen=frozen)[1]
+    else:
         found = identify_sliding(points, next(iter(templates.values())), noise=args.noise, frozen=frozen)
     return replace(found, notes=(*notes, *found.notes))
+
+
+def given(args: argparse.Namespace) -> dict[str, float]:
+    """Values of --set and --freeze."""
+    return values([p for p in (*args.set, *args.freeze) if "=" in p])
 
 
 def template(name: str, velocity: Any, torque: Any, args: argparse.Namespace) -> Model:
@@ -121,8 +128,7 @@ def template(name: str, velocity: Any, torque: Any, args: argparse.Namespace) ->
 
     law = plugins.law(name)
     speed = float(np.max(np.abs(velocity)))
-    known = {k: v for k, v in values([p for p in (*args.set, *args.freeze) if "=" in p]).items()
-             if k in {f.name for f in law.fields}}  # fmt: skip
+    known = {k: v for k, v in given(args).items() if k in {f.name for f in law.fields}}
     return starts(law, float(np.median(np.abs(torque))), 0.0, speed, 1.0, known)[0]
 
 

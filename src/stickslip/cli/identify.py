@@ -8,9 +8,9 @@ stickslip identify steps.csv --method sliding --law stribeck --noise 1e-4
 The records are checked first (`stickslip doctor`); an error stops. Methods: `axis` (inertia, offset or gravity and
 friction jointly, from any motion), `sliding` (constant velocities), `breakaway` (torque ramps), `presliding` and
 `attraction` (GMS), `lugre` (sigma0, sigma1), `inertia` (frequency response). Of several laws the error on data left
-out chooses. With --loop and a reference in the record the closed loop is simulated, otherwise the recorded drive.
---out names a folder for model.toml and report.html, or the model's file with the report beside it; `law = {model =
-"model.toml"}` names the model in a study or simulation.
+out chooses; `sliding` without --law chooses among the curves of the thesis. With --loop and a reference in the record
+the closed loop is simulated, otherwise the recorded drive. --out names a folder for model.toml and report.html, or the
+model's file with the report beside it; `law = {model = "model.toml"}` names the model in a study or simulation.
 """
 
 from __future__ import annotations

@@ -12,7 +12,8 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
 from stickslip.identify.segments import Segment, constant_velocity_segments
-from stickslip.identify.sliding import SlidingPoints, choose_sliding, identify_sliding
+from stickslip.identify.sliding import SlidingPoints, identify_sliding
+from stickslip.identify.sliding_choice import choose_sliding
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.simulation.steady import Steady

@@ -8,7 +8,7 @@ other: without a point on the downward bend many curves fit alike, whatever the 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,14 +17,14 @@ import numpy as np
 from stickslip.errors import InputError, ParameterError
 from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.identify.noise import Noise, as_noise, noise_of_repeats
-from stickslip.identify.selection import Indices, criteria, cross_validate
+from stickslip.identify.selection import Indices, criteria
 from stickslip.identify.starts import separable_starts
 from stickslip.identify.uncertainty import Fit, fit
 from stickslip.identify.vector import Vector
 from stickslip.model import Model
 from stickslip.simulation.steady import Steady
 
-__all__ = ["SlidingPoints", "choose_sliding", "identify_sliding"]
+__all__ = ["SlidingPoints", "default_noise", "fit_sliding", "identify_sliding", "model_of", "steady_vector"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -115,6 +115,15 @@ class SlidingPoints:
         cuts = np.flatnonzero(new) + 1
         return [g for g in np.split(t, cuts) if g.size > 1]
 
+    def speeds(self) -> Indices:
+        """A label for every point: repeats of a speed, in either direction, share one; break-away torques do not."""
+        speed = np.abs(self.velocity)
+        order = np.argsort(speed, kind="stable")
+        new = np.diff(speed[order]) > SAME_VELOCITY * speed[order][1:]
+        label = np.empty(len(self), dtype=np.int64)
+        label[order] = np.concatenate([[0], np.cumsum(new | (speed[order][1:] == 0.0))])
+        return label
+
 
 def default_noise(points: SlidingPoints, noise: Noise | float | None) -> Noise | None:
     """The noise given, else that of the repeats."""
@@ -134,6 +143,13 @@ def steady_vector(points: SlidingPoints, template: Model, frozen: Iterable[str])
         if p.shares or float(np.max(np.abs(moved - here))) <= 1e-12 * float(np.max(np.abs(here))):
             idle.append(p.name)
     return Vector(template, frozen=[*frozen, *idle])
+
+
+def untouched_parameters(template: Model, frozen: Iterable[str], vector: Vector) -> list[str]:
+    """Parameters that nobody froze and that do not act at these velocities, each element's under one name."""
+    free = Vector(template, frozen=frozen).names
+    idle = [name.partition("[")[0] for name in free if name not in vector.names]
+    return list(dict.fromkeys(idle))
 
 
 def fit_sliding(
@@ -193,7 +209,9 @@ def identify_sliding(
     -------
     Identification
         ``details["family"]``: parameters of equally good curves, shape (m, free parameters);
-        ``details["next_velocity"]``: where one more point would tell them apart best, rad/s (None: all is told).
+        ``details["next_velocity"]``: where one more point would tell them apart best, rad/s (None: all is told);
+        ``details["untouched"]``: parameters that do not act at these velocities, whose values in `model` are those of
+        the template.
 
     Raises
     ------
@@ -210,8 +228,14 @@ def identify_sliding(
     found = fit_sliding(points, template, level, frozen, starts, profiles=True)
     unknown = [e.name for e in found.estimates if not e.identified]
     settling = next_velocity(points, found) if unknown and found.noise.known else None
-    model, notes = _model_of(found)
+    model, notes = model_of(found)
     notes += _noise_notes(found)
+    untouched = untouched_parameters(template, frozen, found.vector)
+    if untouched:
+        notes.append(
+            f"Nothing here tells {_listed(untouched)}: these act only away from constant velocity, and stay at the "
+            "values that the search was given."
+        )
     told: list[str] = []
     if unknown and found.noise.known:
         notes.append(f"The data do not determine {_listed(unknown)}: equally good curves differ in them.")
@@ -225,74 +249,10 @@ def identify_sliding(
         {
             "free": found.vector.names,
             "family": np.array([found.vector.values(u) for u in found.family]),
-            "next_velocity": settling, "noise_Nm": found.noise.std, "noise_source": found.noise.source,
+            "untouched": untouched, "next_velocity": settling,
+            "noise_Nm": found.noise.std, "noise_source": found.noise.source,
         },
     )  # fmt: skip
-
-
-def choose_sliding(
-    points: SlidingPoints,
-    templates: Mapping[str, Model],
-    *,
-    noise: Noise | float | None = None,
-    starts: int = 40,
-    folds: int = 10,
-) -> tuple[str, Identification, dict[str, dict[str, float]]]:
-    """Fit several curves and choose: the fewest parameters whose error on points left out is not worse.
-
-    Among those within one standard error of the least cross-validated error (Breiman et al. 1984), the one with the
-    least AICc.
-
-    Returns
-    -------
-    name : str
-        Of the chosen template.
-    result : Identification
-        Its fit; the table of all of them is in its notes and in ``details["comparison"]``.
-    table : dict
-        Per template: parameters, rms_Nm, aicc, bic, cross_validated_Nm. Templates with more parameters than points
-        can tell are left out.
-    """
-    level = default_noise(points, noise)
-    table: dict[str, dict[str, float]] = {}
-    for name, template in templates.items():
-        count = steady_vector(points, template, ()).size
-        if len(points) < count + 2:
-            continue
-        found = fit_sliding(points, template, level, (), starts, profiles=False)
-        scores = criteria(found.optimum.cost, len(points), count, level)
-
-        begin = _model_of(found)[0] or template
-
-        def error(fitted: Indices, left_out: Indices, template: Model = begin) -> Array:
-            return left_out_error(points, template, fitted, left_out)
-
-        table[name] = {
-            "parameters": count, "rms_Nm": found.rms, "aicc": scores.aicc, "bic": scores.bic,
-            "cross_validated_Nm": cross_validate(error, len(points), folds),
-        }  # fmt: skip
-    if not table:
-        raise InputError(
-            f"{len(points)} points are too few for any of the curves; measure at more velocities"
-        )
-    chosen = _best(table, len(points))
-    result = identify_sliding(points, templates[chosen], noise=level, starts=starts)
-    return chosen, replace(result, details={**result.details, "comparison": table}), table
-
-
-def left_out_error(points: SlidingPoints, template: Model, fitted: Indices, left_out: Indices) -> Array:
-    """Weighted errors at some points of the curve fitted to the others."""
-    found = fit_sliding(points.only(fitted), template, None, (), 2, profiles=False)
-    rest = points.only(left_out)
-    steady = Steady(template.law, rest.velocity, rest.side)
-    return points.weight[left_out] * (steady.torque(found.vector.packed(found.u)) - rest.torque)
-
-
-def _best(table: Mapping[str, Mapping[str, float]], n: int) -> str:
-    least = min(row["cross_validated_Nm"] for row in table.values())
-    room = least * (1.0 + 1.0 / math.sqrt(2.0 * n))  # one standard error of a root mean square of n errors
-    near = [name for name, row in table.items() if row["cross_validated_Nm"] <= room]
-    return min(near, key=lambda name: table[name]["aicc"])
 
 
 def next_velocity(points: SlidingPoints, found: Fit) -> float | None:
@@ -331,7 +291,8 @@ def _law(found: Fit) -> Any:
 # ---- what is said about it -----------------------------------------------------------------------------------
 
 
-def _model_of(found: Fit) -> tuple[Model | None, list[str]]:
+def model_of(found: Fit) -> tuple[Model | None, list[str]]:
+    """The law that was found, or why no law holds these values."""
     try:
         return found.vector.model(found.u), []
     except ParameterError as error:
