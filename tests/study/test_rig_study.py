@@ -7,6 +7,8 @@ import json
 import numpy as np
 import pytest
 
+from stickslip.analyse.rig_claims import CLAIMS
+from stickslip.analyse.rig_verdicts import Judged, main_share
 from stickslip.cli import main
 from stickslip.machines.machine import machine
 from stickslip.study import rig_study
@@ -83,6 +85,12 @@ def test_a_small_study_is_judged_kept_and_reported(tmp_path, capsys, monkeypatch
 
     monkeypatch.setattr(rig_study, "run_case", never)
     assert len(run_rig_study(out, only=["grease-step-PID10"], seeds=1, ablation=False).runs) == 20
+
+
+def test_main_statements_are_counted_over_what_was_run():
+    ran = {"dry-low-PID": True, "dry-low-FB-gms": False, "grease-low-FB-gms": True}
+    judged = [Judged(c, ran.get(c.id), "", 0, 0, (), main=True) for c in CLAIMS]
+    assert main_share(judged) == {"PID of 36 Hz oscillates": (1, 1), "GMS feedback is unstable": (1, 2)}
 
 
 @pytest.mark.parametrize("more", [["--only", "lowest"], ["--seeds", "-1"], ["--jobs", "0"], ["--print"]])

@@ -74,6 +74,7 @@ def judged_over(view: View, variants: Sequence[str]) -> list[Judged]:
 
 
 def main_share(judged: Sequence[Judged]) -> dict[str, tuple[int, int]]:
-    """For every main statement: how many of its parts hold, of how many."""
-    by_id = {j.claim.id: j for j in judged}
-    return {text: (sum(by_id[i].holds is True for i in ids), len(ids)) for text, ids in MAIN.items()}
+    """For every main statement of which something was run: how many of its parts hold, of how many that were run."""
+    by_id = {j.claim.id: j.holds for j in judged}
+    ran = {text: [by_id[i] for i in ids if by_id[i] is not None] for text, ids in MAIN.items()}
+    return {text: (sum(holds is True for holds in found), len(found)) for text, found in ran.items() if found}
