@@ -117,6 +117,41 @@ GREASE_VELOCITIES = np.array([  # (4.3)
 ])  # fmt: skip
 
 
+DRY = Model("stribeck_plain", fs=0.2951, fc=0.3524, vs=0.003, delta_s=1.1, sigma2=0.0263)  # thesis Table 9
+DRY_VELOCITIES = np.array([1.4, 1.2, 1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.08, 0.06, 0.04, 0.02])  # (4.1)
+
+
+def test_table_9_from_its_curve_and_break_away_torque() -> None:
+    """Thesis 4.3.1.1.2: the break-away torque is the point at zero; friction rises from it, fs < fc.
+
+    The slowest point is at 7 vs, where the rise is over: nothing tells vs and delta_s, and the verdict must say so.
+    """
+    v = np.concatenate([[0.0], DRY_VELOCITIES])
+    points = SlidingPoints(v, np.concatenate([[0.2951], friction(DRY_VELOCITIES, DRY)]))
+    template = candidates(points.velocity, points.torque)["Stribeck (eq. 2.6)"]
+    result = identify_sliding(points, template, noise=1e-4, starts=20)
+    for name in ("fs", "fc", "sigma2"):
+        assert result[name].identified
+        assert result[name].value == pytest.approx(getattr(DRY.parameters, name), rel=1e-3)
+    assert set(result.not_identified) == {"vs", "delta_s"}
+    assert result.model is not None
+    grid = np.geomspace(0.02, 1.4, 50)
+    assert friction(grid, result.model) == pytest.approx(friction(grid, DRY), abs=1e-4)
+
+
+def test_table_10_gives_its_curve_and_a_verdict_on_its_parameters() -> None:
+    """Thesis 4.3.2.1.2: betas of 80 N·m for a curve of 0.28 N·m are one of many sets of equally good ones."""
+    v = GREASE_VELOCITIES
+    points = SlidingPoints(v, friction(v, GREASE))
+    template = candidates(v, points.torque)["two Stribeck curves (eq. 4.5)"]
+    result = identify_sliding(points, template, noise=1e-3, starts=10)
+    assert result.model is not None
+    grid = np.geomspace(0.005, 25.0, 100)
+    assert friction(grid, result.model) == pytest.approx(friction(grid, GREASE), abs=1e-4)
+    assert {"beta0", "beta1", "beta2"} <= set(result.not_identified)
+    assert any("do not determine beta0" in note for note in result.notes)
+
+
 def test_without_templates_the_grease_of_the_thesis_takes_equation_4_5() -> None:
     """Thesis 4.3.2.1.2: eqs. 2.6 and 4.4 are not flexible enough for the curve of figure 4.33."""
     v = GREASE_VELOCITIES

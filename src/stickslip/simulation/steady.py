@@ -13,8 +13,9 @@ __all__ = ["Steady"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-BARELY = 1e-12
-"""rad/s, at which a law that has no sliding curve of its own is asked for its torque next to rest."""
+BARELY = 1e-150
+"""rad/s, at which a law is asked for its torque next to rest. Below every Stribeck velocity that a search may try (at
+1e-12 a curve could fall before it was looked at, and the break-away torque told nothing); its square is not 0."""
 
 
 @kernel()
