@@ -124,6 +124,19 @@ def test_a_frozen_value_stays(log: Path, tmp_path: Path, capsys: pytest.CaptureF
     assert not (tmp_path / "m.html").exists()
 
 
+@pytest.mark.parametrize("terminal", [True, False])
+def test_progress_goes_to_a_terminal_only(
+    log: Path, tmp_path: Path, terminal: bool, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:  # fmt: skip
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    laws = ["--law", "coulomb", "--law", "viscous", "--loop", LOOP, "--json", "--no-report"]
+    assert main(["identify", str(log), *laws, "--out", str(tmp_path / "m.toml")]) == 0
+    shown = capsys.readouterr()
+    json.loads(shown.out)
+    assert ("viscous: law 2 of 2" in shown.err) == terminal
+    assert ("coulomb: all of the data" in shown.err) == terminal
+
+
 @pytest.fixture(scope="module")
 def steps(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Constant velocities in both directions, each for some revolutions, with noise: fs 0.4, fc 0.3, vs 0.1."""

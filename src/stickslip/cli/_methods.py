@@ -97,6 +97,7 @@ def breakaway(records: Sequence[Record], args: argparse.Namespace) -> Identifica
 
 def sliding(records: Sequence[Record], args: argparse.Namespace) -> Identification:
     """A curve through the torques at constant velocities; of several laws, or where none is named, one is chosen."""
+    from stickslip.cli import _output
     from stickslip.identify.segments import sliding_points
     from stickslip.identify.sliding import identify_sliding
     from stickslip.identify.sliding_choice import candidates, choose_sliding
@@ -108,7 +109,7 @@ def sliding(records: Sequence[Record], args: argparse.Namespace) -> Identificati
     else:
         templates = {name: template(name, points.velocity, points.torque, args) for name in args.law}
     if len(templates) > 1:
-        found = choose_sliding(points, templates, noise=args.noise, frozen=frozen)[1]
+        found = choose_sliding(points, templates, noise=args.noise, frozen=frozen, progress=_output.say)[1]
     else:
         found = identify_sliding(points, next(iter(templates.values())), noise=args.noise, frozen=frozen)
     return replace(found, notes=(*notes, *found.notes))

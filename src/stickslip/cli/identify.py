@@ -167,6 +167,7 @@ def identified(sources: Sequence[Source], args: argparse.Namespace) -> Identific
 
 def whole_axis(records: Sequence[Record], args: argparse.Namespace) -> Identification:
     """The methods `axis` and `inertia`."""
+    from stickslip.cli import _output
     from stickslip.identify.axis import AUTOMATIC, identify_axis, inverse_identification
     from stickslip.identify.axis_inverse import inverse_dynamics
     from stickslip.identify.axis_output import Extras
@@ -187,7 +188,7 @@ def whole_axis(records: Sequence[Record], args: argparse.Namespace) -> Identific
         fitted, axis, args.law or list(AUTOMATIC), validation=held, free=[n.partition("=")[0] for n in args.free],
         frozen=[n.partition("=")[0] for n in args.freeze], values=given,
         extras=Extras(harmonics=args.harmonics, load=args.load), per_direction=args.per_direction,
-        robust=args.robust, intervals=args.intervals,
+        robust=args.robust, intervals=args.intervals, progress=_output.say,
     )  # fmt: skip
 
 
@@ -203,8 +204,10 @@ def written(
         data = [s.about for s in sources]
         made["model_file"] = write_model(model_file, found, data=data, law=law_file(found, laws))
     if not args.no_report:
+        from stickslip.cli import _output
         from stickslip.report.identified import write_identification
 
+        _output.say("report")
         made["report_file"] = write_identification(report_file, found, sources, versions=versions())
     return made
 

@@ -7,7 +7,7 @@ or for several, among which the error on held-out data chooses (`stickslip.ident
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,7 +20,7 @@ from stickslip.identify.axis_output import OutputError, output_error
 from stickslip.identify.axis_prediction import axis_prediction
 from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, fitted_axis
 from stickslip.identify.axis_trial import Trial
-from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.estimate import Estimate, Identification, silent
 from stickslip.identify.prediction_error import PredictionError
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
@@ -81,6 +81,7 @@ def identify_axis(
     robust: bool = False,
     profiles: bool = False,
     intervals: str = "covariance",
+    progress: Callable[[str], None] = silent,
 ) -> Identification:
     """Identify an axis by output error.
 
@@ -102,6 +103,8 @@ def identify_axis(
     intervals : {"covariance", "prediction"}
         From the covariance of the output error: fast, and too narrow for what only break-away tells (Fs, vs); or
         law, estimates and intervals from the prediction error (`stickslip.identify.axis_prediction`).
+    progress : callable
+        Is told what begins, in a few words.
 
     Returns
     -------
@@ -129,15 +132,17 @@ def identify_axis(
         pairs = [t.split(HELD_OUT) for t in trials]
         fitted = list(trials) if validation else [a for a, _ in pairs]
         held = list(validation) if validation else [b for _, b in pairs]
-        candidates = compared(fitted, held, axis, found, inverse, options)
+        candidates = compared(fitted, held, axis, found, inverse, options, progress)
         place = chosen_of(candidates)
         chosen = found[place]
         options["values"] = candidates[place].start
         notes = [*notes, sentence_on(candidates, chosen.name)]
+    progress(f"{chosen.name}: all of the data")
     result = output_error(trials, axis, chosen, inverse, profiles=profiles, **options)
     found_axis = assembled(result, inverse, validation, candidates, notes)
     if intervals == "covariance":
         return found_axis
+    progress(f"{chosen.name}: intervals from the prediction error")
     given = {k: v for k, v in dict[str, Any](values or {}).items() if k in frozen or k in free}
     return with_prediction(found_axis, axis_prediction(
         trials, axis, chosen, first=inverse, values=given, free=free, frozen=frozen, extras=extras,
@@ -170,12 +175,13 @@ def first_look(
 
 def compared(
     fitted: Sequence[Trial], held: Sequence[Trial], axis: ServoAxis, laws: Sequence[Law],
-    inverse: InverseDynamics | None, options: Mapping[str, Any],
+    inverse: InverseDynamics | None, options: Mapping[str, Any], progress: Callable[[str], None] = silent,
 ) -> list[Candidate]:  # fmt: skip
     """Fit every law and look at what it says about the held-out data."""
     out: list[Candidate] = []
     weights: Mapping[str, float] | None = None
-    for law in laws:
+    for number, law in enumerate(laws, 1):
+        progress(f"{law.name}: law {number} of {len(laws)}")
         own = dict(options)
         names = {f.name for f in law.fields}
         all_names = {f.name for x in laws for f in x.fields}

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Identification
+from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.noise import Noise
 from stickslip.identify.selection import Indices, criteria, cross_validate
 from stickslip.identify.sliding import (
@@ -88,6 +88,7 @@ def choose_sliding(
     frozen: Sequence[str] = (),
     starts: int = 40,
     folds: int = 10,
+    progress: Callable[[str], None] = silent,
 ) -> tuple[str, Identification, dict[str, dict[str, float]]]:
     """Fit several curves and choose: the fewest parameters whose error on points left out is not worse.
 
@@ -104,6 +105,8 @@ def choose_sliding(
         Parameters that stay at the template's values, in every template that has them.
     folds : int
         Parts of the points that are left out in turn.
+    progress : callable
+        Is told what begins, in a few words.
 
     Returns
     -------
@@ -119,7 +122,8 @@ def choose_sliding(
     laws = candidates(points.velocity, points.torque) if templates is None else templates
     kept = {name: [n for n in frozen if n in t.parameters._fields] for name, t in laws.items()}
     table: dict[str, dict[str, float]] = {}
-    for name, template in laws.items():
+    for number, (name, template) in enumerate(laws.items(), 1):
+        progress(f"{name}: curve {number} of {len(laws)}")
         count = steady_vector(points, template, kept[name]).size
         if count == 0 or len(points) < count + 2:
             continue
@@ -142,6 +146,7 @@ def choose_sliding(
             f"{len(points)} points are too few for any of the curves; measure at more velocities"
         )
     chosen = _best(table, len(points))
+    progress(f"{chosen}: intervals")
     result = identify_sliding(points, laws[chosen], noise=level, frozen=kept[chosen], starts=starts)
     details = {**result.details, "chosen": chosen, "comparison": table}
     return (
