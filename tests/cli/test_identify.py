@@ -15,6 +15,7 @@ import pytest
 from stickslip import Model
 from stickslip.cli import main
 from stickslip.errors import InputError
+from stickslip.plugins import law_names
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "identify"))
 import axis_cases as cases
@@ -135,6 +136,20 @@ def test_progress_goes_to_a_terminal_only(
     json.loads(shown.out)
     assert ("viscous: law 2 of 2" in shown.err) == terminal
     assert ("coulomb: all of the data" in shown.err) == terminal
+
+
+def test_all_laws_are_tried_and_named(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    short = tmp_path / "short.csv"
+    short.write_text("\n".join(log.read_text(encoding="utf-8").splitlines()[:601]), encoding="utf-8")
+    options = ["--law", "all", "--loop", LOOP, "--no-report", "--json", "--out", str(tmp_path / "m.toml")]
+    assert main(["identify", str(short), *options]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    compared = next(n for n in printed["notes"] if "held-out misfit" in n)
+    others = next(n for n in printed["notes"] if n.startswith("Not among all laws"))
+    for law in law_names():
+        assert re.search(rf"\b{law} [\d.]", compared) or re.search(rf"\b{law}\b", others), law
+    assert re.search(r"\blugre \d", compared)
+    assert re.search(r"\bgms \d", compared)
 
 
 @pytest.fixture(scope="module")

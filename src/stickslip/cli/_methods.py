@@ -173,11 +173,12 @@ def lugre(records: Sequence[Record], args: argparse.Namespace) -> Identification
     return identify_lugre_dynamics(response, given["inertia"], curve_values(args), noise=args.noise)
 
 
-def all_laws() -> list[str]:
-    """Every registered law that has a curve of its own to slide on, for ``--law all``."""
+def all_laws() -> tuple[list[str], list[str]]:
+    """The registered laws for ``--law all``: those that say their torque at constant velocity, and the others."""
     from stickslip import plugins
 
-    return [name for name in plugins.law_names() if plugins.law(name).steady]
+    steady = [name for name in plugins.law_names() if plugins.law(name).steady]
+    return steady, [name for name in plugins.law_names() if name not in steady]
 
 
 METHODS: Mapping[str, Callable[[Sequence[Record], argparse.Namespace], Identification]] = {

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -107,10 +108,18 @@ def run(args: argparse.Namespace) -> int:
     model_file, report_file = places(args.out)
     sources = [checked(path, args) for path in args.files]
     sources += [checked(path, args, held_out=True) for path in args.validation]
-    if args.law == ["all"]:
-        args.law = all_laws()
+    left_out: list[str] = []
+    if "all" in args.law:
+        tried, left_out = all_laws()
+        args.law = [*tried, *(x for x in args.law if x != "all" and x not in tried)]
     _output.say(f"method {args.method}, {sum(len(s.record) for s in sources)} samples")
     found = identified(sources, args)
+    if left_out:
+        names = ", ".join(left_out)
+        note = (
+            f"Not among all laws, as they say no torque at constant velocity: {names}; name one with --law."
+        )
+        found = replace(found, notes=(*found.notes, note))
     made = written(found, sources, args, model_file, report_file)
     if args.json:
         data = [s.about for s in sources]
@@ -155,8 +164,6 @@ def places(out: Path) -> tuple[Path, Path]:
 
 def identified(sources: Sequence[Source], args: argparse.Namespace) -> Identification:
     """The method's result, with the doctor's findings."""
-    from dataclasses import replace
-
     records = [s.record for s in sources]
     if args.method in METHODS:
         found = METHODS[args.method](records, args)
