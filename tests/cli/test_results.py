@@ -13,6 +13,7 @@ import tomli_w
 
 from stickslip import Model
 from stickslip.cli import main
+from stickslip.cli.recommend import parameters, percent
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.model_file import write_model
 
@@ -92,7 +93,24 @@ def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
     full = [c for c in result["candidates"] if (c["kind"], c["gain"]) == ("feedback", 1.0)]
     assert any(c["unsafe"] for c in full)
     assert main(["recommend", str(model), *options]) == 0
-    assert "switch on:" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "switch on:" in shown
+    assert "Model(" not in shown
+    line = next(x for x in shown.splitlines() if x.startswith("parameters:"))
+    model_parameters = result["model"]
+    assert f"fc {model_parameters['fc']:.4g} N·m;" in line
+
+
+def test_parameters_and_percentages_are_readable() -> None:
+    gms = Model(
+        "gms", k=[150.123456, 100.0], alpha=[0.5, 0.5], c=50.0, fs=0.335, fc=0.2850438880791331, vs=0.1
+    )
+    shown = parameters(gms, lambda unit: unit.replace("rad", "m").replace("N·m", "N"))
+    assert "k [150.1, 100] N/m; alpha [0.5, 0.5];" in shown
+    assert "fc 0.285 N;" in shown
+    assert percent(0.951, 0.954) == "95 %"
+    assert percent(0.88, 0.954) == "88 to 95 %"
+    assert percent(0.99, 0.9997) == "99 to 99.9 %"
 
 
 def test_where_the_model_is_unsure_less_is_promised(

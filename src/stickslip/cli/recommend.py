@@ -15,7 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from stickslip.identify.recommend import Recommendation
+    from stickslip.model import Model
 
 SUMMARY = "which compensator to switch on: law, structure, gain, and what to expect"
 
@@ -63,12 +66,12 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         _output.print_json(result.as_dict())
     else:
-        show(result, found.unit("rad"), found.unit("rad/s"))
+        show(result, found.unit)
     return 0
 
 
-def show(result: Recommendation, angle: str, speed: str) -> None:
-    """The setting, what to expect, and what was tried."""
+def show(result: Recommendation, unit: Callable[[str], str]) -> None:
+    """The setting, what to expect, and what was tried; `unit` turns an angular unit into the axis's own."""
     print(f"{'law':<16}{'structure':<13}{'gain':>5}  {'error left':>10}  {'worst':>7}  safe")
     for c in result.candidates:
         mark = "<- " if c == result.chosen else ""
@@ -78,17 +81,37 @@ def show(result: Recommendation, angle: str, speed: str) -> None:
         )
     print()
     print(f"linear controller: kp {result.gains['kp']:.5g}, kd {result.gains['kd']:.5g}; RMS error alone "
-          f"{result.linear_error:.3g} {angle}")  # fmt: skip
+          f"{result.linear_error:.3g} {unit('rad')}")  # fmt: skip
     c = result.chosen
     if c and result.model:
-        print(f"switch on:         {c.kind} of {result.model!r}, gain {c.gain:g}")
-        low, high = 1.0 - c.worst, 1.0 - min(c.errors)
-        print(
-            f"error reduction:   {100 * low:.0f} to {100 * high:.0f} % on {result.axes} axes within the intervals"
-        )
+        print(f"switch on:         {c.kind} of law {result.model.law.name!r}, gain {c.gain:g}")
+        print(f"parameters:        {parameters(result.model, unit)}")
+        reduction = percent(1.0 - c.worst, 1.0 - min(c.errors))
+        print(f"error reduction:   {reduction} on {result.axes} axes within the intervals")
         edge = "none found up to 1.5" if math.isinf(result.margin) else f"{result.margin:.3g}"
         print(f"margin of gain:    {edge}")
         print(f"lead:              {result.lead:.4g} s")
-        print(f"deadband:          {result.deadband:.4g} {speed}")
+        print(f"deadband:          {result.deadband:.4g} {unit('rad/s')}")
     for note in result.notes:
         print(note)
+
+
+def parameters(model: Model, unit: Callable[[str], str]) -> str:
+    """A law's parameters to four digits, with their units; --json has all digits."""
+    parts: list[str] = []
+    for f in model.law.fields:
+        value = getattr(model.parameters, f.name)
+        numbers = ", ".join(f"{v:.4g}" for v in value) if f.per_element else f"{value:.4g}"
+        own = "" if f.par.unit == "-" else f" {unit(f.par.unit)}"
+        parts.append(f"{f.name} {f'[{numbers}]' if f.per_element else numbers}{own}")
+    return "; ".join(parts)
+
+
+def percent(low: float, high: float) -> str:
+    """A range of parts of 1, as one number where both ends read alike; never 100 % for what is less."""
+
+    def shown(part: float) -> str:
+        return f"{math.floor(1000.0 * part) / 10.0:.1f}" if 0.995 <= part < 1.0 else f"{100.0 * part:.0f}"
+
+    a, b = shown(low), shown(high)
+    return f"{a} %" if a == b else f"{a} to {b} %"
