@@ -163,6 +163,14 @@ def test_without_templates_the_grease_of_the_thesis_takes_equation_4_5() -> None
     assert all(tried in result.notes[-1] for tried in table)
 
 
+def test_of_laws_with_the_same_curve_the_one_with_nothing_beside_it_is_taken() -> None:
+    v = np.geomspace(0.002, 1.0, 12)
+    torque = friction(v) + np.random.default_rng(3).normal(0.0, 1e-3, v.size)
+    plain = Model("stribeck_plain", fs=0.5, fc=0.1, vs=0.05, delta_s=1.0, sigma2=0.005)
+    templates = {"gms": PLANT, "lugre": GUESS, "plain": plain}
+    assert choose_sliding(SlidingPoints(v, torque), templates, noise=1e-3, starts=10)[0] == "plain"
+
+
 def test_twins_of_a_speed_are_left_out_together() -> None:
     """A curve with a parameter per speed would else be told every point by its twin in the other direction."""
     v = np.array([0.1, -0.1001, 0.0, 0.0, 0.2, 0.1])

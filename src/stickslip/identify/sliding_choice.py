@@ -28,6 +28,9 @@ __all__ = ["candidates", "choose_sliding"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+ALIKE = 0.01
+"""Difference in AICc below which two laws fit alike."""
+
 
 def candidates(velocity: Array, torque: Array, known: Mapping[str, float] | None = None) -> dict[str, Model]:
     """Laws without a pre-sliding part, on the scales of a sliding curve, from few parameters to many.
@@ -145,7 +148,7 @@ def choose_sliding(
         raise InputError(
             f"{len(points)} points are too few for any of the curves; measure at more velocities"
         )
-    chosen = _best(table, len(points))
+    chosen = _best(table, len(points), laws)
     progress(f"{chosen}: intervals")
     result = identify_sliding(points, laws[chosen], noise=level, frozen=kept[chosen], starts=starts)
     details = {**result.details, "chosen": chosen, "comparison": table}
@@ -175,8 +178,11 @@ def left_out_error(
     return points.weight[left_out] * (steady.torque(found.vector.packed(found.u)) - rest.torque)
 
 
-def _best(table: Mapping[str, Mapping[str, float]], n: int) -> str:
+def _best(table: Mapping[str, Mapping[str, float]], n: int, laws: Mapping[str, Model]) -> str:
     least = min(row["cross_validated_Nm"] for row in table.values())
     room = least * (1.0 + 1.0 / math.sqrt(2.0 * n))  # one standard error of a root mean square of n errors
     near = [name for name, row in table.items() if row["cross_validated_Nm"] <= room]
-    return min(near, key=lambda name: table[name]["aicc"])
+    lowest = min(table[name]["aicc"] for name in near)
+    # Laws that share a curve differ by rounding here: the one with the least beside the curve is taken.
+    alike = [name for name in near if table[name]["aicc"] <= lowest + ALIKE]
+    return min(alike, key=lambda name: len(laws[name].law.fields))
