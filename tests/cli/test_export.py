@@ -87,6 +87,8 @@ def test_the_inertia_comes_from_the_models_file(model, tmp_path):
         (["--to", "c99", "--compensator", "fb", "--filter-hz", "0"], "filter_hz"),
         (["--to", "c99", "--compensator", "fb", "--sample-time", "0"], "sample_time"),
         (["--to", "c99", "--filter-hz", "10"], "--compensator"),
+        (["--to", "c99", "--gain", "0.9"], "--compensator"),
+        (["--to", "c99", "--compensator", "fb", "--lead", "0.001"], "lead"),
         (["--to", "fmu-axis"], "--set inertia="),
         (["--to", "c99", "--name", "1st"], "no name in most languages"),
         (["--to", "c99", "--out", "/proc/none"], "/proc/none"),

@@ -81,13 +81,27 @@ def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = written(tmp_path / "m.toml", 0.03)
-    options = ["--bandwidth", "20", "--counts-per-rev", "65536", "--torque-limit", "3", "--axes", "3"]
+    options = [
+        "--bandwidth",
+        "20",
+        "--counts-per-rev",
+        "65536",
+        "--torque-limit",
+        "3",
+        "--axes",
+        "2",
+        "--confirm",
+        "7",
+    ]
     assert main(["recommend", str(model), *options, "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     chosen = result["chosen"]
     assert chosen["unsafe"] == []
-    assert len(chosen["errors"]) == result["axes"] == 4
-    assert max(chosen["errors"]) < 0.2
+    assert result["axes"] == 3
+    assert len(chosen["errors"]) == 1 + result["axes_confirmed"] == 8
+    assert result["reduction"] == [1.0 - max(chosen["errors"][1:]), 1.0 - min(chosen["errors"][1:])]
+    assert result["reduction_confidence"] == 0.75
+    assert result["reduction"][0] > 0.8
     assert chosen["gain"] <= 1.0
     # Feedback that cancels everything hunts (thesis 3.2.3), and is found to.
     full = [c for c in result["candidates"] if (c["kind"], c["gain"]) == ("feedback", 1.0)]
@@ -95,6 +109,7 @@ def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
     assert main(["recommend", str(model), *options]) == 0
     shown = capsys.readouterr().out
     assert "switch on:" in shown
+    assert "75 % interval" in shown
     assert "Model(" not in shown
     line = next(x for x in shown.splitlines() if x.startswith("parameters:"))
     model_parameters = result["model"]
@@ -119,7 +134,20 @@ def test_where_the_model_is_unsure_less_is_promised(
     kept: list[float] = []
     for relative in (0.01, 0.15):
         model = written(tmp_path / "m.toml", relative)
-        assert main(["recommend", str(model), "--bandwidth", "20", "--axes", "4", "--json"]) == 0
+        assert (
+            main(
+                [
+                    "recommend",
+                    str(model),
+                    "--bandwidth=20",
+                    "--frequency=1",
+                    "--axes=2",
+                    "--confirm=3",
+                    "--json",
+                ]
+            )
+            == 0
+        )
         chosen = json.loads(capsys.readouterr().out)["chosen"]
         kept.append(max(chosen["errors"]) if chosen else 1.0)
     assert kept[1] > 1.5 * kept[0]
@@ -145,6 +173,7 @@ def test_the_demo_goes_the_whole_way(tmp_path: Path, capsys: pytest.CaptureFixtu
         (["recommend", "plain.toml", "--inertia", "4e-4", "--bandwidth", "0"], "bandwidth"),
         (["recommend", "plain.toml", "--inertia", "4e-4", "--bandwidth", "900"], "sample rate"),
         (["recommend", "plain.toml", "--axes", "-1"], "--axes"),
+        (["recommend", "plain.toml", "--confirm", "-1"], "--confirm"),
     ],
 )
 def test_bad_input_is_one_line(

@@ -141,8 +141,10 @@ def run_sample(address, position, wanted, wanted_velocity, n, m, p, u, out):
 
 
 CONTROLLERS = {
-    "FF": lambda m: Controller(place("PD", 3.86e-4, 36.0, 1.0), Feedforward(m), 0.5, 1e-3, 1e6),
-    "FB-filtered": lambda m: Controller(place("PID", 3.86e-4, 25.0, 1.0), Feedback(m, 0.8, 10.0), sample_time=1e-3),
+    "FF": lambda m: Controller(place("PD", 3.86e-4, 36.0, 1.0), Feedforward(m, lead=7e-4), 0.5, 1e-3, 1e6),
+    "FB-filtered": lambda m: Controller(
+        place("PID", 3.86e-4, 25.0, 1.0), Feedback(m, 0.8, 10.0, deadband=0.01), sample_time=1e-3
+    ),
     "none": lambda m: Controller(place("PD", 3.86e-4, 36.0, 1.0), None, 0.2, 1e-3, 4096.0),
 }  # fmt: skip
 

@@ -54,6 +54,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FREQUENCY",
         help="low-pass on the compensator's velocity (default: none)",
     )
+    for option, metavar, what in (
+        ("--gain", "G", "factor on the compensating torque (default: 1)"),
+        ("--lead", "TIME", "by which feedforward looks ahead of the reference, s (default: 0)"),
+        ("--deadband", "SPEED", "velocity below which the compensator's law sees rest, rad/s (default: 0)"),
+    ):
+        parser.add_argument(option, type=float, metavar=metavar, help=what)
     parser.add_argument(
         "--nearest", action="store_true", help="where the target cannot hold the law, the nearest that it can"
     )
@@ -150,7 +156,7 @@ def job_of(args: argparse.Namespace, chosen: Target) -> Job:
         "settings": settings_given(args, chosen),
     }  # fmt: skip
     if args.compensator is None:
-        for option in ("sample_time", "filter_hz"):
+        for option in ("sample_time", "filter_hz", "gain", "lead", "deadband"):
             if getattr(args, option) is not None:
                 raise InputError(
                     f"--{option.replace('_', '-')} belongs to --compensator; give both or neither"
@@ -192,7 +198,8 @@ def compensator_of(args: argparse.Namespace, model: Model) -> Controller | None:
         return None
     kind = {"ff": Feedforward, "fb": Feedback}[args.compensator]
     time = 1e-3 if args.sample_time is None else args.sample_time
-    return Controller(Gains(kp=0.0), kind(model, filter_hz=args.filter_hz), sample_time=time)
+    given = {n: getattr(args, n) for n in ("gain", "lead", "deadband") if getattr(args, n) is not None}
+    return Controller(Gains(kp=0.0), kind(model, filter_hz=args.filter_hz, **given), sample_time=time)
 
 
 def store(export: Export, folder: Path) -> list[str]:

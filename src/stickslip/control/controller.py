@@ -52,3 +52,7 @@ class Controller:
             raise ParameterError(
                 "controller: an encoder is read by samples; give a sample_time greater than 0"
             )
+        helper = self.compensator
+        if helper and self.sample_time == 0.0 and (helper.lead > 0.0 or helper.deadband > 0.0):
+            name = "lead" if helper.lead > 0.0 else "deadband"
+            raise ParameterError(f"controller: a {name} acts on samples; give a sample_time greater than 0")

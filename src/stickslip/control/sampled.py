@@ -51,6 +51,8 @@ class Settings(NamedTuple):
     torque_limit: Annotated[float, Par("N·m", "T_max", "largest torque")]
     sample_time: Annotated[float, Par("s", "T", "sample time")]
     encoder: Annotated[float, Par("-", "N", "counts per revolution; 0 measures exactly")]
+    lead: Annotated[float, Par("s", "", "time by which a feedforward looks ahead of the reference")]
+    deadband: Annotated[float, Par("rad/s", "", "velocity below which the compensator's law sees rest")]
 
 
 class Memory(NamedTuple):
@@ -61,6 +63,7 @@ class Memory(NamedTuple):
     velocity: Annotated[float, Par("rad/s", "v", "difference of measured positions over the sample time")]
     error: Annotated[float, Par("rad", "e", "reference less measured position")]
     error_sum: Annotated[float, Par("rad·s", "", "integral of the error")]
+    wanted_velocity: Annotated[float, Par("rad/s", "", "reference velocity one sample ago")]
     seen: Annotated[float, Par("rad/s", "", "velocity that the compensator's law saw")]
     in_1: Annotated[float, Par("rad/s", "", "filter: input one sample ago")]
     in_2: Annotated[float, Par("rad/s", "", "filter: input two samples ago")]
@@ -114,6 +117,15 @@ def observe(position: float, wanted: float, n: Any, m: Any) -> None:
     m.error = error
 
 
+def ahead(wanted_velocity: float, n: Any, m: Any) -> float:
+    """The reference velocity a lead from now, rad/s, along its last two samples; rest stays rest."""
+    found = wanted_velocity
+    if m.started != 0.0 and wanted_velocity != 0.0:
+        found = wanted_velocity + n.lead * (wanted_velocity - m.wanted_velocity) / n.sample_time
+    m.wanted_velocity = wanted_velocity
+    return found
+
+
 def law_step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
     """The compensator's law; `sampled_by` puts it here."""
     return 0.0
@@ -124,6 +136,8 @@ def compensate(velocity: float, n: Any, m: Any, z: Any, p: Any, u: Any) -> float
     now = velocity
     if n.filter > 0.0:
         now = low_passed(m, velocity)
+    if abs(now) < n.deadband:
+        now = 0.0
     last = now
     elapsed = 0.0  # before the first sample nothing has moved yet
     if m.started != 0.0:
@@ -142,7 +156,7 @@ def sample(
     torque = n.kp * m.error + n.kr * wanted_velocity - n.kd * m.velocity + n.ki * m.error_sum
     m.compensation = 0.0
     if n.source == FROM_REFERENCE:
-        m.compensation = compensate(wanted_velocity, n, m, z, p, u)
+        m.compensation = compensate(ahead(wanted_velocity, n, m), n, m, z, p, u)
     elif n.source == FROM_MEASUREMENT:
         m.compensation = compensate(m.velocity, n, m, z, p, u)
     m.torque = min(max(torque + m.compensation, -n.torque_limit), n.torque_limit)
@@ -179,4 +193,6 @@ def settings(controller: Controller) -> Settings:
         controller.torque_limit,
         controller.sample_time,
         controller.encoder_counts,
+        helper.lead if helper else 0.0,
+        helper.deadband if helper else 0.0,
     )

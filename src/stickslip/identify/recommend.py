@@ -1,8 +1,9 @@
 """From an identified model to a setting that is safe to switch on: by simulating the axes that the data allow.
 
 A compensator that gives more than the friction there is pushes the axis: around rest it limit-cycles (thesis 3.2.3).
-The true friction is unknown but for the model's intervals, so every candidate (law, feedforward or feedback, gain) is
-run on axes drawn from them, along a slow sinusoid and to a stop, as a drive runs it: sampled, counted, held, limited.
+The true friction is unknown but for the model's intervals, so every candidate (law, feedforward or feedback, gain,
+deadband) is run on axes drawn from them, sampled, counted, held and limited as in the drive. The best is then run on
+other axes, with a tenth more gain too: what it does there, not where it was picked, is what to expect of it.
 """
 
 from __future__ import annotations
@@ -18,64 +19,58 @@ from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.errors import InputError, ParameterError, SimulationError
+from stickslip.errors import InputError
 from stickslip.identify.draws import draw_models, sliding_torque
 from stickslip.identify.identified_file import Identified
+from stickslip.identify.setting_trial import Drive, Trial, dangers, run
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
-from stickslip.simulation.closed_loop import simulate
+from stickslip.model import Model
 
-__all__ = ["Candidate", "Drive", "Recommendation", "recommend"]
+__all__ = ["Candidate", "Drive", "Recommendation", "Setting", "recommend"]
 
 GAINS = (0.5, 0.7, 0.8, 0.9, 1.0)
 BEYOND = (1.1, 1.25, 1.5)
 """Gains above 1, for the margin only."""
+GUARD = 1.1
+"""What is recommended is safe with so many times its gain too: friction falls as an axis warms up."""
+LEADS = (0.0, 0.5, 1.0, 2.0)
+"""In sample times."""
+DEADBAND = 1.5
+"""In counts per sample time: a single count, which an axis at rest may give, is then rest."""
 KINDS = {"feedforward": Feedforward, "feedback": Feedback}
-BUSY = 1.0
-"""Reversals per second beyond those of the linear controller alone from which an axis hunts."""
-LIVELIER, ROUGH = 3.0, 0.1
-"""Rough is a velocity above 50 Hz beyond so many times the linear controller's and this part of the reference's RMS."""
 WORTH = 0.95
 """A compensator that leaves more than this part of the error is not worth its risk."""
 NEAR = 1.1
 """Errors within this factor of the best are alike; the lower gain is then taken."""
+ALIKE = 1.02
+"""The same for leads: the shorter one is taken."""
 
 
 @dataclass(frozen=True)
-class Drive:
-    """The drive that will run it, and the motion that matters.
+class Setting:
+    """What is switched on: a law with its numbers.
 
     Attributes
     ----------
-    bandwidth, damping : float
-        Of the position loop's poles, Hz and -; the PD is placed with the model's inertia.
-    sample_time : float
-        s
-    encoder_counts : float
-        Per revolution (2 pi); 0 measures exactly.
-    torque_limit : float
-        N·m
-    amplitude, frequency : float
-        Of the slow sinusoid, rad and Hz; the way to the stop has the length of the amplitude.
+    law, kind : str
+        ``kind`` is "feedforward" or "feedback".
+    gain : float
+    lead : float
+        s, by which a feedforward looks ahead of the reference.
+    deadband : float
+        rad/s, velocities below which a feedback's law sees rest.
     """
 
-    bandwidth: float = 10.0
-    damping: float = 1.0
-    sample_time: float = 1e-3
-    encoder_counts: float = 0.0
-    torque_limit: float = math.inf
-    amplitude: float = 0.1
-    frequency: float = 0.5
+    law: str
+    kind: str
+    gain: float
+    lead: float = 0.0
+    deadband: float = 0.0
 
-    def __post_init__(self) -> None:
-        for name in ("bandwidth", "damping", "sample_time", "torque_limit", "amplitude", "frequency"):
-            if not getattr(self, name) > 0.0:
-                raise ParameterError(f"drive: {name} = {getattr(self, name):g} must be greater than 0")
-        if self.bandwidth * self.sample_time > 0.1:
-            raise ParameterError(
-                f"drive: bandwidth = {self.bandwidth:g} Hz is more than a tenth of the sample rate "
-                f"{1.0 / self.sample_time:g} Hz; take a lower one, or a shorter sample time"
-            )
+    def on(self, linear: Controller, model: Model) -> Controller:
+        """The linear controller with this compensator."""
+        helper = KINDS[self.kind](model, self.gain, lead=self.lead, deadband=self.deadband)
+        return replace(linear, compensator=helper)
 
 
 @dataclass(frozen=True)
@@ -84,8 +79,7 @@ class Candidate:
 
     Attributes
     ----------
-    law, kind : str
-    gain : float
+    setting : Setting
     errors : tuple of float
         RMS position error along the sinusoid over that of the linear controller alone, one per axis; the best
         estimate first. The first axis on which it is not safe is the last.
@@ -93,9 +87,7 @@ class Candidate:
         Why it is not safe to switch on; empty where it is.
     """
 
-    law: str
-    kind: str
-    gain: float
+    setting: Setting
     errors: tuple[float, ...]
     unsafe: tuple[str, ...]
 
@@ -103,6 +95,10 @@ class Candidate:
     def worst(self) -> float:
         """The greatest remaining part of the error."""
         return max(self.errors)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {**asdict(self.setting), "errors": list(self.errors), "unsafe": list(self.unsafe)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +108,7 @@ class Recommendation:
     Attributes
     ----------
     chosen : Candidate or None
-        None: switch no compensator on.
+        None: switch no compensator on. Its errors are those on the axes that it was not picked on.
     model : Model or None
         The law to run, with its parameters.
     gains : mapping
@@ -121,13 +117,9 @@ class Recommendation:
         RMS error of the linear controller alone on the best estimate, rad.
     margin : float
         Lowest gain tried at which some axis is no longer safe, over the chosen one; infinite where none was found.
-    lead : float
-        s, by which the feedforward looks ahead of the reference.
-    deadband : float
-        rad/s, below which a feedback's velocity counts as zero.
     candidates : tuple of Candidate
     axes : int
-        How many were simulated.
+        On how many the candidates were simulated, the best estimate among them.
     notes : tuple of str
     """
 
@@ -136,37 +128,80 @@ class Recommendation:
     gains: dict[str, float]
     linear_error: float
     margin: float
-    lead: float
-    deadband: float
     candidates: tuple[Candidate, ...]
     axes: int
     notes: tuple[str, ...] = ()
     drive: Drive = field(default_factory=Drive)
 
+    @property
+    def reduction(self) -> tuple[float, float]:
+        """Least and greatest part of the error that is taken away, over the axes that the setting was not picked on.
+
+        Of n drawn axes they hold the reduction on another one with a probability of (n - 1)/(n + 1): 95 % for 39.
+        """
+        if self.chosen is None:
+            return 0.0, 0.0
+        drawn = self.chosen.errors[1:] or self.chosen.errors
+        return 1.0 - max(drawn), 1.0 - min(drawn)
+
+    @property
+    def confirmed_on(self) -> int:
+        """How many drawn axes the chosen setting was confirmed on."""
+        return len(self.chosen.errors) - 1 if self.chosen else 0
+
+    @property
+    def confidence(self) -> float:
+        """Probability that `reduction` holds another axis from the model's intervals."""
+        n = self.confirmed_on
+        return max(0.0, (n - 1) / (n + 1))
+
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            "chosen": asdict(self.chosen) if self.chosen else None,
+            "chosen": self.chosen.as_dict() if self.chosen else None,
             "model": self.model.as_dict() if self.model else None, "gains": self.gains,
-            "linear_error_rms": self.linear_error, "margin": self.margin, "lead_s": self.lead,
-            "deadband": self.deadband, "axes": self.axes, "notes": list(self.notes), "drive": asdict(self.drive),
-            "candidates": [asdict(c) for c in self.candidates],
+            "linear_error_rms": self.linear_error, "margin": self.margin,
+            "reduction": list(self.reduction) if self.chosen else None, "reduction_confidence": self.confidence,
+            "axes": self.axes, "axes_confirmed": self.confirmed_on, "notes": list(self.notes),
+            "drive": asdict(self.drive), "candidates": [c.as_dict() for c in self.candidates],
         }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """Metrics of one axis under one controller: along the sinusoid, and to a stop."""
+class Bench:
+    """Axes, each with what the linear controller alone does on it, and the laws that may be switched on."""
 
-    moving: dict[str, float]
-    stopping: dict[str, float]
+    def __init__(
+        self, plants: Sequence[RigidAxis], linear: Controller, drive: Drive, laws: dict[str, Model]
+    ) -> None:
+        self.plants, self.linear, self.drive, self.laws = plants, linear, drive, laws
+        self.alone: list[Trial | str] = []
+
+    def before(self, i: int) -> Trial | str:
+        """The linear controller alone on axis i."""
+        while len(self.alone) <= i:
+            self.alone.append(run(self.plants[len(self.alone)], self.linear, self.drive))
+        return self.alone[i]
+
+    def judged(self, setting: Setting) -> Candidate:
+        """The setting on every axis, up to the first on which it is not safe."""
+        controller = setting.on(self.linear, self.laws[setting.law])
+        errors: list[float] = []
+        for i, plant in enumerate(self.plants):
+            before, after = self.before(i), run(plant, controller, self.drive)
+            if isinstance(after, str) or isinstance(before, str):
+                why = after if isinstance(after, str) else "the linear controller alone fails"
+                return Candidate(setting, (*errors, math.inf), (why,))
+            errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
+            if unsafe := tuple(dangers(before, after, self.drive)):
+                return Candidate(setting, tuple(errors), unsafe)
+        return Candidate(setting, tuple(errors), ())
 
 
 def recommend(
-    found: Identified, drive: Drive, *, inertia: float | None = None, axes: int = 6, seed: int = 0,
+    found: Identified, drive: Drive, *, inertia: float | None = None, axes: int = 6, confirm: int = 39, seed: int = 0,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Recommendation:  # fmt: skip
-    """Choose law, structure and gain.
+    """Choose law, structure, gain, lead and deadband.
 
     Parameters
     ----------
@@ -175,7 +210,9 @@ def recommend(
     inertia : float, optional
         kg·m², where the model has none.
     axes : int
-        Besides the best estimate, drawn from the model's intervals.
+        Besides the best estimate, drawn from the model's intervals: for all candidates.
+    confirm : int
+        Drawn besides, on which the best candidate is confirmed: its `Recommendation.reduction` is theirs.
     seed : int
         Of the draws.
     progress : callable
@@ -193,42 +230,38 @@ def recommend(
     j = inertia if inertia is not None else found.axis.get("inertia")
     if j is None or not float(j) > 0.0:
         raise InputError(f"{found.path} holds no inertia; give --inertia in {found.unit('kg·m²')}")
-    plants = list(plants_of(found, float(j), axes, seed))
     linear = Controller(
         place("PD", float(j), drive.bandwidth, drive.damping), None, drive.torque_limit, drive.sample_time,
         drive.encoder_counts,
     )  # fmt: skip
     laws = laws_of(found.model)
-    total, done = 1 + 2 * len(laws) * len(GAINS) + len(BEYOND), 0
-    alone = [run(p, linear, drive) for p in plants]
-    if isinstance(alone[0], str):
-        raise InputError(f"the linear controller alone: {alone[0]}")
+    bench = Bench(list(plants_of(found, float(j), axes, seed)), linear, drive, laws)
+    others = Bench(list(plants_of(found, float(j), confirm, seed + 1)), linear, drive, laws)
+    if isinstance(first := bench.before(0), str):
+        raise InputError(f"the linear controller alone: {first}")
+    settings = list(settings_of(laws, drive))
+    total = len(settings) + len(BEYOND) + len(others.plants) // max(1, len(bench.plants))
     candidates: list[Candidate] = []
-    for name, model in laws.items():
-        for kind in KINDS:
-            for gain in GAINS:
-                candidates.append(judged(name, model, kind, gain, plants, alone, linear, drive))
-                done += 1
-                progress(done, total)
-    chosen = chosen_of(candidates)
+    for setting in settings:
+        candidates.append(bench.judged(setting))
+        progress(len(candidates), total)
+    chosen, rejected = confirmed(candidates, bench, others)
+    candidates = [rejected.get(c.setting, c) for c in candidates]
     margin = math.inf
     if chosen:
         higher = [
-            c for c in candidates if (c.law, c.kind) == (chosen.law, chosen.kind) and c.gain > chosen.gain
+            c for c in candidates if alike(c.setting, chosen.setting) and c.setting.gain > chosen.setting.gain
         ]
-        for gain in BEYOND:
-            higher.append(
-                judged(chosen.law, laws[chosen.law], chosen.kind, gain, plants, alone, linear, drive)
-            )
-            candidates.append(higher[-1])
-        margin = min((c.gain / chosen.gain for c in higher if c.unsafe), default=math.inf)
+        beyond = [bench.judged(replace(chosen.setting, gain=gain)) for gain in BEYOND]
+        candidates += beyond
+        margin = min(
+            (c.setting.gain / chosen.setting.gain for c in (*higher, *beyond) if c.unsafe), default=math.inf
+        )
     progress(total, total)
-    resolution = 2.0 * math.pi / drive.encoder_counts / drive.sample_time if drive.encoder_counts else 0.0
     return Recommendation(
-        chosen, laws[chosen.law] if chosen else None, dict(linear.gains._asdict()), alone[0].moving["position_rms_rad"],
-        margin, 0.5 * drive.sample_time if chosen and chosen.kind == "feedforward" else 0.0,
-        resolution if chosen and chosen.kind == "feedback" else 0.0, tuple(candidates), len(plants),
-        tuple(notes_on(found, chosen, candidates, drive)), drive,
+        chosen, laws[chosen.setting.law] if chosen else None, dict(linear.gains._asdict()),
+        first.moving["position_rms_rad"], margin, tuple(candidates), len(bench.plants),
+        tuple(notes_on(found, chosen, candidates)), drive,
     )  # fmt: skip
 
 
@@ -253,73 +286,63 @@ def laws_of(model: Model) -> dict[str, Model]:
     return laws
 
 
-def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
-    """Both motions; the reason where one cannot be run to its end."""
-    way, speed = drive.amplitude, 2.0 * math.pi * drive.amplitude * drive.frequency
-    slow = Reference("sine", amplitude=drive.amplitude, frequency=drive.frequency)
-    stop = Reference("scurve", distance=way, velocity=speed, acceleration=10.0 * speed, jerk=400.0 * speed)
-    travel = way / speed + 0.2
-    try:
-        out = [
-            dict(simulate(plant, controller, reference, duration, time_step=min(5e-4, drive.sample_time), output=0.01)
-                 .meta["metrics"])
-            for reference, duration in ((slow, 2.0 / drive.frequency), (stop, 2.0 * travel + 1.0))
-        ]  # fmt: skip
-    except SimulationError as error:
-        return str(error)
-    return Trial(*out)
+def settings_of(laws: dict[str, Model], drive: Drive) -> Iterator[Setting]:
+    """All settings that are tried."""
+    for law in laws:
+        for gain in GAINS:
+            yield Setting(law, "feedforward", gain)
+        for deadband in (0.0, drive.deadband(DEADBAND)) if drive.encoder_counts else (0.0,):
+            for gain in GAINS:
+                yield Setting(law, "feedback", gain, deadband=deadband)
 
 
-def judged(
-    name: str, model: Model, kind: str, gain: float, plants: Sequence[RigidAxis], alone: Sequence[Trial | str],
-    linear: Controller, drive: Drive,
-) -> Candidate:  # fmt: skip
-    """One setting on every axis, up to the first on which it is not safe."""
-    controller = replace(linear, compensator=KINDS[kind](model, gain))
-    errors: list[float] = []
-    unsafe: list[str] = []
-    for plant, before in zip(plants, alone, strict=True):
-        if unsafe:
-            break
-        after = run(plant, controller, drive)
-        if isinstance(after, str) or isinstance(before, str):
-            errors.append(math.inf)
-            unsafe.append(after if isinstance(after, str) else "the linear controller alone fails")
-            continue
-        errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
-        unsafe += dangers(before, after, drive)
-    return Candidate(name, kind, gain, tuple(errors), tuple(dict.fromkeys(unsafe)))
+def alike(one: Setting, other: Setting) -> bool:
+    """Whether they differ at most in gain and lead."""
+    return (one.law, one.kind, one.deadband) == (other.law, other.kind, other.deadband)
 
 
-def dangers(before: Trial, after: Trial, drive: Drive) -> Iterator[str]:
-    """What a compensator makes worse than the linear controller alone."""
-    if after.stopping["second_half_reversals_per_s"] > before.stopping["second_half_reversals_per_s"] + BUSY:
-        yield "limit cycle at rest"
-    name = "reversals_beyond_reference_per_s"
-    if after.moving[name] > max(before.moving[name], 0.0) + BUSY:
-        yield "oscillates in motion"
-    rough = "velocity_above_50Hz_rms_rad_s"
-    speed = 2.0 * math.pi * drive.frequency * drive.amplitude / math.sqrt(2.0)
-    if after.moving[rough] > max(LIVELIER * before.moving[rough], ROUGH * speed):
-        yield "rough motion"
-    if after.moving["position_rms_rad"] > before.moving["position_rms_rad"]:
-        yield "a larger error than without it"
-
-
-def chosen_of(candidates: Sequence[Candidate]) -> Candidate | None:
+def best_of(candidates: Sequence[Candidate]) -> Candidate | None:
     """The safe candidate with the least worst error; among those alike the lowest gain, feedforward first."""
     safe = [c for c in candidates if not c.unsafe and c.worst <= WORTH]
     if not safe:
         return None
     least = min(c.worst for c in safe)
     return min(
-        (c for c in safe if c.worst <= NEAR * least), key=lambda c: (c.kind == "feedback", c.gain, c.worst)
+        (c for c in safe if c.worst <= NEAR * least),
+        key=lambda c: (c.setting.kind == "feedback", c.setting.gain, c.worst),
     )
 
 
-def notes_on(
-    found: Identified, chosen: Candidate | None, candidates: Sequence[Candidate], drive: Drive
-) -> Iterator[str]:  # fmt: skip
+def confirmed(
+    candidates: Sequence[Candidate], bench: Bench, others: Bench
+) -> tuple[Candidate | None, dict[Setting, Candidate]]:
+    """The best that is safe on other axes too, with its errors there; and those that were not."""
+    rejected: dict[Setting, Candidate] = {}
+    while best := best_of([c for c in candidates if c.setting not in rejected]):
+        led = with_lead(best, bench)
+        more = bench.judged(replace(led.setting, gain=GUARD * led.setting.gain))
+        final = others.judged(led.setting) if not more.unsafe else more
+        if not final.unsafe and final.worst <= WORTH:
+            return final, rejected
+        where = f" with {GUARD:g} times the gain" if more.unsafe else " on an axis drawn later"
+        why = final.unsafe or ("hardly less error",)
+        rejected[best.setting] = Candidate(best.setting, best.errors, tuple(w + where for w in why))
+    return None, rejected
+
+
+def with_lead(candidate: Candidate, bench: Bench) -> Candidate:
+    """The candidate with the lead under which its worst error is least; the shortest of those alike."""
+    if candidate.setting.kind != "feedforward":
+        return candidate
+    tried = [candidate]
+    for lead in LEADS[1:]:
+        tried.append(bench.judged(replace(candidate.setting, lead=lead * bench.drive.sample_time)))
+    safe = [c for c in tried if not c.unsafe]
+    least = min(c.worst for c in safe)
+    return next(c for c in safe if c.worst <= ALIKE * least)
+
+
+def notes_on(found: Identified, chosen: Candidate | None, candidates: Sequence[Candidate]) -> Iterator[str]:
     """What the user must know."""
     unknown = [e.name for e in found.estimates if not e.identified]
     if not found.estimates:
@@ -330,15 +353,9 @@ def notes_on(
         reasons = sorted({r for c in candidates for r in c.unsafe}) or ["none reduces the error by 5 %"]
         yield f"No compensator is recommended: {', '.join(reasons)}."
         return
-    stiffer = [c for c in candidates if c.kind == "feedback" and c.gain == 1.0 and c.unsafe]
+    stiffer = [c for c in candidates if c.setting.kind == "feedback" and c.setting.gain == 1.0 and c.unsafe]
     if stiffer:
         yield f"Feedback at gain 1 is not safe: {', '.join(stiffer[0].unsafe)}."
-    if chosen.kind == "feedforward":
-        yield "The lead is half a sample, by which the held torque lags; it was computed, not simulated."
-    elif drive.encoder_counts:
-        yield (
-            "The deadband is one count per sample, the least speed the encoder tells; it was computed, not simulated."
-        )
     if abs(float(found.axis.get("offset", 0.0))) > 0.0:
         offset = f"{float(found.axis['offset']):.4g} {found.unit('N·m')}"
         yield f"A constant torque of {offset} acts beside friction and was left out here: feed it forward too."

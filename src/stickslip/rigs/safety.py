@@ -131,6 +131,7 @@ def idle(y: Any, w: Any, n: Any, m: Any) -> float:
     m.compensation = 0.0
     m.started = 1.0
     m.seen = m.velocity
+    m.wanted_velocity = w.velocity
     if n.source == FROM_REFERENCE:
         m.seen = w.velocity
     m.in_1 = m.seen

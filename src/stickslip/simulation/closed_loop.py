@@ -195,6 +195,8 @@ def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
             "kind": helper.name,
             "gain": helper.gain,
             "filter_hz": helper.filter_hz,
+            "lead": helper.lead,
+            "deadband": helper.deadband,
             **helper.model.as_dict(),
         }
     if case.numbers[_case.METERED] and outcome.code == _case.DONE:

@@ -263,7 +263,8 @@ def controller(
     Parameters
     ----------
     table : Table
-        ``linear`` and ``placement``, or ``gains``; ``compensator``, ``law``, ``gain``, ``filter_hz``;
+        ``linear`` and ``placement``, or ``gains``; ``compensator``, ``law``, ``gain``, ``filter_hz``, ``lead``,
+        ``deadband``;
         ``torque_limit``, ``sample_time``, ``encoder_counts``.
     inertia : float
         Of the axis, kg·m²: what pole placement reckons with.
@@ -304,11 +305,12 @@ def _gains(table: Table, inertia: float, default: Placement | None) -> Gains:
 def _compensator(table: Table, laws: Mapping[str, Model]) -> Compensator | None:
     kinds = {kind.name: kind for kind in Compensator.__subclasses__()}
     if not table.has("compensator"):
-        for key in ("law", "gain", "filter_hz"):
+        for key in ("law", "gain", "filter_hz", "lead", "deadband"):
             if key in table.values:
                 table.choice("compensator", kinds)
         return None
     kind = kinds[table.choice("compensator", kinds)]
     law = laws[table.choice("law", laws, family="laws")]
     gain = table.number("gain", "", 1.0)
-    return kind(law, gain, table.positive("filter_hz", "Hz") if table.has("filter_hz") else None)
+    corner = table.positive("filter_hz", "Hz") if table.has("filter_hz") else None
+    return kind(law, gain, corner, table.number("lead", "s", 0.0), table.number("deadband", "rad/s", 0.0))

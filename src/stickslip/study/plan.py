@@ -51,12 +51,14 @@ class PlannedRun:
     def fingerprint(self) -> str:
         """A hash of everything that determines the run's numbers."""
         helper = self.control.compensator
+        sampled = [helper.lead, helper.deadband] if helper and (helper.lead or helper.deadband) else []
         content = {
             "slip_rule": self.slip_rule,
             "inertia": self.axis.inertia,
             "friction": self.axis.friction.as_dict(),
             "gains": self.control.gains._asdict(),
-            "compensator": helper and [helper.name, helper.gain, helper.filter_hz, helper.model.as_dict()],
+            "compensator": helper
+            and [helper.name, helper.gain, helper.filter_hz, helper.model.as_dict(), *sampled],
             "control": [self.control.torque_limit, self.control.sample_time, self.control.encoder_counts],
             "reference": self.motion.as_dict(),
             "duration": self.duration,

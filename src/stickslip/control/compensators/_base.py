@@ -24,11 +24,19 @@ class Compensator:
         Factor on the compensating torque; 1 cancels the whole model.
     filter_hz : float or None
         Corner of a second-order Butterworth low-pass on the velocity, Hz (the 10 Hz of thesis chapter 4).
+    lead : float
+        Time by which the law looks ahead of the reference, s: its velocity is extended along the last two samples, and
+        a reference at rest stays at rest. Only of a feedforward with a sample time.
+    deadband : float
+        The law sees velocities below it, rad/s, as rest, so that a count of the encoder does not compensate a friction
+        that is not there. Only with a sample time.
     """
 
     model: Model
     gain: float = 1.0
     filter_hz: float | None = None
+    lead: float = 0.0
+    deadband: float = 0.0
 
     name: ClassVar[str] = ""
     prefix: ClassVar[str] = ""
@@ -39,3 +47,10 @@ class Compensator:
             raise ParameterError(f"{self.name}: gain = {self.gain:g} must be a finite number")
         if self.filter_hz is not None and not (self.filter_hz > 0.0 and math.isfinite(self.filter_hz)):
             raise ParameterError(f"{self.name}: filter_hz = {self.filter_hz:g} Hz must be greater than 0")
+        for name, value, unit in (("lead", self.lead, "s"), ("deadband", self.deadband, "rad/s")):
+            if not (value >= 0.0 and math.isfinite(value)):
+                raise ParameterError(f"{self.name}: {name} = {value:g} {unit} must be at least 0")
+        if self.lead > 0.0 and self.velocity != "reference":
+            raise ParameterError(
+                f"{self.name}: lead = {self.lead:g} s, but only a reference can be led; leave it out"
+            )

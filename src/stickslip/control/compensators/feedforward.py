@@ -22,6 +22,12 @@ class Feedforward(Compensator):
         Factor on the compensating torque; 1 cancels the whole model.
     filter_hz : float or None
         Corner of a second-order Butterworth low-pass on the velocity, Hz.
+    lead : float
+        Time by which the law looks ahead of the reference, s: its velocity is extended along the last two samples, and
+        a reference at rest stays at rest. Only of a feedforward with a sample time.
+    deadband : float
+        The law sees velocities below it, rad/s, as rest, so that a count of the encoder does not compensate a friction
+        that is not there. Only with a sample time.
     """
 
     name: ClassVar[str] = "feedforward"
