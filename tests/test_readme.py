@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from stickslip.cli import parser_of
+
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
@@ -40,6 +42,17 @@ def test_commands_run(tmp_path):
         )
         assert out.returncode == 0, f"{command}: {out.stderr}"
     assert (tmp_path / "step-study" / "report.html").exists()
+    assert (tmp_path / "c" / "model.c").exists()
+
+
+def test_the_other_commands_are_spelt_right(tmp_path):
+    """What takes a rig's time or a log of the user's own: every flag and name is one that the command knows."""
+    shown = [line for block in blocks(README, "sh")[2:-1] for line in block.splitlines()]
+    assert len(shown) >= 8
+    for line in shown:
+        name, *arguments = shlex.split(line, comments=True)
+        assert name == "stickslip"
+        parser_of(arguments[:1]).parse_args(arguments)  # complains of what it does not know
 
 
 @pytest.mark.slow

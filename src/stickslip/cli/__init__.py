@@ -52,7 +52,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def parser_of(names: Sequence[str] = VERBS) -> argparse.ArgumentParser:
     """The parser of these verbs; their modules are imported."""
-    parser = Parser(prog="stickslip", description="Friction of a servo axis: simulated and compensated.")
+    parser = Parser(
+        prog="stickslip",
+        description="Friction of a servo axis: identified, simulated, compensated, exported.",
+    )
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     verbs = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs")
     for name in names:
