@@ -1,8 +1,8 @@
 """Events of the exact integrator: where an element breaks away, where the velocity passes through zero.
 
 An event function is a number that rises to zero where a mode ends; `trigger` is the largest of them. Events are
-located on the exact flow. Looked for at the middle and the end of a stretch, and where the velocity dips through
-zero between them (a grazing reversal).
+located on the exact flow. Looked for at the middle and the end of a stretch, on both sides of a reversal, and where
+the velocity dips through zero between them (a grazing reversal).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stickslip.jit import kernel, pointer
+from stickslip.jit import kernel
 from stickslip.simulation._exact_flow import UNMOVED, Linear, acceleration, flow, free_motion, moved
 from stickslip.simulation._exact_rest import NONE, set_off
 from stickslip.simulation._exact_state import (
@@ -24,9 +24,6 @@ from stickslip.simulation._exact_state import (
     KIND,
     LAYER,
     LITERAL,
-    LOAD_AT_0,
-    LOAD_SLOPE,
-    LOWEST,
     NARROW,
     OFFSET,
     POSITION,
@@ -35,14 +32,12 @@ from stickslip.simulation._exact_state import (
     RELAXES,
     S_NOW,
     S_START,
-    SCALE,
     SHARE,
     SIDE_SIZE,
     SIDES,
     SIGMA,
     SLIPPING,
     SLIPS,
-    STICKING,
     STIFFNESS,
     VELOCITY,
     WATCHED,
@@ -62,101 +57,17 @@ from stickslip.simulation._exact_stretch import (
     cubic_of,
     state_at,
 )
+from stickslip.simulation._exact_trigger import BARELY, NOISE, load_of, looks, passes_turn, trigger
 
 NEAR = 1e-3
 """N·m: a guess of how far the event function is below zero."""
-NOISE = 1e-12
-"""Velocities this small (rad/s) may be rounding errors of one that creeps to zero: no reversal yet."""
 ROUNDING = 1e-10
 """N·m by which a load may seem to miss the limit that it was located at."""
 ON_EDGE = 1e-6
 """Velocities this near the edge of a steep layer, in parts of it, are on it."""
-MOST_DIPS = 6
-LOOK, MOST_LOOKS, LOOKS_AT_TURN = 0.1, 16.0, 8
-"""Where an event may hide between two nodes, it is looked for at every such change of velocity, in parts of v_s,
-so often at most, and so often where the velocity turns."""
-VELOCITY_WEIGHT = 10.0
-"""N·m per rad/s: puts a reversal on the scale of a break-away."""
-
-
-@kernel(exact=False)
-def load_of(literal: bool, direction: float, force: float) -> float:
-    """The load that the slip rule compares (`stickslip.laws._stick`)."""
-    return abs(force) if literal else direction * force
-
-
-@kernel(exact=False, inline=True)
-def heaviest(plan: Any, elements: Any, sides: Any, side: int, theta: float, v: float) -> float:
-    """Largest load per share among a side's sticking elements, N·m."""
-    top = -1e300
-    first = first_of(plan, side)
-    literal = plan[LITERAL] > 0.0
-    direction = 1.0 if v >= 0.0 else -1.0
-    for i in range(first, first + int(sides[side * SIDE_SIZE + STICKING])):
-        e = pointer(elements, i * ELEMENT_SIZE)
-        load = load_of(literal, direction, e[LOAD_AT_0] + e[LOAD_SLOPE] * theta)
-        if load > top:
-            top = load
-    return top
-
-
-@kernel(exact=False, inline=True)
-def trigger(
-    parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, theta: float, v: float
-) -> float:
-    """The largest event function at a state: not negative where a mode ends."""
-    g = -1e9
-    if loop[WATCHED] > 0.0:
-        g = -VELOCITY_WEIGHT * (loop[SIGMA] * v - loop[NARROW] + NOISE)
-    for side in range(int(plan[SIDES])):
-        if sides[side * SIDE_SIZE + INSIDE] > 0.0:
-            g = max(g, VELOCITY_WEIGHT * (abs(v) - sides[side * SIDE_SIZE + LAYER]))
-        if sides[side * SIDE_SIZE + STICKING] > 0.0:
-            top = heaviest(plan, elements, sides, side, theta, v)
-            # The curve is only asked for where its lowest level is in reach.
-            limit = sides[side * SIDE_SIZE + LOWEST]
-            if top > limit:
-                limit = sliding(parameters, plan, sides, side, v)
-            g = max(g, top - limit)
-    return g
-
-
-@kernel(exact=False, inline=True)
-def looks(
-    parameters: Any, plan: Any, elements: Any, sides: Any, width: float, theta0: float, v0: float, a0: float,
-    theta1: float, v1: float, a1: float,
-) -> int:  # fmt: skip
-    """Number of parts of a stretch at whose ends events are looked for; the stretch's ends are given.
-
-    The load of a sticking element near its limit can cross it up and down between two nodes, since s(v) varies
-    over v_s. Not where the motion speeds up all along: there the event function rises with the load.
-    """
-    jump = abs(v1 - v0)
-    fastest = max(abs(v0), abs(v1)) + jump
-    rises = v0 * v1 >= 0.0 and a0 * v1 > 0.0 and a1 * v1 > 0.0
-    parts = 1
-    # Where the velocity turns, the load is largest between the ends, and no further than this.
-    peak = (
-        theta0 + 0.5 * (theta1 - theta0) + math.copysign(0.5 * abs(theta1 - theta0) + 0.25 * width * jump, v0)
-    )
-    for side in range(int(plan[SIDES])):
-        if (
-            v0 * v1 < 0.0
-            and sides[side * SIDE_SIZE + STICKING] > 0.0
-            and heaviest(plan, elements, sides, side, peak, v0) > sides[side * SIDE_SIZE + LOWEST]
-        ):
-            parts = LOOKS_AT_TURN
-        seen = LOOK * sides[side * SIDE_SIZE + SCALE]
-        if sides[side * SIDE_SIZE + STICKING] > 0.0 and jump > seen > 0.0:
-            top0 = heaviest(plan, elements, sides, side, theta0, v0)
-            top1 = heaviest(plan, elements, sides, side, theta1, v1)
-            top = max(top0, top1)
-            if top > sides[side * SIDE_SIZE + LOWEST] and not (rises and top0 <= top1):
-                lowest = sliding(parameters, plan, sides, side, fastest)
-                lowest = min(lowest, sliding(parameters, plan, sides, side, -fastest))
-                if top > lowest:
-                    parts = max(parts, int(min(jump / seen, MOST_LOOKS)) + 1)
-    return parts
+MOST_DIPS, MOST_HALVINGS = 6, 60
+SIMULTANEOUS = 1e-14
+"""Times that count as one, s."""
 
 
 @kernel(exact=False, inline=True)
@@ -243,6 +154,14 @@ def find(
                 return locate(
                     lin, parameters, plan, elements, sides, loop, stretch, left, g_left, dip, g, theta, v, tol
                 )
+        elif v * v_right < 0.0 and passes_turn(
+            parameters, plan, elements, sides, half, theta, v, theta_right, v_right
+        ):
+            event = at_turn(
+                lin, parameters, plan, elements, sides, loop, stretch, left, right, v, g_left, tol
+            )
+            if event >= 0.0:
+                return event
         parts = looks(parameters, plan, elements, sides, half, theta, v, a, theta_right, v_right, a_right)
         if parts > 1:
             event, left, g_left = between(
@@ -290,9 +209,11 @@ def locate(
     stretch[VELOCITY_EVENT] = v
     low_miss = min(g_low, 0.0) - wanted
     high_miss = g_high - wanted
+    # The misses that guide the search are weighted; this is the true one at `high`.
+    beyond = high_miss
     side = 0
     turn = 0
-    while high_miss > wanted and high - low > 1e-3 * tol:
+    while beyond > wanted and high - low > 1e-3 * tol:
         x = (low * high_miss - high * low_miss) / (high_miss - low_miss)
         if turn > 10 or not low < x < high:
             x = 0.5 * (low + high)
@@ -302,7 +223,7 @@ def locate(
             if side == 1:
                 low_miss *= 1.0 - miss / high_miss if miss < high_miss else 0.5
             high = x
-            high_miss = miss
+            high_miss = beyond = miss
             side = 1
             stretch[POSITION_EVENT] = theta
             stretch[VELOCITY_EVENT] = v
@@ -314,6 +235,37 @@ def locate(
             side = -1
         turn += 1
     return high
+
+
+@kernel(exact=False)
+def at_turn(
+    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, stretch: Any, low: float,
+    high: float, v_low: float, g_low: float, tol: float,
+) -> float:  # fmt: skip
+    """Time of an event on either side of the reversal in [low, high], or NONE."""
+    left = low
+    x = high
+    theta = loop[POSITION]
+    for _ in range(MOST_HALVINGS):
+        x = 0.5 * (low + high)
+        theta, v = state_at(lin, stretch, x)
+        if v * v_low > 0.0:
+            low = x
+        else:
+            high = x
+        if high - low < SIMULTANEOUS:
+            break
+    before = math.copysign(BARELY, v_low)
+    g = trigger(parameters, plan, elements, sides, loop, theta, before)
+    if g >= 0.0:
+        return locate(
+            lin, parameters, plan, elements, sides, loop, stretch, left, g_low, x, g, theta, before, tol
+        )
+    if trigger(parameters, plan, elements, sides, loop, theta, -before) < 0.0:
+        return NONE
+    stretch[POSITION_EVENT] = theta
+    stretch[VELOCITY_EVENT] = -before
+    return x
 
 
 @kernel(exact=False, inline=True)
@@ -369,19 +321,33 @@ def switch(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> 
             loop[VELOCITY] = 0.0
         if not set_off(plan, elements, sides, parameters, loop):
             loop[SIGMA] = -loop[SIGMA]
+        # Where the curve rises with the velocity, what stuck before may be loaded beyond it in the new direction.
+        if loop[SIGMA] != 0.0:
+            v = loop[SIGMA] * max(loop[SIGMA] * loop[VELOCITY], BARELY)
+            break_away(parameters, plan, elements, sides, loop, v, loop[SIGMA])
         return
-    direction = 1.0 if v >= 0.0 else -1.0
+    break_away(parameters, plan, elements, sides, loop, v, 1.0 if v >= 0.0 else -1.0)
+
+
+@kernel(exact=False, inline=True)
+def break_away(
+    parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, v: float, direction: float
+) -> None:
+    """Let the sticking elements slip whose load in `direction` is at its limit."""
     for side in range(int(plan[SIDES])):
-        if sides[side * SIDE_SIZE + STICKING] > 0.0:
-            s = sliding(parameters, plan, sides, side, v)
-            for i in range(first_of(plan, side), first_of(plan, side + 1)):
-                load = load_of(plan[LITERAL] > 0.0, direction, elements[i * ELEMENT_SIZE + FORCE])
-                if (
-                    elements[i * ELEMENT_SIZE + SLIPS] == 0.0
-                    and load >= elements[i * ELEMENT_SIZE + SHARE] * s - ROUNDING
-                ):
-                    elements[i * ELEMENT_SIZE + SLIPS] = 1.0
-                    loop[SIGMA] = direction
+        first = first_of(plan, side)
+        last = first_of(plan, side + 1)
+        if first == last:
+            continue
+        s = sliding(parameters, plan, sides, side, v)
+        for i in range(first, last):
+            load = load_of(plan[LITERAL] > 0.0, direction, elements[i * ELEMENT_SIZE + FORCE])
+            if (
+                elements[i * ELEMENT_SIZE + SLIPS] == 0.0
+                and load >= elements[i * ELEMENT_SIZE + SHARE] * s - ROUNDING
+            ):
+                elements[i * ELEMENT_SIZE + SLIPS] = 1.0
+                loop[SIGMA] = direction
 
 
 @kernel(exact=False)
