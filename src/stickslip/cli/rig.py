@@ -155,6 +155,7 @@ def commissioned(args: argparse.Namespace) -> int:
     """`stickslip rig commission`."""
     from stickslip.cli import _output
     from stickslip.commission.commission import commission, planned
+    from stickslip.commission.recommended import write_recommended
     from stickslip.errors import InputError
     from stickslip.identify.model_file import versions, write_model
     from stickslip.report.identified import Source, write_identification
@@ -172,8 +173,13 @@ def commissioned(args: argparse.Namespace) -> int:
         raise InputError(f"--out {args.out} is a file; give a folder")
     folder: Path = prepared_folder(args.out)
     found = commission(rig, folder=folder, progress=_output.say, without_watchdog=args.no_watchdog)
-    model = write_model(folder / "model.toml", found.result)
-    sources = [Source(s.name, s.performed.record) for s in found.stages]
+    records = {s.name: s.performed.record for s in found.stages if s.name != "angle"}
+    data = [described(folder / f"{name}.npz", len(record)) for name, record in records.items()]
+    model = write_model(folder / "model.toml", found.result, data=data)
+    advice = found.recommended
+    if advice and advice.chosen:
+        write_recommended(folder / "recommended.toml", advice)
+    sources = [Source(name, record) for name, record in records.items()]
     report = write_identification(
         folder / "report.html",
         found.result,
@@ -189,7 +195,19 @@ def commissioned(args: argparse.Namespace) -> int:
     for note in found.result.notes:
         print(f"- {note}")
     print(f"model: {model}\nreport: {report}\nrecords: {folder}")
+    if advice and advice.chosen:
+        file = folder / "recommended.toml"
+        print(
+            f"recommended: stickslip rig run track --rig {args.rig} --set compensator=recommended --set model={file}"
+        )
     return 0
+
+
+def described(path: Path, rows: int) -> dict[str, Any]:
+    """A record as model.toml names it."""
+    import hashlib
+
+    return {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "rows": rows}
 
 
 def clock(seconds: float) -> str:

@@ -8,17 +8,18 @@ but its rig's limits.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
 
+from stickslip.commission.candidates import Following, Known, resolution_of
 from stickslip.commission.curve import fitted_curve, moving
+from stickslip.commission.recommended import SLOWER, Recommended, picture_of_candidates, recommend_on
+from stickslip.commission.springs import joined_model, resolved
 from stickslip.errors import InputError, LimitCrossed
-from stickslip.identify.attraction import largest_without_overshoot
+from stickslip.identify.angle import identify_angle
 from stickslip.identify.axis_trial import trial_of
 from stickslip.identify.breakaway import identify_breakaway
 from stickslip.identify.estimate import Estimate, Identification, Picture
@@ -26,6 +27,8 @@ from stickslip.identify.hysteresis import Loop as Hysteresis
 from stickslip.identify.inertia import inertia
 from stickslip.identify.lugre_dynamics import Response, identify_lugre_dynamics
 from stickslip.identify.presliding import identify_presliding
+from stickslip.identify.train import fastest_pd, fit_train, identified_train, loop_response
+from stickslip.machines.angle import AngleMap
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.rigs.procedures.attraction import Attraction
@@ -33,8 +36,10 @@ from stickslip.rigs.procedures.base import Performed, Plan, Procedure, perform
 from stickslip.rigs.procedures.breakaway import Breakaway
 from stickslip.rigs.procedures.inertia import Inertia
 from stickslip.rigs.procedures.presliding import Presliding
+from stickslip.rigs.procedures.resonance import Resonance
 from stickslip.rigs.procedures.sliding import Sliding
 from stickslip.rigs.procedures.stickslip import Stickslip
+from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
 from stickslip.simulation.driven import Mechanics
 
@@ -44,10 +49,8 @@ VELOCITIES = (25.0, 18.0, 10.0, 5.0, 3.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1
 """rad/s; those that the rig can run at are taken."""
 BELOW, BEYOND = 0.6, 1.25
 """Of the break-away torque: amplitudes that stick, and that slip."""
-FASTEST, LAG = 1e4, 5e-3
-"""N·m/s up to which C is looked for, and the lag in s that stands in where none overshoots."""
-LEAST = 0.01
-"""Of the amplitude of the pre-sliding loop, below which an element is not resolved."""
+QUIET = 0.04
+"""Of the break-away torque, RMS of the noise that looks for the sticking mode."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +77,10 @@ class Commissioned:
         GMS: its sliding curve is the mean of both directions, its springs are what the encoder sees.
     lugre : Model or None
         LuGre with sigma0 and sigma1 from the stick-slip response.
+    angle : AngleMap
+        What friction and the torque beside it vary by over a revolution.
+    recommended : Recommended or None
+        What to switch on, and what it did.
     stiffness : float
         Total pre-sliding stiffness at the encoder, N·m/rad: contact and shaft in series.
     result : Identification
@@ -84,6 +91,8 @@ class Commissioned:
     inertia: float
     model: Model
     lugre: Model | None
+    angle: AngleMap
+    recommended: Recommended | None
     stiffness: float
     result: Identification
 
@@ -102,12 +111,12 @@ class _Course:
     without_watchdog: bool
     stages: list[Stage] = field(default_factory=list[Stage])
 
-    def run(self, procedure: Procedure, *, insist: bool = True) -> Performed:
-        """Perform, save, and insist on the checks."""
+    def run(self, procedure: Procedure, *, insist: bool = True, name: str = "") -> Performed:
+        """Perform, save under a name (the procedure's), and insist on the checks."""
         self.progress(f"{procedure.name}: {'; '.join(procedure.plan(self.rig).text)}")
         done = perform(procedure, self.rig, without_watchdog=self.without_watchdog)
         if self.folder is not None:
-            done.record.save(self.folder / f"{procedure.name}.npz")
+            done.record.save(self.folder / f"{name or procedure.name}.npz")
         return done.insist() if insist else done
 
     def add(self, name: str, done: Performed, found: Identification | None, note: str = "") -> None:
@@ -120,6 +129,7 @@ def planned(rig: Rig, velocities: tuple[float, ...] = VELOCITIES, duration: floa
     speeds = tuple(v for v in velocities if v <= 0.5 * rig.limits.speed)
     stages: tuple[Procedure, ...] = (
         Inertia(duration=duration), Breakaway(), Sliding(velocities=speeds), Presliding(), Stickslip(), Attraction(),
+        Resonance(), *[Track()] * 2 * (1 + len(SLOWER)),
     )  # fmt: skip
     return tuple(s.plan(rig) for s in stages)
 
@@ -133,6 +143,7 @@ def commission(
     duration: float = 60.0,
     interval: float = 10.0,
     lugre_too: bool = True,
+    track_too: bool = True,
     without_watchdog: bool = False,
 ) -> Commissioned:
     """Commission a rig.
@@ -152,6 +163,8 @@ def commission(
         Between the angles of the break-away stage, degrees.
     lugre_too : bool
         Whether LuGre's dynamics are identified as well, from a stick-slip response: the longest of the computations.
+    track_too : bool
+        Whether a compensator is recommended and tried.
     without_watchdog : bool
         Arm a rig that declares no watchdog.
 
@@ -163,11 +176,20 @@ def commission(
     course = _Course(rig, folder, progress or (lambda _: None), without_watchdog)
     j, top = _inertia(course, duration)
     fs = _breakaway(course, j, interval)
-    sliding, curve = _sliding(course, j, fs, tuple(v for v in velocities if v <= 1.05 * top))
+    sliding, curve, angle = _sliding(course, j, fs, tuple(v for v in velocities if v <= 1.05 * top))
     stuck = _presliding(course, fs, sliding)
     _attraction(course, j)
     lugre = _stickslip(course, j, fs, sliding) if lugre_too else None
-    return _joined(course, j, curve, stuck, lugre)
+    model, stiffness, said = joined_model(curve, stuck)
+    recommended = None
+    if track_too:
+        recommended = _recommended(
+            course, j, top, fs, model, stiffness, angle, lugre.model if lugre else None
+        )
+    result = _result(course, model, j, stiffness, said, angle, recommended)
+    return Commissioned(
+        tuple(course.stages), j, model, lugre.model if lugre else None, angle, recommended, stiffness, result,
+    )  # fmt: skip
 
 
 # ---- stages ---------------------------------------------------------------------------------------------------
@@ -192,17 +214,19 @@ def _breakaway(course: _Course, j: float, interval: float) -> float:
 
 def _sliding(
     course: _Course, j: float, fs: float, velocities: tuple[float, ...]
-) -> tuple[Mapping[str, float], Identification]:
-    """A Stribeck curve for the methods that need one, and the best curve."""
+) -> tuple[Mapping[str, float], Identification, AngleMap]:
+    """A Stribeck curve for the methods that need one, the best curve, and what depends on the angle."""
     if len(velocities) < 5:
         raise InputError(
             f"sliding: the rig runs at {velocities} only of the velocities asked for; give five slower ones"
         )
     done = course.run(Sliding(velocities=velocities, inertia=j), insist=False)
-    points, notes = moving(done.record)
+    points, slid, notes = moving(done.record)
     plain, chosen = fitted_curve(points, fs, notes)
     course.add("sliding", done, chosen)
-    return plain, chosen
+    around = identify_angle(done.record, slid)
+    course.add("angle", done, around)
+    return plain, chosen, around.details["angle"]
 
 
 def _presliding(course: _Course, fs: float, sliding: Mapping[str, float]) -> Identification:
@@ -219,33 +243,6 @@ def _presliding(course: _Course, fs: float, sliding: Mapping[str, float]) -> Ide
     found = resolved(found, share * fs)
     course.add("presliding", done, found)
     return found
-
-
-def resolved(found: Identification, amplitude: float) -> Identification:
-    """Without the elements that carry less than `LEAST` of the loop: their stiffness is that of the noise."""
-    assert found.model is not None
-    p: Any = found.model.parameters
-    keep = [i for i in range(len(p.k)) if p.alpha[i] * p.fs >= LEAST * amplitude]
-    if len(keep) == len(p.k):
-        return found
-    total = math.fsum(p.alpha[i] for i in keep)
-    values: dict[str, Any] = p._asdict()
-    values |= {"k": [p.k[i] for i in keep], "alpha": [p.alpha[i] / total for i in keep]}
-    gone = ", ".join(
-        f"{p.k[i]:.3g} N·m/rad up to {p.alpha[i] * p.fs:.2g} N·m" for i in range(len(p.k)) if i not in keep
-    )
-    note = f"Left out, since the loop does not resolve them: elements of {gone}."
-    estimates = tuple(e for e in found.estimates if not e.name.startswith(("k[", "alpha[")))
-    estimates += tuple(
-        dataclasses.replace(found[f"{n}[{i}]"], name=f"{n}[{keep.index(i)}]")
-        for n in ("k", "alpha")
-        for i in keep
-        if f"{n}[{i}]" in [e.name for e in found.estimates]
-    )
-    return dataclasses.replace(
-        found, model=Model(found.model.law, {}, **values), estimates=estimates, notes=(*found.notes, note),
-        correlation=np.eye(len(estimates)),
-    )  # fmt: skip
 
 
 def _attraction(course: _Course, j: float) -> None:
@@ -282,48 +279,28 @@ def _stickslip(course: _Course, j: float, fs: float, sliding: Mapping[str, float
 # ---- the whole ------------------------------------------------------------------------------------------------
 
 
-def _joined(
-    course: _Course, j: float, curve: Identification, stuck: Identification, lugre: Identification | None
-) -> Commissioned:
-    """One GMS law from the curve, the springs and the rule for C."""
-    assert curve.model is not None
-    assert stuck.model is not None
-    springs: Any = stuck.model.parameters
-    values: dict[str, Any] = {
-        **curve.model.parameters._asdict(),
-        "k": list(springs.k),
-        "alpha": list(springs.alpha),
-    }
-    plain: dict[str, Any] = {k: listed(v) for k, v in values.items()}
-    model = Model(curve.model.law, {}, **plain)
-    c, said = largest_without_overshoot(model, upper=FASTEST)
-    if c >= FASTEST:
-        c = math.fsum(springs.alpha) * stuck_level(stuck) / LAG
-        said = (
-            f"No C overshoots up to {FASTEST:g} N·m/s (thesis 4.3.1.1.5): C is that of a lag of {1e3 * LAG:g} ms.",
-        )
-    model = Model(curve.model.law, {}, **{**plain, "c": c})
-    stiffness = math.fsum(springs.k)
-    return Commissioned(
-        tuple(course.stages), j, model, lugre.model if lugre else None, stiffness,
-        _result(course, model, j, stiffness, said),
-    )  # fmt: skip
+def _recommended(
+    course: _Course, j: float, top: float, fs: float, model: Model, stiffness: float, angle: AngleMap,
+    lugre: Model | None,
+) -> Recommended:  # fmt: skip
+    """The response of the loop, the bandwidth that it bears, the compensator, and what both do."""
+    done = course.run(Resonance(speed=0.6 * top, inertia=j, stuck=QUIET * fs))
+    sliding, sticking = (loop_response(done.part(label), label) for label in ("sliding", "sticking"))
+    train, (at, where, state) = fit_train(sliding, sticking, j), fastest_pd([sliding, sticking], j)
+    known = Known(j, model, angle, train, stiffness, resolution_of(done.part("sticking")), at, where, state)
+    course.add("resonance", done, identified_train([sliding, sticking], train, at, where, state))
+    course.progress("recommend: simulating the machine that was identified")
 
+    def follow(procedure: Following, name: str) -> Performed:
+        return course.run(procedure, name=name)
 
-def listed(value: Any) -> Any:
-    """Tuples as lists, as `Model` takes them."""
-    return list(cast("tuple[float, ...]", value)) if isinstance(value, tuple) else value
-
-
-def stuck_level(stuck: Identification) -> float:
-    """The torque that the springs carry together, N·m."""
-    assert stuck.model is not None
-    return float(stuck.model.parameters.fs)
+    return recommend_on(known, course.rig, lugre, follow)
 
 
 def _result(
-    course: _Course, model: Model, j: float, stiffness: float, said: tuple[str, ...]
-) -> Identification:
+    course: _Course, model: Model, j: float, stiffness: float, said: tuple[str, ...], angle: AngleMap,
+    recommended: Recommended | None,
+) -> Identification:  # fmt: skip
     estimates: list[Estimate] = []
     pictures: list[Picture] = []
     notes: list[str] = [
@@ -331,10 +308,12 @@ def _result(
         "with all that twists between the encoder and the contact; the springs of the model are this.",
         "The sliding curve is the mean of both directions.",
         *said,
+        *(recommended.lines() if recommended else ()),
     ]
     misfit: dict[str, float] = {}
-    for stage in course.stages:
-        failed = [c for c in stage.performed.checks if not c.passed]
+    for i, stage in enumerate(course.stages):
+        again = any(s.performed is stage.performed for s in course.stages[:i])
+        failed = [c for c in stage.performed.checks if not c.passed and not again]
         notes += [f"{stage.name}: {c.name}: {c.text}" for c in failed]
         if stage.found is None:
             notes.append(f"{stage.name}: {stage.note}.")
@@ -346,7 +325,9 @@ def _result(
         pictures += stage.found.pictures
         notes += [f"{stage.name}: {n}" for n in stage.found.notes]
         misfit |= {f"{stage.name}_{k}": float(v) for k, v in stage.found.misfit.items()}
+    if recommended and recommended.chosen:
+        pictures.append(picture_of_candidates(recommended))
     return Identification(
         "commission", model, tuple(estimates), np.eye(len(estimates)), misfit, tuple(notes), (), tuple(pictures),
-        {"mechanics": Mechanics(j), "stiffness": stiffness},
+        {"mechanics": Mechanics(j), "stiffness": stiffness, "angle": angle},
     )  # fmt: skip

@@ -27,8 +27,8 @@ CLOSE = 0.015
 ELEMENTS = {"k": [300.0], "alpha": [1.0], "c": 50.0}
 
 
-def moving(record: Record) -> tuple[SlidingPoints, list[str]]:
-    """Mean torque per speed, both directions folded; without the speeds at which the axis stuck and slipped."""
+def moving(record: Record) -> tuple[SlidingPoints, list[Segment], list[str]]:
+    """Mean torque per speed, both directions folded, and the runs; without those that stuck and slipped."""
     segments = constant_velocity_segments(record)
     slid = [s for s in segments if ripple(record, s) <= RIPPLE]
     left = sorted({round(abs(s.velocity), 4) for s in segments} - {round(abs(s.velocity), 4) for s in slid})
@@ -42,7 +42,7 @@ def moving(record: Record) -> tuple[SlidingPoints, list[str]]:
     notes = [f"{len(slid)} runs at {speeds.size} speeds, mean of both directions."]
     if left:
         notes.append(f"Stuck and slipped, left out: {', '.join(f'{v:g}' for v in left)} rad/s.")
-    return SlidingPoints(speeds, torque), notes
+    return SlidingPoints(speeds, torque), slid, notes
 
 
 def ripple(record: Record, s: Segment) -> float:

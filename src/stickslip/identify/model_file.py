@@ -18,6 +18,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.machines.angle import AngleMap
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import MODEL_FORMAT
 
@@ -30,6 +31,7 @@ def write_model(
     *,
     data: Sequence[Mapping[str, Any]] = (),
     law: str = "",
+    more: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write an identified law.
 
@@ -42,6 +44,8 @@ def write_model(
         One per record: ``file``, ``sha256``, ``rows``, what is known.
     law : str
         How the law is found again if not by its name: the path of its file.
+    more : mapping, optional
+        Further tables.
 
     Raises
     ------
@@ -54,7 +58,7 @@ def write_model(
     draft = target.with_name(target.name + ".part")
     try:
         with draft.open("wb") as file:
-            tomli_w.dump(model_data(found, data, _relative(law, target)), file)
+            tomli_w.dump(model_data(found, data, _relative(law, target)) | dict(more or {}), file)
         os.replace(draft, target)
     except OSError as error:
         raise InputError(f"{target} cannot be written ({error.strerror}); give another path") from None
@@ -96,6 +100,9 @@ def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: st
         }  # fmt: skip
     if isinstance(axis, ServoAxis):
         out["axis"] = out.get("axis", {}) | {"seen_from": axis.seen_from, "gear_ratio": axis.gear_ratio}
+    angle: Any = found.details.get("angle")
+    if isinstance(angle, AngleMap):
+        out["angle"] = angle.as_dict()
     out["misfit"] = {k: float(v) for k, v in found.misfit.items() if math.isfinite(v)}
     out["estimates"] = [_estimate(e) for e in found.estimates]
     out["correlation"] = {

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["PROCEDURES", "procedure"]
 
-PROCEDURES = ("inertia", "breakaway", "sliding", "presliding", "stickslip", "attraction", "track", "repeat")
+PROCEDURES = (
+    "inertia", "resonance", "breakaway", "sliding", "presliding", "stickslip", "attraction", "track", "repeat",
+)  # fmt: skip
 
 
 def procedure(name: str) -> type[Procedure]:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
+from stickslip.config import read_toml
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import LINEAR, Gains, place
 from stickslip.errors import InputError, UnknownName
+from stickslip.machines.angle import AngleMap
 from stickslip.model import Model, Reference
 from stickslip.record import Record
 from stickslip.rigs.procedures._moves import ROOM
@@ -36,8 +40,9 @@ class Track(Procedure):
 
     ``reference`` is low, high or step; ``linear`` PD, PID or PR with ``bandwidth`` (Hz), ``damping`` and ``inertia``
     (kg·m²) of its placement; ``compensator`` none, feedforward or feedback with ``model``, a model.toml or the name of
-    one of the machine's, its ``gain`` and ``filter`` (Hz, 0: the machine's);
-    ``duration`` in s (0: the reference's own).
+    one of the machine's, its ``gain`` and ``filter`` (Hz, 0: the machine's); or recommended: all of that from the
+    ``model``, a recommended.toml of `stickslip rig commission`. What a file knows of the angle (``[angle]``) is
+    compensated as well. ``duration`` in s (0: the reference's own).
     """
 
     name: ClassVar[str] = "track"
@@ -71,18 +76,48 @@ class Track(Procedure):
         InputError
             If a name is unknown or the model is missing.
         """
+        if self.compensator == "recommended":
+            return self.recommended().controller(rig)
         if self.linear not in LINEAR:
             raise UnknownName("linear controller", self.linear, LINEAR)
         gains: Gains = place(self.linear, self.inertia, self.bandwidth, self.damping)
-        limit = ROOM * rig.limits.torque
+        limit = ROOM * rig.limits.torque - self.angle().largest
         if self.compensator == "none":
             return Controller(gains, None, limit, rig.sample_time)
         if self.compensator not in COMPENSATORS:
-            raise UnknownName("compensator", self.compensator, ("none", *COMPENSATORS))
+            raise UnknownName("compensator", self.compensator, ("none", *COMPENSATORS, "recommended"))
         machine: Any = getattr(rig, "machine", None)
         corner = self.filter or (machine.filter if machine is not None else 0.0)
-        helper = COMPENSATORS[self.compensator](self.law(rig), self.gain, corner or None)
+        law = self.angle().on(self.law(rig))
+        helper = COMPENSATORS[self.compensator](law, self.gain, corner or None)
         return Controller(gains, helper, limit, rig.sample_time)
+
+    def recommended(self) -> Track:
+        """This with what the file of the model recommends.
+
+        Raises
+        ------
+        InputError
+        """
+        table = read_toml(Path(self.model)) if self.model.endswith(".toml") else None
+        if table is None or not table.has("recommended"):
+            raise InputError(
+                f"model = {self.model!r} recommends nothing; give the recommended.toml of `stickslip rig commission`"
+            )
+        with table.table("recommended") as given:
+            return dataclasses.replace(
+                self, linear="PD", compensator=given.choice("compensator", COMPENSATORS, "feedforward"),
+                bandwidth=given.positive("bandwidth", "Hz"), damping=given.positive("damping", ""),
+                inertia=given.positive("inertia", "kg·m²"), gain=given.positive("gain", ""),
+                filter=given.number("filter", "Hz", 0.0, 0.0),
+            )  # fmt: skip
+
+    def angle(self) -> AngleMap:
+        """What the file of the model knows of the angle; nothing without a compensator."""
+        if self.compensator == "none" or not self.model.endswith(".toml"):
+            return AngleMap()
+        table = read_toml(Path(self.model))
+        return AngleMap.of(table.table("angle").values) if table.has("angle") else AngleMap()
 
     def law(self, rig: Rig) -> Model:
         """The compensator's model."""
@@ -107,7 +142,9 @@ class Track(Procedure):
         samples = self.samples(rig)
         self.controller(rig)
         words = f"{self.linear} {self.bandwidth:g} Hz"
-        if self.compensator != "none":
+        if self.compensator == "recommended":
+            words = f"as {self.model} recommends"
+        elif self.compensator != "none":
             words += f" with {self.compensator} {self.model}"
         return Plan(
             len(samples) * rig.sample_time + 0.1, float(np.ptp(samples[:, 0])),
@@ -119,10 +156,12 @@ class Track(Procedure):
         """From where the axis stands, as the reference's zero."""
         rows = yield Step(setpoints(round(0.05 / rig.sample_time)), pause=self.wait)
         samples = self.samples(rig)
+        position = float(rows[-1, POSITION]) + samples[:, 0]
         wanted = setpoints(
             len(samples),
-            position=float(rows[-1, POSITION]) + samples[:, 0],
+            position=position,
             velocity=samples[:, 1],
+            torque=self.angle().torque(position),
             closed=1.0,
         )
         yield Step(wanted, self.controller(rig), keep=True, label=self.reference)

@@ -1,0 +1,79 @@
+"""The springs of a commissioned machine: those that its loop resolved, and the law that they make with its curve."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.identify.attraction import largest_without_overshoot
+from stickslip.identify.estimate import Identification
+from stickslip.model import Model
+
+__all__ = ["joined_model", "listed", "resolved"]
+
+FASTEST, LAG = 1e4, 5e-3
+"""N·m/s up to which C is looked for, and the lag in s that stands in where none overshoots."""
+LEAST = 0.01
+"""Of the amplitude of the pre-sliding loop, below which an element is not resolved."""
+
+
+def resolved(found: Identification, amplitude: float) -> Identification:
+    """Without the elements that carry less than `LEAST` of the loop: their stiffness is that of the noise."""
+    assert found.model is not None
+    p: Any = found.model.parameters
+    keep = [i for i in range(len(p.k)) if p.alpha[i] * p.fs >= LEAST * amplitude]
+    if len(keep) == len(p.k):
+        return found
+    total = math.fsum(p.alpha[i] for i in keep)
+    values: dict[str, Any] = p._asdict()
+    values |= {"k": [p.k[i] for i in keep], "alpha": [p.alpha[i] / total for i in keep]}
+    gone = ", ".join(
+        f"{p.k[i]:.3g} N·m/rad up to {p.alpha[i] * p.fs:.2g} N·m" for i in range(len(p.k)) if i not in keep
+    )
+    note = f"Left out, since the loop does not resolve them: elements of {gone}."
+    estimates = tuple(e for e in found.estimates if not e.name.startswith(("k[", "alpha[")))
+    estimates += tuple(
+        dataclasses.replace(found[f"{n}[{i}]"], name=f"{n}[{keep.index(i)}]")
+        for n in ("k", "alpha")
+        for i in keep
+        if f"{n}[{i}]" in [e.name for e in found.estimates]
+    )
+    return dataclasses.replace(
+        found, model=Model(found.model.law, {}, **values), estimates=estimates, notes=(*found.notes, note),
+        correlation=np.eye(len(estimates)),
+    )  # fmt: skip
+
+
+def joined_model(curve: Identification, stuck: Identification) -> tuple[Model, float, tuple[str, ...]]:
+    """One GMS law from the curve, the springs and the rule for C; its total stiffness; what is to be said of C."""
+    assert curve.model is not None
+    assert stuck.model is not None
+    springs: Any = stuck.model.parameters
+    values: dict[str, Any] = {
+        **curve.model.parameters._asdict(),
+        "k": list(springs.k),
+        "alpha": list(springs.alpha),
+    }
+    plain: dict[str, Any] = {k: listed(v) for k, v in values.items()}
+    model = Model(curve.model.law, {}, **plain)
+    c, said = largest_without_overshoot(model, upper=FASTEST)
+    if c >= FASTEST:
+        c = math.fsum(springs.alpha) * stuck_level(stuck) / LAG
+        said = (
+            f"No C overshoots up to {FASTEST:g} N·m/s (thesis 4.3.1.1.5): C is that of a lag of {1e3 * LAG:g} ms.",
+        )
+    return Model(curve.model.law, {}, **{**plain, "c": c}), math.fsum(springs.k), said
+
+
+def listed(value: Any) -> Any:
+    """Tuples as lists, as `Model` takes them."""
+    return list(cast("tuple[float, ...]", value)) if isinstance(value, tuple) else value
+
+
+def stuck_level(stuck: Identification) -> float:
+    """The torque that the springs carry together, N·m."""
+    assert stuck.model is not None
+    return float(stuck.model.parameters.fs)

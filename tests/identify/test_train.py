@@ -1,0 +1,79 @@
+"""The loop's response, its modes and the PD it bears, on virtual machines whose modes are known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip.analyse.tracking import tracking_metrics
+from stickslip.control.controller import Controller
+from stickslip.control.linear import place
+from stickslip.errors import InputError
+from stickslip.identify.train import fastest_pd, fit_train, identified_train, loop_response
+from stickslip.machines.machine import machine
+from stickslip.rigs.loop import Loop
+from stickslip.rigs.procedures.base import perform
+from stickslip.rigs.procedures.resonance import Resonance
+from stickslip.rigs.rig import setpoints
+from stickslip.rigs.virtual import VirtualRig
+
+DRY = machine("thesis-dry")
+
+
+def responses(plant, **options):
+    done = perform(
+        Resonance(inertia=plant.inertia, stuck=0.01, duration=12.0, **options), VirtualRig(plant)
+    ).insist()
+    return [loop_response(done.part(label), label) for label in ("sliding", "sticking")]
+
+
+@pytest.fixture(scope="module")
+def dry():
+    return responses(DRY)
+
+
+def test_modes_spring_and_masses_are_those_of_the_machine(dry):
+    train, flexible = fit_train(*dry, DRY.inertia), DRY.flexible
+    assert train.sliding == pytest.approx(flexible.modes[1], rel=0.02)
+    assert train.axis.elasticity == pytest.approx(flexible.elasticity, rel=0.03)
+    assert train.axis.disk == pytest.approx(flexible.disk, rel=0.03)
+    assert train.axis.inertia == pytest.approx(DRY.inertia)
+    found = identified_train(dry, train, *fastest_pd(dry, DRY.inertia))
+    assert found["mode_sticking"].value < found["mode_sliding"].value
+    assert math.isnan(found["delay"].std)
+
+
+def standing(plant, bandwidth):
+    """Motion above 5 Hz under a PD that holds a position, at the end, rad RMS."""
+    wanted = setpoints(2000, position=0.02, closed=1.0)
+    with Loop(VirtualRig(plant)) as loop:
+        loop.run(wanted, Controller(place("PD", plant.inertia, bandwidth, 1.0), None, 1.0, 1e-3))
+        record = loop.record()
+    return tracking_metrics(record)["late_oscillation_rad"]
+
+
+def test_a_pd_is_calm_below_the_bandwidth_that_rings_and_rings_above(dry):
+    at, frequency, while_ = fastest_pd(dry[1:], DRY.inertia)
+    assert while_ == "sticking"
+    assert standing(DRY, 0.85 * at) < 3e-5
+    assert standing(DRY, 1.3 * at) > 1e-4
+    assert 200.0 < frequency < 260.0
+
+
+def test_a_rigid_axis_has_no_mode_while_it_slides():
+    rigid = replace(DRY.without("flexibility", "encoder-mode", "bandwidth"), delay=0.5)
+    found = fit_train(*responses(rigid), rigid.inertia)
+    assert found.axis is None
+    assert found.delay == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_record_without_excitation_is_refused(dry):
+    rig = VirtualRig(DRY)
+    with Loop(rig) as loop:
+        loop.run(setpoints(5000, torque=1e-6 * np.sin(np.arange(5000.0))))
+        record = loop.record()
+    with pytest.raises(InputError, match="does not answer"):
+        loop_response(record, "quiet")
