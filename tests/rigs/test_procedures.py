@@ -23,6 +23,7 @@ from stickslip.rigs.virtual import VirtualRig, virtual_rig
 
 SHORT = {
     "inertia": {"duration": "25"},
+    "resonance": {"duration": "8"},
     "breakaway": {"interval": "60"},
     "sliding": {"velocities": "5,1,0.3"},
     "presliding": {"frequency": "0.5", "amplitude": "0.15"},

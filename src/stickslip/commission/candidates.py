@@ -40,7 +40,7 @@ from stickslip.rigs.virtual import VirtualRig
 
 __all__ = [
     "DAMPING", "LEVELS", "MARGIN", "Candidate", "Following", "Known", "candidates_of", "chosen_of", "controller_of",
-    "laws_to_try", "resolution_of", "simulated",
+    "laws_to_try", "resolution_of", "simulated", "with_lead",
 ]  # fmt: skip
 
 MARGIN = 2.0
@@ -49,6 +49,10 @@ DAMPING = 1.0
 LEVELS = (1.0, 0.97, 1.03)
 """Friction over what was identified, at which a setting must be calm; the mean of the errors' logarithms counts."""
 GAINS = (1.0, 0.9, 0.8)
+LEADS = (0.5, 1.0, 2.0)
+"""In samples."""
+ALIKE = 0.98
+"""Of the error, that a lead must leave at most to be worth it."""
 KINDS = {"feedforward": Feedforward, "feedback": Feedback}
 CALM = 0.05
 """Of the reference's amplitude: motion above 5 Hz, RMS, up to which a run is calm, on the sinusoid and at rest after a
@@ -62,6 +66,8 @@ SETTLED = 1e-3
 
 
 NOTHING = AngleMap()
+Helper = tuple[Model, str, float, float]
+"""Law, structure, gain and lead (s) of a compensator."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +114,8 @@ class Known:
     resolution : float
         Of the position, rad.
     rings_at, rings_with, rings_while : float, float, str
-        Bandwidth from which on a PD rings, the frequency, and in which state.
+        Bandwidth from which on a PD rings, the frequency, and in which state; the state is empty where none up to that
+        bandwidth does.
     """
 
     inertia: float
@@ -153,6 +160,8 @@ class Candidate:
     ----------
     law, kind : str
     gain : float
+    lead : float
+        s, by which a feedforward looks ahead of the reference.
     errors : tuple of float
         RMS error on the slow sinusoid at `LEVELS`, rad; up to the first at which it is not calm.
     restless : str
@@ -162,8 +171,13 @@ class Candidate:
     law: str
     kind: str
     gain: float
-    errors: tuple[float, ...]
-    restless: str
+    lead: float = 0.0
+    errors: tuple[float, ...] = ()
+    restless: str = ""
+
+    def helper(self, model: Model) -> Helper:
+        """With a law."""
+        return model, self.kind, self.gain, self.lead
 
     @property
     def error(self) -> float:
@@ -182,16 +196,14 @@ def resolution_of(record: Record) -> float:
     return least if np.mean(np.abs(whole - np.round(whole)) < 0.01 * np.round(whole)) > 0.9 else 0.0
 
 
-def controller_of(
-    known: Known, rig: Rig, bandwidth: float, helper: tuple[Model, str, float] | None
-) -> Controller:
-    """The PD, with the compensator by law, structure and gain or without."""
+def controller_of(known: Known, rig: Rig, bandwidth: float, helper: Helper | None = None) -> Controller:
+    """The PD, with the compensator or without."""
     gains = place("PD", known.inertia, bandwidth, DAMPING)
     limit = ROOM * rig.limits.torque - known.angle.largest
     if helper is None:
         return Controller(gains, None, limit, rig.sample_time)
-    model, kind, gain = helper
-    return Controller(gains, KINDS[kind](known.angle.on(model), gain), limit, rig.sample_time)
+    model, kind, gain, lead = helper
+    return Controller(gains, KINDS[kind](known.angle.on(model), gain, lead=lead), limit, rig.sample_time)
 
 
 def laws_to_try(model: Model, lugre: Model | None) -> dict[str, Model]:
@@ -215,16 +227,27 @@ def candidates_of(
     """Every law both ways at every gain, simulated."""
     plants = [known.machine(rig, level) for level in LEVELS]
     return [
-        judged(known, rig, plants, name, laws[name], kind, gain)
+        judged(known, rig, plants, laws[name], Candidate(name, kind, gain))
         for name, kind, gain in itertools.product(laws, KINDS, gains)
     ]
 
 
-def judged(
-    known: Known, rig: Rig, plants: Sequence[Machine], name: str, model: Model, kind: str, gain: float
-) -> Candidate:
-    """One setting on every machine, up to the first on which it is not calm."""
-    controller = controller_of(known, rig, known.bandwidth, (model, kind, gain))
+def with_lead(known: Known, rig: Rig, model: Model, chosen: Candidate) -> Candidate:
+    """The feedforward with the lead that leaves the least error; none where it is all but alike."""
+    if chosen.kind != "feedforward":
+        return chosen
+    plants = [known.machine(rig, level) for level in LEVELS]
+    led = [
+        judged(known, rig, plants, model, dataclasses.replace(chosen, lead=n * rig.sample_time))
+        for n in LEADS
+    ]
+    best = chosen_of(led, ALIKE * chosen.error)
+    return best if best else chosen
+
+
+def judged(known: Known, rig: Rig, plants: Sequence[Machine], model: Model, setting: Candidate) -> Candidate:
+    """The setting with what it does on every machine, up to the first on which it is not calm."""
+    controller = controller_of(known, rig, known.bandwidth, setting.helper(model))
     errors: list[float] = []
     restless = ""
     for plant in plants:
@@ -232,7 +255,7 @@ def judged(
         errors.append(error)
         if restless:
             break
-    return Candidate(name, kind, gain, tuple(errors), restless)
+    return dataclasses.replace(setting, errors=tuple(errors), restless=restless)
 
 
 def simulated(plant: Machine, controller: Controller, angle: AngleMap) -> tuple[float, str]:

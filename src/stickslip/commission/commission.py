@@ -8,16 +8,24 @@ but its rig's limits.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from stickslip.commission.candidates import Following, Known, resolution_of
 from stickslip.commission.curve import fitted_curve, moving
-from stickslip.commission.recommended import SLOWER, Recommended, picture_of_candidates, recommend_on
-from stickslip.commission.springs import joined_model, resolved
+from stickslip.commission.recommended import (
+    SLOWER,
+    Recommended,
+    picture_of_candidates,
+    picture_of_tracking,
+    recommend_on,
+)
+from stickslip.commission.springs import joined_model, resolved, with_stiffness
 from stickslip.errors import InputError, LimitCrossed
 from stickslip.identify.angle import identify_angle
 from stickslip.identify.axis_trial import trial_of
@@ -45,10 +53,14 @@ from stickslip.simulation.driven import Mechanics
 
 __all__ = ["VELOCITIES", "Commissioned", "Stage", "commission", "planned"]
 
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
 VELOCITIES = (25.0, 18.0, 10.0, 5.0, 3.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.06, 0.04, 0.02)
 """rad/s; those that the rig can run at are taken."""
 BELOW, BEYOND = 0.6, 1.25
 """Of the break-away torque: amplitudes that stick, and that slip."""
+MOST = 0.1
+"""Of the sample rate: bandwidth taken as that which rings where none does."""
 QUIET = 0.04
 """Of the break-away torque, RMS of the noise that looks for the sticking mode."""
 
@@ -240,7 +252,7 @@ def _presliding(course: _Course, fs: float, sliding: Mapping[str, float]) -> Ide
     done.insist()
     level = {**sliding, "fs": fs, "fc": fs, "sigma2": 0.0}
     found = identify_presliding(Hysteresis.of(done.record, "motor_torque"), level, elements=3, offset=True)
-    found = resolved(found, share * fs)
+    found = with_stiffness(resolved(found, share * fs), done.record)
     course.add("presliding", done, found)
     return found
 
@@ -287,6 +299,8 @@ def _recommended(
     done = course.run(Resonance(speed=0.6 * top, inertia=j, stuck=QUIET * fs))
     sliding, sticking = (loop_response(done.part(label), label) for label in ("sliding", "sticking"))
     train, (at, where, state) = fit_train(sliding, sticking, j), fastest_pd([sliding, sticking], j)
+    if math.isinf(at):
+        at = MOST / course.rig.sample_time
     known = Known(j, model, angle, train, stiffness, resolution_of(done.part("sticking")), at, where, state)
     course.add("resonance", done, identified_train([sliding, sticking], train, at, where, state))
     course.progress("recommend: simulating the machine that was identified")
@@ -323,11 +337,24 @@ def _result(
             for e in stage.found.estimates
         ]
         pictures += stage.found.pictures
-        notes += [f"{stage.name}: {n}" for n in stage.found.notes]
+        if stage.name != "resonance":  # `Recommended.lines` says it
+            notes += [f"{stage.name}: {n}" for n in stage.found.notes]
         misfit |= {f"{stage.name}_{k}": float(v) for k, v in stage.found.misfit.items()}
     if recommended and recommended.chosen:
-        pictures.append(picture_of_candidates(recommended))
+        pictures += [picture_of_candidates(recommended), picture_of_tracking(recommended)]
+    correlation = blocks([s.found for s in course.stages if s.found])
     return Identification(
-        "commission", model, tuple(estimates), np.eye(len(estimates)), misfit, tuple(notes), (), tuple(pictures),
+        "commission", model, tuple(estimates), correlation, misfit, tuple(notes), (), tuple(pictures),
         {"mechanics": Mechanics(j), "stiffness": stiffness, "angle": angle},
     )  # fmt: skip
+
+
+def blocks(found: Sequence[Identification]) -> Array:
+    """Correlation of all estimates: the stages' own, and none between stages, whose records are others."""
+    sizes = [len(f.estimates) for f in found]
+    whole, begin = np.eye(sum(sizes)), 0
+    for f, size in zip(found, sizes, strict=True):
+        if f.correlation.shape == (size, size):
+            whole[begin : begin + size, begin : begin + size] = f.correlation
+        begin += size
+    return whole

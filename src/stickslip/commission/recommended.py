@@ -8,8 +8,8 @@ follows the slow sinusoid with the PD alone and with the compensator, at this ba
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,12 +28,14 @@ from stickslip.commission.candidates import (
     controller_of,
     laws_to_try,
     simulated,
+    with_lead,
 )
 from stickslip.control.controller import Controller
 from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.identify.model_file import write_model
 from stickslip.machines.angle import AngleMap
 from stickslip.model import Model
+from stickslip.record import Record
 from stickslip.rigs.procedures.base import Performed
 from stickslip.rigs.rig import Rig
 from stickslip.simulation.driven import Mechanics
@@ -46,10 +48,12 @@ SLOWER = (0.75, 0.5)
 
 @dataclass(frozen=True)
 class Tracked:
-    """RMS errors on the machine itself at one bandwidth, rad."""
+    """RMS errors on the machine itself at one bandwidth, rad: with the PD alone, with the law's mean over the angle
+    alone, and with all that was found."""
 
     bandwidth: float
     alone: float
+    mean: float
     helped: float
 
     @property
@@ -74,6 +78,8 @@ class Recommended:
         RMS error of the PD alone on the identified machine, rad.
     tracked : tuple of Tracked
         On the machine itself, from the recommended bandwidth down.
+    runs : mapping of str to Record
+        Those at the recommended bandwidth: ``alone``, ``mean``, ``helped``.
     """
 
     known: Known
@@ -82,21 +88,27 @@ class Recommended:
     model: Model | None
     alone: float
     tracked: tuple[Tracked, ...] = ()
+    runs: Mapping[str, Record] = field(default_factory=dict[str, Record])
 
-    def controllers(self, rig: Rig, bandwidth: float) -> tuple[Controller, Controller]:
-        """The PD alone, and with the compensator."""
+    def controllers(self, rig: Rig, bandwidth: float) -> dict[str, tuple[Controller, AngleMap]]:
+        """Controller and map by name: the PD alone, with the law's mean, with all that was found."""
         assert self.chosen is not None
         assert self.model is not None
-        return (
-            controller_of(self.known, rig, bandwidth, None),
-            controller_of(self.known, rig, bandwidth, (self.model, self.chosen.kind, self.chosen.gain)),
-        )
+        k, c = self.known, self.chosen
+        flat = dataclasses.replace(k, angle=AngleMap())
+        return {
+            "alone": (controller_of(k, rig, bandwidth), AngleMap()),
+            "mean": (controller_of(flat, rig, bandwidth, c.helper(self.model)), AngleMap()),
+            "helped": (controller_of(k, rig, bandwidth, c.helper(self.model)), k.angle),
+        }
 
     def lines(self) -> Iterator[str]:
         """What people read."""
         k = self.known
         yield (
-            f"A PD rings from {k.rings_at:.3g} Hz on, at {k.rings_with:.3g} Hz while {k.rings_while} (measured "
+            f"No PD up to {k.rings_at:.3g} Hz rings (measured response); recommended: {k.bandwidth:.3g} Hz."
+            if not k.rings_while
+            else f"A PD rings from {k.rings_at:.3g} Hz on, at {k.rings_with:.3g} Hz while {k.rings_while} (measured "
             f"response); recommended: {k.bandwidth:.3g} Hz, a factor of {MARGIN:g} below."
         )
         if self.chosen is None:
@@ -104,23 +116,25 @@ class Recommended:
             return
         c = self.chosen
         yield (
-            f"Recommended compensator: {c.kind} of law {c.law!r}, gain {c.gain:g}, with the ripple and the torque "
-            f"beside friction by angle; simulated with friction {', '.join(f'{100 * x:g}' for x in LEVELS)} % of that "
+            f"Recommended compensator: {c.kind} of law {c.law!r}, gain {c.gain:g}, lead {1e3 * c.lead:g} ms, "
+            "with the ripple and the torque beside friction by angle; "
+            f"simulated with friction {', '.join(f'{100 * x:g}' for x in LEVELS)} % of that "
             f"identified: error {', '.join(f'{self.alone / e:.3g}' for e in c.errors)} times smaller than with the "
             f"PD alone ({1e3 * self.alone:.3g} mrad RMS)."
         )
         for t in self.tracked:
             yield (
                 f"Measured on the slow sinusoid, PD of {t.bandwidth:.3g} Hz: {1e3 * t.alone:.3g} mrad RMS alone, "
-                f"{1e3 * t.helped:.3g} with the compensator: {t.ratio:.3g} times smaller."
+                f"{1e3 * t.helped:.3g} with the compensator: {t.ratio:.3g} times smaller "
+                f"({t.alone / t.mean:.3g} times without what it knows of the angle)."
             )
 
     def table(self) -> dict[str, Any]:
         """``[recommended]`` of a recommended.toml."""
         assert self.chosen is not None
         return {
-            "compensator": self.chosen.kind, "gain": self.chosen.gain, "bandwidth": self.known.bandwidth,
-            "damping": DAMPING, "inertia": self.known.inertia,
+            "compensator": self.chosen.kind, "gain": self.chosen.gain, "lead": self.chosen.lead,
+            "bandwidth": self.known.bandwidth, "damping": DAMPING, "inertia": self.known.inertia,
         }  # fmt: skip
 
 
@@ -152,21 +166,44 @@ def recommend_on(
     """
     laws = laws_to_try(known.model, lugre)
     tried = candidates_of(known, rig, laws)
-    alone, _ = simulated(known.machine(rig), controller_of(known, rig, known.bandwidth, None), known.angle)
+    alone, _ = simulated(known.machine(rig), controller_of(known, rig, known.bandwidth), known.angle)
     chosen = chosen_of(tried, alone)
-    found = Recommended(known, tuple(tried), chosen, laws[chosen.law] if chosen else None, alone)
     if chosen is None:
-        return found
+        return Recommended(known, tuple(tried), None, None, alone)
+    chosen = with_lead(known, rig, laws[chosen.law], chosen)
+    found = Recommended(known, tuple(tried), chosen, laws[chosen.law], alone)
     tracked: list[Tracked] = []
+    runs: dict[str, Record] = {}
     for share in (1.0, *SLOWER):
         errors: list[float] = []
-        for name, controller, angle in zip(
-            ("alone", "helped"), found.controllers(rig, share * known.bandwidth), (AngleMap(), known.angle), strict=True
-        ):  # fmt: skip
-            done = follow(Following(using=controller, over=angle), f"track-{100 * share:.0f}-{name}")
-            errors.append(tracking_metrics(done.record)["position_rms_rad"])
+        for name, (controller, angle) in found.controllers(rig, share * known.bandwidth).items():
+            record = follow(Following(using=controller, over=angle), f"track-{100 * share:.0f}-{name}").record
+            errors.append(tracking_metrics(record)["position_rms_rad"])
+            if share == 1.0:
+                runs[name] = record
         tracked.append(Tracked(share * known.bandwidth, *errors))
-    return dataclasses.replace(found, tracked=tuple(tracked))
+    return dataclasses.replace(found, tracked=tuple(tracked), runs=runs)
+
+
+def picture_of_tracking(found: Recommended) -> Picture:
+    """The slow sinusoid on the machine itself."""
+    traces: list[Trace] = []
+    for name, words in (("alone", "PD alone"), ("mean", "without the angle"), ("helped", "recommended")):
+        record = found.runs[name]
+        origin = record["position_reference"][0]
+        if not traces:
+            traces.append(
+                Trace(
+                    "reference", record.time - record.time[0], record["position_reference"] - origin, "faint"
+                )
+            )
+        traces.append(Trace(words, record.time - record.time[0], record["position"] - origin))
+    best = found.tracked[0]
+    return Picture(
+        "tracking", f"Slow sinusoid, PD of {best.bandwidth:.3g} Hz",
+        f"The error is {best.ratio:.2g} times smaller than with the PD alone", "time (s)", "position (rad)",
+        tuple(traces),
+    )  # fmt: skip
 
 
 def picture_of_candidates(found: Recommended) -> Picture:

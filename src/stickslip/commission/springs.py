@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import Any, cast
 
 import numpy as np
 
 from stickslip.identify.attraction import largest_without_overshoot
-from stickslip.identify.estimate import Identification
+from stickslip.identify.breakaway import student
+from stickslip.identify.estimate import Estimate, Identification
 from stickslip.model import Model
+from stickslip.record import Record
 
-__all__ = ["joined_model", "listed", "resolved"]
+__all__ = ["joined_model", "listed", "resolved", "with_stiffness"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Rows = np.ndarray[Any, np.dtype[np.intp]]
 
 FASTEST, LAG = 1e4, 5e-3
 """N·m/s up to which C is looked for, and the lag in s that stands in where none overshoots."""
+FIRST = 0.3
+"""Of a swing of the torque, along which all elements still stick."""
 LEAST = 0.01
 """Of the amplitude of the pre-sliding loop, below which an element is not resolved."""
 
@@ -77,3 +85,48 @@ def stuck_level(stuck: Identification) -> float:
     """The torque that the springs carry together, N·m."""
     assert stuck.model is not None
     return float(stuck.model.parameters.fs)
+
+
+def with_stiffness(found: Identification, record: Record) -> Identification:
+    """The total stiffness beside the elements, with the interval that its reversals give.
+
+    After each reversal of the torque every element sticks: the slope there is the sum of all stiffnesses.
+    """
+    assert found.model is not None
+    total = math.fsum(found.model.parameters.k)
+    slopes = np.array(slopes_after_reversals(record["motor_torque"], record["position"]))
+    std = float(np.std(slopes, ddof=1)) / math.sqrt(slopes.size) if slopes.size > 1 else math.nan
+    half = student(slopes.size - 1) * std if slopes.size > 1 else math.inf
+    good = total - half > 0.0 and half < 0.33 * total
+    why = "" if good else "the slopes after the reversals scatter too much"
+    whole = Estimate("stiffness", "N·m/rad", "k", total, std, total - half, total + half, good, why)
+    return dataclasses.replace(
+        found, estimates=(*found.estimates, whole), correlation=np.pad(found.correlation, ((0, 1), (0, 1))) + last(
+            len(found.estimates)
+        ),
+    )  # fmt: skip
+
+
+def last(size: int) -> Array:
+    """One in the last place of the diagonal, shape (size + 1, size + 1)."""
+    out = np.zeros((size + 1, size + 1))
+    out[size, size] = 1.0
+    return out
+
+
+def slopes_after_reversals(torque: Array, position: Array) -> list[float]:
+    """Slope of the torque over the position along the first `FIRST` of each swing, N·m/rad."""
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(smooth(torque)))) != 0) + 1
+    reach = 0.5 * float(np.ptp(torque))
+    out: list[float] = []
+    for begin, end in itertools.pairwise(int(i) for i in turns):
+        rows: Rows = np.arange(begin, end)
+        rows = rows[np.abs(torque[rows] - torque[begin]) < FIRST * 2.0 * reach]
+        if rows.size > 4 and np.ptp(torque[rows]) > 0.5 * FIRST * 2.0 * reach:
+            out.append(1.0 / float(np.polyfit(torque[rows], position[rows], 1)[0]))
+    return out
+
+
+def smooth(x: Array) -> Array:
+    """A mean over 9 rows, so that noise makes no reversals."""
+    return np.convolve(np.pad(x, 4, mode="edge"), np.full(9, 1.0 / 9.0), mode="valid")

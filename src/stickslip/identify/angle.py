@@ -86,7 +86,7 @@ def identify_angle(
     )
     left = _misfit(record, [s for v in slow for s in pairs[v]], torque, angle)
     notes = [
-        f"Angle: {len(slow)} speeds up to {max(slow):g} rad/s, both directions; friction varies by "
+        f"{len(slow)} speeds up to {max(slow):g} rad/s, both directions; friction varies by "
         f"{100.0 * ripple.peak_to_peak():.3g} % peak to peak over a revolution, the torque beside it by "
         f"{rest.peak_to_peak():.3g} N·m about {angle.offset:.3g} N·m.",
     ]

@@ -179,15 +179,22 @@ def rate_effect(breaks: Sequence[Break]) -> Estimate | None:
     return Estimate("rate_effect", "N·m", "dF_S", value, std, value - half, value + half, not why, why)
 
 
+def turned(angles: Sequence[float]) -> Array:
+    """Angles in degrees; within a revolution where they lie beyond one."""
+    degrees = np.degrees(np.array(angles))
+    return np.mod(degrees, 360.0) if np.any(np.abs(degrees) > 400.0) else degrees
+
+
 def angle_picture(breaks: Sequence[Break], estimates: Sequence[Estimate]) -> Picture:
     """Break-away torque over the angle (thesis figures 4.5, 4.27, 4.28)."""
     traces: list[Trace] = []
     for direction, kind, word in ((1, "points", "positive"), (-1, "open points", "negative")):
         chosen = [b for b in breaks if b.direction == direction]
         if chosen:
-            angle = np.degrees(np.array([b.angle for b in chosen]))
+            angle = turned([b.angle for b in chosen])
             traces.append(Trace(f"{word} direction", angle, np.array([b.torque for b in chosen]), kind))
-    ends = np.degrees(np.array([min(b.angle for b in breaks), max(b.angle for b in breaks)]))
+    angles = turned([b.angle for b in breaks])
+    ends = np.array([np.min(angles), np.max(angles)])
     means = [e for e in estimates if e.name.startswith("fs_")]
     for e in means:
         traces.append(Trace(f"mean, {e.name[3:]}", ends, np.full(2, e.value)))

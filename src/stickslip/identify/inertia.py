@@ -32,6 +32,7 @@ Complex = np.ndarray[Any, np.dtype[np.complex128]]
 BAND = (0.4, 25.0)  # Hz, of the fit in the thesis
 PEAK = 2.0  # factor over the rigid axis's response that makes a resonance
 COHERENT = 0.5
+NEAR = 1.15  # factor between frequencies within which the highest peak alone is a resonance
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,9 +176,7 @@ def _result(
         good = low > 0.0 and high <= 2.0 * low
         why = "" if good else "the data do not tell it from 0" if low <= 0.0 else "its interval is too wide"
         estimates.append(Estimate(name, unit, symbol, float(value), float(s), low, high, good, why))
-    resonances = sorted(
-        {round(f, 2) for r in responses for f in resonances_of(r, float(solution[0]), band[1])}
-    )
+    resonances = merged([f for r in responses for f in resonances_of(r, float(solution[0]), band[1])])
     notes = [f"Rigid axis fitted from {band[0]:g} to {band[1]:g} Hz with {estimator.upper()}."]
     if resonances:
         notes.append(f"Resonances at {', '.join(f'{f:g}' for f in resonances)} Hz.")
@@ -197,17 +196,31 @@ def resonances_of(response: Response, inertia: float, above: float) -> list[floa
     over = np.abs(response.h1) * inertia * (2.0 * math.pi * f) ** 2
     out: list[float] = []
     for i in range(1, f.size - 1):
-        near = over[max(0, i - 5) : i + 6]
+        near = over[(f > f[i] / NEAR) & (f < f[i] * NEAR)]
         if f[i] > above and over[i] > PEAK and over[i] == near.max() and response.coherence[i] >= COHERENT:
             out.append(float(f[i]))
     return out
 
 
+def merged(found: Sequence[float]) -> list[float]:
+    """Peaks of several records that are one resonance as their mean, ascending, Hz."""
+    groups: list[list[float]] = []
+    for f in sorted(found):
+        if groups and f < NEAR * groups[-1][0]:
+            groups[-1].append(f)
+        else:
+            groups.append([f])
+    return [round(math.fsum(g) / len(g), 1) for g in groups]
+
+
 def _picture(responses: Sequence[Response], solution: Array, axis: ServoAxis) -> Picture:
     decibel = [
-        Trace(f"{r.amplitude:.3g} {axis.unit('N·m')} RMS", r.frequency, 20.0 * np.log10(np.abs(r.h1)))
+        Trace(
+            f"{r.amplitude:.3g} {axis.unit('N·m')} RMS", r.frequency,
+            np.where(r.coherence >= COHERENT, 20.0 * np.log10(np.abs(r.h1)), np.nan),
+        )
         for r in responses
-    ]
+    ]  # fmt: skip
     f = responses[0].frequency
     s = 2j * math.pi * f
     rigid = 1.0 / (solution[0] * s**2 + solution[1] * s)

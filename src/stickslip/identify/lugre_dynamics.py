@@ -391,7 +391,8 @@ def plain_verdict(scan: Array, sigma0: float) -> tuple[bool, str]:
 def response_picture(response: Response, simulated: Array) -> Picture:
     """Measured and simulated position (thesis figures 3.12, 4.13, 4.37)."""
     error = float(np.sqrt(np.mean((simulated - response.position) ** 2)))
-    traces = (Trace("measured", response.time, response.position), Trace("LuGre", response.time, simulated))
+    time, origin = response.time - response.time[0], response.position[0]
+    traces = (Trace("measured", time, response.position - origin), Trace("LuGre", time, simulated - origin))
     return Picture(
         "lugre-response", "Open-loop response", f"Root mean square difference {1e3 * error:.3g} mrad", "time (s)",
         "position (rad)", traces,

@@ -168,12 +168,16 @@ class Train:
         Of the torque beyond hold and the answer one sample later, samples.
     sliding, sticking : float
         Frequencies of the modes, Hz; that while sliding is not a number for a rigid axis.
+    spread : tuple of float
+        Standard deviations of the logarithms of load over motor, of the sticking mode, of the damping; and of the
+        delay. Empty for a rigid axis.
     """
 
     axis: FlexibleAxis | None
     delay: float
     sliding: float
     sticking: float
+    spread: tuple[float, ...] = ()
 
 
 def fit_train(sliding: LoopResponse, sticking: LoopResponse, inertia: float) -> Train:
@@ -221,7 +225,11 @@ def fit_train(sliding: LoopResponse, sticking: LoopResponse, inertia: float) -> 
     spring = motor * (2.0 * math.pi * held) ** 2
     axis = FlexibleAxis(0.5 * motor, 0.5 * motor, load, STIFF * spring, spring, min(damping, 0.5))
     free = math.sqrt(spring * (1.0 / motor + 1.0 / load)) / (2.0 * math.pi)
-    return Train(axis, float(found.x[3]), free, held)
+    # A Hann window spreads each line over its neighbours: half of them count as independent.
+    level = 2.0 * float(found.fun @ found.fun) / (found.fun.size - 4)
+    information: Array = np.asarray(found.jac.T @ found.jac, dtype=np.float64)
+    spread = np.sqrt(np.diag(level * np.linalg.inv(information)))
+    return Train(axis, float(found.x[3]), free, held, tuple(float(s) for s in spread))
 
 
 def over_rigid(r: LoopResponse, inertia: float) -> float:
@@ -265,22 +273,42 @@ def identified_train(
     responses: Sequence[LoopResponse], train: Train, rings_at: float, frequency: float, name: str
 ) -> Identification:
     """Modes, delay and the bandwidth from which on a PD rings, as an identification without a law."""
-    values = [("mode_sticking", "Hz", "f_0", train.sticking), ("delay", "samples", "d", train.delay)]
+    estimates = [
+        plain("mode_sticking", "Hz", "f_0", train.sticking),
+        plain("delay", "samples", "d", train.delay),
+    ]
     if train.axis:
-        values += [
-            ("mode_sliding", "Hz", "f", train.sliding), ("damping", "-", "zeta", train.axis.damping),
-            ("spring", "N·m/rad", "k", train.axis.elasticity), ("load_inertia", "kg·m²", "J_L", train.axis.disk),
+        share, mode, damping, delay = train.spread
+        load, motor = train.axis.disk, train.axis.inertia - train.axis.disk
+        # What a relative change of load over motor does to load, to motor, and so to spring and free mode.
+        of_load, of_motor = share * motor / train.axis.inertia, share * load / train.axis.inertia
+        estimates = [
+            within("mode_sticking", "Hz", "f_0", train.sticking, mode * train.sticking),
+            within("mode_sliding", "Hz", "f", train.sliding, math.hypot(mode, 0.5 * of_load) * train.sliding),
+            within("damping", "-", "zeta", train.axis.damping, damping * train.axis.damping),
+            within("delay", "samples", "d", train.delay, delay),
+            within("spring", "N·m/rad", "k", train.axis.elasticity,
+                   math.hypot(2.0 * mode, of_motor) * train.axis.elasticity),
+            within("load_inertia", "kg·m²", "J_L", load, of_load * load),
         ]  # fmt: skip
-    why = "read from a response: no interval"
-    estimates = tuple(
-        Estimate(n, unit, symbol, v, math.nan, -math.inf, math.inf, True, why)
-        for n, unit, symbol, v in values
-    )
+    notes = (f"A PD rings from {rings_at:.3g} Hz on, at {frequency:.3g} Hz while {name}.",)
     return Identification(
-        "resonance", None, estimates, np.eye(len(estimates)), {},
-        (f"A PD rings from {rings_at:.3g} Hz on, at {frequency:.3g} Hz while {name}.",), (),
+        "resonance", None, tuple(estimates), np.eye(len(estimates)), {}, notes, (),
         (picture_of(responses, train),), {"train": train, "responses": tuple(responses)},
     )  # fmt: skip
+
+
+def plain(name: str, unit: str, symbol: str, value: float) -> Estimate:
+    """A number that was read off a response."""
+    why = "read off the response, without an interval"
+    return Estimate(name, unit, symbol, value, math.nan, math.nan, math.nan, False, why)
+
+
+def within(name: str, unit: str, symbol: str, value: float, std: float) -> Estimate:
+    """A number with its interval."""
+    low, high = value - 1.96 * std, value + 1.96 * std
+    why = "" if low > 0.0 and high <= 2.0 * low else "its interval is too wide"
+    return Estimate(name, unit, symbol, value, std, low, high, not why, why)
 
 
 def picture_of(responses: Sequence[LoopResponse], train: Train) -> Picture:

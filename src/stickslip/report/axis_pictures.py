@@ -35,7 +35,8 @@ def data_pictures(records: Sequence[Record]) -> tuple[Picture, ...]:
             if channel not in record.channels or not np.any(np.isfinite(record[channel])):
                 continue
             traces = [over_time("measured", record.time, record[channel])]
-            if channel == "position" and "position_reference" in record.channels:
+            # A reference that never changes belongs to an open loop.
+            if channel == "position" and np.ptp(record.channels.get("position_reference", np.zeros(1))) > 0.0:
                 traces = [
                     over_time("measured", record.time, record[channel]),
                     over_time("reference", record.time, record["position_reference"]),

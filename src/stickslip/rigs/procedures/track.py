@@ -40,9 +40,9 @@ class Track(Procedure):
 
     ``reference`` is low, high or step; ``linear`` PD, PID or PR with ``bandwidth`` (Hz), ``damping`` and ``inertia``
     (kg·m²) of its placement; ``compensator`` none, feedforward or feedback with ``model``, a model.toml or the name of
-    one of the machine's, its ``gain`` and ``filter`` (Hz, 0: the machine's); or recommended: all of that from the
-    ``model``, a recommended.toml of `stickslip rig commission`. What a file knows of the angle (``[angle]``) is
-    compensated as well. ``duration`` in s (0: the reference's own).
+    one of the machine's, its ``gain``, ``filter`` (Hz, 0: the machine's) and ``lead`` (s, of feedforward); or
+    recommended: all of that from the ``model``, a recommended.toml of `stickslip rig commission`. What a file knows of
+    the angle (``[angle]``) is compensated as well. ``duration`` in s (0: the reference's own).
     """
 
     name: ClassVar[str] = "track"
@@ -57,6 +57,7 @@ class Track(Procedure):
     model: str = ""
     gain: float = 1.0
     filter: float = 0.0
+    lead: float = 0.0
     duration: float = 0.0
     wait: float = 1.0
 
@@ -89,7 +90,7 @@ class Track(Procedure):
         machine: Any = getattr(rig, "machine", None)
         corner = self.filter or (machine.filter if machine is not None else 0.0)
         law = self.angle().on(self.law(rig))
-        helper = COMPENSATORS[self.compensator](law, self.gain, corner or None)
+        helper = COMPENSATORS[self.compensator](law, self.gain, corner or None, lead=self.lead)
         return Controller(gains, helper, limit, rig.sample_time)
 
     def recommended(self) -> Track:
@@ -109,7 +110,7 @@ class Track(Procedure):
                 self, linear="PD", compensator=given.choice("compensator", COMPENSATORS, "feedforward"),
                 bandwidth=given.positive("bandwidth", "Hz"), damping=given.positive("damping", ""),
                 inertia=given.positive("inertia", "kg·m²"), gain=given.positive("gain", ""),
-                filter=given.number("filter", "Hz", 0.0, 0.0),
+                filter=given.number("filter", "Hz", 0.0, 0.0), lead=given.number("lead", "s", 0.0, 0.0),
             )  # fmt: skip
 
     def angle(self) -> AngleMap:
