@@ -45,6 +45,7 @@ __all__ = [
     "call_switch",
     "call_value",
     "compiled_guarded",
+    "compiled_lanes",
     "compiled_law",
     "compiled_profile",
     "compiled_sample",
@@ -279,6 +280,83 @@ def _loaded(name: str, text: str) -> Any:
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
+
+
+# ---- lanes -------------------------------------------------------------------------------------------------
+
+LANES_ALLOW = {"contract", "arcp", "nsz"}
+"""What the compiler may do with the arithmetic of lanes: fused operations, reciprocals, unsigned zeros."""
+
+
+@functools.lru_cache(maxsize=64)
+def compiled_lanes(text: str) -> Any:
+    """The module of a specialised program of lanes (`stickslip.simulation._lanes_source`)."""
+    return _loaded(f"lanes_{hashlib.sha256(text.encode()).hexdigest()[:16]}", text)
+
+
+def compile_inlined(function: Any) -> Any:
+    """Decorator of programs of lanes: a function whose machine code goes into its callers, so that it vectorises."""
+    return numba.njit(function, fastmath=LANES_ALLOW, error_model="numpy", forceinline=True)
+
+
+def compile_lanes(function: Any) -> Any:
+    """Decorator of programs of lanes: a function that releases the interpreter's lock and is cached."""
+    return _cached(
+        lambda: numba.njit(function, cache=True, nogil=True, fastmath=LANES_ALLOW, error_model="numpy")
+    )
+
+
+def _select(typingctx: Any, condition: Any, one: Any, other: Any) -> Any:
+    """One value or the other, both computed: `if` may become a branch, which does not vectorise."""
+
+    def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        return builder.select(arguments[0], arguments[1], arguments[2])
+
+    return FLOAT(types.boolean, FLOAT, FLOAT), generate
+
+
+select: Any = intrinsic(_select)
+
+
+def _two_to(typingctx: Any, shifted: Any) -> Any:
+    """2**k, with k + 1.5 2**52 given: the sum's last bits are k."""
+
+    def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        whole = ir.IntType(64)
+        bits = builder.shl(builder.bitcast(arguments[0], whole), ir.Constant(whole, 52))
+        return builder.bitcast(builder.add(bits, ir.Constant(whole, 1023 << 52)), ir.DoubleType())
+
+    return FLOAT(types.float64), generate
+
+
+two_to: Any = intrinsic(_two_to)
+
+
+@compile_inlined
+def exponential(x: float) -> float:
+    """exp(x) to 1e-15 of its value, without a branch; beyond +-700 that of +-700.
+
+    x = k ln 2 + r with |r| <= ln(2) / 2, and the series of exp(r) to the twelfth power.
+    """
+    x = select(x > -700.0, x, -700.0)
+    x = select(x < 700.0, x, 700.0)
+    shifted = x * 1.4426950408889634 + 6755399441055744.0
+    k = shifted - 6755399441055744.0
+    r = x - k * 6.93147180369123816490e-01
+    r = r - k * 1.90821492927058770002e-10
+    y = 1.0 / 479001600.0
+    y = 1.0 / 39916800.0 + r * y
+    y = 1.0 / 3628800.0 + r * y
+    y = 1.0 / 362880.0 + r * y
+    y = 1.0 / 40320.0 + r * y
+    y = 1.0 / 5040.0 + r * y
+    y = 1.0 / 720.0 + r * y
+    y = 1.0 / 120.0 + r * y
+    y = 1.0 / 24.0 + r * y
+    y = 1.0 / 6.0 + r * y
+    y = 0.5 + r * y
+    y = 1.0 + r * (1.0 + r * y)
+    return y * two_to(shifted)
 
 
 def compile_inner(function: Any) -> Any:

@@ -149,15 +149,8 @@ def prepare(case: Case, columns: Mapping[str, Array]) -> Batch:
     """
     if why := refusal(case, list(columns)):
         raise InputError(f"no batch: {why}")
-    if not columns:
-        raise InputError("no batch: nothing varies; give at least one column")
-    n = len(next(iter(columns.values())))
-    data = {name: np.ascontiguousarray(values, dtype=np.float64) for name, values in columns.items()}
-    numbers = _numbers(case, data, n)
-    one = prepare_one(case)
-    members = [member(case.plant, _of("friction", data), n)]
-    if case.numbers[SOURCE] == FROM_MEASUREMENT:
-        members.append(member(case.compensator, _of("law", data), n))
+    numbers, members = laid_out(case, columns)
+    n, one = len(numbers), prepare_one(case)
     parameters = np.tile(one.parameters, (n, 1))
     parameters[:, : numbers.shape[1]] = numbers
     at = numbers.shape[1]
@@ -169,6 +162,25 @@ def prepare(case: Case, columns: Mapping[str, Array]) -> Batch:
         plans[:, col.SHARED] = share_curves(*members)
     plans[:, col.STIFFNESS_FLOOR] = _floors(numbers, members)
     return Batch(case, parameters, plans, one.cells, one.breaks, _starts(one.work, numbers, members, n))
+
+
+def laid_out(case: Case, columns: Mapping[str, Array]) -> tuple[Array, list[Member]]:
+    """`Case.numbers` of every loop, shape (n, NUMBERS), and the laws in the loop: the plant's, that of feedback.
+
+    Raises
+    ------
+    InputError
+        If nothing varies, or a number is out of bounds.
+    """
+    if not columns:
+        raise InputError("no batch: nothing varies; give at least one column")
+    n = len(next(iter(columns.values())))
+    data = {name: np.ascontiguousarray(values, dtype=np.float64) for name, values in columns.items()}
+    numbers = _numbers(case, data, n)
+    members = [member(case.plant, _of("friction", data), n)]
+    if case.numbers[SOURCE] == FROM_MEASUREMENT:
+        members.append(member(case.compensator, _of("law", data), n))
+    return numbers, members
 
 
 def _of(family: str, columns: Mapping[str, Array]) -> dict[str, Array]:

@@ -1,0 +1,482 @@
+"""One step of many closed loops side by side: the trapezoid for laws made of springs that slip along one curve.
+
+J dv/dt = T_m - T_f with linear control, friction as in `stickslip.spec.Elements` and `Bristle`: what the laws' `modes`
+say, and their own sliding curves. The velocity is linear over a step; sticking elements and bristles enter implicitly,
+the curve by its value extrapolated to the middle of the step, so that a step needs no iteration, one value of each
+curve and no branch: the compiler runs it on 4 or 8 cases at once. A step inside which an element breaks away or the
+motion reverses is cut there and finished by itself (`finish`).
+
+This text is specialised by `_lanes_source`: sizes, numbers and curves are those of `_lanes_names`. ``z`` holds the
+cases, row after row of `LANES` numbers; ``now`` is the reference over this step. What a step would end with lies in
+``z`` too, `AHEAD` rows behind the state: with all of it in one array the compiler sees what does not overlap.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from stickslip.jit import pointer, select
+from stickslip.simulation._lanes_names import (
+    ELEMENTS,
+    FIRST_1,
+    KIND_0,
+    KIND_1,
+    LANES,
+    METERED,
+    RIGID_0,
+    RIGID_1,
+    attraction,
+    curve,
+    gain,
+    inertia,
+    kd,
+    ki,
+    kp,
+    kr,
+    lag,
+    rigid,
+    share,
+    stiffness,
+    viscous,
+)
+
+RELAXES, FOLLOWS, BENDS = 0, 1, 2
+
+# ---- rows of z: the state ------------------------------------------------------------------------------------
+POSITION, VELOCITY, INTEGRAL, CURVE_0, CURVE_1, BRISTLE_0, BRISTLE_1, FORCE = range(8)
+AHEAD = FORCE + ELEMENTS
+# ---- what only whole steps and events change: the direction in which elements slip, by how much |v| and the curves
+# rose over the last step, the stiffness of what sticks (the compensator's with its weight), how many elements slip ----
+DIRECTION, SPEED_RISE, RISE_0, RISE_1, STUCK, SLIPPING, EVENT, UNRESOLVED = range(2 * AHEAD, 2 * AHEAD + 8)
+SLIPS = 2 * AHEAD + 8
+# ---- what is measured, since the begin of the part of the run ----
+SUMS = SLIPS + ELEMENTS
+(
+    ERROR_2, ERROR_PEAK, ERROR_SUM, ERROR_LOW, ERROR_HIGH, RATE_2, SPEED_PEAK, MOTOR_2, MOTOR_PEAK, RESIDUAL_2, WORK,
+    LOSS, NUMBERS,
+) = range(SUMS, SUMS + 13)  # fmt: skip
+# From NUMBERS on: what varies from case to case.
+
+# ---- entries of `now`: the reference at begin and end of the step, its feedforward in the mean, at end and begin ----
+GOAL_BEGIN, GOAL_END, WANTED_BEGIN, WANTED_END, FED_MEAN, FED_END, FED_BEGIN = range(7)
+MOST_EVENTS = 16  # in a step
+SHORTEST = 1e-6  # part of a step that is not worth another one
+FAR = 1e300
+
+
+# ---- a step in which no mode changes -----------------------------------------------------------------------------
+
+
+def trial(z: Any, lane: int, c: Any, h: float, part: float, now: Any) -> bool:
+    """Step over the last `part` of a step of h as if no mode changed, into the rows ahead; returns whether one does."""
+    dt = part * h
+    v0 = z[VELOCITY * LANES + lane]
+    x0 = z[POSITION * LANES + lane]
+    sigma = z[DIRECTION * LANES + lane]
+    # T_f = held + stuck d/2 + damping d/h in the mean over the step, with the displacement d.
+    s0 = z[CURVE_0 * LANES + lane] + 0.5 * part * z[RISE_0 * LANES + lane]
+    give0 = give(z, lane, c, 0, KIND_0, dt, part)
+    inverse0 = 1.0 / (s0 + give0)
+    keep0 = (s0 - give0) * inverse0 if KIND_0 != FOLLOWS else -1.0
+    pull0 = 2.0 * sigma * s0 * (give0 * inverse0 if KIND_0 != FOLLOWS else 1.0)
+    held = 0.0
+    for i in range(FIRST_1):
+        held += held_by(z, lane, c, i, keep0, pull0)
+    stuck = z[STUCK * LANES + lane]
+    damping = viscous(c, z, lane, 0)
+    bend0 = 0.0
+    if RIGID_0:
+        held += rigid(c, z, lane, 0) * sigma * s0
+    if KIND_0 == BENDS:
+        bend0 = attraction(c, z, lane, 0) * s0 * inverse0
+        rate = lag(c, z, lane, 0) / dt
+        held += (0.5 * (1.0 + keep0) + rate * (keep0 - 1.0)) * z[BRISTLE_0 * LANES + lane]
+        stuck += (1.0 + 2.0 * rate) * bend0
+    keep1 = 0.0
+    pull1 = 0.0
+    bend1 = 0.0
+    if KIND_1 >= 0:
+        weight = gain(c, z, lane)
+        s1 = z[CURVE_1 * LANES + lane] + 0.5 * part * z[RISE_1 * LANES + lane]
+        give1 = give(z, lane, c, 1, KIND_1, dt, part)
+        inverse1 = 1.0 / (s1 + give1)
+        keep1 = (s1 - give1) * inverse1 if KIND_1 != FOLLOWS else -1.0
+        pull1 = 2.0 * sigma * s1 * (give1 * inverse1 if KIND_1 != FOLLOWS else 1.0)
+        helped = 0.0
+        for i in range(FIRST_1, ELEMENTS):
+            helped += held_by(z, lane, c, i, keep1, pull1)
+        damping -= weight * viscous(c, z, lane, 1)
+        if RIGID_1:
+            helped += rigid(c, z, lane, 1) * sigma * s1
+        if KIND_1 == BENDS:
+            bend1 = attraction(c, z, lane, 1) * s1 * inverse1
+            rate = lag(c, z, lane, 1) / dt
+            helped += (0.5 * (1.0 + keep1) + rate * (keep1 - 1.0)) * z[BRISTLE_1 * LANES + lane]
+            stuck -= weight * (1.0 + 2.0 * rate) * bend1
+        held -= weight * helped
+    # ---- the end velocity, from a linear equation ----
+    goal = now[GOAL_END] - 0.5 * part * (now[GOAL_END] - now[GOAL_BEGIN])
+    wanted = now[WANTED_END] - 0.5 * part * (now[WANTED_END] - now[WANTED_BEGIN])
+    integral = z[INTEGRAL * LANES + lane]
+    drive = kp(c, z, lane) * (goal - x0) + kr(c, z, lane) * wanted - held
+    drive += ki(c, z, lane) * (integral + 0.5 * dt * (goal - x0)) + gain(c, z, lane) * now[FED_MEAN]
+    slope = 0.25 * dt * (kp(c, z, lane) + stuck + 0.5 * dt * ki(c, z, lane)) + 0.5 * (
+        kd(c, z, lane) + damping
+    )
+    mass = inertia(c, z, lane) / dt
+    v1 = ((mass - slope) * v0 + drive) / (mass + slope)
+    d = 0.5 * dt * (v0 + v1)
+    z[(AHEAD + POSITION) * LANES + lane] = x0 + d
+    z[(AHEAD + VELOCITY) * LANES + lane] = v1
+    z[(AHEAD + INTEGRAL) * LANES + lane] = integral + dt * (goal - x0 - 0.5 * d)
+    # ---- what is reached there ----
+    side = select(v1 >= 0.0, 1.0, -1.0)
+    end0 = curve(v1, c, z, lane, 0)
+    z[(AHEAD + CURVE_0) * LANES + lane] = end0
+    if KIND_0 == BENDS:
+        z[(AHEAD + BRISTLE_0) * LANES + lane] = keep0 * z[BRISTLE_0 * LANES + lane] + bend0 * d
+    gap = FAR
+    for i in range(FIRST_1):
+        left = gap_ahead(z, lane, c, i, KIND_0, keep0, pull0, end0, side, d)
+        gap = select(left < gap, left, gap)
+    if KIND_1 >= 0:
+        end1 = curve(v1, c, z, lane, 1)
+        z[(AHEAD + CURVE_1) * LANES + lane] = end1
+        if KIND_1 == BENDS:
+            z[(AHEAD + BRISTLE_1) * LANES + lane] = keep1 * z[BRISTLE_1 * LANES + lane] + bend1 * d
+        for i in range(FIRST_1, ELEMENTS):
+            left = gap_ahead(z, lane, c, i, KIND_1, keep1, pull1, end1, side, d)
+            gap = select(left < gap, left, gap)
+    turns = (
+        sigma * v1 < 0.0 if RIGID_0 or RIGID_1 else (z[SLIPPING * LANES + lane] > 0.0) & (sigma * v1 <= 0.0)
+    )
+    return (gap <= 0.0) | turns
+
+
+def give(z: Any, lane: int, c: Any, which: int, kind: int, dt: float, part: float) -> float:
+    """How fast a force of law `which` yields to its curve s, as a part of s in half a step, N·m."""
+    half = 0.5 * dt * attraction(c, z, lane, which)
+    if kind == BENDS:
+        speed = abs(z[VELOCITY * LANES + lane]) + 0.5 * part * z[SPEED_RISE * LANES + lane]
+        return half * select(speed > 0.0, speed, 0.0)
+    return half
+
+
+def held_by(z: Any, lane: int, c: Any, i: int, keep: float, pull: float) -> float:
+    """Mean torque of element i over the step, without what it takes up while it sticks, N·m."""
+    force = z[(FORCE + i) * LANES + lane]
+    slides = 0.5 * (force + (keep * force + share(c, z, lane, i) * pull))
+    return select(z[(SLIPS + i) * LANES + lane] > 0.0, slides, force)
+
+
+def gap_ahead(
+    z: Any, lane: int, c: Any, i: int, kind: int, keep: float, pull: float, s: float, side: float, d: float
+) -> float:  # fmt: skip
+    """Torque by which element i misses its break-away at the end of the step, N·m; writes its force there."""
+    force = z[(FORCE + i) * LANES + lane]
+    level = share(c, z, lane, i) * s
+    slides = keep * force + share(c, z, lane, i) * pull if kind != FOLLOWS else side * level
+    sticks = force + stiffness(c, z, lane, i) * d
+    slips = z[(SLIPS + i) * LANES + lane] > 0.0
+    z[(AHEAD + FORCE + i) * LANES + lane] = select(slips, slides, sticks)
+    return select(slips, FAR, level - side * sticks)
+
+
+def accept(z: Any, lane: int, part: float) -> None:
+    """Go to the end of a step over the last `part`: the state and the rows ahead change places."""
+    speed = abs(z[VELOCITY * LANES + lane])
+    z[SPEED_RISE * LANES + lane] = (abs(z[(AHEAD + VELOCITY) * LANES + lane]) - speed) / part
+    swap(z, lane, POSITION)
+    swap(z, lane, VELOCITY)
+    swap(z, lane, INTEGRAL)
+    z[RISE_0 * LANES + lane] = swap(z, lane, CURVE_0) / part
+    if KIND_0 == BENDS:
+        swap(z, lane, BRISTLE_0)
+    if KIND_1 >= 0:
+        z[RISE_1 * LANES + lane] = swap(z, lane, CURVE_1) / part
+    if KIND_1 == BENDS:
+        swap(z, lane, BRISTLE_1)
+    for i in range(ELEMENTS):
+        swap(z, lane, FORCE + i)
+
+
+def swap(z: Any, lane: int, row: int) -> float:
+    """Exchange a row of the state with the one ahead; returns by how much it rises."""
+    before = z[row * LANES + lane]
+    after = z[(AHEAD + row) * LANES + lane]
+    z[row * LANES + lane] = after
+    z[(AHEAD + row) * LANES + lane] = before
+    return after - before
+
+
+# ---- a step with events ----------------------------------------------------------------------------------------
+
+
+def finish(z: Any, lane: int, c: Any, h: float, now: Any) -> None:
+    """Do a step again whose trial had events: from one to the next, the velocity linear in between."""
+    accept(z, lane, 1.0)  # back to the begin: trial and state change places again
+    part = 1.0
+    for _ in range(MOST_EVENTS):
+        x, which = first_event(z, lane, c)
+        rest = (1.0 - x) * part
+        if rest < SHORTEST:
+            x, rest = 1.0, 0.0
+        go_to(z, lane, h, part, x, now)
+        switch(z, lane, c, which)
+        if rest == 0.0:
+            return
+        part = rest
+        if not trial(z, lane, c, h, part, now):
+            accept(z, lane, part)
+            return
+    accept(z, lane, part)
+    z[UNRESOLVED * LANES + lane] += 1.0
+
+
+def first_event(z: Any, lane: int, c: Any) -> tuple[float, int]:
+    """Fraction of the trial at which its first event happens, and the element that breaks away (ELEMENTS: reversal)."""
+    v0 = z[VELOCITY * LANES + lane]
+    v1 = z[(AHEAD + VELOCITY) * LANES + lane]
+    side = 1.0 if v1 >= 0.0 else -1.0
+    found = FAR
+    which = ELEMENTS
+    for i in range(ELEMENTS):
+        curve_row = CURVE_0 if i < FIRST_1 else CURVE_1
+        start = gap_of(z, lane, c, i, side, FORCE + i, curve_row)
+        end = gap_of(z, lane, c, i, side, AHEAD + FORCE + i, AHEAD + curve_row)
+        x = start / (start - end) if start > 0.0 else 0.0
+        x = x if (z[(SLIPS + i) * LANES + lane] == 0.0) & (end <= 0.0) else FAR
+        which = i if x < found else which
+        found = x if x < found else found
+    turns = RIGID_0 or RIGID_1 or z[SLIPPING * LANES + lane] > 0.0
+    if turns and z[DIRECTION * LANES + lane] * v1 <= 0.0:
+        x = v0 / (v0 - v1) if v0 * v1 < 0.0 else 0.0
+        which = ELEMENTS if x <= found else which
+        found = x if x <= found else found
+    return found if found < 1.0 else 1.0, which
+
+
+def gap_of(z: Any, lane: int, c: Any, i: int, side: float, row: int, curve_row: int) -> float:
+    """How far element i is from breaking away towards `side`, N·m."""
+    return share(c, z, lane, i) * z[curve_row * LANES + lane] - side * z[row * LANES + lane]
+
+
+def go_to(z: Any, lane: int, h: float, part: float, x: float, now: Any) -> None:
+    """Go to fraction x of a trial over the last `part`."""
+    v0 = z[VELOCITY * LANES + lane]
+    v1 = z[(AHEAD + VELOCITY) * LANES + lane]
+    v = v0 + x * (v1 - v0)
+    dt = x * part * h
+    goal = now[GOAL_END] - part * (1.0 - 0.5 * x) * (now[GOAL_END] - now[GOAL_BEGIN])
+    middle = z[POSITION * LANES + lane] + 0.25 * dt * (v0 + v)
+    z[INTEGRAL * LANES + lane] += dt * (goal - middle)
+    z[POSITION * LANES + lane] += 0.5 * dt * (v0 + v)
+    z[SPEED_RISE * LANES + lane] = (abs(v1) - abs(v0)) / part
+    z[VELOCITY * LANES + lane] = v
+    z[RISE_0 * LANES + lane] = between(z, lane, CURVE_0, x) / part
+    if KIND_0 == BENDS:
+        between(z, lane, BRISTLE_0, x)
+    if KIND_1 >= 0:
+        z[RISE_1 * LANES + lane] = between(z, lane, CURVE_1, x) / part
+    if KIND_1 == BENDS:
+        between(z, lane, BRISTLE_1, x)
+    for i in range(ELEMENTS):
+        between(z, lane, FORCE + i, x)
+
+
+def between(z: Any, lane: int, row: int, x: float) -> float:
+    """Move a row of the state by fraction x towards the one ahead; returns the whole way."""
+    way = z[(AHEAD + row) * LANES + lane] - z[row * LANES + lane]
+    z[row * LANES + lane] += x * way
+    return way
+
+
+def switch(z: Any, lane: int, c: Any, which: int) -> None:
+    """Let element `which` slip; ELEMENTS: the motion reverses, and every element sticks."""
+    z[DIRECTION * LANES + lane] = 1.0 if z[(AHEAD + VELOCITY) * LANES + lane] >= 0.0 else -1.0
+    if which == ELEMENTS:
+        z[VELOCITY * LANES + lane] = 0.0
+        z[SPEED_RISE * LANES + lane] = abs(z[SPEED_RISE * LANES + lane])
+        stick(z, lane, c)
+        return
+    z[(SLIPS + which) * LANES + lane] = 1.0
+    z[SLIPPING * LANES + lane] += 1.0
+    for i in range(ELEMENTS):
+        if i == which:
+            z[STUCK * LANES + lane] -= weighted(z, lane, c, i)
+
+
+def stick(z: Any, lane: int, c: Any) -> None:
+    """Let every element stick."""
+    z[SLIPPING * LANES + lane] = 0.0
+    stuck = 0.0
+    for i in range(ELEMENTS):
+        z[(SLIPS + i) * LANES + lane] = 0.0
+        stuck += weighted(z, lane, c, i)
+    z[STUCK * LANES + lane] = stuck
+
+
+def weighted(z: Any, lane: int, c: Any, i: int) -> float:
+    """Stiffness that element i adds to the loop, N·m/rad."""
+    k = stiffness(c, z, lane, i)
+    return k if i < FIRST_1 else -gain(c, z, lane) * k
+
+
+# ---- what is measured ------------------------------------------------------------------------------------------
+
+
+def measure(z: Any, lane: int, c: Any, weight: float, now: Any, fine: bool) -> None:
+    """Add the state, with its weight in the sums, to what is measured, if it is fine."""
+    weight = select(fine, weight, 0.0)
+    error = now[GOAL_END] - z[POSITION * LANES + lane]
+    z[ERROR_2 * LANES + lane] += weight * error * error
+    highest(z, lane, ERROR_PEAK, abs(error), fine)
+    if METERED:
+        measure_all(z, lane, c, weight, now, fine, error)
+
+
+def measure_all(z: Any, lane: int, c: Any, weight: float, now: Any, fine: bool, error: float) -> None:
+    """What `measure` adds besides the error in position."""
+    v = z[VELOCITY * LANES + lane]
+    highest(z, lane, ERROR_LOW, -error, fine)
+    highest(z, lane, ERROR_HIGH, error, fine)
+    z[ERROR_SUM * LANES + lane] += weight * error
+    rate = now[WANTED_END] - v
+    z[RATE_2 * LANES + lane] += weight * rate * rate
+    highest(z, lane, SPEED_PEAK, abs(v), fine)
+    friction = torque(z, lane, c, 0)
+    helped = gain(c, z, lane) * now[FED_END]
+    if KIND_1 >= 0:
+        helped += gain(c, z, lane) * torque(z, lane, c, 1)
+    motor = kp(c, z, lane) * error + kr(c, z, lane) * now[WANTED_END] - kd(c, z, lane) * v
+    motor += ki(c, z, lane) * z[INTEGRAL * LANES + lane] + helped
+    highest(z, lane, MOTOR_PEAK, abs(motor), fine)
+    z[MOTOR_2 * LANES + lane] += weight * motor * motor
+    z[RESIDUAL_2 * LANES + lane] += weight * (friction - helped) * (friction - helped)
+    z[WORK * LANES + lane] += weight * motor * v
+    z[LOSS * LANES + lane] += weight * friction * v
+
+
+def highest(z: Any, lane: int, row: int, value: float, fine: bool) -> None:
+    """Keep the largest value."""
+    before = z[row * LANES + lane]
+    z[row * LANES + lane] = select((value > before) & fine, value, before)
+
+
+def torque(z: Any, lane: int, c: Any, which: int) -> float:
+    """Friction torque of a law, N·m."""
+    kind = KIND_0 if which == 0 else KIND_1
+    v = z[VELOCITY * LANES + lane]
+    s = z[(CURVE_0 if which == 0 else CURVE_1) * LANES + lane]
+    total = viscous(c, z, lane, which) * v
+    if RIGID_0 if which == 0 else RIGID_1:
+        total += rigid(c, z, lane, which) * z[DIRECTION * LANES + lane] * s
+    if kind == BENDS:
+        force = z[(BRISTLE_0 if which == 0 else BRISTLE_1) * LANES + lane]
+        total += force + lag(c, z, lane, which) * attraction(c, z, lane, which) * (v - abs(v) * force / s)
+    for i in range(ELEMENTS):
+        if (i < FIRST_1) == (which == 0):
+            total += z[(FORCE + i) * LANES + lane]
+    return total
+
+
+# ---- many steps ------------------------------------------------------------------------------------------------
+
+
+def run(z: Any, c: Any, h: float, reference: Any, first: int, last: int) -> None:
+    """Steps first to last - 1 of LANES cases; row t of `reference` is ``now`` in step t."""
+    for t in range(first, last):
+        now = (
+            reference[t, 0], reference[t, 1], reference[t, 2], reference[t, 3], reference[t, 4], reference[t, 5],
+        )  # fmt: skip
+        events = 0
+        for lane in range(LANES):
+            event = trial(z, lane, c, h, 1.0, now)
+            accept(z, lane, 1.0)
+            measure(z, lane, c, 1.0, now, not event)
+            z[EVENT * LANES + lane] = select(event, 1.0, 0.0)
+            events += event
+        if events > 0:
+            for lane in range(LANES):
+                if z[EVENT * LANES + lane] > 0.0:
+                    finish(z, lane, c, h, now)
+                    measure(z, lane, c, 1.0, now, True)
+
+
+def begin(z: Any, lane: int, c: Any, start: Any) -> None:
+    """The state at the start, every element sticking and unloaded."""
+    for i in range(NUMBERS):
+        z[i * LANES + lane] = 0.0
+    z[POSITION * LANES + lane] = start[0]
+    z[VELOCITY * LANES + lane] = start[1]
+    z[DIRECTION * LANES + lane] = start[2]
+    z[CURVE_0 * LANES + lane] = curve(start[1], c, z, lane, 0)
+    if KIND_1 >= 0:
+        z[CURVE_1 * LANES + lane] = curve(start[1], c, z, lane, 1)
+    stick(z, lane, c)
+
+
+def clear(z: Any, lane: int) -> None:
+    """Begin to measure."""
+    for i in range(SUMS, NUMBERS):
+        z[i * LANES + lane] = 0.0
+    z[ERROR_LOW * LANES + lane] = -FAR
+    z[ERROR_HIGH * LANES + lane] = -FAR
+
+
+def edge(reference: Any, t: int, begins: bool) -> Any:
+    """What `measure` reads at the begin or at the end of step t."""
+    goal = reference[t, GOAL_BEGIN] if begins else reference[t, GOAL_END]
+    wanted = reference[t, WANTED_BEGIN] if begins else reference[t, WANTED_END]
+    fed = reference[t, FED_BEGIN] if begins else reference[t, FED_END]
+    return (goal, goal, wanted, wanted, fed, fed)
+
+
+def run_parts(z: Any, c: Any, h: float, reference: Any, cuts: Any, sums: Any, base: int, count: int) -> None:
+    """Run LANES cases part by part; integrals are sums by the trapezoidal rule."""
+    for part in range(cuts.size - 1):
+        first, last = cuts[part], cuts[part + 1]
+        for lane in range(LANES):
+            clear(z, lane)
+            measure(z, lane, c, 0.5, edge(reference, first, True), True)
+        run(z, c, h, reference, first, last)
+        for lane in range(count):
+            measure(z, lane, c, -0.5, edge(reference, last - 1, False), True)
+            for i in range(NUMBERS - SUMS):
+                sums[base + lane, part, i] = z[(SUMS + i) * LANES + lane]
+
+
+def solve_lanes(
+    c: Any, columns: Any, start: Any, h: float, reference: Any, cuts: Any, sums: Any, ends: Any
+) -> None:
+    """Run all cases, LANES at a time.
+
+    ``columns`` (n, varied) is what varies, ``start`` position, velocity and direction at the begin, ``reference``
+    (steps, 7) what ``now`` names, ``cuts`` the steps at which parts of the run begin, and its end. ``sums`` (n, parts,
+    rows) receives what is measured in each part, ``ends`` (n, 3) position, velocity and the number of steps with more
+    events than were followed.
+    """
+    varied = columns.shape[1]
+    n = columns.shape[0]
+    room = aligned((NUMBERS + varied) * LANES)
+    z = pointer(room, 0)
+    for base in range(0, n, LANES):
+        for lane in range(LANES):
+            for j in range(varied):
+                z[(NUMBERS + j) * LANES + lane] = columns[min(base + lane, n - 1), j]
+            begin(z, lane, c, start)
+        count = min(LANES, n - base)
+        run_parts(z, c, h, reference, cuts, sums, base, count)
+        for lane in range(count):
+            ends[base + lane, 0] = z[POSITION * LANES + lane]
+            ends[base + lane, 1] = z[VELOCITY * LANES + lane]
+            ends[base + lane, 2] = z[UNRESOLVED * LANES + lane]
+
+
+def aligned(size: int) -> Any:
+    """Zeros that begin on a cache line, since vectors across two of them cost twice."""
+    room = np.zeros(size + 8)
+    first = (64 - room.ctypes.data % 64) % 64 // 8
+    return room[first : first + size]

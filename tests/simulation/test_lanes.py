@@ -1,0 +1,116 @@
+"""Lanes: the same cases as one at a time in plain Python, close to the exact integrator, in vectors of the machine."""
+
+import math
+import platform
+
+import numpy as np
+import pytest
+
+from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.controller import Controller
+from stickslip.control.linear import place
+from stickslip.errors import InputError, UnknownName
+from stickslip.jit import compiled_lanes, exponential
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model, Reference
+from stickslip.simulation import batch, lanes
+from stickslip.simulation.closed_loop import prepare
+
+CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
+LAWS = {
+    "gms": Model("gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, **CURVE),
+    "gms-3": Model("gms", k=[12896.0, 8141.0, 4273.0], alpha=[1 / 3] * 3, c=23.8782, **CURVE),
+    "lugre": Model("lugre", sigma0=3.5e4, sigma1=0.1, **CURVE),
+    "stribeck": Model("stribeck", k=3.5e4, **CURVE),
+    "coulomb": Model("coulomb", fc=0.285, sigma2=0.018),
+    "maxwell_slip": Model("maxwell_slip", k=[1e4, 7e3], w=[0.15, 0.15], sigma2=0.018),
+}
+INERTIA = 3.8623e-4
+HELPERS = {
+    "none": None,
+    "FF-lugre": Feedforward(LAWS["lugre"]),
+    "FF-coulomb": Feedforward(LAWS["coulomb"]),
+    "FB-gms": Feedback(LAWS["gms-3"]),
+    "FB-lugre": Feedback(LAWS["lugre"]),
+    "FB-stribeck": Feedback(LAWS["stribeck"]),
+    "FB-coulomb": Feedback(LAWS["coulomb"]),
+}
+
+
+def loops(plant="gms", helper="none", n=20, duration=1.0, step=1e-4, kind="PD", spread=0.1, **more):
+    rng = np.random.default_rng(5)
+    controller = Controller(place(kind, INERTIA, 36.0, 1.0), HELPERS[helper])
+    sine = Reference("sine", amplitude=0.01, frequency=2.0)
+    case = prepare(
+        RigidAxis(INERTIA, LAWS[plant]), controller, sine, duration, tolerance=1e-8, output=duration
+    )
+    columns = {
+        f"friction.{name}": getattr(LAWS[plant].parameters, name) * rng.uniform(1.0 - spread, 1.0 + spread, n)
+        for name in ("fs", "fc") if hasattr(LAWS[plant].parameters, name)
+    } | {"inertia": INERTIA * rng.uniform(1.0 - spread, 1.0 + spread, n)} | more  # fmt: skip
+    return case, columns, lanes.prepare(case, columns, step)
+
+
+def in_python(many: lanes.Lanes, i: int) -> np.ndarray:
+    """Position and velocity of case i, by the same text in plain Python, one case at a time."""
+    same = {"compile_inlined": lambda f: f, "compile_lanes": lambda f: f, "pointer": lambda a, _: a}
+    same |= {"exponential": math.exp, "select": lambda c, a, b: a if c else b, "math": math, "np": np}
+    text = "\n".join(line for line in many.text.splitlines() if not line.startswith(("import", "from")))
+    exec(f"METERED = False\n{text.replace(f'LANES = {lanes.LANES}', 'LANES = 1')}", same)
+    ends = np.zeros((1, 3))
+    steps = np.array([0, len(many.reference)])
+    same["solve_lanes"](
+        many.shared, many.columns[i : i + 1], np.array([0.0, 0.0, 1.0]), many.step, many.reference, steps,
+        np.zeros((1, 1, 12)), ends,
+    )  # fmt: skip
+    return ends[0, :2]
+
+
+@pytest.mark.parametrize(("plant", "helper"), [("gms", "FB-gms"), ("lugre", "FB-stribeck")])
+def test_lanes_do_what_one_case_does_in_plain_python(plant, helper):
+    """To 1e-12 rad: products and sums are fused in lanes, and events magnify that."""
+    _, _, many = loops(plant, helper, n=lanes.LANES + 3, duration=0.08)
+    found = many.run(())
+    for i in (0, lanes.LANES + 2):
+        position, velocity = in_python(many, i)
+        assert found.position[i] == pytest.approx(position, abs=1e-12)
+        assert found.velocity[i] == pytest.approx(velocity, abs=1e-9)
+
+
+def test_the_error_falls_with_the_square_of_the_step():
+    case, columns, _ = loops()
+    truth = batch.prepare(case, columns).run(()).position
+    errors = [np.max(np.abs(lanes.prepare(case, columns, h).run(()).position - truth)) for h in (2e-4, 5e-5)]
+    assert errors[1] < 1e-6
+    assert errors[0] > 8.0 * errors[1]
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 code")
+def test_the_step_runs_in_vectors():
+    _, _, many = loops("gms", "FB-gms", n=2, duration=0.01)
+    module = compiled_lanes(
+        f"METERED = True\n{many.text}\n# a text of its own, since cached code has no listing"
+    )
+    c, h, n = many.shared, many.step, len(many.reference)
+    ends = np.zeros((2, 3))
+    start, cuts = np.array([0.0, 0.0, 1.0]), np.array([0, n])
+    module.solve_lanes(c, many.columns, start, h, many.reference, cuts, np.zeros((2, 1, 12)), ends)
+    (code,) = module.run.inspect_asm().values()
+    wide = [line for line in code.splitlines() if "vdivpd" in line and ("ymm" in line or "zmm" in line)]
+    assert len(wide) >= 3
+
+
+def test_the_exponential_is_as_exact_as_it_says():
+    x = np.concatenate([-np.geomspace(1e-9, 690.0, 2000), np.geomspace(1e-9, 690.0, 2000), [0.0]])
+    found = np.array([exponential(v) for v in x])
+    assert np.max(np.abs(found / np.exp(x) - 1.0)) < 1e-15
+
+
+def test_what_lanes_refuse():
+    with pytest.raises(InputError, match="holds at rest needs its events"):
+        loops("coulomb")
+    with pytest.raises(InputError, match="step = 0 s must be greater than 0"):
+        loops(step=0.0)
+    with pytest.raises(UnknownName, match="metric of lanes"):
+        loops()[2].run(["reversals_per_s"])
