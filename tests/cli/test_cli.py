@@ -226,6 +226,7 @@ def test_simulate_writes_a_record_and_prints_metrics(
         assert name in text
     assert all(len(line.split()) >= 2 for line in text.splitlines())
     assert any(line.split() == ["limit_cycle_period_s", "none"] for line in text.splitlines())
+    assert "accuracy: position within about" in text
     data = json_output(capsys, "simulate", "one_run.toml", "--json", "--out", "other.npz")
     assert data["record"] == "other.npz"
     assert data["metrics"]["position_rms_rad"] == record.meta["metrics"]["position_rms_rad"]

@@ -58,6 +58,23 @@ def print_metrics(metrics: Mapping[str, float]) -> None:
         print(f"{name:<44}{'none' if math.isnan(value) else f'{value:.6g}':>14}")
 
 
+def print_accuracy(meta: Mapping[str, Any]) -> None:
+    """What a checked run says of its error; nothing where it was not checked."""
+    found = meta.get("accuracy")
+    if not found:
+        return
+    tolerance, error = meta["tolerance"], found["error_rad"]
+    if found["well_conditioned"]:
+        print(
+            f"accuracy: position within about {max(error, tolerance):.1g} rad (tolerance {tolerance:g} rad)"
+        )
+    else:
+        print(
+            f"accuracy: this run is sensitive: errors within the tolerance, {tolerance:g} rad, move its position by"
+            f" about {error:.1g} rad; compare its metrics with those at another tolerance before you rely on them"
+        )
+
+
 def result_as_data(result: StudyResult, report: Path | None) -> dict[str, Any]:
     """A study's result as plain data."""
     return {

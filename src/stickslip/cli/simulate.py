@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--out {out} is a folder; give the name of a file")
     planned.check()
     prepared_folder(out.parent)
-    executed = execute(planned)
+    executed = execute(planned, check=True)
     try:
         executed.record.save(out)
     except OSError as error:
@@ -71,5 +71,6 @@ def run(args: argparse.Namespace) -> int:
         _output.print_json({**executed.record.meta, "record": str(out), "failure": executed.failure})
     else:
         _output.print_metrics(executed.metrics)
+        _output.print_accuracy(executed.record.meta)
         print(f"record: {out} ({len(executed.record)} rows)")
     return _output.report_failures([(planned.key, executed.failure, out)] if executed.failure else [])

@@ -11,6 +11,7 @@ from stickslip.simulation._case import (
     DONE,
     DURATION,
     KI,
+    KICK,
     MAX_STEP,
     NO_STEP,
     NOT_FINITE,
@@ -26,6 +27,7 @@ from stickslip.simulation._case import (
 from stickslip.simulation._exact_bend import bend
 from stickslip.simulation._exact_events import add_exponents, find, switch
 from stickslip.simulation._exact_flow import Linear, Matrix, flow
+from stickslip.simulation._exact_kick import kick
 from stickslip.simulation._exact_output import measure, row_after, row_before, write_grid, write_rows
 from stickslip.simulation._exact_rest import applied, release, rest, set_off
 from stickslip.simulation._exact_state import (
@@ -91,7 +93,7 @@ from stickslip.simulation._exact_stretch import (
     slip_force_at,
 )
 
-SAFETY = 0.005
+SAFETY = 0.0015
 """Share of the tolerance that one step may be wrong by."""
 FINEST = 2e-12  # rad
 LONGEST_STEP = 64e-3
@@ -368,12 +370,16 @@ def solve(
             switch(parameters, plan, elements, sides, loop)
             if held:
                 release(plan, elements, sides, parameters, loop)
+            if parameters[KICK] != 0.0:
+                kick(parameters, plan, elements, loop, h, tol, True)
             slow_again = growth_of(lin) * FIRST_STEP > MOST_GROWTH
             lin = arrange(parameters, plan, elements, sides, loop)
             generation += 1
             level = after_event if slow_again else max(level, after_event)
         else:
             finish_step(plan, sides, loop, stretch, loop[TIME] + h, parameters[KI])
+            if parameters[KICK] != 0.0:
+                kick(parameters, plan, elements, loop, h, tol, False)
             if not held:
                 level = next_level(lin, loop, stretch, cache, level, tol)
         jumps = happens

@@ -58,6 +58,7 @@ def simulate(
     output: float | Sequence[float] | np.ndarray[Any, Any] = 1e-3,
     initial: tuple[float, float] = (0.0, 0.0),
     metered: bool = True,
+    check: bool = False,
 ) -> Record:
     """Run an axis with friction under a controller along a reference.
 
@@ -82,12 +83,16 @@ def simulate(
         Position (rad) and velocity (rad/s) at the start; every law starts at rest, sticking.
     metered : bool
         Whether metrics and energies are accumulated during the run.
+    check : bool
+        Whether the error of the run is estimated (exact and adaptive), at about three times its price.
 
     Returns
     -------
     Record
         The grid and the events; channels as in ``record.units``. ``record.meta["metrics"]`` holds the metrics,
-        ``record.meta["energy"]`` the balance: motor work = friction loss + kinetic energy + residual, J.
+        ``record.meta["energy"]`` the balance: motor work = friction loss + kinetic energy + residual, J;
+        ``record.meta["accuracy"]``, if asked for, ``error_rad``, the estimate of the largest error in position, and
+        ``well_conditioned``, whether that is at most ten times the tolerance (`stickslip.simulation.accuracy`).
 
     Raises
     ------
@@ -103,7 +108,11 @@ def simulate(
     )  # fmt: skip
     name, run = integrator_for(case, integrator)
     outcome: Outcome = run(case, time_step) if name == "fixed" else run(case)
-    record = _record(case, outcome, {"integrator": name, "slip_rule": slip_rule})
+    how: dict[str, Any] = {"integrator": name, "slip_rule": slip_rule}
+    if check and name != "fixed" and outcome.code == _case.DONE:
+        found = importlib.import_module("stickslip.simulation.accuracy").estimate(case, name)
+        how["accuracy"] = {"error_rad": found.error, "well_conditioned": found.well_conditioned}
+    record = _record(case, outcome, how)
     if outcome.code != _case.DONE:
         kind, why = REASONS[outcome.code]
         raise kind(f"the run ended at {outcome.time:.6g} s: {why}", outcome.time, record)

@@ -39,14 +39,18 @@ class Executed:
         return dict(self.record.meta.get("metrics", {}))
 
 
-def execute(planned: PlannedRun) -> Executed:
-    """Simulate one `planned` run that its `check` passes; one that ends early gives what was computed until then."""
+def execute(planned: PlannedRun, check: bool = False) -> Executed:
+    """Simulate one `planned` run that its `check` passes; one that ends early gives what was computed until then.
+
+    With `check` the record's meta has the estimate of its error (`stickslip.simulate`).
+    """
     n = planned.numerics
     start, failure = time.thread_time(), ""
     try:
         record = simulate(
             planned.axis, planned.control, planned.motion, planned.duration, integrator=n.integrator,
             tolerance=n.tolerance, time_step=n.time_step, slip_rule=planned.slip_rule, output=n.output,
+            check=check,
         )  # fmt: skip
     except SimulationError as error:
         if error.record is None:

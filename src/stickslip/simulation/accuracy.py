@@ -1,0 +1,93 @@
+"""How far the position of a run can be trusted.
+
+Friction makes some motions sensitive: a break-away a little later, a limit cycle a little ahead. An error that a step
+may have is then not the error of the run. So the run is repeated with every step wrong on purpose, by twice what the
+integrator lets a step be wrong by, once along the motion and once against it: how far those two end up from the run is
+the estimate of its error. It holds where the steps keep what they promise, which `benchmarks/accuracy.py` counts on
+random cases.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip.simulation import adaptive, exact
+from stickslip.simulation._case import DONE, KICK, TOLERANCE, Case, Outcome
+
+__all__ = ["Accuracy", "estimate"]
+
+KICKS = (2.0, -2.0)
+"""Over what a step may be wrong by."""
+WELL = 10.0
+"""Largest error of a well-conditioned run, over the tolerance."""
+LOOSER = 10.0
+POSITION, EVENT = 3, 8
+
+
+class Accuracy(NamedTuple):
+    """How far a run can be trusted.
+
+    Attributes
+    ----------
+    error : float
+        Estimate of the largest error in position on the grid, rad; infinite where a repeated run ends early.
+    well_conditioned : bool
+        Whether that is at most ten times the tolerance.
+    """
+
+    error: float
+    well_conditioned: bool
+
+
+def estimate(case: Case, integrator: str = "exact") -> Accuracy:
+    """Repeat a run with wrong steps (exact), or at ten times the tolerance (adaptive); about three times its price.
+
+    Parameters
+    ----------
+    case : Case
+        What `stickslip.simulation.closed_loop.prepare` returns; positions are compared on its grid.
+    integrator : {"exact", "adaptive"}
+
+    Raises
+    ------
+    ValueError
+        If the integrator cannot run the case, or is another one.
+    """
+    if integrator == "exact":
+        error = _kicked(case)
+    elif integrator == "adaptive":
+        error = _looser(case)
+    else:
+        raise ValueError(f"the {integrator} integrator has no tolerance to be held to")
+    return Accuracy(error, error <= WELL * float(case.numbers[TOLERANCE]))
+
+
+def _kicked(case: Case) -> float:
+    prepared, worst = exact.prepare(case), 0.0
+    motion, code, _ = prepared.run()
+    for kick in KICKS:
+        parameters = prepared.parameters.copy()
+        parameters[KICK] = kick
+        other, ended, _ = replace(prepared, parameters=parameters).run()
+        worst = max(worst, _apart(motion[:, 0], other[:, 0], code == ended == DONE))
+    return worst
+
+
+def _looser(case: Case) -> float:
+    numbers = case.numbers.copy()
+    numbers[TOLERANCE] *= LOOSER
+    one, other = adaptive.run(case), adaptive.run(replace(case, numbers=numbers))
+    return _apart(_positions(one), _positions(other), one.code == other.code == DONE)
+
+
+def _positions(outcome: Outcome) -> Any:
+    return outcome.rows[outcome.rows[:, EVENT] == 0.0, POSITION]
+
+
+def _apart(one: Any, other: Any, whole: bool) -> float:
+    """Largest difference, rad."""
+    return float(np.max(np.abs(one - other), initial=0.0)) if whole else math.inf

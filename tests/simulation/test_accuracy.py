@@ -1,0 +1,69 @@
+"""A run's own estimate of its error, against finer runs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from conftest import CASES, INERTIA, PLANT, thesis_run
+from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Gains, place
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model
+from stickslip.simulation import accuracy, exact
+from stickslip.simulation.closed_loop import prepare, simulate
+
+AXIS = RigidAxis(INERTIA, Model("gms", **PLANT))
+PD = Controller(place("PD", INERTIA, 36.0, 1.0))
+SINE = CASES["low"][0]
+
+
+@pytest.mark.parametrize(
+    "run", ["low/nominal/PD", "low/nominal/PID", "high/nominal/FF-lugre", "low/plus10/FB-gms", "low/minus10/FB-lugre",
+            "step/nominal/FB-coulomb", "high/nominal/FB-stribeck"],
+)  # fmt: skip
+def test_errors_lie_within_the_estimate(run):
+    axis, controller, reference, duration = thesis_run(run)
+    duration = min(duration, 1.0)
+    case = prepare(axis, controller, reference, duration, tolerance=1e-7)
+    fine = prepare(axis, controller, reference, duration, tolerance=1e-10)
+    found = accuracy.estimate(case)
+    error = np.max(np.abs(exact.prepare(case).run()[0][:, 0] - exact.prepare(fine).run()[0][:, 0]))
+    assert error <= max(found.error, 1e-7)
+    assert found.well_conditioned == (found.error <= 1e-6)
+
+
+def test_a_linear_run_is_well_conditioned():
+    axis = RigidAxis(INERTIA, Model("coulomb", fc=0.0, sigma2=0.018))
+    assert accuracy.estimate(prepare(axis, PD, SINE, 1.0, tolerance=1e-9)).error < 1e-10
+
+
+def test_a_run_in_which_errors_grow_is_not():
+    """Feedback of more viscous friction than there is: an oscillation, and any error, grows by exp(20 t)."""
+    axis = RigidAxis(1.0, Model("coulomb", fc=0.0))
+    controller = Controller(Gains(kp=1000.0), Feedback(Model("coulomb", fc=0.0, sigma2=40.0)))
+    found = accuracy.estimate(prepare(axis, controller, SINE, 1.0, tolerance=1e-7))
+    assert not found.well_conditioned
+    assert found.error > 1e-6
+
+
+def test_simulate_tells_when_asked():
+    record = simulate(AXIS, PD, SINE, 0.5, tolerance=1e-7, check=True)
+    assert record.meta["accuracy"]["well_conditioned"] is True
+    assert 0.0 < record.meta["accuracy"]["error_rad"] < 1e-6
+    assert "accuracy" not in simulate(AXIS, PD, SINE, 0.1).meta
+
+
+def test_the_adaptive_integrator_is_held_to_ten_times_the_tolerance():
+    record = simulate(AXIS, PD, SINE, 0.2, integrator="adaptive", tolerance=1e-8, check=True)
+    assert 0.0 < record.meta["accuracy"]["error_rad"] < 1e-7
+    assert math.isfinite(record.meta["accuracy"]["error_rad"])
+
+
+def test_the_fixed_integrator_has_no_tolerance():
+    case = prepare(AXIS, PD, SINE, 0.1)
+    with pytest.raises(ValueError, match="no tolerance"):
+        accuracy.estimate(case, "fixed")
