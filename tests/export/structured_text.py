@@ -1,9 +1,11 @@
-"""An evaluator of IEC 61131-3 structured text (types, functions, function blocks), to try what is exported.
+"""IEC 61131-3 structured text (types, functions, function blocks) run as Python, to try what is exported.
 
 The grammar is the part of the norm's Annex B that covers user types, POUs with VAR sections, assignments, IF,
 FOR, RETURN, EXIT and calls with named arguments. LREAL is a double, INT an int; names know no case.
 """
 
+import copy
+import functools
 import math
 
 from lark import Lark, Token, Tree
@@ -57,22 +59,7 @@ LIBRARY = {
     "atan": math.atan, "expt": math.pow, "min": min, "max": max, "sel": lambda c, a, b: b if c else a,
     "int_to_lreal": float, "lint_to_lreal": float, "trunc_lint": math.trunc, "lreal_to_int": int,
 }  # fmt: skip
-ARITHMETIC = {
-    "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b, "/": lambda a, b: a / b,
-    "MOD": math.fmod,
-}  # fmt: skip
-COMPARISONS = {
-    "<": lambda a, b: a < b, ">": lambda a, b: a > b, "<=": lambda a, b: a <= b, ">=": lambda a, b: a >= b,
-    "=": lambda a, b: a == b, "<>": lambda a, b: a != b,
-}  # fmt: skip
-
-
-class Returned(Exception):
-    """RETURN."""
-
-
-class Left(Exception):
-    """EXIT."""
+COMPARISONS = {"=": "==", "<>": "!="}
 
 
 class Program:
@@ -87,14 +74,22 @@ class Program:
                 self.types[names[0].lower()] = [c for c in part.children if isinstance(c, Tree)]
             else:
                 self.pous[names[0].lower()] = part
+        self.initial = {
+            name: {
+                d.children[0].lower(): self.fresh(d)
+                for section in part.find_data("section")
+                for d in section.find_data("declaration")
+            }
+            for name, part in self.pous.items()
+        }
 
     def fresh(self, declaration):
         """The initial value of a declared variable."""
         _, kind, initial = declaration.children
         if initial is not None and isinstance(initial, Tree) and initial.data == "listed":
-            return [self.value(c, {}) for c in initial.children]
+            return [constant(c) for c in initial.children]
         if initial is not None:
-            return self.value(initial, {})
+            return constant(initial)
         if kind.data == "array":
             return [0.0] * (int(kind.children[1]) + 1)
         name = kind.children[0].lower()
@@ -104,108 +99,117 @@ class Program:
 
     def instance(self, name):
         """The variables of a function block at the start."""
-        return {
-            d.children[0].lower(): self.fresh(d)
-            for section in self.pous[name.lower()].find_data("section")
-            for d in section.find_data("declaration")
-        }
+        return copy.deepcopy(self.initial[name.lower()])
 
     def run(self, name, variables):
         """Run the statements of a POU on its variables."""
-        part = self.pous[name.lower()]
-        try:
-            for c in part.children:
-                if isinstance(c, Tree) and c.data != "section":
-                    self.execute(c, variables)
-        except Returned:
-            pass
+        self.statements(name.lower())(variables)
 
-    def execute(self, node, v):
-        if node.data == "assign":
-            self.store(node.children[0], self.value(node.children[1], v), v)
-        elif node.data == "call_statement":
-            self.value(node.children[0], v)
-        elif node.data == "if_":
-            self.branch(node.children, v)
-        elif node.data == "for_":
-            name, first, last, body = node.children
-            try:
-                for i in range(int(self.value(first, v)), int(self.value(last, v)) + 1):
-                    v[name.lower()] = i
-                    self.execute(body, v)
-            except Left:
-                pass
-        elif node.data == "body":
-            for c in node.children:
-                self.execute(c, v)
-        elif node.data == "return_":
-            raise Returned
-        elif node.data == "exit_":
-            raise Left
+    @functools.cache  # noqa: B019 (a program lives for one test)
+    def statements(self, name):
+        """The statements of a POU as a Python function of its variables."""
+        lines = [line for c in self.pous[name].children if is_statement(c) for line in statement(c)]
+        source = "\n    ".join(["def run(v):", "pass", *lines])
+        found = {"call": self.call, "store": store, "both": both, "fmod": math.fmod, "library": LIBRARY}
+        exec(compile(source, name, "exec"), found)
+        return found["run"]
 
-    def branch(self, children, v):
-        *pairs, otherwise = children
-        for test, body in zip(pairs[::2], pairs[1::2]):
-            if self.value(test, v):
-                self.execute(body, v)
-                return
-        if otherwise is not None:
-            self.execute(otherwise, v)
-
-    def steps(self, place, v):
-        for step in place.children[1:]:
-            yield (
-                step.lower() if isinstance(step, Token) and step.type == "NAME" else int(self.value(step, v))
-            )
-
-    def store(self, place, value, v):
-        keys = [place.children[0].lower(), *self.steps(place, v)]
-        owner = v
-        for key in keys[:-1]:
-            owner = owner[key]
-        assert keys[-1] in owner if isinstance(owner, dict) else keys[-1] < len(owner), f"undeclared {keys}"
-        owner[keys[-1]] = value
-
-    def value(self, node, v):
-        if isinstance(node, Token):
-            return self.token(node, v)
-        kind, c = node.data, node.children
-        if kind == "place":
-            out = v[c[0].lower()]
-            for key in self.steps(node, v):
-                out = out[key]
-            return out
-        if kind == "call":
-            return self.call(c[0].lower(), [a for a in c[1:] if a is not None], v)
-        if kind == "negative":
-            return -self.value(c[0], v)
-        if kind == "not_":
-            return not self.value(c[0], v)
-        if kind in ("or_", "and_"):
-            results = [self.value(x, v) for x in c]  # both sides, as a PLC may
-            return any(results) if kind == "or_" else all(results)
-        if kind == "comparison":
-            return COMPARISONS[c[1]](self.value(c[0], v), self.value(c[2], v))
-        out = self.value(c[0], v)
-        for sign, operand in zip(c[1::2], c[2::2]):
-            right = self.value(operand, v)
-            out = ARITHMETIC[sign.upper()](out, right)
-        return out
-
-    def token(self, node, v):
-        if node.type == "TRUTH":
-            return node.lower() == "true"
-        if node.type == "NAME":
-            return v[node.lower()]
-        return float(node) if any(x in node for x in ".eE") else int(node)
-
-    def call(self, name, arguments, v):
-        if name in LIBRARY:
-            return LIBRARY[name](*(self.value(a.children[0], v) for a in arguments))
+    def call(self, name, **given):
         inner = {name: 0.0, **self.instance(name)}
-        for a in arguments:
-            key, expression = a.children
-            assert key.lower() in inner, f"{name} has no input {key}"
-            inner[key.lower()] = self.value(expression, v)
+        assert given.keys() <= inner.keys(), f"{name} has not all of the inputs {list(given)}"
+        inner |= given
         self.run(name, inner)
         return inner[name]
+
+
+def constant(node):
+    return eval(value(node), {"library": LIBRARY})
+
+
+def is_statement(node):
+    return isinstance(node, Tree) and node.data != "section"
+
+
+def store(owner, key, value):
+    assert key in owner if isinstance(owner, dict) else key < len(owner), f"undeclared {key}"
+    owner[key] = value
+
+
+def both(kind, *results):
+    """AND and OR work out all their operands, as a PLC may."""
+    return any(results) if kind == "or_" else all(results)
+
+
+def indented(lines):
+    return ["    " + line for line in lines] or ["    pass"]
+
+
+def statement(node):
+    """The lines of Python of a statement."""
+    c = node.children
+    if node.data == "assign":
+        *owner, key = keys(c[0])
+        return [f"store(v{''.join(f'[{k}]' for k in owner)}, {key}, {value(c[1])})"]
+    if node.data == "call_statement":
+        return [value(c[0])]
+    if node.data == "if_":
+        *pairs, otherwise = c
+        out = []
+        for test, body in zip(pairs[::2], pairs[1::2]):
+            out += [f"{'elif' if out else 'if'} {value(test)}:", *indented(statement(body))]
+        return out if otherwise is None else [*out, "else:", *indented(statement(otherwise))]
+    if node.data == "for_":
+        name, first, last, body = c
+        head = f"for v[{name.lower()!r}] in range(int({value(first)}), int({value(last)}) + 1):"
+        return [head, *indented(statement(body))]
+    if node.data == "body":
+        return [line for inner in c for line in statement(inner)]
+    return {"return_": ["return"], "exit_": ["break"], "empty": []}[node.data]
+
+
+def keys(place):
+    """What leads from the variables to a place: names and numbers."""
+    first, *rest = place.children
+    names = (
+        repr(k.lower()) if isinstance(k, Token) and k.type == "NAME" else f"int({value(k)})" for k in rest
+    )
+    return [repr(first.lower()), *names]
+
+
+def value(node):
+    """The Python of an expression."""
+    if isinstance(node, Token):
+        return token(node)
+    kind, c = node.data, node.children
+    if kind == "place":
+        return "v" + "".join(f"[{key}]" for key in keys(node))
+    if kind == "call":
+        return called(c[0].lower(), [a for a in c[1:] if a is not None])
+    if kind == "negative":
+        return f"(-{value(c[0])})"
+    if kind == "not_":
+        return f"(not {value(c[0])})"
+    if kind in ("or_", "and_"):
+        return f"both({kind!r}, {', '.join(value(x) for x in c)})"
+    if kind == "comparison":
+        return f"({value(c[0])} {COMPARISONS.get(c[1], c[1])} {value(c[2])})"
+    out = value(c[0])
+    for sign, operand in zip(c[1::2], c[2::2]):
+        right = value(operand)
+        out = f"fmod({out}, {right})" if sign.upper() == "MOD" else f"({out} {sign} {right})"
+    return out
+
+
+def called(name, arguments):
+    if name in LIBRARY:
+        return f"library[{name!r}]({', '.join(value(a.children[0]) for a in arguments)})"
+    given = (f"{a.children[0].lower()}={value(a.children[1])}" for a in arguments)
+    return f"call({name!r}, {', '.join(given)})"
+
+
+def token(node):
+    if node.type == "TRUTH":
+        return str(node.lower() == "true")
+    if node.type == "NAME":
+        return f"v[{node.lower()!r}]"
+    return repr(float(node) if any(x in node for x in ".eE") else int(node))
