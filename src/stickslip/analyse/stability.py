@@ -39,7 +39,7 @@ from stickslip.analyse.stability_result import (
 from stickslip.control.linear import Gains
 from stickslip.model import Model
 
-__all__ = ["COUNTED", "SLOW", "gain_margin", "stability"]
+__all__ = ["COUNTED", "SLOW", "gain_margin", "stability", "with_law"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -96,7 +96,7 @@ def _linear_limit(train: Train, drive: Drive) -> float:
     return _edge(good, np.geomspace(0.02, 20.0, 61))
 
 
-def _with_law(
+def with_law(
     axis: Axis, drive: Drive, model: Model | None, amplitude: float, frequency: float
 ) -> tuple[Train, Drive]:
     """Train and drive at an amplitude of the encoder; the compensator sees what its filter leaves of it."""
@@ -111,11 +111,11 @@ def _with_law(
 
 def _poles(axis: Axis, drive: Drive, model: Model | None, amplitude: float) -> Poles:
     """Least stable pole at an amplitude, with the laws as they are at its own frequency."""
-    found = Loop(*_with_law(axis, drive, model, amplitude, axis.ringing)).poles()
+    found = Loop(*with_law(axis, drive, model, amplitude, axis.ringing)).poles()
     for _ in range(2):
         if found.frequency < SLOW:
             break
-        found = Loop(*_with_law(axis, drive, model, amplitude, found.frequency)).poles()
+        found = Loop(*with_law(axis, drive, model, amplitude, found.frequency)).poles()
     return found
 
 
@@ -138,7 +138,7 @@ def _cycle(axis: Axis, drive: Drive, model: Model | None, first: Poles) -> Cycle
 def _margins(name: str, axis: Axis, drive: Drive, model: Model | None) -> Margins:
     at_one = _poles(axis, drive, model, axis.amplitude)
     frequency = at_one.frequency if at_one.frequency >= SLOW else axis.ringing
-    train, there = _with_law(axis, drive, model, axis.amplitude, frequency)
+    train, there = with_law(axis, drive, model, axis.amplitude, frequency)
     softer = counts = math.nan
     if at_one.stable:
         lost = _edge(lambda s: stable(train.softer(1.0 - s), there), np.linspace(0.0, 1.0, 51))
@@ -162,7 +162,7 @@ def _recommended(name: str, axis: Axis, drive: Drive, model: Model) -> Recommend
     """
     for gain in TRIED_GAINS:
         for corner in TRIED_FILTERS:
-            train, setting = _with_law(
+            train, setting = with_law(
                 axis, replace(drive, filter_hz=corner), model, axis.amplitude, axis.ringing
             )
             setting = replace(setting, gain=gain)
@@ -228,7 +228,7 @@ def stability(
 def _map(axis: Axis, name: str, model: Model, drives: Sequence[Drive]) -> Map:
     growth, frequency = np.empty((GAINS.size, len(drives))), np.empty((GAINS.size, len(drives)))
     for j, drive in enumerate(drives):
-        train, there = _with_law(axis, drive, model, axis.amplitude, axis.ringing)
+        train, there = with_law(axis, drive, model, axis.amplitude, axis.ringing)
         for i, gain in enumerate(GAINS):
             found = Loop(train, replace(there, gain=float(gain))).poles()
             growth[i, j], frequency[i, j] = found.growth, found.frequency
@@ -236,5 +236,5 @@ def _map(axis: Axis, name: str, model: Model, drives: Sequence[Drive]) -> Map:
 
 
 def _filtered(axis: Axis, drive: Drive, model: Model, corner: float) -> float:
-    train, there = _with_law(axis, replace(drive, filter_hz=corner), model, axis.amplitude, axis.ringing)
+    train, there = with_law(axis, replace(drive, filter_hz=corner), model, axis.amplitude, axis.ringing)
     return gain_margin(train, there, there.law)

@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stickslip.analyse.stability_result import Stability
+    from stickslip.control.linear import Gains
     from stickslip.machines.machine import Machine
+    from stickslip.model import Model
+    from stickslip.study.stability_map import Confirmed
 
 __all__ = ["arguments", "work"]
 
@@ -40,6 +43,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
                         help="of the compensators' input, repeatable; 0 for none (default 0 and 10)")  # fmt: skip
     parser.add_argument("--amplitude", type=float, default=0.0, metavar="RAD",
                         help="small motion at the encoder (default one count)")  # fmt: skip
+    parser.add_argument(
+        "--confirm",
+        action="store_true",
+        help="simulate a grid of filters and gains, and the recommended ones, on the virtual rig",
+    )
     parser.add_argument("--law", action="append", default=[], metavar="NAME",
                         help="of the machine's models (default all)")  # fmt: skip
 
@@ -49,20 +57,23 @@ def work(
 ) -> None:
     """Reckon and show."""
     found = reckoned(args)
+    tried: Confirmed | None = None
+    if args.confirm:
+        from stickslip.study.stability_map import confirmed
+
+        plant, gains, models = described(args)
+        tried = confirmed(plant, gains, models, found.recommended, drawn=args.plot is not None)
 
     def picture() -> Any:
-        from stickslip.report.stability_pictures import picture_of_stability
+        from stickslip.report.stability_pictures import picture_of_confirmed, picture_of_stability
 
-        return picture_of_stability(found)
+        return picture_of_confirmed(tried) if tried else picture_of_stability(found)
 
-    show(args, [found], picture)
+    show(args, [found, tried] if tried else [found], picture)
 
 
-def reckoned(args: argparse.Namespace) -> Stability:
-    """The stability of what the options describe."""
-    from stickslip.analyse.machine_axis import axis_of
-    from stickslip.analyse.presliding_loop import Drive
-    from stickslip.analyse.stability import stability
+def described(args: argparse.Namespace) -> tuple[Machine, Gains, dict[str, Model]]:
+    """The machine, the linear controller and the compensators' laws that the options describe."""
     from stickslip.control.linear import place
     from stickslip.errors import InputError
     from stickslip.machines.machine import machine
@@ -70,14 +81,26 @@ def reckoned(args: argparse.Namespace) -> Stability:
     plant = machine(args.rig).without(*(n.strip() for n in args.without.split(",") if n.strip()))
     if args.amplitude < 0.0 or any(f < 0.0 for f in args.filter):
         raise InputError("--amplitude and --filter must be 0 or greater")
-    gains = place(
-        args.linear, plant.inertia if args.inertia is None else args.inertia, args.bandwidth, args.damping
-    )
+    inertia = plant.inertia if args.inertia is None else args.inertia
+    if args.confirm and (args.sample_time or args.delay):
+        raise InputError(
+            "--confirm runs the machine with its own sample time and delay; leave the options out"
+        )
+    gains = place(args.linear, inertia, args.bandwidth, args.damping)
+    return plant, gains, {name: plant.models[name] for name in _chosen(plant, args.law)}
+
+
+def reckoned(args: argparse.Namespace) -> Stability:
+    """The stability of what the options describe."""
+    from stickslip.analyse.machine_axis import axis_of
+    from stickslip.analyse.presliding_loop import Drive
+    from stickslip.analyse.stability import stability
+
+    plant, gains, models = described(args)
     drive = Drive(
         gains, sample_time=plant.sample_time if args.sample_time is None else args.sample_time,
         delay=plant.delay if args.delay is None else args.delay,
     )  # fmt: skip
-    models = {name: plant.models[name] for name in _chosen(plant, args.law)}
     return stability(axis_of(plant, args.amplitude), drive, models, args.filter or (0.0, 10.0))
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from stickslip.analyse.stability import SLOW
 from stickslip.analyse.stability_result import FILTERS, GAINS, TIMES, Map, Stability
 from stickslip.report.plots import Curve, Panel, Style
+from stickslip.study.stability_map import FINE, FINE_GAINS, OPEN, Confirmed
 
-__all__ = ["picture_of_stability"]
+__all__ = ["picture_of_confirmed", "picture_of_stability"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -46,13 +47,34 @@ def picture_of_stability(found: Stability) -> tuple[str, str, Sequence[Panel], f
     return title, _message(found, name), panels, 2.0
 
 
-def _areas(x: Array, region: Map) -> list[Curve]:
+def picture_of_confirmed(found: Confirmed) -> tuple[str, str, Sequence[Panel], float]:
+    """What the poles say as areas, what the virtual rig does as points."""
+    panels: list[Panel] = []
+    for region in found.maps:
+        points = found.of(region.name)
+        marks = [
+            Curve(
+                np.array([p.filter_hz or OPEN for p in points if p.calm == calm]),
+                np.array([p.gain for p in points if p.calm == calm]), words, Style("#000000", "-", 0.8), kind,
+            )
+            for calm, words, kind in ((True, "simulated: calm", "open points"), (False, "simulated: moves", "points"))
+        ]  # fmt: skip
+        panels.append(Panel(
+            [*_areas(FINE, region, FINE_GAINS), *marks], "gain", "corner of the filter (Hz); the last column has none",
+            (float(FINE[0]), 1.05 * float(FINE[-1])), (float(FINE_GAINS[0]), float(FINE_GAINS[-1])), region.name, "log",
+        ))  # fmt: skip
+    agreed = sum(p.agrees for p in found.points)
+    message = f"{agreed} of {len(found.points)} settings do on the virtual rig what the poles say"
+    return f"Feedback at rest on {found.machine}", message, panels, 1.5
+
+
+def _areas(x: Array, region: Map, gains: Array = GAINS) -> list[Curve]:
     """One area for each kind of end, overlapping by nothing."""
     stable = -region.growth / np.maximum(np.abs(region.growth), 1.0)
     creeps = np.where((region.growth > 0.0) & (region.frequency < SLOW), 1.0, -1.0)
     rings = np.where((region.growth > 0.0) & (region.frequency >= SLOW), 1.0, -1.0)
     values = dict(zip(AREAS, (stable, rings, creeps)))
-    return [Curve(x, GAINS, name, style, "area", values[name]) for name, style in AREAS.items()]
+    return [Curve(x, gains, name, style, "area", values[name]) for name, style in AREAS.items()]
 
 
 def _one(x: Array) -> Curve:
