@@ -2,12 +2,14 @@
 
 The loop of Table 6 (PD on the low reference, 2.5 s), Fs and Fc each up to `--spread` off. Ours is
 `stickslip.simulation.batch` at the loosest tolerance at which 99 % of 200 of the loops end within `--error` of a tight
-run; with no metrics, with four that need no short windows, and with all. C is `baseline.c` (the same method, compiled
-here by gcc -O3 -march=native), and, where `--prototypes DIR` names a folder with them, the first prototypes: etd.c
-(event-driven, position on a 1 ms grid) and trim.c (trapezoid at 2e-4 s in SIMD lanes, by clang). Times are CPU times,
-the least of three rounds taken in turns.
+run; with no metrics, with four that need no short windows, and with all; and `stickslip.simulation.lanes` at 2e-4 s.
+C is `baseline.c` (the same method, compiled here by gcc -O3 -march=native), and, where `--prototypes DIR` names a
+folder with them, the first prototypes: etd.c (event-driven, position on a 1 ms grid) and trim.c (trapezoid at 2e-4 s
+in SIMD lanes, by clang). With `--jax`, trim.c's step in JAX (`jax_step.py`), compiled beforehand. Times are CPU times
+of the process, the least of three rounds taken in turns; laying out counts, compiling does not. Each method is judged
+against C of its own kind: from event to event, or at a fixed step.
 
-    python benchmarks/batch.py [--cases 10000] [--spread 0.1] [--prototypes DIR]
+    python benchmarks/batch.py [--cases 10000] [--spread 0.1] [--prototypes DIR] [--jax]
 """
 
 from __future__ import annotations
@@ -25,8 +27,10 @@ from typing import Any
 import numpy as np
 
 import closed_loop
+import jax_step
 from stickslip.control.controller import Controller
-from stickslip.simulation import batch
+from stickslip.simulation import batch, lanes
+from stickslip.simulation._case import Case
 from stickslip.simulation.closed_loop import prepare
 
 DURATION = 2.5
@@ -36,6 +40,8 @@ SAMPLE = 200
 COARSE = ("position_rms_rad", "position_peak_rad", "velocity_rms_rad_s", "torque_rms_Nm")
 REAL, ARRAY = ctypes.c_double, ctypes.POINTER(ctypes.c_double)
 TIMES_C = 1.3
+TIMES_JAX = 10.0
+STEP = 2e-4
 Column = np.ndarray[Any, np.dtype[np.float64]]
 
 
@@ -44,13 +50,22 @@ def pointer(values: Column) -> Any:
     return values.ctypes.data_as(ARRAY)
 
 
-def ours(name: str, fs: Column, fc: Column, tolerance: float) -> batch.Batch:
-    """The loops, laid out."""
+def the_case(name: str, tolerance: float) -> Case:
+    """The loop that the others vary."""
     controller = Controller(closed_loop.GAINS, closed_loop.COMPENSATORS[name])
-    case = prepare(
+    return prepare(
         closed_loop.AXIS, controller, closed_loop.REFERENCE, DURATION, tolerance=tolerance, output=DURATION
     )
-    return batch.prepare(case, {"friction.fs": fs, "friction.fc": fc})
+
+
+def ours(name: str, fs: Column, fc: Column, tolerance: float) -> batch.Batch:
+    """The loops, laid out."""
+    return batch.prepare(the_case(name, tolerance), {"friction.fs": fs, "friction.fc": fc})
+
+
+def side_by_side(name: str, fs: Column, fc: Column) -> lanes.Lanes:
+    """The loops at a fixed step, laid out."""
+    return lanes.prepare(the_case(name, 1e-7), {"friction.fs": fs, "friction.fc": fc}, STEP)
 
 
 def built(compiler: str, source: Path, folder: str) -> Any | None:
@@ -123,14 +138,14 @@ def event_driven(library: Any, name: str, fs: Column, fc: Column, tolerance: flo
     return run
 
 
-def lanes(library: Any, name: str, fs: Column, fc: Column) -> Callable[[], Column]:
+def trapezoid(library: Any, name: str, fs: Column, fc: Column) -> Callable[[], Column]:
     """trim.c over the loops."""
     function = library.batch
     function.argtypes = [ARRAY, REAL, REAL, ctypes.c_long, ARRAY, ARRAY, ARRAY, ARRAY]
     p, ends, peaks = prototype_numbers(name), np.zeros(fs.size), np.zeros(fs.size)
 
     def run() -> Column:
-        function(pointer(p), DURATION, 2e-4, fs.size, pointer(fs), pointer(fc), pointer(ends), pointer(peaks))
+        function(pointer(p), DURATION, STEP, fs.size, pointer(fs), pointer(fc), pointer(ends), pointer(peaks))
         return ends.copy()
 
     return run
@@ -153,13 +168,19 @@ def compare(name: str, options: argparse.Namespace, c: dict[str, Any]) -> None:
     truth = ours(name, *some, 1e-10).run(()).position
     tolerance = loosest(lambda tol: lambda: ours(name, *some, tol).run(()).position, truth, options.error)
     many = ours(name, fs, fc, tolerance)
-    start = time.thread_time()
-    ours(name, fs, fc, tolerance)
-    laid_out = time.thread_time() - start
+    laid_out = {
+        "events": least(lambda: ours(name, fs, fc, tolerance)),
+        "lanes": least(lambda: side_by_side(name, fs, fc)),
+    }
+    fixed = side_by_side(name, fs, fc)
+    fixed[:1].run(())
+    fixed[:1].run(lanes.METRICS)
     runs: dict[str, Callable[[], Column]] = {
         "ours, no metrics": lambda: many.run(()).position,
         "ours, 4 metrics": lambda: many.run(COARSE).position,
         "ours, all metrics": lambda: many.run().position,
+        f"ours, lanes ({STEP:g} s)": lambda: fixed.run(()).position,
+        "ours, lanes, 16 metrics": lambda: fixed.run(lanes.METRICS).position,
     }
     if "baseline" in c:
         level = loosest(lambda tol: same_method(c["baseline"], name, *some, tol), truth, options.error)
@@ -168,27 +189,59 @@ def compare(name: str, options: argparse.Namespace, c: dict[str, Any]) -> None:
         level = loosest(lambda tol: event_driven(c["etd"], name, *some, tol), truth, options.error)
         runs[f"C, etd.c ({level:.0e})"] = event_driven(c["etd"], name, fs, fc, level)
     if "trim" in c:
-        runs["C, trim.c (2e-4 s)"] = lanes(c["trim"], name, fs, fc)
+        runs["C, trim.c (2e-4 s)"] = trapezoid(c["trim"], name, fs, fc)
+    if options.jax:
+        runs["JAX, trim.c's step"] = jax_step.runner(name, fs, fc, DURATION, STEP)
     times = dict.fromkeys(runs, np.inf)
     errors: dict[str, Column] = {}
     for _ in range(3):
         for label, run in runs.items():
-            start = time.thread_time()
+            start = time.process_time()
             ends = run()
-            times[label] = min(times[label], time.thread_time() - start)
+            times[label] = min(times[label], time.process_time() - start)
             errors[label] = np.abs(ends[:SAMPLE] - truth)
-    print(f"{name}, {options.cases} loops, ours at {tolerance:.0e} rad, laid out in {laid_out:.3f} s")
+    print(
+        f"{name}, {options.cases} loops, ours at {tolerance:.0e} rad, laid out in {laid_out['events']:.3f} s"
+    )
     for label in runs:
         e = errors[label]
         worse = f"median {np.median(e):.1e}, 99 % {np.percentile(e, 99):.1e} rad"
         print(f"    {label:28} {times[label]:8.3f} s   error: {worse}")
+    events = times["ours, no metrics"] + laid_out["events"]
+    steps = times[f"ours, lanes ({STEP:g} s)"] + laid_out["lanes"]
     for label in runs:
         if label.startswith("C"):
-            ratio = (times["ours, no metrics"] + laid_out) / times[label]
+            ratio = (steps if "trim" in label else events) / times[label]
             print(
-                f"    {closed_loop.verdict(ratio <= TIMES_C)}  {ratio:.2f} times {label} (at most {TIMES_C})",
-                flush=True,
+                f"    {closed_loop.verdict(ratio <= TIMES_C)}  {ratio:.2f} times {label} (at most {TIMES_C})"
             )
+        if label.startswith("JAX"):
+            ratio = times[label] / steps
+            print(
+                f"    {closed_loop.verdict(ratio >= TIMES_JAX)}  {ratio:.1f} times faster than {label} (at least 10)"
+            )
+    print(f"    both cores: {two_cores(fixed):.2f} times as fast as one", flush=True)
+
+
+def least(run: Callable[[], Any]) -> float:
+    """CPU time, the least of three, s."""
+    times: list[float] = []
+    for _ in range(3):
+        start = time.process_time()
+        run()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def two_cores(fixed: lanes.Lanes) -> float:
+    """How much faster two threads are by the clock, the best of five."""
+    times: dict[int, float] = {1: np.inf, 2: np.inf}
+    for _ in range(5):
+        for jobs in times:
+            start = time.perf_counter()
+            fixed.run((), jobs)
+            times[jobs] = min(times[jobs], time.perf_counter() - start)
+    return times[1] / times[2]
 
 
 def main() -> None:
@@ -199,6 +252,7 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=10_000)
     parser.add_argument("--spread", type=float, default=0.1, help="of Fs and Fc, as a part of their values")
     parser.add_argument("--error", type=float, default=1e-6, help="in the last position, rad")
+    parser.add_argument("--jax", action="store_true", help="compare with JAX (pip install jax)")
     parser.add_argument("--prototypes", type=Path, metavar="DIR", help="with etd.c and trim.c")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

@@ -8,6 +8,7 @@ decided here.
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -101,15 +102,14 @@ def source(
     ------
     Refused
     """
-    tree = ast.parse(Path(__file__).with_name("_lanes_step.py").read_text(encoding="utf-8"))
     lines = [
         "import math",
         "import numpy as np",
         "from stickslip.jit import compile_inlined, compile_lanes, exponential, pointer, select",
     ]
     lines += [f"{name} = {value!r}" for name, value in sizes.items()]
-    constants = [node for node in tree.body if isinstance(node, ast.Assign)]
-    lines += [ast.unparse(node) for node in constants]
+    constants, functions = body()
+    lines += constants
     for name, expression in scalars.items():
         lines += function(name, "", [f"    return {expression}"])
     for name, each in (*sides.items(), *elements.items()):
@@ -118,13 +118,20 @@ def source(
         lines += curve_lines(side, curve, numbers)
     lines += ["@compile_inlined", "def curve(v, c, z, lane, which):"]
     lines += chosen([f"curve_{side}(v, c, z, lane)" for side in range(len(curves))])
+    return "\n".join([*lines, *functions]) + "\n"
+
+
+@functools.cache
+def body() -> tuple[list[str], list[str]]:
+    """The constants and the functions of `_lanes_step`."""
+    tree = ast.parse(Path(__file__).with_name("_lanes_step.py").read_text(encoding="utf-8"))
+    constants = [ast.unparse(node) for node in tree.body if isinstance(node, ast.Assign)]
+    functions: list[str] = []
     for node in tree.body:
         if isinstance(node, ast.FunctionDef):
-            lines += [
-                "@compile_inlined" if node.name in INLINED else "@compile_lanes",
-                ast.unparse(bare(node)),
-            ]
-    return "\n".join(lines) + "\n"
+            functions.append("@compile_inlined" if node.name in INLINED else "@compile_lanes")
+            functions.append(ast.unparse(bare(node)))
+    return constants, functions
 
 
 def function(name: str, more: str, body: Sequence[str]) -> list[str]:
