@@ -50,6 +50,7 @@ __all__ = [
     "compiled_profile",
     "compiled_sample",
     "kernel",
+    "loaded",
     "pointer",
     "pointer_at",
 ]
@@ -262,11 +263,12 @@ def _compile(
             "",
         ]
     text = "\n".join(lines)
-    module = _loaded(f"{name.replace('-', '_')}_{hashlib.sha256(text.encode()).hexdigest()[:16]}", text)
+    module = loaded(f"{name.replace('-', '_')}_{hashlib.sha256(text.encode()).hexdigest()[:16]}", text)
     return {entry: int(getattr(module, entry).address) for entry in entries}
 
 
-def _loaded(name: str, text: str) -> Any:
+def loaded(name: str, text: str) -> Any:
+    """Import a generated module, written to a file so that its compiled code can be cached."""
     path = cache_folder() / f"{name}.py"
     if not path.exists():
         # Written aside and renamed, so that a second process never reads half a file.
@@ -291,7 +293,7 @@ LANES_ALLOW = {"contract", "arcp", "nsz"}
 @functools.lru_cache(maxsize=64)
 def compiled_lanes(text: str) -> Any:
     """The module of a specialised program of lanes (`stickslip.simulation._lanes_source`)."""
-    return _loaded(f"lanes_{hashlib.sha256(text.encode()).hexdigest()[:16]}", text)
+    return loaded(f"lanes_{hashlib.sha256(text.encode()).hexdigest()[:16]}", text)
 
 
 def compile_inlined(function: Any) -> Any:

@@ -16,6 +16,8 @@ FIRST_1: int = 1
 KIND_0: int = 0
 KIND_1: int = -1
 """How what slips behaves: `RELAXES`, `FOLLOWS`, `BENDS`; -1: there is no law."""
+VARIED: int = 0
+"""Numbers that vary from case to case."""
 RIGID_0: bool = False
 RIGID_1: bool = False
 """Whether a share of the curve is held rigidly: it jumps with the sign of the velocity."""

@@ -27,6 +27,7 @@ from stickslip.simulation._lanes_names import (
     METERED,
     RIGID_0,
     RIGID_1,
+    VARIED,
     attraction,
     curve,
     gain,
@@ -448,31 +449,37 @@ def run_parts(z: Any, c: Any, h: float, reference: Any, cuts: Any, sums: Any, ba
                 sums[base + lane, part, i] = z[(SUMS + i) * LANES + lane]
 
 
+def solve_block(
+    z: Any, c: Any, columns: Any, start: Any, h: float, reference: Any, cuts: Any, sums: Any, ends: Any, base: int
+) -> None:  # fmt: skip
+    """Run the LANES cases from `base` on; the last one again where there are fewer."""
+    n = columns.shape[0]
+    for lane in range(LANES):
+        for j in range(VARIED):
+            z[(NUMBERS + j) * LANES + lane] = columns[min(base + lane, n - 1), j]
+        begin(z, lane, c, start)
+    count = min(LANES, n - base)
+    run_parts(z, c, h, reference, cuts, sums, base, count)
+    for lane in range(count):
+        ends[base + lane, 0] = z[POSITION * LANES + lane]
+        ends[base + lane, 1] = z[VELOCITY * LANES + lane]
+        ends[base + lane, 2] = z[UNRESOLVED * LANES + lane]
+
+
 def solve_lanes(
     c: Any, columns: Any, start: Any, h: float, reference: Any, cuts: Any, sums: Any, ends: Any
-) -> None:
+) -> None:  # fmt: skip
     """Run all cases, LANES at a time.
 
-    ``columns`` (n, varied) is what varies, ``start`` position, velocity and direction at the begin, ``reference``
+    ``columns`` (n, VARIED) is what varies, ``start`` position, velocity and direction at the begin, ``reference``
     (steps, 7) what ``now`` names, ``cuts`` the steps at which parts of the run begin, and its end. ``sums`` (n, parts,
     rows) receives what is measured in each part, ``ends`` (n, 3) position, velocity and the number of steps with more
     events than were followed.
     """
-    varied = columns.shape[1]
-    n = columns.shape[0]
-    room = aligned((NUMBERS + varied) * LANES)
+    room = aligned((NUMBERS + VARIED) * LANES)
     z = pointer(room, 0)
-    for base in range(0, n, LANES):
-        for lane in range(LANES):
-            for j in range(varied):
-                z[(NUMBERS + j) * LANES + lane] = columns[min(base + lane, n - 1), j]
-            begin(z, lane, c, start)
-        count = min(LANES, n - base)
-        run_parts(z, c, h, reference, cuts, sums, base, count)
-        for lane in range(count):
-            ends[base + lane, 0] = z[POSITION * LANES + lane]
-            ends[base + lane, 1] = z[VELOCITY * LANES + lane]
-            ends[base + lane, 2] = z[UNRESOLVED * LANES + lane]
+    for base in range(0, columns.shape[0], LANES):
+        solve_block(z, c, columns, start, h, reference, cuts, sums, ends, base)
 
 
 def aligned(size: int) -> Any:

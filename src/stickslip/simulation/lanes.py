@@ -8,6 +8,7 @@ enough.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -44,6 +45,7 @@ from stickslip.simulation.exact import curve_of
 __all__ = ["LANES", "METRICS", "Lanes", "prepare"]
 
 LANES = 16
+DEVICES = ("cpu", "gpu")
 METRICS = (
     "position_rms_rad", "position_peak_rad", "steady_state_error_rad", "end_error_rad", "velocity_rms_rad_s",
     "velocity_peak_rad_s", "torque_rms_Nm", "torque_peak_Nm", "friction_residual_rms_Nm",
@@ -96,7 +98,7 @@ class Lanes:
         """Some of the loops."""
         return replace(self, columns=self.columns[some])
 
-    def run(self, metrics: Sequence[str] = METRICS, jobs: int = 1) -> Results:
+    def run(self, metrics: Sequence[str] = METRICS, jobs: int = 1, device: str = "cpu") -> Results:
         """Run all of them; a loop that ran away has code `NOT_FINITE` and no metrics.
 
         Parameters
@@ -105,17 +107,23 @@ class Lanes:
             Of `METRICS`; with none, or those of `LIGHT` alone, it is a tenth faster.
         jobs : int
             Threads.
+        device : {"cpu", "gpu"}
+            A GPU runs one case a thread (``pip install 'stickslip[gpu]'``).
 
         Raises
         ------
         UnknownName
-            If there is no such metric.
+            If there is no such metric or device.
+        InputError
+            If there is no GPU.
         """
         for name in metrics:
             if name not in METRICS:
                 raise UnknownName("metric of lanes", name, METRICS)
+        if device not in DEVICES:
+            raise UnknownName("device", device, DEVICES)
         metered = any(name not in LIGHT for name in metrics)
-        solve = compiled_lanes(f"METERED = {metered}\n{self.text}").solve_lanes
+        solve = program(f"METERED = {metered}\n{self.text}", device)
         n, steps = len(self), len(self.reference)
         cuts = np.array([0, round(0.5 * steps), round(0.8 * steps), steps])
         sums, ends = np.zeros((n, 3, ROWS)), np.zeros((n, 3))
@@ -136,7 +144,7 @@ class Lanes:
             )
 
         size = LANES * max(1, math.ceil(n / LANES / max(1, jobs)))
-        parts = [(i, min(i + size, n)) for i in range(0, n, size)]
+        parts = [(i, min(i + size, n)) for i in range(0, n, size)] if device == "cpu" else [(0, n)]
         if len(parts) == 1:
             part(*parts[0])
         else:
@@ -176,6 +184,16 @@ class Lanes:
             "motor_work_J": self.step * sums[:, :, WORK].sum(axis=1),
             "friction_loss_J": self.step * sums[:, :, LOSS].sum(axis=1),
         }
+
+
+def program(text: str, device: str) -> Any:
+    """What runs a specialised text."""
+    if device == "cpu":
+        return compiled_lanes(text).solve_lanes
+    # Imported only here: numba.cuda takes long, and few have a GPU.
+    from stickslip import gpu
+
+    return functools.partial(gpu.solve, text, LANES)
 
 
 def prepare(case: Case, columns: Mapping[str, Array], step: float = 2e-4) -> Lanes:
@@ -237,6 +255,7 @@ def specialised(numbers: Array, members: Sequence[Member]) -> tuple[str, Numbers
             elements["share"].append(kept.place(m.elements[:, j, 1]))
         curves.append(curve_for(m, kept))
     sizes["ELEMENTS"] = len(elements["share"])
+    sizes["VARIED"] = len(kept.varied)
     sizes["FIRST_1"] = members[0].elements.shape[1]
     return source(sizes, scalars, sides, elements, curves, kept), kept
 
