@@ -78,8 +78,9 @@ def test_models_of_different_laws_are_compared_by_their_curves(
 
 
 def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (0.8, 1.0))
     model = written(tmp_path / "m.toml", 0.03)
     options = [
         "--bandwidth",
@@ -129,8 +130,9 @@ def test_parameters_and_percentages_are_readable() -> None:
 
 
 def test_where_the_model_is_unsure_less_is_promised(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (0.8, 1.0))
     kept: list[float] = []
     for relative in (0.01, 0.15):
         model = written(tmp_path / "m.toml", relative)
