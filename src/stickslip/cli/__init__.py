@@ -34,6 +34,7 @@ class Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line. Returns the exit code."""
     _tolerate_any_terminal()
+    _one_thread_for_algebra()
     try:
         return _dispatch(list(sys.argv[1:] if argv is None else argv))
     except InputError as error:
@@ -48,6 +49,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader (`| head`) has gone; Python would complain once more when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
+
+
+def _one_thread_for_algebra() -> None:
+    """Matrices here are small: threads of the algebra library would mostly wait for each other, at full load."""
+    if "numpy" not in sys.modules:
+        for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+            os.environ.setdefault(name, "1")
 
 
 def parser_of(names: Sequence[str] = VERBS) -> argparse.ArgumentParser:

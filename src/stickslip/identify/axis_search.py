@@ -154,10 +154,11 @@ def fitted_axis(
     tried = [descended(rough, u, ROUGH) for _, _, u in ranked[:DESCENTS]]
     found = FittedAxis(rough, min(tried, key=lambda found: found[1])[0])
     problem, u = found.on(trials), found.u
-    for _ in range(3):
+    for descents in range(3):
         weights = problem.weights
         problem = problem.weighted(u)
-        if all(abs(problem.weights[s] / weights[s] - 1.0) < SETTLED for s in weights):
+        # The first descents saw the beginnings of the records only.
+        if descents and all(abs(problem.weights[s] / weights[s] - 1.0) < SETTLED for s in weights):
             break
         problem = problem.resolved(u)
         u, _ = descended(problem, u)
@@ -240,12 +241,17 @@ def starting_models(
     needed = [f.name for f in law.fields if f.par.default is None]
     if all(name in known for name in needed):
         return [Model(law, **known)]
-    if first is None:
-        raise InputError(
-            f"{law.name}: without the drive's torque the search needs starting values; give {', '.join(needed)}"
-        )
-    speed = math.sqrt(float(np.mean(first.velocity**2)))
     travel = max(float(np.ptp(t.position)) for t in trials)
+    if first is None:
+        if not float(given.get("fc", 0.0)) > 0.0:
+            raise InputError(
+                f"{law.name}: without the drive's torque the search needs starting values; give {', '.join(needed)}, "
+                "or the friction's level fc"
+            )
+        speeds = np.concatenate([np.diff(t.position) / np.diff(t.time) for t in trials])
+        speed = math.sqrt(float(np.mean(speeds**2)))
+        return starts(law, float(given["fc"]), float(given.get("sigma2", 0.0)), speed, travel, known)
+    speed = math.sqrt(float(np.mean(first.velocity**2)))
     coulomb = max(first.coulomb, 1e-3 * float(np.sqrt(np.mean(first.torque**2))))
     return starts(law, coulomb, max(first.viscous, 0.0), speed, travel, known)
 

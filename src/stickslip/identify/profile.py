@@ -36,11 +36,17 @@ def inverse_information(jacobian: Array) -> tuple[Array, Any]:
 
 def long_run(scores: Array, lags: int) -> Array:
     """Covariance of the sum of correlated scores (n, p), Bartlett's window: Newey and West 1987."""
-    total = scores.T @ scores
-    for lag in range(1, min(lags, scores.shape[0] - 1) + 1):
-        part = scores[lag:].T @ scores[:-lag]
-        total += (1.0 - lag / (lags + 1.0)) * (part + part.T)
-    return total
+    n = scores.shape[0]
+    reach = min(lags, n - 1)
+    # All lags at once, by the spectrum; padded, so that the end does not meet the beginning.
+    length = 1 << (n + reach).bit_length()
+    window = np.zeros(length)
+    window[: reach + 1] = 1.0 - np.arange(reach + 1) / (lags + 1.0)
+    window[length - reach :] = window[1 : reach + 1][::-1]
+    spectrum = np.fft.rfft(scores, length, axis=0)
+    weight = np.fft.rfft(window).real / length
+    weight[1:-1] *= 2.0
+    return np.real((spectrum.conj().T * weight) @ spectrum)
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,8 @@ __all__ = ["LAW"]
 
 GAMMA = 1.0 - math.sqrt(0.5)
 """Alexander's coefficient (1977): two stages of backward Euler, of second order and stable for any step."""
+ROUNDING = 4.5e-16
+"""Two units in the last place, of the travel without slip."""
 
 
 class Params(NamedTuple):
@@ -134,8 +136,10 @@ def backward_euler(base: float, v: float, dt: float, z: Any, p: Any) -> float:
     f_high = high - base - dt * bristle_rate(v, torque_after(high, z, p), p)
     if f_low * f_high > 0.0:
         return high
+    close = ROUNDING * max(abs(base), dt * abs(v))
     for i in range(100):
-        if f_high == 0.0 or abs(high - low) <= 1e-16 * max(abs(high), abs(low)):
+        # The function rises at least as fast as the travel: the solution is no farther off than its value.
+        if abs(f_high) <= close:
             break
         x = high - f_high * (high - low) / (f_high - f_low)
         if i % 4 == 3 or not min(low, high) < x < max(low, high):
