@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import json
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +13,7 @@ from stickslip.report._tables import metrics_tables
 from stickslip.report._view import StudyView, is_thesis
 from stickslip.report.captions import case_message, figure_of_merit, ranking
 from stickslip.report.figures import COMMON, Figure
+from stickslip.report.plots import embedded
 
 __all__ = ["image", "render"]
 
@@ -164,25 +163,10 @@ def _embedded(figure: Figure) -> dict[str, Any]:
 
 
 def image(stem: Path) -> dict[str, Any]:
-    """The smaller of a figure's two files (`stem`.svg and .png) as a data URI, and its size in points."""
+    """One of a figure's two files, `embedded`: the SVG, unless dense oscillations make it larger than the PNG."""
     svg = stem.with_name(stem.name + ".svg")
     png = stem.with_name(stem.name + ".png")
-    head = svg.read_text(encoding="utf-8")[:2000]
-    size = re.search(r'width="([\d.]+)pt" height="([\d.]+)pt"', head) or re.search(
-        r'viewBox="0 0 ([\d.]+) ([\d.]+)"', head
-    )
-    width, height = (float(x) for x in size.groups()) if size else (317.0, 317.0)
-    data, kind = _smaller(svg, png)
-    return {
-        "source": f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}",
-        "width": round(width * 2), "height": round(height * 2),
-    }  # fmt: skip
-
-
-def _smaller(svg: Path, png: Path) -> tuple[bytes, str]:
-    """The SVG, unless dense oscillations make it larger than the PNG."""
-    vector, pixels = svg.read_bytes(), png.read_bytes()
-    return (vector, "image/svg+xml") if len(vector) <= 1.5 * len(pixels) else (pixels, "image/png")
+    return embedded(svg if svg.stat().st_size <= 1.5 * png.stat().st_size else png)
 
 
 def _brief(manifest: Mapping[str, Any]) -> dict[str, Any]:

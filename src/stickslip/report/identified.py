@@ -16,11 +16,13 @@ from stickslip.finding import Finding
 from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.record import Record
 from stickslip.report.axis_pictures import data_pictures, pictures_of
-from stickslip.report.html import image
-from stickslip.report.identification import draw_picture
+from stickslip.report.identification import draw_picture_to
+from stickslip.report.plots import embedded
 
 __all__ = ["Source", "comparison_of", "number", "write_identification"]
 
+DENSE = 3000
+"""Points of a picture beyond which it is embedded as pixels: drawing both forms to compare them takes as long again."""
 LABELS = {
     "parameters": ("free parameters", "", 1.0),
     "held_out": ("held-out misfit", "standard deviations", 1.0),
@@ -220,6 +222,7 @@ def figures(pictures: Sequence[Picture], folder: Path) -> list[dict[str, Any]]:
     """Draw pictures and embed them."""
     out: list[dict[str, Any]] = []
     for p in pictures:
-        stem = draw_picture(p, folder).with_suffix("")
-        out.append({"id": p.name, "title": p.title, "caption": p.message, **image(stem)})
+        dense = sum(t.x.size for t in p.traces) > DENSE
+        file = draw_picture_to(p, folder / f"{p.name}.{'png' if dense else 'svg'}")
+        out.append({"id": p.name, "title": p.title, "caption": p.message, **embedded(file)})
     return out

@@ -5,8 +5,11 @@ matplotlib is imported inside the functions, so that importing this module costs
 
 from __future__ import annotations
 
+import base64
 import importlib
 import math
+import re
+import struct
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Curve", "Panel", "Style", "draw", "envelope", "save", "scaled", "style_of"]
+__all__ = ["Curve", "Panel", "Style", "draw", "embedded", "envelope", "save", "scaled", "style_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -194,6 +197,23 @@ def save(
             # No date in the file: the same study gives the same bytes.
             undated = {"metadata": {DATES[target.suffix]: None}} if target.suffix in DATES else {}
             figure.savefig(target, format=target.suffix[1:], dpi=DPI, **undated)
+
+
+def embedded(file: Path) -> dict[str, Any]:
+    """An SVG, or a PNG of ours, as a data URI, and its size in pixels."""
+    data = file.read_bytes()
+    if file.suffix == ".png":
+        kind, (width, height) = "image/png", (72.0 / DPI * x for x in struct.unpack(">II", data[16:24]))
+    else:
+        kind, head = "image/svg+xml", data[:2000].decode("utf-8", "ignore")
+        size = re.search(r'width="([\d.]+)pt" height="([\d.]+)pt"', head) or re.search(
+            r'viewBox="0 0 ([\d.]+) ([\d.]+)"', head
+        )
+        width, height = (float(x) for x in size.groups()) if size else (317.0, 317.0)
+    return {
+        "source": f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}",
+        "width": round(width * 2), "height": round(height * 2),
+    }  # fmt: skip
 
 
 def _figure(title: str, message: str, panels: Sequence[Panel], height: float) -> Any:
