@@ -242,17 +242,18 @@ def starting_models(
     if all(name in known for name in needed):
         return [Model(law, **known)]
     travel = max(float(np.ptp(t.position)) for t in trials)
+    level = float(given.get("fc", 0.0))
+    if first is None and not level > 0.0:
+        raise InputError(
+            f"{law.name}: without the drive's torque the search needs starting values; give {', '.join(needed)}, "
+            "or the friction's level fc"
+        )
     if first is None:
-        if not float(given.get("fc", 0.0)) > 0.0:
-            raise InputError(
-                f"{law.name}: without the drive's torque the search needs starting values; give {', '.join(needed)}, "
-                "or the friction's level fc"
-            )
         speeds = np.concatenate([np.diff(t.position) / np.diff(t.time) for t in trials])
         speed = math.sqrt(float(np.mean(speeds**2)))
-        return starts(law, float(given["fc"]), float(given.get("sigma2", 0.0)), speed, travel, known)
+        return starts(law, level, float(given.get("sigma2", 0.0)), speed, travel, known)
     speed = math.sqrt(float(np.mean(first.velocity**2)))
-    coulomb = max(first.coulomb, 1e-3 * float(np.sqrt(np.mean(first.torque**2))))
+    coulomb = level or max(first.coulomb, 1e-3 * float(np.sqrt(np.mean(first.torque**2))))
     return starts(law, coulomb, max(first.viscous, 0.0), speed, travel, known)
 
 

@@ -9,6 +9,7 @@ stiffness; a step of it costs about 0.3 us.
 from __future__ import annotations
 
 import ast
+import functools
 import math
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -236,6 +237,7 @@ class Course:
         return out
 
 
+@functools.cache
 def reads_load(law: Law) -> bool:
     """Whether the law's own functions depend on the load; the engine scales the torque of one that does not."""
     functions = {"step": law.step} if law.holding is None else {"step": law.step, "holding": law.holding}
