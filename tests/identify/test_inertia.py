@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,39 @@ def test_amplitudes_agree_on_the_inertia_and_not_on_the_friction() -> None:
     assert found["inertia"].value == pytest.approx(J, rel=0.05)
     # Coulomb friction acts like viscous friction that falls with the amplitude.
     assert found["viscous[0]"].value > 1.2 * found["viscous[1]"].value
+
+
+def two_masses(mode: float, seed: int = 0, noise: float = 1e-6) -> Trial:
+    """Motor and load of equal inertia on a spring with that natural frequency (Hz), 2 % of damping; exact."""
+    from scipy.signal import cont2discrete, dlsim
+
+    rng = np.random.default_rng(seed)
+    dt, half, omega = 1e-3, 0.5 * J, 2.0 * np.pi * mode
+    k, d = 0.5 * half * omega**2, 0.5 * half * 2.0 * 0.02 * omega
+    a = np.array([[0, 1, 0, 0], [-k / half, -(d + 0.01) / half, k / half, d / half], [0, 0, 0, 1],
+                  [k / half, d / half, -k / half, -d / half]])  # fmt: skip
+    system = cont2discrete(
+        (a, np.array([[0.0], [1.0 / half], [0.0], [0.0]]), np.eye(1, 4), np.zeros((1, 1))), dt
+    )
+    torque = 0.5 * rng.normal(size=60_000)
+    position = dlsim(system, torque)[1][:, 0]
+    time = dt * np.arange(torque.size)
+    return Trial("two masses", time, position + noise * rng.normal(size=time.size), torque)
+
+
+@pytest.mark.parametrize("mode", [70.0, 230.0])
+def test_a_true_mode_is_found_and_nothing_else(mode: float) -> None:
+    found = inertia([two_masses(mode), two_masses(mode, 1)], AXIS, band=(0.4, 15.0)).details["resonances"]
+    assert len(found) == 1
+    assert found[0] == pytest.approx(mode, rel=0.03)
+
+
+@pytest.mark.parametrize("noise", [1e-6, 1e-4, 1e-3])
+def test_noise_on_a_rigid_axis_is_no_resonance(noise: float) -> None:
+    trials = [excited(0.5, Model("coulomb", fc=0.02, sigma2=0.018), seed) for seed in (1, 2)]
+    rng = np.random.default_rng(9)
+    noisy = [replace(t, position=t.position + noise * rng.normal(size=t.time.size)) for t in trials]
+    assert inertia(noisy, AXIS, band=(0.4, 10.0)).details["resonances"] == ()
 
 
 def test_coherence_lies_between_the_estimators() -> None:

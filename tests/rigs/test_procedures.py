@@ -69,6 +69,13 @@ def test_inertia_is_recovered(where):
     assert found["inertia"].value == pytest.approx(4.2757e-4, rel=0.03)
 
 
+def test_the_response_shows_the_modes_of_the_machine_and_no_others():
+    """The encoder's mount (85 Hz, 4.2) and the shaft (308 Hz, as `machines/library/thesis-dry.toml` says)."""
+    result = run("inertia", virtual_rig("thesis-dry"), band="400", current="1.6")
+    records = [trial_of(result.part(label), ServoAxis()) for label, *_ in result.segments]
+    assert inertia(records, ServoAxis()).details["resonances"] == pytest.approx([85.0, 308.0], rel=0.02)
+
+
 def test_inertia_refuses_a_run_that_slows_down_too_far():
     result = run("inertia", virtual_rig("thesis-grease"), speed="2.2")
     assert not result.passed

@@ -30,9 +30,15 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 
 BAND = (0.4, 25.0)  # Hz, of the fit in the thesis
-PEAK = 2.0  # factor over the rigid axis's response that makes a resonance
 COHERENT = 0.5
-NEAR = 1.15  # factor between frequencies within which the highest peak alone is a resonance
+NEAR = 1.15
+"""Peaks of several records within this factor are one mode."""
+PEAK = 1.4
+"""Factor over the rigid axis's response, and over the valleys beside it, that makes a resonance."""
+CHANCE = 0.01
+"""That some frequency of a record counts as coherent where nothing is."""
+MODE_BAND, FEWEST = 6.0, 16.0
+"""Windows in which resonances are looked for: four periods of the band's end over this; at least so many in a record."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,12 +166,13 @@ def inertia(
     # A Hann window spreads each line over its neighbours: half of them count as independent.
     level = max(1.0, float(residual @ residual) / max(y.size - solution.size, 1))
     covariance: Array = (2.0 * level * np.linalg.inv(a.T @ a)).astype(np.float64)
-    return _result(responses, solution, covariance, axis, band, estimator)
+    resonances = modes_of(trials, axis, float(solution[0]), band[1])
+    return _result(responses, solution, covariance, axis, band, estimator, resonances)
 
 
 def _result(
     responses: Sequence[Response], solution: Array, covariance: Array, axis: ServoAxis, band: tuple[float, float],
-    estimator: str,
+    estimator: str, resonances: Sequence[float],
 ) -> Identification:  # fmt: skip
     std = np.sqrt(np.diag(covariance))
     names = [("inertia", axis.unit("kg·m²"), "J")]
@@ -176,7 +183,6 @@ def _result(
         good = low > 0.0 and high <= 2.0 * low
         why = "" if good else "the data do not tell it from 0" if low <= 0.0 else "its interval is too wide"
         estimates.append(Estimate(name, unit, symbol, float(value), float(s), low, high, good, why))
-    resonances = merged([f for r in responses for f in resonances_of(r, float(solution[0]), band[1])])
     notes = [f"Rigid axis fitted from {band[0]:g} to {band[1]:g} Hz with {estimator.upper()}."]
     if resonances:
         notes.append(f"Resonances at {', '.join(f'{f:g}' for f in resonances)} Hz.")
@@ -190,14 +196,44 @@ def _result(
     )  # fmt: skip
 
 
+def modes_of(trials: Sequence[Trial], axis: ServoAxis, inertia: float, above: float) -> list[float]:
+    """Frequencies at which a record's response has a resonance, Hz; those of several records that are alike are one."""
+    found: list[float] = []
+    for trial in trials:
+        # Shorter windows than the fit's: many averages, which tell a mode from chance.
+        span = float(trial.time[-1] - trial.time[0])
+        try:
+            response = frequency_response(trial, axis, lowest=max(above / MODE_BAND, 4.0 * FEWEST / span))
+        except InputError:
+            continue  # The record is too short for them.
+        found += resonances_of(response, inertia, above)
+    return merged(found)
+
+
 def resonances_of(response: Response, inertia: float, above: float) -> list[float]:
-    """Frequencies above the band where the response peaks over the rigid axis's, Hz."""
-    f = response.frequency
-    over = np.abs(response.h1) * inertia * (2.0 * math.pi * f) ** 2
+    """Frequencies above the band where the response surely peaks over the rigid axis's, Hz.
+
+    A peak counts where the coherence is more than chance gives at any of the frequencies, and where it rises out of
+    the lowest response to either side, before a higher peak, by more than the uncertainty of both: their standard
+    deviations are those of a response with that coherence (Bendat and Piersol 2010, eq. 9.90), times the range that
+    the logarithms of so many responses have by chance.
+    """
+    place = np.flatnonzero(response.frequency > above)
+    n, windows = place.size, response.windows
+    if n < 3 or windows < 2:
+        return []
+    f, g = response.frequency[place], response.coherence[place]
+    # Without any relation the coherence exceeds c with the chance (1 - c)^(windows - 1).
+    sure = max(COHERENT, 1.0 - (CHANCE / n) ** (1.0 / (windows - 1)))
+    level = np.log(np.abs(response.h1[place]) * inertia * (2.0 * math.pi * f) ** 2)
+    spread = np.sqrt(np.maximum(1.0 - g, 1e-9) / (2.0 * np.maximum(g, 1e-9) * windows))
+    factor = 2.0 * math.sqrt(math.log(n))
     out: list[float] = []
-    for i in range(1, f.size - 1):
-        near = over[(f > f[i] / NEAR) & (f < f[i] * NEAR)]
-        if f[i] > above and over[i] > PEAK and over[i] == near.max() and response.coherence[i] >= COHERENT:
+    for i in range(1, n - 1):
+        if not (level[i] > math.log(PEAK) and g[i] >= sure and level[i - 1] < level[i] >= level[i + 1]):
+            continue
+        rises = [rise(level[i::-1], spread[i::-1], factor), rise(level[i:], spread[i:], factor)]
+        if min(rises) > math.log(PEAK):
             out.append(float(f[i]))
     return out
 
@@ -211,6 +247,16 @@ def merged(found: Sequence[float]) -> list[float]:
         else:
             groups.append([f])
     return [round(math.fsum(g) / len(g), 1) for g in groups]
+
+
+def rise(level: Array, spread: Array, factor: float) -> float:
+    """By how much the first level surely stands above the lowest that comes before a higher one."""
+    higher = np.flatnonzero(level > level[0])
+    end = int(higher[0]) if higher.size else level.size
+    if end < 2:
+        return 0.0
+    sure = level[0] - level[1:end] - factor * np.hypot(spread[0], spread[1:end])
+    return float(np.max(sure))
 
 
 def _picture(responses: Sequence[Response], solution: Array, axis: ServoAxis) -> Picture:
