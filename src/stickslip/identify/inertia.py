@@ -38,7 +38,7 @@ PEAK = 1.4
 CHANCE = 0.01
 """That some frequency of a record counts as coherent where nothing is."""
 MODE_BAND, FEWEST = 6.0, 16.0
-"""Windows in which resonances are looked for: four periods of the band's end over this; at least so many in a record."""
+"""Windows of the search for resonances: four periods of the band's end over this; at least so many in a record."""
 
 
 @dataclass(frozen=True, eq=False)
