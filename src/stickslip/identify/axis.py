@@ -38,6 +38,8 @@ INTERVALS = ("covariance", "prediction")
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
 BLOCKS = 20
+COMPARABLE = 1e-2
+"""Relative decrease of the sum of squares at which the fits that are compared end: laws differ by more."""
 
 
 @dataclass(frozen=True)
@@ -194,7 +196,7 @@ def compared(
             if k in names or k not in all_names
         }
         try:
-            result = fitted_axis(fitted, axis, law, inverse, **own)
+            result = fitted_axis(fitted, axis, law, inverse, tolerance=COMPARABLE, **own)
         except InputError as error:
             out.append(Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), {}, str(error)))
             continue

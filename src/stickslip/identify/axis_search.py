@@ -138,10 +138,12 @@ def fitted_axis(
     values: Mapping[str, Any] | None = None,
     extras: Extras = Extras(),
     robust: bool = False,
+    tolerance: float = ENOUGH,
 ) -> FittedAxis:
     """Find the parameters of an axis, without a judgement on them.
 
-    Parameters and errors as in `stickslip.identify.axis_output.output_error`.
+    Parameters and errors as in `stickslip.identify.axis_output.output_error`; ``tolerance`` is the relative decrease of
+    the sum of squares at which the last descent ends.
     """
     given = dict(values or {})
     candidates = [
@@ -161,7 +163,7 @@ def fitted_axis(
         if descents and all(abs(problem.weights[s] / weights[s] - 1.0) < SETTLED for s in weights):
             break
         problem = problem.resolved(u)
-        u, _ = descended(problem, u)
+        u, _ = descended(problem, u, tolerance)
     return FittedAxis(problem, u)
 
 
