@@ -70,6 +70,32 @@ def test_the_point_asked_for_settles_it() -> None:
     assert identify_sliding(added, GUESS, noise=1e-6).not_identified == ()
 
 
+def test_the_point_asked_for_may_lie_outside_the_range_but_not_beyond_the_axis() -> None:
+    """Measured above the Stribeck velocity only: a slower point tells vs; half the lowest velocity is the limit."""
+    v = np.geomspace(0.015, 1.0, 8)
+    points = SlidingPoints(v, friction(v))
+    wanted = identify_sliding(points, GUESS, noise=1e-4, starts=10).details["next_velocity"]
+    assert 0.0075 * (1.0 - 1e-9) <= wanted < 0.015
+    # Below it the viscous slope is open: a fast point tells it, unless the axis cannot.
+    v = np.geomspace(0.001, 0.012, 8)
+    points = SlidingPoints(v, friction(v))
+    wanted = [
+        identify_sliding(points, GUESS, noise=1e-4, starts=10, fastest=x).details["next_velocity"]
+        for x in (np.inf, 0.015)
+    ]
+    assert wanted[0] > 0.015
+    assert wanted[1] <= 0.015 * (1.0 + 1e-9)
+
+
+def test_an_error_left_out_does_not_blow_up() -> None:
+    """Of the two exponentials twelve points leave a fold's parameters open; unbounded, its error was 93 N·m."""
+    v = np.array([0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.2, 0.5, 1.0, 2.0, 4.0, 7.0])
+    points = SlidingPoints(v, friction(v) + 2e-3 * np.random.default_rng(7).standard_normal(v.size))
+    name = "two exponentials (eq. 4.4)"
+    _, _, table = choose_sliding(points, {name: candidates(v, points.torque)[name]}, noise=2e-3, starts=10)
+    assert table[name]["cross_validated_Nm"] < 0.02
+
+
 def test_intervals_with_noise_hold_the_truth() -> None:
     """Both directions, break-away points at zero velocity, repeats that set the noise; 20 draws."""
     rng = np.random.default_rng(1)

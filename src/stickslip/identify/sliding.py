@@ -8,7 +8,7 @@ other: without a point on the downward bend many curves fit alike, whatever the 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -30,6 +30,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SAME_VELOCITY = 0.005
 """Velocities within this part of each other are repeats of one."""
+BELOW, ABOVE = 0.5, 2.0
+"""Times the lowest and the highest velocity measured: in between one more point is looked for."""
 FAMILY = 40
 """How many of the equally good curves are drawn."""
 
@@ -154,10 +156,12 @@ def untouched_parameters(template: Model, frozen: Iterable[str], vector: Vector)
 
 def fit_sliding(
     points: SlidingPoints, template: Model, noise: Noise | None, frozen: Iterable[str], starts: int, profiles: bool,
-    seed: int = 0,
+    seed: int = 0, limits: Mapping[str, tuple[float, float]] | None = None,
 ) -> Fit:  # fmt: skip
-    """Weighted least squares of the law's torque at constant velocity, from many starts."""
+    """Weighted least squares of the law's torque at constant velocity, from many starts, perhaps within limits."""
     vector = steady_vector(points, template, frozen)
+    if limits:
+        vector = Vector(template, free=vector.names, limits=limits)
     if not vector.free:
         raise InputError(f"{template.law.name}: no free parameter acts at constant velocity")
     steady, weight = Steady(template.law, points.velocity, points.side), points.weight
@@ -188,6 +192,7 @@ def identify_sliding(
     noise: Noise | float | None = None,
     frozen: Sequence[str] = (),
     starts: int = 40,
+    fastest: float = math.inf,
 ) -> Identification:
     """Fit a law's curve to torques at constant velocity (thesis 3.1.3.1).
 
@@ -204,6 +209,8 @@ def identify_sliding(
         Parameters that stay at the template's values.
     starts : int
         Random starts of the search.
+    fastest : float
+        Highest velocity that the axis can run, rad/s: no point is asked for above.
 
     Returns
     -------
@@ -227,7 +234,7 @@ def identify_sliding(
         )
     found = fit_sliding(points, template, level, frozen, starts, profiles=True)
     unknown = [e.name for e in found.estimates if not e.identified]
-    settling = next_velocity(points, found) if unknown and found.noise.known else None
+    settling = next_velocity(points, found, fastest) if unknown and found.noise.known else None
     model, notes = model_of(found)
     notes += _noise_notes(found)
     untouched = untouched_parameters(template, frozen, found.vector)
@@ -255,8 +262,8 @@ def identify_sliding(
     )  # fmt: skip
 
 
-def next_velocity(points: SlidingPoints, found: Fit) -> float | None:
-    """The velocity inside the measured range at which one more point would tell most, rad/s.
+def next_velocity(points: SlidingPoints, found: Fit, fastest: float = math.inf) -> float | None:
+    """The velocity at which one more point would tell most, rad/s: from half the lowest measured to twice the highest.
 
     Each of the equally good curves is taken as the truth in turn; a point tells most where the curves that would
     still agree with it, within the noise, span the least in their parameters. None where no point would tell.
@@ -264,7 +271,10 @@ def next_velocity(points: SlidingPoints, found: Fit) -> float | None:
     fast = np.abs(points.velocity[points.velocity != 0.0])
     if fast.size == 0:
         return None
-    grid: Array = np.array(np.geomspace(float(np.min(fast)), float(np.max(fast)), 200), dtype=np.float64)
+    grid: Array = np.array(
+        np.geomspace(BELOW * float(np.min(fast)), ABOVE * min(float(np.max(fast)), fastest / ABOVE), 200),
+        dtype=np.float64,
+    )
     steady = Steady(_law(found), grid, np.ones(grid.size))
     curves = np.array([steady.torque(found.vector.packed(u)) for u in found.family])
     usable = np.all(np.isfinite(curves), axis=1)

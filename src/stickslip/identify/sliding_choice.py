@@ -28,6 +28,8 @@ __all__ = ["candidates", "choose_sliding"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+FOLD_REACH = 10.0
+"""Factor within which a parameter of a fit to a part of the points stays around that of the fit to all."""
 ALIKE = 0.01
 """Difference in AICc below which two laws fit alike."""
 
@@ -172,7 +174,12 @@ def left_out_error(
     points: SlidingPoints, template: Model, fitted: Indices, left_out: Indices, frozen: Sequence[str] = ()
 ) -> Array:
     """Weighted errors at some points of the curve fitted to the others."""
-    found = fit_sliding(points.only(fitted), template, None, frozen, 2, profiles=False)
+    # Fewer points may leave a parameter open that all of them close: it must not run off and blow the error up.
+    limits = {
+        p.name: (p.value / FOLD_REACH, p.value * FOLD_REACH)
+        for p in steady_vector(points, template, frozen).free if p.logarithmic and p.value > 0.0
+    }  # fmt: skip
+    found = fit_sliding(points.only(fitted), template, None, frozen, 2, profiles=False, limits=limits)
     rest = points.only(left_out)
     steady = Steady(template.law, rest.velocity, rest.side)
     return points.weight[left_out] * (steady.torque(found.vector.packed(found.u)) - rest.torque)
