@@ -20,9 +20,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from stickslip.finding import Finding
     from stickslip.rigs.procedures.base import Performed, Plan
     from stickslip.rigs.rig import Rig
 
+SHOWN = 4
+"""Passed checks that a report shows one by one; more are counted."""
 SUMMARY = "run identification procedures on a virtual or real machine"
 
 
@@ -173,13 +176,14 @@ def commissioned(args: argparse.Namespace) -> int:
         raise InputError(f"--out {args.out} is a file; give a folder")
     folder: Path = prepared_folder(args.out)
     found = commission(rig, folder=folder, progress=_output.say, without_watchdog=args.no_watchdog)
-    records = {s.name: s.performed.record for s in found.stages if s.name != "angle"}
+    stages = [s for s in found.stages if s.name != "angle"]  # another look at the sliding record
+    records = {s.name: s.performed.record for s in stages}
     data = [described(folder / f"{name}.npz", len(record)) for name, record in records.items()]
     model = write_model(folder / "model.toml", found.result, data=data)
     advice = found.recommended
     if advice and advice.chosen:
         write_recommended(folder / "recommended.toml", advice)
-    sources = [Source(name, record) for name, record in records.items()]
+    sources = [Source(s.name, s.performed.record, findings_of(s.performed)) for s in stages]
     report = write_identification(
         folder / "report.html",
         found.result,
@@ -201,6 +205,18 @@ def commissioned(args: argparse.Namespace) -> int:
             f"recommended: stickslip rig run track --rig {args.rig} --set compensator=recommended --set model={file}"
         )
     return 0
+
+
+def findings_of(performed: Performed) -> list[Finding]:
+    """The acceptance checks of a procedure as a report shows what was found in a record."""
+    from stickslip.finding import Finding
+
+    failed = [c for c in performed.checks if not c.passed]
+    out = [Finding("warning", c.name, c.text) for c in failed]
+    good = [c for c in performed.checks if c.passed]
+    if len(good) > SHOWN:
+        return [*out, Finding("note", "checks", f"{len(good)} of {len(performed.checks)} checks passed")]
+    return [*out, *(Finding("note", c.name, c.text) for c in good)]
 
 
 def described(path: Path, rows: int) -> dict[str, Any]:

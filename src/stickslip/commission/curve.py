@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Identification
+from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.identify.segments import Segment, constant_velocity_segments
 from stickslip.identify.sliding import SlidingPoints, identify_sliding
 from stickslip.identify.sliding_choice import choose_sliding
@@ -123,5 +123,22 @@ def _table(points: SlidingPoints, fs: float, tried: Identification) -> Identific
     )
     return dataclasses.replace(
         tried, model=model, notes=(note,), estimates=(), correlation=np.eye(0), measure_next=(),
+        pictures=(_picture(points, fs, model),),
         misfit={"rms_Nm": 0.0, "points": float(len(points))},
+    )  # fmt: skip
+
+
+def _picture(points: SlidingPoints, fs: float, model: Model) -> Picture:
+    """The table with its points over the velocity (thesis figures 4.9, 4.33)."""
+    low, high = float(points.velocity[0]), float(points.velocity[-1])
+    v = np.geomspace(0.3 * low, high, 300)
+    torque = Steady(model.law, v, np.ones(v.size)).torque(np.array(model.law.pack(model.parameters)))
+    traces = (
+        Trace("measured", points.velocity, points.torque, "points"), Trace("table", v, torque),
+        Trace("break-away at rest", np.array([0.3 * low]), np.array([fs]), "open points"),
+    )  # fmt: skip
+    return Picture(
+        "sliding", "Sliding curve: table of the points",
+        f"Mean of both directions, {float(points.torque.min()):.3g} to {float(points.torque.max()):.3g} N·m",
+        "velocity (rad/s)", "friction torque (N·m)", traces, "log",
     )  # fmt: skip

@@ -21,6 +21,8 @@ __all__ = ["data_pictures", "pictures_of"]
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BINS, FEWEST = 60, 5
+FAR = 20.0
+"""Times the motion, that its first position is away from 0."""
 SHOWN = 4
 """Records that are drawn one by one; the residuals hold all of them."""
 QUANTITIES = {"torque": "N·m", "current": "A", "rated_torque": "%", "voltage": "V"}
@@ -34,9 +36,18 @@ def data_pictures(records: Sequence[Record]) -> tuple[Picture, ...]:
         for channel in ("position", "torque", "motor_torque", "current", "voltage"):
             if channel not in record.channels or not np.any(np.isfinite(record[channel])):
                 continue
-            traces = [over_time("measured", record.time, record[channel])]
+            values, words = record[channel], channel.replace("_", " ")
+            # A small motion far out is shown from where it begins.
+            far = channel == "position" and abs(values[0]) > FAR * np.ptp(values)
+            if far:
+                values, words = values - values[0], "position from the first"
+            traces = [over_time("measured", record.time, values)]
             # A reference that never changes belongs to an open loop.
-            if channel == "position" and np.ptp(record.channels.get("position_reference", np.zeros(1))) > 0.0:
+            if (
+                channel == "position"
+                and not far
+                and np.ptp(record.channels.get("position_reference", np.zeros(1))) > 0.0
+            ):
                 traces = [
                     over_time("measured", record.time, record[channel]),
                     over_time("reference", record.time, record["position_reference"]),
@@ -45,7 +56,7 @@ def data_pictures(records: Sequence[Record]) -> tuple[Picture, ...]:
             out.append(Picture(
                 f"data-{place + 1}-{channel}", f"{name}: {channel.replace('_', ' ')}",
                 f"{len(record)} samples over {seconds:.3g} s", "time (s)",
-                f"{channel.replace('_', ' ')} ({record.units[channel]})", tuple(traces),
+                f"{words} ({record.units[channel]})", tuple(traces),
             ))  # fmt: skip
     return tuple(out)
 

@@ -40,7 +40,7 @@ OPEN = 300.0
 """Hz, where pictures show what has no filter."""
 FINE = np.append(np.geomspace(3.0, 200.0, 12), OPEN)
 FINE_GAINS = np.linspace(0.1, 1.3, 13)
-ROUNDS = 4
+ROUNDS = 6
 """Times that the laws are taken anew at the frequency of the motion that they make."""
 PUSH, PUSHED = 0.004, 0.005
 """N·m and s."""
@@ -197,11 +197,14 @@ def poles_at(
     """
     axis = axis_of(machine, math.sqrt(2.0) * most)
     drive = Drive(gains, filter_hz=filter_hz, sample_time=machine.sample_time, delay=machine.delay)
-    poles = Poles(1.0, 0.0, axis.ringing)
+    found = poles = Poles(1.0, 0.0, axis.ringing)
     for _ in range(ROUNDS):
         train, there = with_law(axis, drive, model, axis.amplitude, max(poles.frequency, SLOWEST))
-        poles = Loop(train, replace(there, gain=gain)).poles()
-    return poles
+        found = Loop(train, replace(there, gain=gain)).poles()
+        # Half-way on a logarithmic scale, so that it settles.
+        between = math.sqrt(max(found.frequency, SLOWEST) * max(poles.frequency, SLOWEST))
+        poles = replace(found, frequency=between)
+    return found
 
 
 def _background(machine: Machine, gains: Gains, name: str, model: Model, most: float) -> Map:

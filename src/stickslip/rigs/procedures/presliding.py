@@ -15,13 +15,16 @@ from stickslip.rigs.rig import Rig, setpoints
 
 __all__ = ["PROCEDURE", "Presliding"]
 
+LEAST = 200
+"""Rows of a cycle."""
+
 
 @dataclass(frozen=True)
 class Presliding(Procedure):
     """Options of the procedure.
 
     ``amplitude`` in N·m (thesis: 0.18 dry, 0.13 greased), ``frequency`` in Hz, ``cycles``, and ``average``, the samples
-    of one row of the record.
+    of one row of the record: fewer where a cycle would have less than `LEAST` rows.
     """
 
     name: ClassVar[str] = "presliding"
@@ -32,6 +35,10 @@ class Presliding(Procedure):
     cycles: float = 3.0
     average: int = 50
     farthest: float = 0.01
+
+    def rows_of(self, rig: Rig) -> int:
+        """Samples of one row."""
+        return max(1, min(self.average, math.floor(1.0 / (LEAST * self.frequency * rig.sample_time))))
 
     def plan(self, rig: Rig) -> Plan:
         """The cycles."""
@@ -49,7 +56,7 @@ class Presliding(Procedure):
         torque = self.amplitude * np.sin(2.0 * math.pi * self.frequency * t)
         # Beyond the travel the axis has broken away, and the step ends.
         yield Step(
-            setpoints(count, torque=torque), keep=True, average=self.average, pause=1.0, travel=self.farthest,
+            setpoints(count, torque=torque), keep=True, average=self.rows_of(rig), pause=1.0, travel=self.farthest,
             label=f"{self.amplitude:g} N·m",
         )  # fmt: skip
         yield Step(setpoints(round(0.2 / rig.sample_time)))
@@ -57,7 +64,8 @@ class Presliding(Procedure):
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
         """It moved by more than an encoder shows as noise, and did not break away."""
         moved = float(np.ptp(record["position"]))
-        full = float(record.time[-1] - record.time[0]) >= 0.98 * self.cycles / self.frequency
+        row = self.rows_of(rig) * rig.sample_time
+        full = float(record.time[-1] - record.time[0]) + row >= 0.98 * self.cycles / self.frequency
         return (
             Check("moved", moved > 1e-5, f"moved by {moved:.3g} rad"),
             Check(
