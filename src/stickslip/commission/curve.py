@@ -20,8 +20,8 @@ from stickslip.simulation.steady import Steady
 
 __all__ = ["fitted_curve", "moving"]
 
-RIPPLE = 0.5
-"""Of the velocity: a motion that ripples by more, over a hundredth of a revolution, sticks and slips."""
+RESTING, SLOW = 0.02, 0.2
+"""Share of the time in which a motion goes slower than this part of its mean speed, from which it sticks and slips."""
 CLOSE = 0.015
 """Largest error of a curve by parameters; beyond it the curve is the table of the points."""
 ELEMENTS = {"k": [300.0], "alpha": [1.0], "c": 50.0}
@@ -30,7 +30,7 @@ ELEMENTS = {"k": [300.0], "alpha": [1.0], "c": 50.0}
 def moving(record: Record) -> tuple[SlidingPoints, list[Segment], list[str]]:
     """Mean torque per speed, both directions folded, and the runs; without those that stuck and slipped."""
     segments = constant_velocity_segments(record)
-    slid = [s for s in segments if ripple(record, s) <= RIPPLE]
+    slid = [s for s in segments if resting(record, s) <= RESTING]
     left = sorted({round(abs(s.velocity), 4) for s in segments} - {round(abs(s.velocity), 4) for s in slid})
     by_speed: dict[float, list[float]] = {}
     for s in slid:
@@ -45,14 +45,12 @@ def moving(record: Record) -> tuple[SlidingPoints, list[Segment], list[str]]:
     return SlidingPoints(speeds, torque), slid, notes
 
 
-def ripple(record: Record, s: Segment) -> float:
-    """Deviation of the speed over a hundredth of a revolution, over the mean speed."""
+def resting(record: Record, s: Segment) -> float:
+    """Share of the time in which the axis all but stands, by the record's own rows."""
     inside = (record.time >= s.start) & (record.time <= s.end)
     t, x = record.time[inside], record["position"][inside]
-    window = max(0.0628 / abs(s.velocity), 2.0 * float(np.median(np.diff(t))))
-    grid = np.arange(t[0], t[-1], window)
-    speed = np.diff(np.interp(grid, t, x)) / window
-    return float(np.std(speed) / abs(s.velocity)) if speed.size > 2 else 0.0
+    speed = np.diff(x) / np.diff(t) / s.velocity
+    return float(np.mean(speed < SLOW)) if speed.size > 2 else 0.0
 
 
 def fitted_curve(

@@ -26,8 +26,8 @@ GREASED = (
     0.3, 0.2, 0.1, 0.08, 0.06, 0.04, 0.02, 0.01, 0.005,
 )  # fmt: skip
 """rad/s, thesis eq. 4.3"""
-ROWS = 2000
-"""Rows of a velocity's record, about."""
+ROWS, LONGEST = 2000, 0.02
+"""Rows of a velocity's record, about, and the longest that one may last, s: sticking must show in them."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,9 @@ class Sliding(Procedure):
                 begin, v = float(rows[-1, POSITION]), direction * speed
                 ramp, level, _ = uniform(rig, begin, v, travel, self.inertia)
                 yield Step(ramp, loop)
+                most = max(1, round(LONGEST / rig.sample_time))
                 rows = yield Step(
-                    level, loop, keep=True, average=max(1, len(level) // ROWS), label=f"{v:g} rad/s"
+                    level, loop, keep=True, average=min(max(1, len(level) // ROWS), most), label=f"{v:g} rad/s"
                 )
                 yield brake(rig, loop, float(level[-1, 0]), v, self.inertia)
         yield now(rig)
