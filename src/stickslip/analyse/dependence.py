@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -138,7 +138,10 @@ class Dependence:
 
 
 def dependence(
-    records: Mapping[str, Record], channel: str = "motor_torque", *, transient: float = math.radians(20.0)
+    records: Mapping[str, Record],
+    channel: str = "motor_torque",
+    *more: str,
+    transient: float = math.radians(20.0),
 ) -> Dependence:
     """Torque over the angle, for every revolution of every record.
 
@@ -148,6 +151,8 @@ def dependence(
         By name; each slides in one direction.
     channel : str
         A torque.
+    *more : str
+        Further torques of the same records, whose passes come beside.
     transient : float
         Travel that is left out at the start, rad (the thesis leaves out 20 degrees).
 
@@ -158,13 +163,18 @@ def dependence(
     """
     if not (transient >= 0.0 and math.isfinite(transient)):
         raise ParameterError(f"dependence: transient = {transient:g} rad must be 0 or greater")
-    passes = tuple(p for name, record in records.items() for p in _passes(name, record, channel, transient))
+    passes = tuple(
+        p if not more else replace(p, name=f"{p.name}, {one.removesuffix('_torque')}")
+        for name, record in records.items()
+        for one in (channel, *more)
+        for p in _passes(name, record, one, transient)
+    )
     if not passes:
         raise InputError(
             f"dependence: no record fills {100 * FULL:g} % of a revolution behind the first "
             f"{math.degrees(transient):g} degrees; give longer ones, or less transient"
         )
-    return Dependence(channel, passes)
+    return Dependence(channel if not more else "torque", passes)
 
 
 def _passes(name: str, record: Record, channel: str, transient: float) -> Iterator[Pass]:

@@ -142,11 +142,13 @@ def _repeatability_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _repeatability(args: argparse.Namespace) -> None:
+    from stickslip.analyse.pieces import pieces
     from stickslip.analyse.repeatability import repeatability
 
     groups: dict[str, list[Record]] = {}
     for text, (name, record) in zip(args.records, _opened(args), strict=True):
-        groups.setdefault(name if "=" in text else "runs", []).append(record)
+        runs = [piece for _, piece in pieces(name, record)]
+        groups.setdefault(name if "=" in text or len(runs) > 1 else "runs", []).extend(runs)
     found = repeatability(groups, args.channel)
 
     def picture() -> Any:
@@ -204,7 +206,7 @@ def _sides_arguments(parser: argparse.ArgumentParser) -> None:
 def _sides(args: argparse.Namespace) -> None:
     from stickslip.analyse.sides import sides
 
-    found = sides(_distinct(_opened(args)), args.inertia)
+    found = sides(_distinct(_runs(args)), args.inertia)
 
     def picture() -> Any:
         from stickslip.report.analysis_pictures import picture_of_sides
@@ -212,6 +214,13 @@ def _sides(args: argparse.Namespace) -> None:
         return picture_of_sides(found)
 
     _show(args, [found], picture)
+
+
+def _runs(args: argparse.Namespace) -> list[tuple[str, Record]]:
+    """Every run of every record."""
+    from stickslip.analyse.pieces import pieces
+
+    return [piece for name, record in _opened(args) for piece in pieces(name, record)]
 
 
 def _distinct(named: Sequence[tuple[str, Record]]) -> dict[str, Record]:
@@ -225,7 +234,9 @@ def _distinct(named: Sequence[tuple[str, Record]]) -> dict[str, Record]:
 
 def _position_arguments(parser: argparse.ArgumentParser) -> None:
     _with_records(parser)
-    parser.add_argument("--channel", default="motor_torque", help="a torque (default motor_torque)")
+    parser.add_argument(
+        "--channel", action="append", default=[], help="a torque; repeatable, for both sides (default motor_torque)"
+    )  # fmt: skip
     parser.add_argument(
         "--transient", type=float, default=20.0, metavar="DEG", help="travel left out at the start (default 20)"
     )  # fmt: skip
@@ -236,7 +247,8 @@ def _position(args: argparse.Namespace) -> None:
 
     from stickslip.analyse.dependence import dependence
 
-    found = dependence(_distinct(_opened(args)), args.channel, transient=radians(args.transient))
+    channels = args.channel or ["motor_torque"]
+    found = dependence(_distinct(_runs(args)), *channels, transient=radians(args.transient))
 
     def picture() -> Any:
         from stickslip.report.analysis_pictures import picture_of_dependence

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +110,7 @@ def picture_of_dependence(found: Dependence) -> Drawn:
     """Torque over the angle, one line a pass."""
     angle = np.degrees(found.angle)
     curves = [
-        Curve(angle, p.torque, f"{p.name}, {p.velocity:+.3g} rad/s, {p.time:.0f} s", LINES[i % len(LINES)])
+        Curve(angle, p.torque, f"{p.name}, {p.time:.0f} s", LINES[i % len(LINES)])
         for i, p in enumerate(found.passes[: len(LINES)])
     ]
     panels = [
@@ -119,7 +119,19 @@ def picture_of_dependence(found: Dependence) -> Drawn:
         )
     ]
     swing = max(p.swing for p in found.passes)
-    return "Torque against position", f"peak to peak up to {swing:.3g} N·m", panels, 2.4
+    message = f"peak to peak up to {swing:.3g} N·m"
+    speeds = np.abs([p.velocity for p in found.passes])
+    if len({p.time for p in found.passes}) > 2 and np.ptp(speeds) < 0.02 * float(np.mean(speeds)):
+        panels.append(Panel([*_means(found)], "mean (N·m)", "time (s)"))
+        message += f"; the mean changes by {100.0 * found.drift:.2g} %"
+    return "Torque against position", message, panels, 2.4 if len(panels) == 1 else 2.0
+
+
+def _means(found: Dependence) -> Iterator[Curve]:
+    """Mean torque of every pass over time, each direction for itself."""
+    for forth, word, style, kind in ((True, "forth", MAIN, "points"), (False, "back", OTHER, "open points")):
+        some = [p for p in found.passes if (p.velocity > 0.0) == forth]
+        yield Curve(np.array([p.time for p in some]), np.array([p.mean for p in some]), word, style, kind)
 
 
 def picture_of_sides(found: Sides) -> Drawn:

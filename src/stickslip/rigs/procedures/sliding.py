@@ -29,12 +29,16 @@ GREASED = (
 ROWS, LONGEST = 2000, 0.02
 """Rows of a velocity's record, about, and the longest that one may last, s: sticking must show in them."""
 
+SHORT = 0.5
+"""s of rest before the way back."""
+
 
 @dataclass(frozen=True)
 class Sliding(Procedure):
     """Options of the procedure.
 
-    ``velocities`` in rad/s, ``degrees`` of each run, ``inertia`` in kg·m² and ``bandwidth`` in Hz of the loop.
+    ``velocities`` in rad/s, ``degrees`` of each run, ``inertia`` in kg·m² and ``bandwidth`` in Hz of the loop, ``rest``
+    in s before each velocity.
     """
 
     name: ClassVar[str] = "sliding"
@@ -44,6 +48,7 @@ class Sliding(Procedure):
     degrees: float = 380.0
     inertia: float = 4.3e-4
     bandwidth: float = 10.0
+    rest: float = 0.5
 
     @property
     def speeds(self) -> tuple[float, ...]:
@@ -62,7 +67,7 @@ class Sliding(Procedure):
                 f"{len(self.speeds)} velocities from {max(self.speeds):g} to {min(self.speeds):g} rad/s, "
                 f"{self.degrees:g} degrees forth and back each",
             ),
-            0.5 * 2 * len(self.speeds),
+            (self.rest + SHORT) * len(self.speeds),
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:
@@ -72,13 +77,17 @@ class Sliding(Procedure):
         travel = math.radians(self.degrees + 3.0)
         for speed in self.speeds:
             for direction in (1.0, -1.0):
-                rows = yield Step(setpoints(2), pause=0.5)
+                rows = yield Step(setpoints(2), pause=self.rest if direction > 0.0 else SHORT)
                 begin, v = float(rows[-1, POSITION]), direction * speed
                 ramp, level, _ = uniform(rig, begin, v, travel, self.inertia)
                 yield Step(ramp, loop)
                 most = max(1, round(LONGEST / rig.sample_time))
                 rows = yield Step(
-                    level, loop, keep=True, average=min(max(1, len(level) // ROWS), most), label=f"{v:g} rad/s"
+                    level,
+                    loop,
+                    keep=True,
+                    average=min(max(1, len(level) // ROWS), most),
+                    label=f"{v:g} rad/s",
                 )
                 yield brake(rig, loop, float(level[-1, 0]), v, self.inertia)
         yield now(rig)

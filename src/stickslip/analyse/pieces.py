@@ -1,0 +1,49 @@
+"""A procedure's record as the runs that it holds: one per velocity and direction, or one per repetition."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from stickslip.record import Record
+
+__all__ = ["pieces"]
+
+SAME = 1e-6
+"""Relative change of the wanted velocity from which another run begins."""
+GAP = 50.0
+"""Usual distances between two rows, from which one is a pause."""
+FEWEST = 20
+"""Rows of a run."""
+
+
+def pieces(name: str, record: Record) -> list[tuple[str, Record]]:
+    """The runs of a record that `stickslip rig run` made, by name; of any other record the record itself.
+
+    Parameters
+    ----------
+    name : str
+        Of the record.
+    record : Record
+        Of ``sliding`` (one run per velocity and direction) or ``repeat`` (one per repetition).
+    """
+    constants: Any = record.meta.get("reading", {}).get("constants", {})
+    kind = record.meta.get("procedure", constants.get("procedure"))
+    if kind == "repeat":
+        steps = np.diff(record.time)
+        runs = np.split(np.arange(len(record)), np.flatnonzero(steps > GAP * np.median(steps)) + 1)
+        return [(f"{name} {i + 1}", rows_of(record, rows)) for i, rows in enumerate(runs)]
+    if kind == "sliding":
+        wanted = record["velocity_reference"]
+        edges = np.flatnonzero(np.abs(np.diff(wanted)) > SAME * np.abs(wanted[:-1])) + 1
+        parts = [p for p in np.split(np.arange(len(record)), edges) if p.size >= FEWEST]
+        return [(f"{name} {float(wanted[p[0]]):+.3g} rad/s", rows_of(record, p)) for p in parts]
+    return [(name, record)]
+
+
+def rows_of(record: Record, rows: np.ndarray[Any, np.dtype[np.intp]]) -> Record:
+    """Some rows of a record, whatever it holds besides."""
+    meta = {k: v for k, v in record.meta.items() if k != "procedure"}
+    channels = {n: values[rows] for n, values in record.channels.items()}
+    return Record(record.time[rows], channels, record.units, meta)
