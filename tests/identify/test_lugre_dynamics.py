@@ -82,6 +82,27 @@ def test_a_lugre_contact_is_found_by_its_position() -> None:
     assert found.estimates[0].identified
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("start", [5e3, 1e5])
+def test_a_bad_first_sample_moves_nothing(start: float) -> None:
+    """Eight standard deviations off; the search starts from a seventh and from three times the stiffness."""
+    exact = response_of(Model("lugre", sigma0=3.5e4, sigma1=0.1, **SLIDING), 1.0)
+    noisy = exact.position + np.random.default_rng(1).normal(0.0, 1e-4, exact.time.size)
+    noisy[0] = exact.position[0] + 8e-4
+    found = fit_position(
+        Response(exact.time, exact.torque, noisy),
+        INERTIA,
+        SLIDING,
+        sigma0=start,
+        sigma1=0.3,
+        noise=1e-4,
+        profiles=False,
+    )
+    sigma0 = found.estimates[0]
+    assert sigma0.lower < 3.5e4 < sigma0.upper
+    assert sigma0.value == pytest.approx(3.5e4, rel=0.02)
+
+
 def test_bad_responses_get_one_clear_error() -> None:
     t = np.linspace(0.0, 1.0, 100)
     with pytest.raises(InputError, match="strictly ascending"):

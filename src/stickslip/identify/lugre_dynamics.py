@@ -193,8 +193,17 @@ class Simulation:
 
 
 def misfit(response: Response, simulation: Simulation) -> Residuals:
-    """Simulated minus measured position at the vector's coordinates, rad."""
-    return lambda u: simulation.position(u) - response.position
+    """Simulated minus measured position at the vector's coordinates, rad, without its mean.
+
+    The simulation starts at the first sample, whose noise would else shift all of it; friction does not depend on the
+    position, so that a free offset is the mean.
+    """
+
+    def difference(u: Array) -> Array:
+        apart = simulation.position(u) - response.position
+        return apart - np.mean(apart)
+
+    return difference
 
 
 def with_middles(values: Array) -> Array:
@@ -221,8 +230,9 @@ def fit_position(
     response: Response, inertia: float, sliding: Mapping[str, float], *, sigma0: float, sigma1: float,
     noise: Noise | float | None = None, profiles: bool = True,
 ) -> Fit:  # fmt: skip
-    """Plain output error: least squares of the simulated position, all samples alike (thesis 3.1.3.2.3.1).
+    """Plain output error: least squares of the simulated position, all samples alike, where it starts left free.
 
+    Thesis 3.1.3.2.3.1, without the free start.
     Right where the friction is LuGre's; where it is not, see `identify_lugre_dynamics`.
     """
     vector = lugre_vector(sliding, sigma0, sigma1)
