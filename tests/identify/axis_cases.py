@@ -57,6 +57,7 @@ def trial(
     offset: float = 0.03,
     noise: float = 0.01,
     drift: float = 0.0,
+    **mechanics: Any,
 ) -> Trial:
     """One record; `noise` is the standard deviation of a torque with a time constant of 5 ms, N·m."""
     time = np.arange(0.0, seconds, 1e-3) + 0.0
@@ -70,7 +71,7 @@ def trial(
     reference = wanted(time, seed)
     loop = Loop(LOOP.kp, LOOP.ki, LOOP.kd, LOOP.kr, LOOP.limit, count=COUNT)
     drive = Drive(time, reference, "feedback", loop, disturbance=push, max_step=1e-4)
-    out = drive_axis(Mechanics(INERTIA, offset=offset), model(name), drive)
+    out = drive_axis(Mechanics(INERTIA, offset=offset, **mechanics), model(name), drive)
     position = COUNT * np.round(out[:, 0] / COUNT)
     return Trial(f"{name} {seed}", time, position, out[:, 2], "torque", reference, LOOP)
 

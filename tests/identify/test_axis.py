@@ -17,9 +17,10 @@ from stickslip.identify.axis_inverse import correlation_lags, inverse_dynamics
 from stickslip.identify.axis_output import Extras, output_error
 from stickslip.identify.axis_start import dimensions, starts
 from stickslip.identify.axis_trial import Trial, trial_of
+from stickslip.identify.estimate import Identification
 from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.plugins import law
-from stickslip.simulation.driven import Drive, Mechanics, drive_axis
+from stickslip.simulation.driven import Drive, Harmonics, Mechanics, drive_axis
 
 AXIS = ServoAxis(drive_side="load")
 
@@ -195,3 +196,43 @@ def test_intervals_of_the_prediction_error_hold_the_truth() -> None:
     assert found.model.parameters.fc == found["fc"].value
     with pytest.raises(UnknownName, match="source of intervals"):
         identify_axis([trial], AXIS, ["coulomb"], intervals="guess")
+
+
+def within(found: Identification, truth: dict[str, float]) -> None:
+    """Identified, and the truth inside the 99 % interval (2.58 standard deviations; 1.96 make the 95 % one)."""
+    for name, value in truth.items():
+        e = found[name]
+        assert e.identified, name
+        assert abs(e.value - value) <= 2.58 / 1.96 * 0.5 * (e.upper - e.lower), name
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_torque_and_friction_over_the_position_are_recovered(seed: int) -> None:
+    """Cogging, and friction that varies by 12 % over half a radian (thesis 2.1.6)."""
+    known = Harmonics(0.5, torque=((0.03, -0.02),), friction=((0.1, 0.06),))
+    trial = cases.trial("coulomb", seed, noise=5e-3, harmonics=known)
+    extras = Extras(harmonics=1, friction_harmonics=1, harmonic_period=0.5)
+    found = identify_axis([trial], AXIS, ["coulomb"], extras=extras, intervals="prediction")
+    within(
+        found,
+        {"cos[0]": 0.03, "sin[0]": -0.02, "friction_cos[0]": 0.1, "friction_sin[0]": 0.06, "fc": cases.FC},
+    )
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_friction_that_grows_with_the_load_is_recovered(seed: int) -> None:
+    """A pendulum: the gearing carries the motor's and gravity's torque, each with a share of its own."""
+    known = {"gravity": 0.25, "gravity_angle": 0.1, "load_motor": 0.8, "load_external": 1.5}
+    trial = cases.trial("coulomb", seed, offset=0.0, noise=5e-3, **known)
+    axis = ServoAxis(drive_side="load", gravity="pendulum")
+    found = identify_axis(
+        [trial], axis, ["coulomb"], extras=Extras(load=True), frozen=["offset"], values={"offset": 0.0},
+        intervals="prediction",
+    )  # fmt: skip
+    within(found, {"load_motor": 0.8, "load_external": 1.5, "gravity": 0.25, "fc": cases.FC})
+
+
+def test_under_a_constant_torque_its_share_of_the_load_is_the_level_of_friction() -> None:
+    found = identify_axis([cases.trial("coulomb", seconds=3.0)], AXIS, ["coulomb"], extras=Extras(load=True))
+    assert "load_motor" in {e.name for e in found.estimates}
+    assert "load_external" not in {e.name for e in found.estimates}

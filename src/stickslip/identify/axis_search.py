@@ -54,7 +54,8 @@ class Extras:
     harmonic_period : float
         rad (m) after which they repeat.
     load : bool
-        Friction grows with the torque that the gearing carries.
+        Friction grows with the torque that the gearing carries; with the outer torque's own share (``load_external``)
+        only where that changes, that is for a pendulum, or where it is freed by name.
     """
 
     harmonics: int = 0
@@ -284,7 +285,8 @@ def laid_out(
     )
     held = {"drive_gain", "back_emf", "backlash", "controller_gain", *frozen_by_default(law)}
     if axis.gravity != "pendulum":
-        held |= {"gravity", "gravity_angle"}
+        # Under a constant outer torque its part of the load is one with the level of friction.
+        held |= {"gravity", "gravity_angle", "load_external"}
     if not extras.load:
         held |= {"load_motor", "load_external"}
     held = (held - set(free)) | set(frozen)
