@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.dataset
+import pyarrow.parquet
 import pytest
 
 from stickslip.cli import main
@@ -129,7 +130,7 @@ def test_a_case_out_of_bounds_is_a_failure_of_its_own(small):
     assert "must be greater than 0" in why[1]
 
 
-def test_cases_are_flagged_where_a_metric_is_not_sure():
+def test_metrics_differ_beyond_one_per_cent():
     one = np.array([[1e-3, 5.0], [1e-3, 5.0], [1e-3, np.nan], [1e-10, 5.0]])
     other = np.array([[1.02e-3, 5.0], [1.005e-3, 5.0], [1e-3, 5.0], [2e-10, 5.0]])
     names = ("position_rms_rad", "reversals_per_s")
@@ -225,6 +226,23 @@ def test_percentiles_and_shares(small, tmp_path):
     values = dataset.read(tmp_path, few, few.runs[0], ["position_rms_rad"])["position_rms_rad"]
     assert row["position_rms_rad_p95"] == np.percentile(values, 95)
     assert row["cases"] == 40
+
+
+def test_a_sweep_is_run_again_from_its_manifest(tmp_path, capsys):
+    assert main(["sweep", str(SMALL), "--out", str(tmp_path), "--cases", "30", "--no-report"]) == 0
+    assert main(["rerun", str(tmp_path)]) == 0
+    assert "60 cases, " in capsys.readouterr().out
+    part = next((tmp_path / "data").rglob("*controller=PD/*.parquet"))
+    table = pyarrow.parquet.read_table(part)
+    column = table.schema.get_field_index("position_rms_rad")
+    off = table["position_rms_rad"].to_pylist()
+    off[7] *= 1.0 + 1e-12
+    pyarrow.parquet.write_table(table.set_column(column, "position_rms_rad", pyarrow.array(off)), part)
+    assert main(["rerun", str(tmp_path)]) == 1
+    assert "PD case 7 position_rms_rad" in capsys.readouterr().out
+    part.unlink()
+    assert main(["rerun", str(tmp_path)]) == 2
+    assert "0 of 30 cases" in capsys.readouterr().err
 
 
 # ---- bad sweeps --------------------------------------------------------------------------------------------

@@ -1,24 +1,30 @@
-"""Run a finished study again from its manifest, and check that every metric is the same."""
+"""Run a finished study or sweep again from its manifest, and check that every metric is the same."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-SUMMARY = "run a finished study again from its manifest and compare the metrics"
+SUMMARY = "run a finished study or sweep again from its manifest and compare the metrics"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """The folder."""
-    parser.add_argument("folder", type=Path, metavar="DIR", help="a folder that `stickslip study` wrote")
+    parser.add_argument(
+        "folder", type=Path, metavar="DIR", help="a folder that `stickslip study` or `stickslip sweep` wrote"
+    )
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at a time (default 1)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print what differs; 1 if anything does."""
     from stickslip.cli import _output
-    from stickslip.study.rerun import rerun
+    from stickslip.study.rerun import rerun as rerun_study
+    from stickslip.sweep.rerun import is_sweep
+    from stickslip.sweep.rerun import rerun as rerun_sweep
 
+    sweep = is_sweep(args.folder)
+    rerun = rerun_sweep if sweep else rerun_study
     with _output.progress_bar("rerun") as progress:
         found = rerun(args.folder, args.jobs, progress)
     for line in found.notes:
@@ -28,5 +34,5 @@ def run(args: argparse.Namespace) -> int:
     if found.differences:
         print(f"{len(found.differences)} metrics differ, by {found.largest:.1e} of their value at most")
         return 1
-    print(f"{found.runs} runs, {found.metrics} metrics: all identical")
+    print(f"{found.runs} {'cases' if sweep else 'runs'}, {found.metrics} metrics: all identical")
     return 0

@@ -244,7 +244,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
                 )
     except OSError as error:
         raise InputError(
-            f"no study in {folder} ({path.name}: {error.strerror}); give a folder that `stickslip study` wrote"
+            f"no study in {folder} ({path.name}: {error.strerror}); give a folder that `stickslip study` or"
+            " `stickslip sweep` wrote"
         ) from None
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path} is not a study's manifest ({error!r}); run the study anew") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from stickslip.errors import InputError, ParameterError
 from stickslip.simulation import _case, batch
 from stickslip.simulation._meter import metrics as read_meter
+from stickslip.simulation.accuracy import KICKS
 from stickslip.simulation.closed_loop import REASONS, integrator_for, prepare
 from stickslip.study.plan import PlannedRun
 from stickslip.sweep.numbers import as_columns, varied
@@ -19,10 +21,11 @@ from stickslip.sweep.plan import BLOCK, Sweep
 __all__ = ["FLOORS", "Block", "compute", "differ"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-LOOSER = 10.0
-"""Times the tolerance, at which a case is run again to see whether its metrics are sure."""
-SURE = 0.01
-"""Part of a metric by which the two may differ."""
+TIGHTER, FINEST = (0.1, 0.01), 1e-9
+"""Times the tolerance, at which those that are not sure are run again; least tolerance, rad."""
+SUSPECT, SURE = 0.005, 0.01
+"""Parts of a metric by which they may differ: at first half of the 1 % that is wanted, since motions without a truth
+may agree by chance."""
 FLOORS = {"rad": 1e-8, "s": 1e-6, "Nm": 1e-6, "J": 1e-9}
 """Differences this small count for nothing, by the unit that a metric's name ends with (rad/s: 1e-6)."""
 
@@ -40,7 +43,8 @@ class Block:
     metrics : array, shape (n, metrics)
         NaN where there is none.
     flagged : array of bool, shape (n,)
-        The metrics are not sure: ten times the tolerance changes one of them by more than 1 %.
+        The metrics are not sure, not even at the tightest tolerance: ten times that changes one of them by more than
+        1 %, or a count of reversals by more than one.
     failures : list of str
         Why a case ended early or could not be run, else "".
     """
@@ -61,30 +65,82 @@ def compute(sweep: Sweep, run: int, start: int) -> Block:
     found, failures = measured(planned, values, sweep.metrics, len(numbers))
     flagged = np.zeros(len(numbers), dtype=np.bool_)
     if sweep.check:
-        rough = replace(
-            planned, numerics=replace(planned.numerics, tolerance=LOOSER * planned.numerics.tolerance)
-        )
-        again, failed = measured(rough, values, sweep.metrics, len(numbers))
-        flagged = differ(found, again, sweep.metrics) | np.array([a != b for a, b in zip(failures, failed)])
+        found, failures, flagged = checked(planned, values, sweep.metrics, found, failures)
     return Block(run, start, numbers, found, flagged, failures)
 
 
-def differ(one: Array, other: Array, names: Sequence[str]) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Where a metric of one differs from the other's by more than 1 %, shape (n,) of two (n, metrics)."""
-    floors = np.array([1e-6 if n.endswith("rad_s") else FLOORS.get(n.rsplit("_", 1)[1], 0.0) for n in names])
+def checked(
+    planned: PlannedRun, values: Mapping[str, Array], metrics: Sequence[str], found: Array, failures: Sequence[str]
+) -> tuple[Array, list[str], np.ndarray[Any, np.dtype[np.bool_]]]:  # fmt: skip
+    """Hold every case against wrong steps, and what differs then at ever tighter tolerances.
+
+    Returns
+    -------
+    metrics, failures, flagged
+        Of every case at the tightest tolerance that it was run at; whether it differs there, too.
+    """
+    tolerance, found, failures = planned.numerics.tolerance, found.copy(), list(failures)
+    cases = np.arange(len(found))
+    flagged = np.zeros(len(found), dtype=np.bool_)
+
+    def again(times: float, kick: float = 0.0) -> tuple[Array, list[str]]:
+        run = replace(planned, numerics=replace(planned.numerics, tolerance=times * tolerance))
+        return measured(run, {k: v[cases] for k, v in values.items()}, metrics, len(cases), kick)
+
+    def differs(other: tuple[Array, list[str]], part: float = SURE) -> Any:
+        """Where metrics or failures of the cases in hand are others."""
+        ends = np.array([failures[i] != why for i, why in zip(cases, other[1])], dtype=np.bool_)
+        return differ(found[cases], other[0], metrics, planned.duration, part) | ends
+
+    for kick in KICKS:
+        flagged |= differs(again(1.0, kick), SUSPECT)
+    for times in TIGHTER:
+        cases = np.flatnonzero(flagged)
+        if not cases.size or times * tolerance < FINEST * (1.0 - 1e-9):
+            break
+        fine = again(times)
+        flagged[cases] = differs(fine)
+        found[cases] = fine[0]
+        for i, why in zip(cases, fine[1]):
+            failures[i] = why
+        for kick in KICKS:
+            flagged[cases] |= differs(again(times, kick))
+    return found, failures, flagged
+
+
+def differ(
+    one: Array, other: Array, names: Sequence[str], duration: float = math.inf, part: float = SURE
+) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Where a metric of one differs from the other's, shape (n,) of two (n, metrics).
+
+    By more than a part, or, for reversals, by more than one in `duration` seconds (in the second half, half of that).
+    """
+    floors = np.array([_floor(name, duration) for name in names])
     none = np.isnan(one) & np.isnan(other)
-    close = np.abs(one - other) <= SURE * np.abs(one) + floors
+    close = np.abs(one - other) <= part * np.abs(one) + floors
     return ~np.all(close | none, axis=1)
 
 
+def _floor(name: str, duration: float) -> float:
+    """Difference of a metric that counts for nothing."""
+    if "reversals" in name:
+        return 1.001 * (2.0 if name.startswith("second_half") else 1.0) / duration
+    if name.endswith("rad_s"):
+        return 1e-6
+    return FLOORS.get(name.rsplit("_", 1)[1], 0.0)
+
+
 def measured(
-    planned: PlannedRun, values: Mapping[str, Array], metrics: Sequence[str], n: int
+    planned: PlannedRun, values: Mapping[str, Array], metrics: Sequence[str], n: int, kick: float = 0.0
 ) -> tuple[Array, list[str]]:
-    """Metrics, shape (n, metrics), and failures of every case."""
+    """Metrics, shape (n, metrics), and failures of every case; with wrong steps (`stickslip.simulation.accuracy`)."""
     many = _as_batch(planned, values)
     if many is None:
-        rows = [_alone(planned, {k: v[i].tolist() for k, v in values.items()}, metrics) for i in range(n)]
+        rows = [
+            _alone(planned, {k: v[i].tolist() for k, v in values.items()}, metrics, kick) for i in range(n)
+        ]
         return np.array([row for row, _ in rows]).reshape(n, len(metrics)), [why for _, why in rows]
+    many.parameters[:, _case.KICK] = kick
     results = many.run(metrics)
     found = np.column_stack([results.metrics[name] for name in metrics])
     reasons = [_reason(int(code), float(t)) for code, t in zip(results.codes, results.time)]
@@ -115,11 +171,14 @@ def _as_batch(planned: PlannedRun, values: Mapping[str, Array]) -> batch.Batch |
         return None  # One of the cases is out of bounds; the others are run.
 
 
-def _alone(planned: PlannedRun, values: Mapping[str, Any], metrics: Sequence[str]) -> tuple[list[float], str]:
+def _alone(
+    planned: PlannedRun, values: Mapping[str, Any], metrics: Sequence[str], kick: float = 0.0
+) -> tuple[list[float], str]:
     none = [np.nan] * len(metrics)
     try:
         run = varied(planned, values)
         case = _laid_out(run)
+        case.numbers[_case.KICK] = kick
         name, integrate = integrator_for(case, run.numerics.integrator)
     except ParameterError as error:
         return none, str(error)

@@ -18,6 +18,7 @@ from stickslip.identify.identified_file import read_identified
 from stickslip.simulation._meter import METRICS
 from stickslip.study import plan as studies
 from stickslip.study.plan import PlannedRun, Study
+from stickslip.study.provenance import file_hash
 from stickslip.sweep.numbers import belongs, value_of, varied
 from stickslip.sweep.sample import LEVEL, METHODS, Drawn, Spread, count_of
 
@@ -43,7 +44,8 @@ class Sweep:
         The cases.
     metrics : tuple of str
     check : bool
-        Whether every case is run a second time, ten times less accurately, to flag those whose metrics are not sure.
+        Whether every case is run a second time, ten times less accurately, and those that differ tighter, to flag those
+        whose metrics are not sure.
     study : Study
     config : mapping
         The sweep's TOML as read.
@@ -81,6 +83,7 @@ class Sweep:
         """A hash of everything that determines the numbers of a run's cases."""
         content = [
             self.runs[run].fingerprint, asdict(self.drawn), self.metrics, self.check, BLOCK,
+            file_hash(Path(__file__).with_name("block.py")),
         ]  # fmt: skip
         return hashlib.sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
 
