@@ -296,3 +296,44 @@ def test_the_command_prints_and_draws(tmp_path, capsys):
         .startswith("slip_rule,reference,friction,controller,cases,flagged")
     )
     assert main(["sweep", "no-such-sweep"]) == 2
+
+
+# ---- lanes ---------------------------------------------------------------------------------------------------
+
+
+def in_lanes(tmp_path, more=""):
+    """The small sweep in lanes, of few cases."""
+    text = SMALL.read_text().replace("../data", (SMALL.parents[1] / "data").as_posix())
+    text = text.replace("cases = 600", f'cases = 12\nintegrator = "lanes"\n{more}')
+    path = tmp_path / "lanes.toml"
+    path.write_text(text)
+    return path
+
+
+def test_lanes_are_within_a_percent_or_flagged(tmp_path):
+    sweep = load(in_lanes(tmp_path))
+    assert sweep.step == 1e-4
+    for run in range(len(sweep.runs)):
+        exact = block.compute(replace(sweep, step=0.0), run, 0)
+        for step, most in ((1e-4, 0.3), (5e-3, 1.0)):
+            fast = block.compute(replace(sweep, step=step), run, 0)
+            assert not any(fast.failures)
+            assert np.all(fast.flagged | ~block.differ(exact.metrics, fast.metrics, sweep.metrics))
+            assert np.mean(fast.flagged) <= most
+            assert not np.array_equal(fast.metrics, exact.metrics)
+        assert fast.flagged.any()  # of steps as long as 5 ms
+    assert sweep.fingerprint(0) != replace(sweep, step=0.0).fingerprint(0)
+
+
+def test_a_missing_gpu_is_told_before_anything_runs(tmp_path, capsys):
+    path = in_lanes(tmp_path, 'device = "gpu"')
+    assert main(["sweep", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert "looked for NVIDIA's driver" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_lanes_do_not_measure_is_told(tmp_path):
+    path = in_lanes(tmp_path)
+    path.write_text(path.read_text().replace('"velocity_rms_rad_s"]', '"standstills"]'))
+    with pytest.raises(ConfigError, match="'standstills', which lanes do not measure"):
+        load(path)

@@ -168,7 +168,7 @@ def give(z: Any, lane: int, c: Any, which: int, kind: int, dt: float, part: floa
 def held_by(z: Any, lane: int, c: Any, i: int, keep: float, pull: float) -> float:
     """Mean torque of element i over the step, without what it takes up while it sticks, N·m."""
     force = z[(FORCE + i) * LANES + lane]
-    slides = 0.5 * (force + (keep * force + share(c, z, lane, i) * pull))
+    slides = 0.5 * (1.0 + keep) * force + share(c, z, lane, i) * (0.5 * pull)
     return select(z[(SLIPS + i) * LANES + lane] > 0.0, slides, force)
 
 
@@ -217,45 +217,51 @@ def swap(z: Any, lane: int, row: int) -> float:
 
 def finish(z: Any, lane: int, c: Any, h: float, now: Any) -> None:
     """Do a step again whose trial had events: from one to the next, the velocity linear in between."""
-    accept(z, lane, 1.0)  # back to the begin: trial and state change places again
+    start, end = AHEAD, 0  # the trial was accepted, so that state and trial have changed places
     part = 1.0
     for _ in range(MOST_EVENTS):
-        x, which = first_event(z, lane, c)
+        side = 1.0 if z[(end + VELOCITY) * LANES + lane] >= 0.0 else -1.0
+        x, which = first_event(z, lane, c, start, end, side)
         rest = (1.0 - x) * part
         if rest < SHORTEST:
             x, rest = 1.0, 0.0
-        go_to(z, lane, h, part, x, now)
-        switch(z, lane, c, which)
+        go_to(z, lane, h, part, x, now, start, end)
+        switch(z, lane, c, which, side)
         if rest == 0.0:
             return
         part = rest
         if not trial(z, lane, c, h, part, now):
             accept(z, lane, part)
             return
+        start, end = 0, AHEAD
     accept(z, lane, part)
     z[UNRESOLVED * LANES + lane] += 1.0
 
 
-def first_event(z: Any, lane: int, c: Any) -> tuple[float, int]:
-    """Fraction of the trial at which its first event happens, and the element that breaks away (ELEMENTS: reversal)."""
-    v0 = z[VELOCITY * LANES + lane]
-    v1 = z[(AHEAD + VELOCITY) * LANES + lane]
-    side = 1.0 if v1 >= 0.0 else -1.0
+def first_event(z: Any, lane: int, c: Any, start: int, end: int, side: float) -> tuple[float, int]:
+    """Fraction of the trial at which its first event happens, and the element that breaks away (ELEMENTS: reversal).
+
+    The trial goes from the rows `start` on to the rows `end` on.
+    """
+    v0 = z[(start + VELOCITY) * LANES + lane]
+    v1 = z[(end + VELOCITY) * LANES + lane]
     found = FAR
     which = ELEMENTS
     for i in range(ELEMENTS):
         curve_row = CURVE_0 if i < FIRST_1 else CURVE_1
-        start = gap_of(z, lane, c, i, side, FORCE + i, curve_row)
-        end = gap_of(z, lane, c, i, side, AHEAD + FORCE + i, AHEAD + curve_row)
-        x = start / (start - end) if start > 0.0 else 0.0
-        x = x if (z[(SLIPS + i) * LANES + lane] == 0.0) & (end <= 0.0) else FAR
-        which = i if x < found else which
-        found = x if x < found else found
+        last = gap_of(z, lane, c, i, side, end + FORCE + i, end + curve_row)
+        if (z[(SLIPS + i) * LANES + lane] == 0.0) & (last <= 0.0):
+            first = gap_of(z, lane, c, i, side, start + FORCE + i, start + curve_row)
+            x = first / (first - last) if first > 0.0 else 0.0
+            if x < found:
+                found = x
+                which = i
     turns = RIGID_0 or RIGID_1 or z[SLIPPING * LANES + lane] > 0.0
     if turns and z[DIRECTION * LANES + lane] * v1 <= 0.0:
         x = v0 / (v0 - v1) if v0 * v1 < 0.0 else 0.0
-        which = ELEMENTS if x <= found else which
-        found = x if x <= found else found
+        if x <= found:
+            found = x
+            which = ELEMENTS
     return found if found < 1.0 else 1.0, which
 
 
@@ -264,39 +270,41 @@ def gap_of(z: Any, lane: int, c: Any, i: int, side: float, row: int, curve_row: 
     return share(c, z, lane, i) * z[curve_row * LANES + lane] - side * z[row * LANES + lane]
 
 
-def go_to(z: Any, lane: int, h: float, part: float, x: float, now: Any) -> None:
-    """Go to fraction x of a trial over the last `part`."""
-    v0 = z[VELOCITY * LANES + lane]
-    v1 = z[(AHEAD + VELOCITY) * LANES + lane]
+def go_to(z: Any, lane: int, h: float, part: float, x: float, now: Any, start: int, end: int) -> None:
+    """Bring the state to fraction x of a trial over the last `part`."""
+    v0 = z[(start + VELOCITY) * LANES + lane]
+    v1 = z[(end + VELOCITY) * LANES + lane]
     v = v0 + x * (v1 - v0)
     dt = x * part * h
     goal = now[GOAL_END] - part * (1.0 - 0.5 * x) * (now[GOAL_END] - now[GOAL_BEGIN])
-    middle = z[POSITION * LANES + lane] + 0.25 * dt * (v0 + v)
-    z[INTEGRAL * LANES + lane] += dt * (goal - middle)
-    z[POSITION * LANES + lane] += 0.5 * dt * (v0 + v)
-    z[SPEED_RISE * LANES + lane] = (abs(v1) - abs(v0)) / part
+    position = z[(start + POSITION) * LANES + lane]
+    integral = z[(start + INTEGRAL) * LANES + lane]
+    z[INTEGRAL * LANES + lane] = integral + dt * (goal - position - 0.25 * dt * (v0 + v))
+    z[POSITION * LANES + lane] = position + 0.5 * dt * (v0 + v)
     z[VELOCITY * LANES + lane] = v
-    z[RISE_0 * LANES + lane] = between(z, lane, CURVE_0, x) / part
+    z[SPEED_RISE * LANES + lane] = (abs(v1) - abs(v0)) / part
+    z[RISE_0 * LANES + lane] = between(z, lane, CURVE_0, x, start, end) / part
     if KIND_0 == BENDS:
-        between(z, lane, BRISTLE_0, x)
+        between(z, lane, BRISTLE_0, x, start, end)
     if KIND_1 >= 0:
-        z[RISE_1 * LANES + lane] = between(z, lane, CURVE_1, x) / part
+        z[RISE_1 * LANES + lane] = between(z, lane, CURVE_1, x, start, end) / part
     if KIND_1 == BENDS:
-        between(z, lane, BRISTLE_1, x)
+        between(z, lane, BRISTLE_1, x, start, end)
     for i in range(ELEMENTS):
-        between(z, lane, FORCE + i, x)
+        between(z, lane, FORCE + i, x, start, end)
 
 
-def between(z: Any, lane: int, row: int, x: float) -> float:
-    """Move a row of the state by fraction x towards the one ahead; returns the whole way."""
-    way = z[(AHEAD + row) * LANES + lane] - z[row * LANES + lane]
-    z[row * LANES + lane] += x * way
+def between(z: Any, lane: int, row: int, x: float, start: int, end: int) -> float:
+    """Bring a row of the state to fraction x of a trial; returns the whole way."""
+    first = z[(start + row) * LANES + lane]
+    way = z[(end + row) * LANES + lane] - first
+    z[row * LANES + lane] = first + x * way
     return way
 
 
-def switch(z: Any, lane: int, c: Any, which: int) -> None:
-    """Let element `which` slip; ELEMENTS: the motion reverses, and every element sticks."""
-    z[DIRECTION * LANES + lane] = 1.0 if z[(AHEAD + VELOCITY) * LANES + lane] >= 0.0 else -1.0
+def switch(z: Any, lane: int, c: Any, which: int, side: float) -> None:
+    """Let element `which` slip towards `side`; ELEMENTS: the motion reverses, and every element sticks."""
+    z[DIRECTION * LANES + lane] = side
     if which == ELEMENTS:
         z[VELOCITY * LANES + lane] = 0.0
         z[SPEED_RISE * LANES + lane] = abs(z[SPEED_RISE * LANES + lane])
@@ -304,9 +312,7 @@ def switch(z: Any, lane: int, c: Any, which: int) -> None:
         return
     z[(SLIPS + which) * LANES + lane] = 1.0
     z[SLIPPING * LANES + lane] += 1.0
-    for i in range(ELEMENTS):
-        if i == which:
-            z[STUCK * LANES + lane] -= weighted(z, lane, c, i)
+    z[STUCK * LANES + lane] -= weighted(z, lane, c, which)
 
 
 def stick(z: Any, lane: int, c: Any) -> None:

@@ -42,9 +42,11 @@ from stickslip.simulation._lanes_source import Curve, Numbers, Refused, source
 from stickslip.simulation.batch import Results, laid_out, refusal
 from stickslip.simulation.exact import curve_of
 
-__all__ = ["LANES", "METRICS", "Lanes", "prepare"]
+__all__ = ["DEVICES", "LANES", "METRICS", "STEP", "Lanes", "check_gpu", "prepare"]
 
-LANES = 16
+LANES = 32
+STEP = 1e-4
+"""Step in s, unless another is given."""
 DEVICES = ("cpu", "gpu")
 METRICS = (
     "position_rms_rad", "position_peak_rad", "steady_state_error_rad", "end_error_rad", "velocity_rms_rad_s",
@@ -75,6 +77,8 @@ class Lanes:
     Attributes
     ----------
     case : Case
+    varied : mapping of str to array
+        The columns that it was made of.
     text : str
         The specialised program, without `METERED`.
     shared : tuple of float
@@ -85,6 +89,7 @@ class Lanes:
     """
 
     case: Case
+    varied: Mapping[str, Array]
     text: str
     shared: tuple[float, ...]
     columns: Array
@@ -96,7 +101,8 @@ class Lanes:
 
     def __getitem__(self, some: slice) -> Lanes:
         """Some of the loops."""
-        return replace(self, columns=self.columns[some])
+        varied = {name: values[some] for name, values in self.varied.items()}
+        return replace(self, varied=varied, columns=self.columns[some])
 
     def run(self, metrics: Sequence[str] = METRICS, jobs: int = 1, device: str = "cpu") -> Results:
         """Run all of them; a loop that ran away has code `NOT_FINITE` and no metrics.
@@ -186,6 +192,19 @@ class Lanes:
         }
 
 
+def check_gpu() -> None:
+    """Refuse where there is no GPU.
+
+    Raises
+    ------
+    InputError
+        It says what was looked for.
+    """
+    from stickslip import gpu
+
+    gpu.check()
+
+
 def program(text: str, device: str) -> Any:
     """What runs a specialised text."""
     if device == "cpu":
@@ -196,7 +215,7 @@ def program(text: str, device: str) -> Any:
     return functools.partial(gpu.solve, text, LANES)
 
 
-def prepare(case: Case, columns: Mapping[str, Array], step: float = 2e-4) -> Lanes:
+def prepare(case: Case, columns: Mapping[str, Array], step: float = STEP) -> Lanes:
     """Lay out the loops that `columns` make of `case`; arguments as of `stickslip.simulation.batch.prepare`.
 
     Parameters
@@ -223,7 +242,13 @@ def prepare(case: Case, columns: Mapping[str, Array], step: float = 2e-4) -> Lan
     varied = np.column_stack([np.zeros((n, 0)), *kept.varied]) if kept.varied else np.zeros((n, 0))
     exact_step = float(case.numbers[DURATION]) / steps
     return Lanes(
-        case, text, tuple(kept.shared), np.ascontiguousarray(varied), reference_of(case, steps), exact_step
+        case,
+        dict(columns),
+        text,
+        tuple(kept.shared),
+        np.ascontiguousarray(varied),
+        reference_of(case, steps),
+        exact_step,
     )
 
 

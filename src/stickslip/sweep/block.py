@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError, ParameterError
-from stickslip.simulation import _case, batch
+from stickslip.simulation import _case, batch, lanes
 from stickslip.simulation._meter import metrics as read_meter
 from stickslip.simulation.accuracy import KICKS
 from stickslip.simulation.closed_loop import REASONS, integrator_for, prepare
@@ -26,6 +26,9 @@ TIGHTER, FINEST = (0.1, 0.01), 1e-9
 SUSPECT, SURE = 0.005, 0.01
 """Parts of a metric by which they may differ: at first half of the 1 % that is wanted, since motions without a truth
 may agree by chance."""
+LONGER, SURE_OF_STEPS = 2.0, 0.003
+"""Times the step of lanes, at which they run again, and the part of a metric by which the two may differ: a third of
+`SURE`, since where an axis switches often two steps can agree by chance."""
 FLOORS = {"rad": 1e-8, "s": 1e-6, "Nm": 1e-6, "J": 1e-9}
 """Differences this small count for nothing, by the unit that a metric's name ends with (rad/s: 1e-6)."""
 
@@ -62,11 +65,27 @@ def compute(sweep: Sweep, run: int, start: int) -> Block:
     numbers = sweep.drawn.block(start, min(start + BLOCK, sweep.drawn.cases))
     planned = sweep.runs[run]
     values = sweep.values(planned, numbers)
-    found, failures = measured(planned, values, sweep.metrics, len(numbers))
     flagged = np.zeros(len(numbers), dtype=np.bool_)
+    if sweep.step > 0.0 and (many := as_lanes(planned, values, sweep.step)) is not None:
+        found, failures = _read(many.run(sweep.metrics, device=sweep.device), sweep.metrics)
+        if sweep.check:
+            flagged = doubtful(many, sweep, found, failures)
+        return Block(run, start, numbers, found, flagged, failures)
+    found, failures = measured(planned, values, sweep.metrics, len(numbers))
     if sweep.check:
         found, failures, flagged = checked(planned, values, sweep.metrics, found, failures)
     return Block(run, start, numbers, found, flagged, failures)
+
+
+def doubtful(
+    many: lanes.Lanes, sweep: Sweep, found: Array, failures: Sequence[str]
+) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Which cases in lanes differ at twice the step."""
+    wide = lanes.prepare(many.case, many.varied, LONGER * sweep.step)
+    again, failed = _read(wide.run(sweep.metrics, device=sweep.device), sweep.metrics)
+    duration = float(many.case.numbers[_case.DURATION])
+    ends = np.array([a != b for a, b in zip(failures, failed)], dtype=np.bool_)
+    return differ(found, again, sweep.metrics, duration, SURE_OF_STEPS) | ends
 
 
 def checked(
@@ -141,10 +160,21 @@ def measured(
         ]
         return np.array([row for row, _ in rows]).reshape(n, len(metrics)), [why for _, why in rows]
     many.parameters[:, _case.KICK] = kick
-    results = many.run(metrics)
+    return _read(many.run(metrics), metrics)
+
+
+def _read(results: batch.Results, metrics: Sequence[str]) -> tuple[Array, list[str]]:
+    """Metrics, shape (n, metrics), and failures."""
     found = np.column_stack([results.metrics[name] for name in metrics])
-    reasons = [_reason(int(code), float(t)) for code, t in zip(results.codes, results.time)]
-    return found, reasons
+    return found, [_reason(int(code), float(t)) for code, t in zip(results.codes, results.time)]
+
+
+def as_lanes(planned: PlannedRun, values: Mapping[str, Array], step: float) -> lanes.Lanes | None:
+    """The block in lanes, or None where they cannot run it."""
+    try:
+        return lanes.prepare(_laid_out(planned), as_columns(planned, values), step)
+    except InputError:
+        return None
 
 
 def _reason(code: int, time: float) -> str:

@@ -15,6 +15,7 @@ from stickslip.config import Table, read_toml
 from stickslip.errors import ConfigError, InputError, suggestion
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import read_identified
+from stickslip.simulation import lanes
 from stickslip.simulation._meter import METRICS
 from stickslip.study import plan as studies
 from stickslip.study.plan import PlannedRun, Study
@@ -54,6 +55,10 @@ class Sweep:
         Files it refers to, by the path as written.
     tuned, percentile
         What `stickslip.sweep.tune` may choose, and the percentile over the cases that it judges by.
+    step : float
+        Of lanes, s (`stickslip.simulation.lanes`); 0 runs every case exactly.
+    device : {"cpu", "gpu"}
+        Where lanes run.
     """
 
     name: str
@@ -68,6 +73,8 @@ class Sweep:
     files: Mapping[str, Path]
     tuned: tuple[Spread, ...] = ()
     percentile: float = 95.0
+    step: float = 0.0
+    device: str = "cpu"
 
     @property
     def blocks(self) -> list[tuple[int, int]]:
@@ -85,6 +92,8 @@ class Sweep:
             self.runs[run].fingerprint, asdict(self.drawn), self.metrics, self.check, BLOCK,
             file_hash(Path(__file__).with_name("block.py")),
         ]  # fmt: skip
+        if self.step > 0.0:
+            content += [self.step, self.device]
         return hashlib.sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
 
     def values(self, run: PlannedRun, numbers: Array) -> dict[str, Array]:
@@ -140,15 +149,31 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
     check = table.choice("check", ("yes", "no"), "yes") == "yes"
     drawn = _drawn(table)
     tuned = _spreads(table, "tune", drawn.method) if table.has("tune") else []
+    step, device = _lanes(table, metrics)
     percentile = table.positive("percentile", "%", 95.0) if tuned else 95.0
     if percentile > 100.0:
         raise table.error("percentile", "must be at most 100 %")
     found = Sweep(
         name, title, runs, drawn, tuple(metrics), check, study, table.values, path, dict(table.document.files),
-        tuple(tuned), percentile,
+        tuple(tuned), percentile, step, device,
     )  # fmt: skip
     _check(found, table)
     return found
+
+
+def _lanes(table: Table, metrics: Sequence[str]) -> tuple[float, str]:
+    """Step and device of ``integrator = "lanes"``; no step where every case is run exactly."""
+    if table.choice("integrator", ("exact", "lanes"), "exact") == "exact":
+        return 0.0, "cpu"
+    unknown = [name for name in metrics if name not in lanes.METRICS]
+    if unknown:
+        raise table.error(
+            "metrics", f"has {unknown[0]!r}, which lanes do not measure; choose integrator exact"
+        )
+    device = table.choice("device", lanes.DEVICES, "cpu")
+    if device == "gpu":
+        lanes.check_gpu()
+    return table.positive("time_step", "s", lanes.STEP), device
 
 
 def _study(table: Table, moved: Mapping[str, Path]) -> Study:
