@@ -119,9 +119,9 @@ def test_a_machine_that_is_not_in_the_library(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["thesis-dry", "thesis-grease"])
-def test_the_thesis_machines(name):
-    m = replace(machine(name), seed=11)
+@pytest.mark.parametrize(("name", "seed"), [("thesis-dry", 11), ("thesis-grease", 11), ("thesis-grease", 2)])
+def test_the_thesis_machines(name, seed):
+    m = replace(machine(name), seed=seed)
     done = commission(VirtualRig(m))
     held_to_the_bars(m, done)
     flexible, train = m.flexible, done.stage("resonance").found.details["train"]

@@ -23,6 +23,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 REVOLUTION = 2.0 * math.pi
 TRANSIENT = math.radians(20.0)
+BINS = 120
+"""Stretches of a segment that count alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,11 +172,24 @@ def _averaged(
     )
     means = np.array([float(np.mean(y[place == k])) for k in range(parts) if np.any(place == k)])
     std = float(np.std(means, ddof=1)) / math.sqrt(means.size) if means.size > 1 else math.nan
-    # The mean over the position, so that every angle counts alike even if the speed ripples.
-    weight = np.abs(np.gradient(x)) if x.size > 1 else np.ones(1)
-    mean = float(np.sum(weight * y) / np.sum(weight)) if np.any(weight > 0.0) else float(np.mean(y))
+    mean = even_mean(x, y)
     velocity = float((x[-1] - x[0]) / (t[-1] - t[0]))
     return Segment(float(t[0]), float(t[-1]), velocity, mean, std, turns, abs(float(x[-1] - x[0])))
+
+
+def even_mean(x: Array, y: Array) -> float:
+    """Mean of y over time, every stretch of x counting alike: the speed may ripple, and the axis stick and slip.
+
+    A mean over x itself would count the slips only, and their torque is that of the speed which they reach.
+    """
+    stretches = min(BINS, x.size // 4)
+    travel = float(x[-1] - x[0])
+    if stretches < 2 or travel == 0.0:
+        return float(np.mean(y))
+    place = np.clip(stretches * (x - x[0]) / travel, 0.0, stretches - 1.0).astype(np.int64)
+    count = np.bincount(place, minlength=stretches)
+    sums = np.bincount(place, weights=y, minlength=stretches)
+    return float(np.mean(sums[count > 0] / count[count > 0]))
 
 
 def sliding_points(

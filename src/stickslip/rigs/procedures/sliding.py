@@ -29,6 +29,8 @@ GREASED = (
 ROWS, LONGEST = 2000, 0.02
 """Rows of a velocity's record, about, and the longest that one may last, s: sticking must show in them."""
 
+STANDS, OFTEN = 0.2, 0.02
+"""Of the mean speed, below which the axis all but stands; share of the time from which it sticks and slips."""
 SHORT = 0.5
 """s of rest before the way back."""
 
@@ -113,11 +115,17 @@ class Sliding(Procedure):
         if t.size < 3:
             return Check(f"{v:g} rad/s", False, "the axis did not travel a revolution")
         mean = float((x[-1] - x[0]) / (t[-1] - t[0]))
-        ripple = float(np.std(np.diff(x) / np.diff(t)))
+        speed = np.diff(x) / np.diff(t)
+        ripple, still = float(np.std(speed)), float(np.mean(speed / v < STANDS))
+        words = (
+            f"; it sticks and slips, {100.0 * still:.2g} % of the time all but at rest"
+            if still > OFTEN
+            else ""
+        )
         return Check(
             f"{v:g} rad/s", abs(mean / v - 1.0) <= 0.01,
             f"mean speed of a revolution {mean:.5g} rad/s, ripple {ripple:.2g} rad/s RMS over "
-            f"{1e3 * float(np.median(np.diff(t))):.3g} ms",
+            f"{1e3 * float(np.median(np.diff(t))):.3g} ms{words}",
         )  # fmt: skip
 
 
