@@ -1,4 +1,4 @@
-"""The text that lanes run: `_lanes_step` with sizes, numbers and the laws' own sliding curves filled in.
+"""The text that lanes run: `_lanes_step` and `_lanes_run` with sizes, numbers and the laws' sliding curves filled in.
 
 Numbers that all cases share are elements of a tuple, those that vary are rows of ``z``; equal shared numbers are the
 same element, so that the compiler computes once what two laws have in common. A branch on a shared number is
@@ -28,7 +28,7 @@ INLINED = frozenset(
         "between", "switch", "stick", "weighted", "measure", "measure_all", "highest", "torque",
     }
 )  # fmt: skip
-"""Functions of `_lanes_step` that run for all lanes at once."""
+"""Functions that run for all lanes at once."""
 
 
 class Refused(Exception):
@@ -123,8 +123,11 @@ def source(
 
 @functools.cache
 def body() -> tuple[list[str], list[str]]:
-    """The constants and the functions of `_lanes_step`."""
-    tree = ast.parse(Path(__file__).with_name("_lanes_step.py").read_text(encoding="utf-8"))
+    """The constants and the functions of `_lanes_step` and `_lanes_run`."""
+    texts = [
+        Path(__file__).with_name(f"_lanes_{name}.py").read_text(encoding="utf-8") for name in ("step", "run")
+    ]
+    tree = ast.parse("\n".join(text.partition("from __future__ import annotations")[2] for text in texts))
     constants = [ast.unparse(node) for node in tree.body if isinstance(node, ast.Assign)]
     functions: list[str] = []
     for node in tree.body:
