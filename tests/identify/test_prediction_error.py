@@ -109,3 +109,14 @@ def test_short_coverage_study(generator: Any, monkeypatch: pytest.MonkeyPatch) -
     sure = [r for r in rows if r.name in coverage.ALWAYS and r.identified]
     # 24 intervals of 95 %: fewer than 18 that hold would have a chance below 1e-4.
     assert sum(r.inside for r in sure) >= 0.75 * len(sure)
+
+
+def test_an_inertia_that_the_inverse_dynamics_misses_is_found(generator: Any) -> None:
+    case = generator.make(
+        11025
+    )  # 14-bit encoder and a small inertia: the inverse dynamics finds a negative one
+    trial = trial_of(case.record, AXIS)
+    assert inverse_dynamics([trial], AXIS)["inertia"] < 0.0
+    found = axis_prediction([trial], AXIS, case.model.law)
+    by_name = {e.name: e.value for e in found.estimates}
+    assert by_name["inertia"] == pytest.approx(case.truth["inertia"], rel=0.2)

@@ -139,6 +139,30 @@ def test_an_observer_pulls_the_axis_to_what_was_measured() -> None:
     assert np.median(pulled[moving, 3]) == pytest.approx(-0.05, abs=0.01)
 
 
+def test_a_firm_observer_sticks_and_slips_with_the_axis() -> None:
+    """Friction that falls steeply with velocity: the true model is told from a wrong one only where nothing parts."""
+    contact = Model("stribeck", k=5000.0, fs=0.5, fc=0.3, vs=0.05, sigma2=0.01)
+    time = 1e-3 * np.arange(3000)
+    travel = np.where(time < 2.5, 0.4 * time, 1.0)
+    true, loop = Mechanics(INERTIA, offset=0.02), Loop(kp=5.0, kd=0.02)
+    push = 0.02 * np.sin(40.0 * time) * np.cos(17.0 * time)
+    measured = drive_axis(true, contact, Drive(time, travel, "feedback", loop, disturbance=push))
+    assert np.mean(np.abs(measured[:, 1]) < 1e-3) > 0.2  # it sticks between its slips
+    velocity = np.append(np.diff(measured[:, 0]) / 1e-3, 0.0)
+    firm = Drive(
+        time, measured[:, 2], "held", position=measured[:, 0], grip=np.full(time.size, INERTIA / 2e-4), goal=velocity,
+        returns=100.0,
+    )  # fmt: skip
+    found = drive_axis(true, contact, firm)
+    assert np.max(np.abs(found[:, 0] - measured[:, 0])) < 1e-3
+    # The moment at which it breaks away lies somewhere within a sample.
+    sliding = np.array([np.all(np.abs(velocity[max(k - 5, 0) : k + 1]) > 0.2) for k in range(time.size)])
+    # What is added is the disturbance, and without the offset that, too.
+    assert np.std((found[:, 3] - push)[sliding]) < 0.25 * np.std(push[sliding])
+    without = drive_axis(Mechanics(INERTIA), contact, firm)
+    assert np.median((without[:, 3] - push)[sliding]) == pytest.approx(-0.02, abs=0.003)
+
+
 def test_backlash_hides_small_motion() -> None:
     drive = sine()
     free = drive_axis(Mechanics(INERTIA), example("coulomb"), drive)

@@ -56,8 +56,6 @@ def run(args: argparse.Namespace) -> int:
             "stribeck",
             "--loop",
             LOOP,
-            "--intervals",
-            "prediction",
             "--out",
             str(args.out),
         ],

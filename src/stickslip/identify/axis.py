@@ -34,7 +34,8 @@ AUTOMATIC = ("coulomb", "stribeck", "lugre")
 """Laws among which the held-out error chooses where none is named."""
 MISSING = "Not identified:"
 NARROW = "Intervals come from the covariance of the output error:"
-INTERVALS = ("covariance", "prediction")
+NO_PREDICTION = "The prediction error cannot be had from these records:"
+INTERVALS = ("prediction", "covariance")
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
 BLOCKS = 20
@@ -82,10 +83,10 @@ def identify_axis(
     per_direction: bool = False,
     robust: bool = False,
     profiles: bool = False,
-    intervals: str = "covariance",
+    intervals: str = "prediction",
     progress: Callable[[str], None] = silent,
 ) -> Identification:
-    """Identify an axis by output error.
+    """Identify an axis: by output error, which law; by prediction error, its values and how sure they are.
 
     Parameters
     ----------
@@ -102,9 +103,9 @@ def identify_axis(
         As in `stickslip.identify.axis_output.output_error`.
     per_direction : bool
         Whether the inverse dynamics reported beside it has friction of its own for each direction.
-    intervals : {"covariance", "prediction"}
-        From the covariance of the output error: fast, and too narrow for what only break-away tells (Fs, vs); or
-        law, estimates and intervals from the prediction error (`stickslip.identify.axis_prediction`).
+    intervals : {"prediction", "covariance"}
+        Values and intervals from the prediction error (`stickslip.identify.axis_prediction`), where the records allow
+        it; or from the covariance of the output error: in half the time, and too narrow where noise is coloured.
     progress : callable
         Is told what begins, in a few words.
 
@@ -146,9 +147,13 @@ def identify_axis(
         return found_axis
     progress(f"{chosen.name}: intervals from the prediction error")
     given = {k: v for k, v in dict[str, Any](values or {}).items() if k in frozen or k in free}
-    return with_prediction(found_axis, axis_prediction(
-        trials, axis, chosen, first=inverse, values=given, free=free, frozen=frozen, extras=extras,
-    ))  # fmt: skip
+    try:
+        prediction = axis_prediction(
+            trials, axis, chosen, first=inverse, values=given, free=free, frozen=frozen, extras=extras
+        )
+    except InputError as error:
+        return replace(found_axis, notes=(*found_axis.notes, f"{NO_PREDICTION} {error}."))
+    return with_prediction(found_axis, prediction)
 
 
 def first_look(
@@ -298,13 +303,16 @@ def with_prediction(found: Identification, result: PredictionError) -> Identific
 
 
 def narrow_note(result: OutputError) -> tuple[str, ...]:
-    """That the intervals are too narrow where the law has a velocity of its own that only break-away tells."""
-    if result.problem.law.velocity_scale is None or any(t.drive is None for t in result.problem.trials):
-        return ()
-    return (
-        f"{NARROW} too narrow for what only slow motion and break-away tell, such as a Stribeck velocity; "
-        "--intervals prediction gives honest ones.",
+    """That the intervals are too narrow where noise is coloured; where friction has a velocity of its own, by far."""
+    most = (
+        " most of all for what slow motion and break-away tell" if result.problem.law.velocity_scale else ""
     )
+    remedy = (
+        ""
+        if any(t.drive is None for t in result.problem.trials)
+        else " --intervals prediction gives honest ones."
+    )
+    return (f"{NARROW} too narrow where noise is coloured,{most}.{remedy}".replace(",.", "."),)
 
 
 def missing_note(estimates: Sequence[Estimate]) -> tuple[str, ...]:

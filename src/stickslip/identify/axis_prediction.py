@@ -15,7 +15,8 @@ from stickslip.identify.axis_output import Extras, laid_out, starting_models
 from stickslip.identify.axis_problem import Problem
 from stickslip.identify.axis_start import steady_fit
 from stickslip.identify.axis_trial import Trial
-from stickslip.identify.corrections import BAND, DIFFERENCE, Criterion, Motion
+from stickslip.identify.corrections import BAND, DIFFERENCE, Criterion
+from stickslip.identify.observer import Motion, prepare
 from stickslip.identify.optimum import cost_of
 from stickslip.identify.prediction_error import PredictionError, prediction_error
 from stickslip.identify.secant import descend_by_secants
@@ -90,7 +91,8 @@ def axis_prediction(
         problem = Problem.of(
             trials, axis, law, vector, inertia=inertia, harmonic_period=extras.harmonic_period
         )
-        criterion = Criterion.first(motions, law, vector, problem.mechanics, inertia, band)
+        records = [prepare(m, law, inertia, abs(start.coulomb), band) for m in motions]
+        criterion = Criterion.first(records, law, vector, problem.mechanics)
         cost = cost_of(criterion.residuals(vector.start))
         if math.isfinite(cost):
             tried.append((cost, criterion, inertia))
@@ -115,8 +117,8 @@ def axis_prediction(
             best = min(best, (*descended(criterion, there), criterion, inertia), key=lambda entry: entry[0])
     _, u, criterion, inertia = best
     return prediction_error(
-        motions, law, criterion.vector, criterion.mechanics, inertia=inertia, start=u,
-        signed_scale=abs(start.coulomb), band=band, seed=seed,
+        motions, law, criterion.vector, criterion.mechanics, inertia=inertia,
+        friction=abs(start.coulomb), start=u, signed_scale=abs(start.coulomb), band=band, seed=seed,
     )  # fmt: skip
 
 

@@ -267,7 +267,7 @@ def laid_out(
     """The vector of everything that is fitted, and the inertia it starts from."""
     values: dict[str, float] = {}
     if first is not None:
-        values = {"inertia": max(first["inertia"], 1e-12), "offset": first.offset}
+        values = {"inertia": first_inertia(first), "offset": first.offset}
         if first.has("gravity_sin"):
             sine, cosine = first["gravity_sin"], first["gravity_cos"]
             values |= {"gravity": math.hypot(sine, cosine), "gravity_angle": math.atan2(-cosine, sine)}
@@ -293,6 +293,15 @@ def laid_out(
     size = abs(first.coulomb) if first is not None else 1.0
     extra = [scaled_parameter(p, size) for p in extra]
     return NearVector(model, frozen=sorted(held), extra=extra), values["inertia"]
+
+
+def first_inertia(first: InverseDynamics) -> float:
+    """That of the inverse dynamics; where it does not tell it from 0, what friction would accelerate as in the record."""
+    place = first.names.index("inertia")
+    if first.values[place] > 2.0 * first.robust_std[place]:
+        return float(first.values[place])
+    fast = float(np.quantile(np.abs(first.matrix[:, place]), 0.98))
+    return max(abs(first.coulomb) / fast if fast > 0.0 else 0.0, float(first.values[place]), 1e-12)
 
 
 def scaled_parameter(p: Parameter, torque: float) -> Parameter:

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
 from stickslip.identify.axis_start import feasible
+from stickslip.identify.observer import Prepared
 from stickslip.identify.optimum import Optimum, descend
 from stickslip.identify.vector import Vector
-from stickslip.simulation.driven import Course, Drive, Mechanics
+from stickslip.simulation.driven import Mechanics
 from stickslip.spec import Law
 
 __all__ = [
@@ -25,9 +25,6 @@ __all__ = [
     "DIFFERENCE",
     "Criterion",
     "MakeMechanics",
-    "Motion",
-    "Prepared",
-    "prepare",
     "student_weight",
 ]
 
@@ -36,10 +33,6 @@ MakeMechanics = Callable[[Mapping[str, float]], Mechanics]
 
 BAND = 40.0
 """Hz up to which corrections count, where the sample rate allows it."""
-LAG = 4.0
-"""Corner of the low-pass behind which the observer damps, in bands."""
-LONGEST = 1e-3
-"""Longest step of the simulation, s."""
 ORDER = 16
 """Order of the autoregression."""
 FIRST = np.array([1.0, -0.9])
@@ -48,83 +41,6 @@ FREEDOM = 10.0
 """Degrees of freedom of Student's distribution that weighs outliers."""
 DIFFERENCE = 5e-3
 """Of coordinates, for Jacobians: a contact that breaks away a sample later makes the residuals rough below it."""
-EDGE = 0.15
-"""s at both ends that filters spoil."""
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """A record of equally spaced samples.
-
-    Attributes
-    ----------
-    time, position, torque : array, shape (n,)
-        s, rad, N·m (m, N), the torque held until the next sample; a signal that the axis's ``drive_gain`` turns into
-        torque will do.
-    count : float
-        Resolution of the position, rad (m); 0 for none.
-    """
-
-    time: Array
-    position: Array
-    torque: Array
-    count: float = 0.0
-
-
-# ---- one motion ----------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """A motion with its observer and the filter of its corrections."""
-
-    course: Course
-    low_pass: Any
-    stride: int
-    edge: int
-
-    def correction(self, mechanics: Mechanics, parameters: Any) -> Array:
-        """Torque that the model lacks, N·m, in the band, shape (m,)."""
-        signal: Any = importlib.import_module("scipy.signal")  # it carries no types
-
-        raw = self.course.run(mechanics, parameters)[:, 3]
-        if not np.all(np.isfinite(raw)):
-            return self.nothing()
-        return signal.sosfiltfilt(self.low_pass, raw)[self.edge : -self.edge : self.stride]
-
-    def nothing(self) -> Array:
-        """Not a number, as many as there are corrections."""
-        return np.full(self.course.drive.time[self.edge : -self.edge : self.stride].shape, math.nan)
-
-
-def prepare(motion: Motion, law: Law, inertia: float, band: float, speed: float = 1.0) -> Prepared:
-    """Lay the observer out; `speed` is its natural frequency in bands."""
-    signal: Any = importlib.import_module("scipy.signal")  # it carries no types
-
-    checked(motion, band)
-    dt = float(np.median(np.diff(motion.time)))
-    omega = 2.0 * math.pi * speed * band
-    velocity = np.diff(motion.position, prepend=motion.position[0]) / dt
-    drive = Drive(
-        motion.time, motion.torque, "held", start=(float(motion.position[0]), 0.0), position=motion.position,
-        velocity=velocity, pull=(inertia * omega**2, 2.0 * inertia * omega), slack=0.5 * motion.count,
-        forgets=-math.expm1(-LAG * omega * dt), max_step=min(dt, LONGEST),
-    )  # fmt: skip
-    low_pass = signal.butter(4, band, fs=1.0 / dt, output="sos")
-    stride = max(1, int(1.0 / (3.0 * band * dt)))
-    return Prepared(Course(law, drive), low_pass, stride, max(1, int(EDGE / dt)))
-
-
-def checked(motion: Motion, band: float) -> None:
-    """Refuse what the filters cannot work on."""
-    steps = np.diff(motion.time)
-    if motion.time.size < 200 or np.ptp(steps) > 1e-3 * float(np.median(steps)):
-        raise InputError(
-            f"{motion.time.size} samples between {steps.min():.3g} and {steps.max():.3g} s apart: this method needs at "
-            "least 200 that are equally spaced; resample the record"
-        )
-    if 1.0 / float(np.median(steps)) < 3.0 * band:
-        raise InputError(f"a band of {band:g} Hz needs a sample rate of {3.0 * band:g} Hz; give a lower band")
 
 
 # ---- noise -----------------------------------------------------------------------------------------------------
@@ -197,10 +113,9 @@ class Criterion:
 
     @staticmethod
     def first(
-        motions: Sequence[Motion], law: Law, vector: Vector, mechanics: MakeMechanics, inertia: float, band: float
+        records: Sequence[Prepared], law: Law, vector: Vector, mechanics: MakeMechanics
     ) -> Criterion:  # fmt: skip
         """Plain squares behind the first filter: for the search."""
-        records = [prepare(m, law, inertia, band) for m in motions]
         return Criterion(records, law, vector, mechanics, FIRST)
 
     def corrections(self, u: Array) -> list[Array]:

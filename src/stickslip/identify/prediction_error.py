@@ -1,12 +1,13 @@
 """Honest intervals for an axis: what an observer must correct, whitened, with a spread that leaves stretches out.
 
-The simulated axis is driven by the recorded torque and pulled towards the measured position by a spring and damper
-(an observer). The pull is the torque that the model lacks: disturbance, noise of the torque, rounding of the encoder.
-An autoregression of it gives the weights (prediction-error method: Ljung 1999, chapters 7 and 9). It needs no
+The simulated axis is driven by the recorded torque and held to the measured motion (`stickslip.identify.observer`).
+What that takes is the torque that the model lacks: disturbance, noise of the torque, rounding of the encoder. An
+autoregression of it gives the weights (prediction-error method: Ljung 1999, chapters 7 and 9). It needs no
 knowledge of the controller. Three things keep the truth near the minimum:
 
 - Torque and position enter as they were recorded. A filter would round the corners at which a contact breaks away.
-- The spring is slack within half a count: a contact at rest is pulled by no rounding.
+- In slow motion the observer is firm, so that simulated and measured contact stick and slip together. At rest no
+  rounding pulls: positions within half a count are alike.
 - Where the disturbance decides whether the contact sticks, measured and simulated motion part for a while. Such
   outliers are few and large; Student's distribution weighs them (Lange, Little and Taylor 1989).
 
@@ -28,10 +29,11 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.axis_start import feasible
-from stickslip.identify.corrections import BAND, Criterion, MakeMechanics, Motion, prepare, student_weight
+from stickslip.identify.corrections import BAND, Criterion, MakeMechanics, student_weight
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.jackknife import BlockCovariance, leave_blocks_out
 from stickslip.identify.noise import Noise
+from stickslip.identify.observer import GRASP, Motion, prepare
 from stickslip.identify.optimum import Optimum
 from stickslip.identify.uncertainty import interval_of, verdict_on
 from stickslip.identify.vector import Vector
@@ -43,8 +45,8 @@ __all__ = ["PredictionError", "prediction_error"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-SLOWER, STRICTER = 0.5, 3.0
-"""Other choices that would do as well: an observer this much slower, degrees of freedom this few."""
+SLOWER, LOOSER, STRICTER = 0.5, 3.0, 3.0
+"""Other choices that would do as well: an observer this much slower and looser, degrees of freedom this few."""
 BLOCK = 0.25
 """s of a stretch that is left out: some correlation times of the disturbance."""
 REACH = 3.0
@@ -107,6 +109,7 @@ def prediction_error(
     mechanics: MakeMechanics,
     *,
     inertia: float,
+    friction: float,
     start: Array | None = None,
     signed_scale: float | Mapping[str, float] = math.nan,
     band: float = BAND,
@@ -125,6 +128,8 @@ def prediction_error(
         Makes the axis of all parameters by name.
     inertia : float
         About that of the axis, kg·m²: it sets the observer's stiffness.
+    friction : float
+        About the Coulomb torque, N·m: what the observer may do to a velocity that the encoder hardly shows.
     start : array, shape (p,), optional
         Coordinates at which the search starts.
     signed_scale : float or mapping
@@ -145,7 +150,9 @@ def prediction_error(
     InputError
         If a motion is too short for the band, or the model gives no finite values at the start.
     """
-    criterion = Criterion.first(motions, law, vector, mechanics, inertia, band)
+    criterion = Criterion.first(
+        [prepare(m, law, inertia, friction, band) for m in motions], law, vector, mechanics
+    )
     u = vector.start if start is None else start
     optimum = None
     for _ in range(rounds):
@@ -154,10 +161,13 @@ def prediction_error(
         u = optimum.u
     assert optimum is not None
     spread = spread_of(criterion, optimum)
-    slow = [prepare(m, law, inertia, band, SLOWER) for m in motions]
-    others = [replace(criterion, records=slow), replace(criterion, freedom=STRICTER)]
+    slow = [prepare(m, law, inertia, friction, band, SLOWER, LOOSER * GRASP) for m in motions]
+    others = [
+        replace(criterion, records=slow),
+        replace(criterion, freedom=STRICTER),
+    ]
     moved = [c.adapted(u).descend(u, 6, 1e-3).u - u for c in others]
-    beside = shaken_steps(criterion, optimum, motions, inertia, band, np.random.default_rng(seed))
+    beside = shaken_steps(criterion, optimum, np.random.default_rng(seed))
     beside = beside + sum(np.outer(d, d) for d in moved)
     estimates = estimates_of(vector, u, spread, beside, signed_scale)
     accepted = feasible(law, vector.law_parameters(u))
@@ -189,10 +199,7 @@ def ridge_of(r: Array, size: int) -> Array:
     return variance / REACH**2 * np.eye(size)
 
 
-def shaken_steps(
-    criterion: Criterion, optimum: Optimum, motions: Sequence[Motion], inertia: float, band: float,
-    rng: np.random.Generator,
-) -> Array:  # fmt: skip
+def shaken_steps(criterion: Criterion, optimum: Optimum, rng: np.random.Generator) -> Array:
     """Mean square of the steps of Gauss and Newton from the minimum on records with the corrections as noise.
 
     Returns
@@ -207,8 +214,8 @@ def shaken_steps(
     steps: list[Array] = []
     for _ in range(DRAWS):
         records = [
-            prepare(replace(m, torque=m.torque + e * random_signs(rng, m.time)), criterion.law, inertia, band)
-            for m, e in zip(motions, lacking, strict=True)
+            x.shaken(e * random_signs(rng, x.course.drive.time))
+            for x, e in zip(criterion.records, lacking, strict=True)
         ]
         step = newton @ replace(criterion, records=records).weighed(u)
         if np.all(np.isfinite(step)):

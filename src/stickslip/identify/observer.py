@@ -1,0 +1,158 @@
+"""The observer of an axis: it holds a simulated axis to the measured motion, and tells what torque that takes.
+
+In fast motion a spring and a damper pull, slow enough that the axis moves by its model and not by the encoder's noise.
+In slow motion and at rest that would not do: where friction falls with velocity faster than the damping rises, a
+contact may stick or slip at one torque, and simulated and measured motion would part even under the true parameters.
+There a damper takes over that is part of the implicit step, as firm as the encoder knows the velocity.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.edges import SeenVelocity, seen_velocity
+from stickslip.simulation.driven import Course, Drive, Mechanics
+from stickslip.spec import Law
+
+__all__ = ["Motion", "Prepared", "prepare"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+LAG = 4.0
+"""Corner of the low-pass behind which the slow damper damps, in natural frequencies of the observer."""
+SLOW = 0.15
+"""Part of the usual (RMS) speed below which the firm damper takes over."""
+GRASP = 0.6
+"""Samples within which it takes the measured velocity."""
+RETURNS = 0.5
+"""Rate at which the position is led back there, in natural frequencies."""
+TOLERATED = 3e-3
+"""Part of friction that a wrong velocity may make it add."""
+LONGEST = 1e-3
+"""Longest step of the simulation, s."""
+EDGE = 0.15
+"""s at both ends that filters spoil."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A record of equally spaced samples.
+
+    Attributes
+    ----------
+    time, position, torque : array, shape (n,)
+        s, rad, N·m (m, N), the torque held until the next sample; a signal that the axis's ``drive_gain`` turns into
+        torque will do.
+    count : float
+        Resolution of the position, rad (m); 0 for none.
+    """
+
+    time: Array
+    position: Array
+    torque: Array
+    count: float = 0.0
+
+    @property
+    def period(self) -> float:
+        """Time between samples, s."""
+        return float(np.median(np.diff(self.time)))
+
+    @cached_property
+    def seen(self) -> SeenVelocity:
+        """Its velocity, as far as the encoder shows it."""
+        return seen_velocity(self.time, self.position, self.count)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A motion with its observer and the filter of its corrections."""
+
+    course: Course
+    low_pass: Any
+    stride: int
+    edge: int
+
+    def correction(self, mechanics: Mechanics, parameters: Any) -> Array:
+        """Torque that the model lacks, N·m, in the band, shape (m,)."""
+        signal: Any = importlib.import_module("scipy.signal")  # it carries no types
+
+        raw = self.course.run(mechanics, parameters)[:, 3]
+        if not np.all(np.isfinite(raw)):
+            return self.nothing()
+        return signal.sosfiltfilt(self.low_pass, raw)[self.edge : -self.edge : self.stride]
+
+    def shaken(self, signal: Array) -> Prepared:
+        """The same with this added to the drive's signal, shape (n,)."""
+        drive = replace(self.course.drive, signal=self.course.drive.signal + signal)
+        return replace(self, course=Course(self.course.law, drive))
+
+    def nothing(self) -> Array:
+        """Not a number, as many as there are corrections."""
+        return np.full(self.course.drive.time[self.edge : -self.edge : self.stride].shape, math.nan)
+
+
+def prepare(
+    motion: Motion, law: Law, inertia: float, friction: float, band: float, speed: float = 1.0, grasp: float = GRASP
+) -> Prepared:  # fmt: skip
+    """Lay the observer out.
+
+    Parameters
+    ----------
+    motion : Motion
+    law : Law
+    inertia, friction : float
+        About those of the axis: kg·m², and the Coulomb torque, N·m.
+    band : float
+        Hz up to which corrections count.
+    speed : float
+        Its natural frequency in bands.
+    grasp : float
+        Samples within which its firm damper takes the measured velocity.
+
+    Raises
+    ------
+    InputError
+        If the record is too short, or its samples too few or not equally spaced.
+    """
+    signal: Any = importlib.import_module("scipy.signal")  # it carries no types
+
+    checked(motion, band)
+    dt, seen = motion.period, motion.seen
+    omega = 2.0 * math.pi * speed * band
+    drive = Drive(
+        motion.time, motion.torque, "held", start=(float(motion.position[0]), 0.0), position=motion.position,
+        velocity=np.diff(motion.position, prepend=motion.position[0]) / dt,
+        pull=(inertia * omega**2, 2.0 * inertia * omega), forgets=-math.expm1(-LAG * omega * dt),
+        grip=grip_of(seen, inertia / (grasp * dt), 2.0 * RETURNS * inertia * omega, friction), goal=seen.velocity,
+        returns=RETURNS * omega, slack=0.5 * motion.count, max_step=min(dt, LONGEST),
+    )  # fmt: skip
+    low_pass = signal.butter(4, band, fs=1.0 / dt, output="sos")
+    stride = max(1, int(1.0 / (3.0 * band * dt)))
+    return Prepared(Course(law, drive), low_pass, stride, max(1, int(EDGE / dt)))
+
+
+def grip_of(seen: SeenVelocity, firm: float, least: float, friction: float) -> Array:
+    """Damping of the firm damper, N·m·s/rad; 0 where the axis is fast, or its velocity too unsure for one."""
+    allowed = TOLERATED * friction / np.maximum(seen.doubt, 1e-300)
+    grip = np.where(seen.doubt > 0.0, np.minimum(allowed, firm), firm)
+    slow = np.abs(seen.velocity) < SLOW * float(np.std(seen.velocity))
+    return np.where(slow & (grip > least), grip, 0.0)
+
+
+def checked(motion: Motion, band: float) -> None:
+    """Refuse what the filters cannot work on."""
+    steps = np.diff(motion.time)
+    if motion.time.size < 200 or np.ptp(steps) > 1e-3 * float(np.median(steps)):
+        raise InputError(
+            f"{motion.time.size} samples between {steps.min():.3g} and {steps.max():.3g} s apart: this method needs at "
+            "least 200 that are equally spaced; resample the record"
+        )
+    if 1.0 / float(np.median(steps)) < 3.0 * band:
+        raise InputError(f"a band of {band:g} Hz needs a sample rate of {3.0 * band:g} Hz; give a lower band")
