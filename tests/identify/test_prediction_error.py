@@ -13,10 +13,12 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.identify.axis_inverse import inverse_dynamics
-from stickslip.identify.axis_prediction import axis_prediction, encoder_resolution, held_torque
+from stickslip.identify.axis_prediction import axis_prediction, encoder_resolution, held_torque, motion_of
 from stickslip.identify.axis_trial import trial_of
 from stickslip.identify.jackknife import leave_blocks_out
+from stickslip.identify.observer import GRASP, prepare
 from stickslip.machines.servo import ServoAxis
+from stickslip.simulation.driven import Mechanics
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 AXIS = ServoAxis(drive_side="load")
@@ -95,6 +97,20 @@ def test_torque_at_rest_is_the_static_torque_where_the_axis_sticks(generator: An
     assert found == pytest.approx(case.truth["fs"], rel=0.05)
 
 
+def test_the_true_parameters_need_few_corrections_where_the_axis_sticks_and_slips(generator: Any) -> None:
+    """A soft observer parts from the contact that sticks by chance: under the true law it corrects twice as much."""
+    case = generator.make(7021)  # friction falls with velocity ten times faster than a soft observer damps
+    motion = motion_of(trial_of(case.record, AXIS))
+    axis = Mechanics(case.truth["inertia"], offset=case.truth["offset"])
+    firm, soft = (
+        prepare(motion, case.model.law, case.truth["inertia"], case.truth["fc"], 40.0, grasp=grasp)
+        for grasp in (GRASP, np.inf)
+    )
+    sizes = [float(np.std(p.correction(axis, case.model.parameters))) for p in (firm, soft)]
+    assert sizes[0] < 0.02 * case.truth["fc"]
+    assert sizes[1] > 1.5 * sizes[0]
+
+
 @pytest.mark.slow
 def test_short_coverage_study(generator: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     spec = importlib.util.spec_from_file_location("interval_coverage", BENCHMARKS / "interval_coverage.py")
@@ -109,6 +125,9 @@ def test_short_coverage_study(generator: Any, monkeypatch: pytest.MonkeyPatch) -
     sure = [r for r in rows if r.name in coverage.ALWAYS and r.identified]
     # 24 intervals of 95 %: fewer than 18 that hold would have a chance below 1e-4.
     assert sum(r.inside for r in sure) >= 0.75 * len(sure)
+    # Errors in half-widths: about 0.5 where the intervals are right, above 0.7 were they half as wide.
+    errors = [2.0 * (r.value - r.truth) / (r.upper - r.lower) for r in sure]
+    assert 0.15 < float(np.sqrt(np.mean(np.square(errors)))) < 0.7
 
 
 def test_an_inertia_that_the_inverse_dynamics_misses_is_found(generator: Any) -> None:

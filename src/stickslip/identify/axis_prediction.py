@@ -115,7 +115,8 @@ def axis_prediction(
         there = hop(criterion.vector, u, {f.name for f in law.fields}, rng)
         if math.isfinite(cost_of(criterion.residuals(there))):
             best = min(best, (*descended(criterion, there), criterion, inertia), key=lambda entry: entry[0])
-    _, u, criterion, inertia = best
+    _, u, criterion, _ = best
+    inertia = criterion.vector.named(u)["inertia"]
     return prediction_error(
         motions, law, criterion.vector, criterion.mechanics, inertia=inertia,
         friction=abs(start.coulomb), start=u, signed_scale=abs(start.coulomb), band=band, seed=seed,

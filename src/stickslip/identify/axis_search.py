@@ -296,7 +296,7 @@ def laid_out(
 
 
 def first_inertia(first: InverseDynamics) -> float:
-    """That of the inverse dynamics; where it does not tell it from 0, what friction would accelerate as in the record."""
+    """That of the inverse dynamics; where it does not tell it from 0, what friction accelerates as in the record."""
     place = first.names.index("inertia")
     if first.values[place] > 2.0 * first.robust_std[place]:
         return float(first.values[place])

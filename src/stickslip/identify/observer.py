@@ -114,7 +114,7 @@ def prepare(
     speed : float
         Its natural frequency in bands.
     grasp : float
-        Samples within which its firm damper takes the measured velocity.
+        Samples within which its firm damper takes the measured velocity; infinite for an observer without one.
 
     Raises
     ------

@@ -6,8 +6,7 @@ autoregression of it gives the weights (prediction-error method: Ljung 1999, cha
 knowledge of the controller. Three things keep the truth near the minimum:
 
 - Torque and position enter as they were recorded. A filter would round the corners at which a contact breaks away.
-- In slow motion the observer is firm, so that simulated and measured contact stick and slip together. At rest no
-  rounding pulls: positions within half a count are alike.
+- At rest no rounding pulls: positions within half a count are alike.
 - Where the disturbance decides whether the contact sticks, measured and simulated motion part for a while. Such
   outliers are few and large; Student's distribution weighs them (Lange, Little and Taylor 1989).
 
@@ -15,7 +14,9 @@ The residuals are correlated and uneven for the same reason, so that the covaria
 time out (`stickslip.identify.jackknife`), and the quantile from the degrees of freedom that this has. What the
 linearisation does not see, contacts that stick or slip by chance, is added from the steps that the estimate takes
 when the corrections are given to the torque once more as noise (dependent wild bootstrap: Shao 2010), and from what
-a slower observer and a stricter view of outliers would have found: neither is better founded than the other.
+a slower observer, one that is firm in slow motion and a stricter view of outliers would have found: none is better
+founded than the others. The search (`stickslip.identify.axis_prediction`) takes the firm one, under which the true
+parameters are a minimum also where the soft one parts from a contact that sticks by chance.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ __all__ = ["PredictionError", "prediction_error"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-SLOWER, LOOSER, STRICTER = 0.5, 3.0, 3.0
-"""Other choices that would do as well: an observer this much slower and looser, degrees of freedom this few."""
+SLOWER, STRICTER = 0.5, 3.0
+"""Other choices that would do as well: an observer this much slower, degrees of freedom this few."""
 BLOCK = 0.25
 """s of a stretch that is left out: some correlation times of the disturbance."""
 REACH = 3.0
@@ -150,9 +151,11 @@ def prediction_error(
     InputError
         If a motion is too short for the band, or the model gives no finite values at the start.
     """
-    criterion = Criterion.first(
-        [prepare(m, law, inertia, friction, band) for m in motions], law, vector, mechanics
+    soft, slower, firm = (
+        [prepare(m, law, inertia, friction, band, speed, grasp) for m in motions]
+        for speed, grasp in ((1.0, math.inf), (SLOWER, math.inf), (1.0, GRASP))
     )
+    criterion = Criterion.first(soft, law, vector, mechanics)
     u = vector.start if start is None else start
     optimum = None
     for _ in range(rounds):
@@ -161,9 +164,9 @@ def prediction_error(
         u = optimum.u
     assert optimum is not None
     spread = spread_of(criterion, optimum)
-    slow = [prepare(m, law, inertia, friction, band, SLOWER, LOOSER * GRASP) for m in motions]
     others = [
-        replace(criterion, records=slow),
+        replace(criterion, records=slower),
+        replace(criterion, records=firm),
         replace(criterion, freedom=STRICTER),
     ]
     moved = [c.adapted(u).descend(u, 6, 1e-3).u - u for c in others]
