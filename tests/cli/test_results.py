@@ -54,6 +54,24 @@ def test_friction_that_changed_is_told_from_one_that_did_not(
     assert not compared(before, same, capsys)["changed"]
 
 
+def test_where_a_parameter_is_open_the_curves_alone_decide(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is not identified trades places with what is: another steep slope k, and a vs that leans on it."""
+    files = [written(tmp_path / "a.toml", 0.003), written(tmp_path / "b.toml", 0.003, vs=0.103, k=500.0)]
+    assert compared(*files, capsys)["changed"]
+    for file in files:
+        content = tomllib.loads(file.read_text(encoding="utf-8"))
+        content["estimates"][0] |= {"identified": False, "lower": 1.0, "upper": 1e4}
+        file.write_text(tomli_w.dumps(content), encoding="utf-8")
+    result = compared(*files, capsys)
+    assert any("the curves alone decide" in note for note in result["notes"])
+    assert result["changed"] == (result["curve_difference_over_band"] > 1.0)
+    assert not any(c["changed"] for c in result["parameters"])
+    assert main(["compare", str(files[0]), str(files[1])]) == 0
+    assert "together" not in capsys.readouterr().out
+
+
 def test_false_alarms_are_as_rare_as_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Estimates drawn with exactly their standard deviation: the level of the test is 5 %."""
     rng = np.random.default_rng(5)

@@ -10,6 +10,7 @@ the curves by a band that holds for the whole curve. The level of both together 
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 SUMMARY = "has the friction changed between two identified models?"
@@ -45,11 +46,11 @@ def run(args: argparse.Namespace) -> int:
     for c in result.changes:
         span = f"[{c.lower:.4g}, {c.upper:.4g}]"
         mark = "changed" if c.changed else ""
-        print(
-            f"{c.name:<14}{c.first:>11.5g}{c.second:>11.5g}  {span:<26} {c.unit:<11} {c.p:<9.2g}{mark}".rstrip()
-        )
+        p = "-" if math.isnan(c.p) else f"{c.p:.2g}"
+        print(f"{c.name:<14}{c.first:>11.5g}{c.second:>11.5g}  {span:<26} {c.unit:<11} {p:<9}{mark}".rstrip())
     print()
-    print(f"friction parameters together: p = {result.p:.2g}")
+    if not math.isnan(result.p):
+        print(f"friction parameters together: p = {result.p:.2g}")
     print(f"sliding curve: largest difference is {result.largest:.2g} times what the intervals explain")
     for note in result.notes:
         print(note)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,10 @@ DRAWS = 400
 
 @dataclass(frozen=True)
 class Change:
-    """One parameter in both models; ``p`` is the chance of such a difference without a change, after Holm."""
+    """One parameter in both models; ``p`` is the chance of such a difference without a change, after Holm.
+
+    Not a number where it cannot be told, as other parameters of the law are not identified.
+    """
 
     name: str
     unit: str
@@ -49,11 +52,11 @@ class Comparison:
     changes : tuple of Change
         Parameters that both models identified.
     p : float
-        Of the joint test on those of the law (chi-square); not a number where there are none in common.
+        Of the joint test on those of the law (chi-square); not a number where the law has some that are not identified.
     velocity, difference, band : array, shape (n,)
         Second curve minus first, and the half-width that holds 95 % of the whole curves.
     changed : bool
-        Either test says so.
+        Either test says so; the curves' alone where there is no other.
     notes : tuple of str
     picture : Picture
     """
@@ -164,8 +167,14 @@ def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Ch
         if log:
             low, high = x.value * math.expm1(low), x.value * math.expm1(high)
         changes.append(Change(x.name, x.unit, x.value, y.value, low, high, float(p)))
+    # What is not identified may trade places with what is, whose interval then leans on it: a joint test would take
+    # two equally good descriptions of one friction for a change.
+    open_ones = sorted({e.name for m in (first, second) for e in m.law_estimates[0] if not e.identified})
     left = sorted({e.name for e in (*first.estimates, *second.estimates)} - set(names))
     notes = [f"Not compared, since not identified in both: {', '.join(left)}."] if left else []
+    if open_ones:
+        notes.append("As parameters of the law are not identified, the curves alone decide.")
+        joint, changes = math.nan, [replace(c, p=math.nan) for c in changes]
     return tuple(changes), joint, notes
 
 

@@ -272,6 +272,6 @@ def _picture(responses: Sequence[Response], solution: Array, axis: ServoAxis) ->
     rigid = 1.0 / (solution[0] * s**2 + solution[1] * s)
     return Picture(
         "inertia", "Frequency response", "The rigid axis explains the response below its resonances",
-        "frequency in Hz", f"position over torque in dB ({axis.unit('rad')}/({axis.unit('N·m')}))",
+        "frequency (Hz)", f"position over torque (dB of 1 {axis.unit('rad')}/({axis.unit('N·m')}))",
         (*decibel, Trace("rigid axis", f, 20.0 * np.log10(np.abs(rigid)), "dashes")), "log",
     )  # fmt: skip

@@ -164,7 +164,7 @@ def residuals(
     signal: str, label: str, rest: Array, position: Array, velocity: Array, time: Array, angle: str, speed: str
 ) -> list[Picture]:  # fmt: skip
     """Mean and the middle 90 % of a residual in bins of position, velocity and time."""
-    rms = float(np.sqrt(np.mean(rest**2)))
+    rms, unit = float(np.sqrt(np.mean(rest**2))), label.rpartition(" (")[2].rstrip(")")
     out: list[Picture] = []
     for name, x, x_label in (
         ("position", position, f"position ({angle})"), ("velocity", velocity, f"velocity ({speed})"),
@@ -182,7 +182,7 @@ def residuals(
         )  # fmt: skip
         out.append(Picture(
             f"residual-{signal}-over-{name}", f"Residual of the {signal} over {name}",
-            f"Root mean square {rms:.3g}; {word}", x_label, label, traces,
+            f"Root mean square {rms:.3g} {unit}; {word}", x_label, label, traces,
         ))  # fmt: skip
     return out
 
