@@ -67,8 +67,6 @@ def can_run(case: Case) -> str:
         return "the exact integrator runs controllers in continuous time, not with a sample time"
     if math.isfinite(controller.torque_limit):
         return "the exact integrator needs a controller without a torque limit"
-    if controller.gains.kp == 0.0 and case.plant.model is not None and case.plant.model.law.state_fields:
-        return "the exact integrator needs a proportional gain: sliding freely, it would take minute steps"
     for side in (case.plant, case.compensator):
         if side.model is not None and side.model.law.reads_surroundings:
             return f"law {side.model.law.name!r} depends on its surroundings ({modulations(side.model.law)})"
@@ -83,6 +81,12 @@ def can_run(case: Case) -> str:
         if complaint:
             return f"the exact integrator cannot take the {where}: {complaint}"
     plant = elements_of(case.plant)
+    springs = isinstance(plant, Elements) and any(math.isfinite(k) for k in plant.stiffness)
+    if springs and controller.gains.kp == 0.0:
+        return (
+            "the exact integrator needs a proportional gain with this plant: in a free slide, every spring slipping,"
+            " it loses digits"
+        )
     if isinstance(plant, Elements) and math.isfinite(plant.slope):
         return "the exact integrator cannot take the plant: it creeps on its steep slope instead of resting"
     return ""
