@@ -5,7 +5,8 @@
 The record belongs to the report of Janot, Gautier and Brunot (2019, hal-02178709) and is not part of this package;
 without it this prints where to get it. The command line does the second half from the file:
 
-    stickslip identify DATA_EMPS.mat --drive-gain 35.15065 --loop kp=38995.8,kd=243.45,limit=10,span=2 --law coulomb
+    stickslip identify DATA_EMPS.mat --drive-gain 35.15065 --loop kp=38995.8,kd=243.45,limit=10,span=2 --law coulomb \\
+        --intervals covariance
 """
 
 from __future__ import annotations
@@ -49,7 +50,8 @@ def main() -> int:
         print(f"inverse dynamics, relative force error {100 * found.relative_error:.4f} %")
         for name, value, std, unit in zip(found.names, found.values, found.std, found.units):
             print(f"  {name:<10}{value:>10.4f} +- {std:.4f} {unit}")
-    result = identify_axis([trial], axis, ["coulomb"])
+    # The output error is what was published; the prediction error looks at what Coulomb friction leaves out, too.
+    result = identify_axis([trial], axis, ["coulomb"], intervals="covariance")
     print(
         f"closed loop, relative errors: position {100 * result.misfit['position_relative']:.5f} %, "
         f"force {100 * result.misfit['drive_relative']:.3f} %"
