@@ -25,6 +25,8 @@ class Feedback(Compensator):
         Factor on the compensating torque; 1 cancels the whole model.
     filter_hz : float or None
         Corner of a second-order Butterworth low-pass on the velocity, Hz.
+    lead : float
+        0: only a reference can be led.
     deadband : float
         The law sees velocities below it, rad/s, as rest, so that a count of the encoder does not compensate a friction
         that is not there. Only with a sample time.
