@@ -88,7 +88,8 @@ def check() -> None:
     why = str(cuda.cuda_error() or "the driver is there, but no device").strip().splitlines()
     raise InputError(
         "device = 'gpu': no GPU was found; looked for NVIDIA's driver (libcuda) and a device through numba.cuda: "
-        f"{why[0].rstrip('.') if why else 'none'}; on a machine with both, pip install 'stickslip[gpu]'; else choose device = 'cpu'"
+        f"{why[0].rstrip('.') if why else 'none'}; on a machine with both, pip install 'stickslip[gpu]'; "
+        "else choose device = 'cpu'"
     )
 
 
