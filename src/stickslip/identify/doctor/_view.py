@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import shlex
 from dataclasses import dataclass
@@ -10,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.filters import low_pass
 from stickslip.record import Record
 
 __all__ = ["Array", "Column", "Smooth", "View", "is_number", "row", "step_of"]
@@ -145,9 +145,13 @@ class View:
             return None
         grid = np.linspace(float(self.time[0]), float(self.time[-1]), count)
         period = span / (count - 1)
+        signal: Any = importlib.import_module("scipy.signal")
+        sections = signal.butter(2, 0.08, output="sos")
 
         def filtered(values: Array) -> Array:
-            return low_pass(values, 0.08, 2.0, order=2, edge=min(30, values.size - 1))
+            return np.asarray(
+                signal.sosfiltfilt(sections, values, padlen=min(30, values.size - 1)), dtype=np.float64
+            )
 
         def at_grid(channel: str) -> Array:
             return np.interp(grid, self.time, self.values(channel))
