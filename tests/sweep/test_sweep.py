@@ -130,6 +130,17 @@ def test_a_case_out_of_bounds_is_a_failure_of_its_own(small):
     assert "must be greater than 0" in why[1]
 
 
+@pytest.mark.parametrize("integrator", ["exact", "adaptive", "fixed"])
+def test_every_integrator_is_held_against_a_worse_run(small, integrator):
+    run = replace(small.runs[0], duration=0.1)
+    run = replace(run, numerics=replace(run.numerics, integrator=integrator, output=0.1, tolerance=1e-6))
+    one, worse = (
+        block._alone(run, {"friction.fs": 0.35}, ["position_rms_rad"], kick)[0][0] for kick in (0.0, 2.0)
+    )
+    assert one != worse  # else nothing would ever be flagged
+    assert one == pytest.approx(worse, rel=1e-2)
+
+
 def test_metrics_differ_beyond_one_per_cent():
     one = np.array([[1e-3, 5.0], [1e-3, 5.0], [1e-3, np.nan], [1e-10, 5.0]])
     other = np.array([[1.02e-3, 5.0], [1.005e-3, 5.0], [1e-3, 5.0], [2e-10, 5.0]])
