@@ -82,7 +82,7 @@ def described(args: argparse.Namespace) -> tuple[Machine, Gains, dict[str, Model
     if args.amplitude < 0.0 or any(f < 0.0 for f in args.filter):
         raise InputError("--amplitude and --filter must be 0 or greater")
     inertia = plant.inertia if args.inertia is None else args.inertia
-    if args.confirm and (args.sample_time or args.delay):
+    if args.confirm and (args.sample_time is not None or args.delay is not None):
         raise InputError(
             "--confirm runs the machine with its own sample time and delay; leave the options out"
         )
