@@ -10,8 +10,9 @@ import pytest
 
 from stickslip.analyse.tracking import tracking_metrics
 from stickslip.commission.candidates import Following
-from stickslip.commission.commission import commission
+from stickslip.commission.commission import commission, tried
 from stickslip.commission.recommended import write_recommended
+from stickslip.errors import InputError, LimitCrossed
 from stickslip.identify.model_file import write_model
 from stickslip.identify.segments import constant_velocity_segments
 from stickslip.machines.contact import Contact
@@ -116,6 +117,16 @@ def test_a_machine_that_is_not_in_the_library(tmp_path):
     sources = [Source(s.name, s.performed.record) for s in done.stages]
     report = write_identification(tmp_path / "report.html", done.result, sources, title="Commissioning")
     assert "Total pre-sliding stiffness" in report.read_text()
+
+
+@pytest.mark.parametrize("error", [InputError("the position does not answer"), LimitCrossed("speed")])
+def test_a_recommendation_that_fails_leaves_the_model(error):
+    def fails():
+        raise error
+
+    found, said = tried(fails)
+    assert found is None
+    assert str(error) in said[0]
 
 
 @pytest.mark.slow

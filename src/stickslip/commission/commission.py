@@ -40,7 +40,7 @@ from stickslip.machines.angle import AngleMap
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.rigs.procedures.attraction import Attraction
-from stickslip.rigs.procedures.base import Performed, Plan, Procedure, perform
+from stickslip.rigs.procedures.base import CheckFailed, Performed, Plan, Procedure, perform
 from stickslip.rigs.procedures.breakaway import Breakaway
 from stickslip.rigs.procedures.inertia import Inertia
 from stickslip.rigs.procedures.presliding import Presliding
@@ -195,9 +195,10 @@ def commission(
     model, stiffness, said = joined_model(curve, stuck)
     recommended = None
     if track_too:
-        recommended = _recommended(
-            course, j, top, fs, model, stiffness, angle, lugre.model if lugre else None
+        recommended, unsaid = tried(
+            lambda: _recommended(course, j, top, fs, model, stiffness, angle, lugre.model if lugre else None)
         )
+        said = (*said, *unsaid)
     result = _result(course, model, j, stiffness, said, angle, recommended)
     return Commissioned(
         tuple(course.stages), j, model, lugre.model if lugre else None, angle, recommended, stiffness, result,
@@ -289,6 +290,14 @@ def _stickslip(course: _Course, j: float, fs: float, sliding: Mapping[str, float
 
 
 # ---- the whole ------------------------------------------------------------------------------------------------
+
+
+def tried(recommend: Callable[[], Recommended]) -> tuple[Recommended | None, tuple[str, ...]]:
+    """The recommendation; where it fails, why: no stage rests on it, and the model that is had is kept."""
+    try:
+        return recommend(), ()
+    except (InputError, CheckFailed, LimitCrossed) as error:
+        return None, (f"No compensator is recommended: {str(error).rstrip('.')}.",)
 
 
 def _recommended(
