@@ -132,6 +132,7 @@ def test_a_deadband_takes_single_counts_for_rest() -> None:
         (lambda m: Feedback(m, deadband=math.nan), "deadband"),
         (lambda m: Feedback(m, lead=1e-3), "reference"),
         (lambda m: Controller(place("PD", 1e-3, 10.0, 1.0), Feedforward(m, lead=1e-3)), "sample_time"),
+        (lambda m: Drive(encoder_counts=-1.0), "encoder_counts"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message) -> None:

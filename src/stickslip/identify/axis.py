@@ -35,6 +35,7 @@ AUTOMATIC = ("coulomb", "stribeck", "lugre")
 MISSING = "Not identified:"
 NARROW = "Intervals come from the covariance of the output error:"
 NO_PREDICTION = "The prediction error cannot be had from these records:"
+ASK = " --intervals prediction gives honest ones."
 INTERVALS = ("prediction", "covariance")
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
@@ -152,7 +153,8 @@ def identify_axis(
             trials, axis, chosen, first=inverse, values=given, free=free, frozen=frozen, extras=extras
         )
     except InputError as error:
-        return replace(found_axis, notes=(*found_axis.notes, f"{NO_PREDICTION} {error}."))
+        kept = [n.removesuffix(ASK) for n in found_axis.notes]
+        return replace(found_axis, notes=(*kept, f"{NO_PREDICTION} {error}."))
     return with_prediction(found_axis, prediction)
 
 
@@ -307,11 +309,7 @@ def narrow_note(result: OutputError) -> tuple[str, ...]:
     most = (
         " most of all for what slow motion and break-away tell" if result.problem.law.velocity_scale else ""
     )
-    remedy = (
-        ""
-        if any(t.drive is None for t in result.problem.trials)
-        else " --intervals prediction gives honest ones."
-    )
+    remedy = "" if any(t.drive is None for t in result.problem.trials) else ASK
     return (f"{NARROW} too narrow where noise is coloured,{most}.{remedy}".replace(",.", "."),)
 
 

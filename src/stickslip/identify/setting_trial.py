@@ -50,6 +50,8 @@ class Drive:
         for name in ("bandwidth", "damping", "sample_time", "torque_limit", "amplitude", "frequency"):
             if not getattr(self, name) > 0.0:
                 raise ParameterError(f"drive: {name} = {getattr(self, name):g} must be greater than 0")
+        if not self.encoder_counts >= 0.0:
+            raise ParameterError(f"drive: encoder_counts = {self.encoder_counts:g} must be 0 or greater")
         if self.bandwidth * self.sample_time > 0.1:
             raise ParameterError(
                 f"drive: bandwidth = {self.bandwidth:g} Hz is more than a tenth of the sample rate "

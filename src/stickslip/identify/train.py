@@ -291,7 +291,11 @@ def identified_train(
                    math.hypot(2.0 * mode, of_motor) * train.axis.elasticity),
             within("load_inertia", "kg·m²", "J_L", load, of_load * load),
         ]  # fmt: skip
-    notes = (f"A PD rings from {rings_at:.3g} Hz on, at {frequency:.3g} Hz while {name}.",)
+    notes = (
+        f"A PD rings from {rings_at:.3g} Hz on, at {frequency:.3g} Hz while {name}."
+        if name
+        else f"No PD up to {rings_at:.3g} Hz rings.",
+    )
     return Identification(
         "resonance", None, tuple(estimates), np.eye(len(estimates)), {}, notes, (),
         (picture_of(responses, train),), {"train": train, "responses": tuple(responses)},
