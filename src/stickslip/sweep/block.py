@@ -152,10 +152,10 @@ def _floor(name: str, duration: float) -> float:
 def measured(
     planned: PlannedRun, values: Mapping[str, Array], metrics: Sequence[str], n: int, kick: float = 0.0
 ) -> tuple[Array, list[str]]:
-    """Metrics, shape (n, metrics), and failures of every case; with a kick less exact (`stickslip.simulation.accuracy`).
+    """Metrics, shape (n, metrics), and failures of every case; less exact with a kick.
 
     The exact integrator's steps are then wrong on purpose, the adaptive one's tolerance is ten times wider, the fixed
-    one's step twice as long.
+    one's step twice as long (`stickslip.simulation.accuracy`).
     """
     many = _as_batch(planned, values)
     if many is None:

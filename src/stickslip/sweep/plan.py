@@ -45,8 +45,8 @@ class Sweep:
         The cases.
     metrics : tuple of str
     check : bool
-        Whether every case is run twice more with wrong steps, and those that differ tighter, to flag those whose metrics
-        are not sure; in lanes once more, with twice the step.
+        Whether every case is run twice more with wrong steps, and those that differ tighter, to flag those whose
+        metrics are not sure; in lanes once more, with twice the step.
     study : Study
     config : mapping
         The sweep's TOML as read.
