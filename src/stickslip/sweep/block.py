@@ -46,8 +46,8 @@ class Block:
     metrics : array, shape (n, metrics)
         NaN where there is none.
     flagged : array of bool, shape (n,)
-        The metrics are not sure, not even at the tightest tolerance: wrong steps change one of them by more than 1 %, or
-        a count of reversals by more than one. In lanes: twice the step does, by more than 0.3 %.
+        The metrics are not sure, not even at the tightest tolerance: wrong steps change one of them by more than 1 %,
+        or a count of reversals by more than one. In lanes: twice the step does, by more than 0.3 %.
     failures : list of str
         Why a case ended early or could not be run, else "".
     """
