@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -88,6 +89,19 @@ def test_a_setting_that_is_unsafe_on_an_axis_drawn_later_gives_way(monkeypatch: 
     assert advice.chosen.setting.kind == "feedback"
     fed = [c for c in advice.candidates if c.setting.kind == "feedforward"]
     assert all("rough motion on an axis drawn later" in c.unsafe for c in fed)
+
+
+def test_a_law_without_intervals_is_simulated_once_and_promises_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As `stickslip rig commission` writes it: the estimates are the stages', not the law's."""
+    monkeypatch.setattr(recommending, "GAINS", (0.8,))
+    found = identified(0.02)
+    named = tuple(replace(e, name=f"sliding.{e.name}") for e in found.estimates)
+    advice = recommend(replace(found, estimates=named), Drive(20.0), axes=1, confirm=2)
+    assert advice.axes == 1
+    assert advice.confidence == advice.confirmed_on == 0
+    assert any("no intervals" in note for note in advice.notes)
 
 
 def torques(compensator: Feedforward | Feedback, position: np.ndarray, speed: np.ndarray) -> np.ndarray:

@@ -108,12 +108,13 @@ def compare_models(
     Raises
     ------
     InputError
-        If a file has no estimates, or the axes move differently.
+        If a file has no estimates of its law, or the axes move differently.
     """
     for x in (first, second):
-        if not x.estimates:
+        if not x.law_estimates[0]:
             raise InputError(
-                f"{x.path} has no intervals; only what `stickslip identify` wrote can be compared"
+                f"{x.path} has no intervals of its law's parameters; only what `stickslip identify` wrote can be "
+                "compared"
             )
     if first.motion != second.motion:
         raise InputError(f"{first.path} is a {first.motion} axis and {second.path} a {second.motion} one")

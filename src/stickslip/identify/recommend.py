@@ -210,7 +210,7 @@ def recommend(
     inertia : float, optional
         kg·m², where the model has none.
     axes : int
-        Besides the best estimate, drawn from the model's intervals: for all candidates.
+        Besides the best estimate, drawn from the model's intervals: for all candidates; none where the law has none.
     confirm : int
         Drawn besides, on which the best candidate is confirmed: its `Recommendation.reduction` is theirs.
     seed : int
@@ -234,6 +234,8 @@ def recommend(
         place("PD", float(j), drive.bandwidth, drive.damping), None, drive.torque_limit, drive.sample_time,
         drive.encoder_counts,
     )  # fmt: skip
+    if not found.law_estimates[0]:
+        axes = confirm = 0  # Nothing of the friction would be drawn: all axes would be the same one.
     laws = laws_of(found.model)
     bench = Bench(list(plants_of(found, float(j), axes, seed)), linear, drive, laws)
     others = Bench(list(plants_of(found, float(j), confirm, seed + 1)), linear, drive, laws)
@@ -345,8 +347,8 @@ def with_lead(candidate: Candidate, bench: Bench) -> Candidate:
 def notes_on(found: Identified, chosen: Candidate | None, candidates: Sequence[Candidate]) -> Iterator[str]:
     """What the user must know."""
     unknown = [e.name for e in found.estimates if not e.identified]
-    if not found.estimates:
-        yield "The model has no intervals: only its best estimate was simulated, and nothing is said about its error."
+    if not found.law_estimates[0]:
+        yield "The law has no intervals: only its best estimate was simulated, and nothing is said about its error."
     elif unknown:
         yield f"Not identified: {', '.join(unknown)}; the axes drawn cover at most a factor of 9 to each side for them."
     if chosen is None:
