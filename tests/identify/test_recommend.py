@@ -104,6 +104,15 @@ def test_a_law_without_intervals_is_simulated_once_and_promises_nothing(
     assert any("no intervals" in note for note in advice.notes)
 
 
+def test_axes_are_drawn_about_the_inertia_that_is_given() -> None:
+    found = identified(0.02)
+    own = Estimate("inertia", "kg·m²", "J", INERTIA, 0.01 * INERTIA, 0.98 * INERTIA, 1.02 * INERTIA, True)
+    more = replace(found, estimates=(*found.estimates, own), correlation=np.eye(len(found.estimates) + 1))
+    drawn = [plant.inertia for plant in recommending.plants_of(more, 3.0 * INERTIA, 20, 0)]
+    assert drawn == pytest.approx([3.0 * INERTIA] * 21, rel=0.05)
+    assert np.ptp(drawn) > 0.01 * INERTIA
+
+
 def torques(compensator: Feedforward | Feedback, position: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Compensating torque at every sample of 1 ms."""
     law, p = compensator.model.law, compensator.model.parameters

@@ -268,10 +268,11 @@ def recommend(
 
 
 def plants_of(found: Identified, inertia: float, count: int, seed: int) -> Iterator[RigidAxis]:
-    """The best estimate, and axes drawn from the intervals."""
+    """The best estimate, and axes drawn from the intervals; about another inertia as wide in proportion."""
     yield RigidAxis(inertia, found.model)
+    identified = next((e.value for e in found.estimates if e.name == "inertia"), inertia)
     for model, named in draw_models(found.model, found.estimates, found.correlation, count, seed):
-        yield RigidAxis(named.get("inertia", inertia), model)
+        yield RigidAxis(inertia * named.get("inertia", identified) / identified, model)
 
 
 def laws_of(model: Model) -> dict[str, Model]:
