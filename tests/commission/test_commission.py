@@ -12,6 +12,9 @@ from stickslip.analyse.tracking import tracking_metrics
 from stickslip.commission.candidates import Following
 from stickslip.commission.commission import commission, tried
 from stickslip.commission.recommended import write_recommended
+from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.controller import Controller
+from stickslip.control.linear import place
 from stickslip.errors import InputError, LimitCrossed
 from stickslip.identify.model_file import write_model
 from stickslip.identify.segments import constant_velocity_segments
@@ -117,6 +120,12 @@ def test_a_machine_that_is_not_in_the_library(tmp_path):
     sources = [Source(s.name, s.performed.record) for s in done.stages]
     report = write_identification(tmp_path / "report.html", done.result, sources, title="Commissioning")
     assert "Total pre-sliding stiffness" in report.read_text()
+
+
+def test_a_record_of_tracking_names_the_lead():
+    helper = Feedforward(Model("coulomb", fc=0.3), lead=2e-3)
+    using = Controller(place("PD", 1e-3, 10.0, 1.0), helper, sample_time=1e-3)
+    assert Following(using=using).options()["compensator"]["lead"] == 2e-3
 
 
 @pytest.mark.parametrize("error", [InputError("the position does not answer"), LimitCrossed("speed")])

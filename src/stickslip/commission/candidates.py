@@ -92,7 +92,8 @@ class Following(Track):
         helper = self.using.compensator
         return {
             "reference": self.reference, "gains": self.using.gains._asdict(),
-            "compensator": {"kind": helper.name, "gain": helper.gain, **helper.model.as_dict()} if helper else None,
+            "compensator": helper
+            and {"kind": helper.name, "gain": helper.gain, "lead": helper.lead, **helper.model.as_dict()},
             "angle": self.over.as_dict(),
         }  # fmt: skip
 
