@@ -171,7 +171,8 @@ def prediction_error(
     ]
     moved = [c.adapted(u).descend(u, 6, 1e-3).u - u for c in others]
     beside = shaken_steps(criterion, optimum, np.random.default_rng(seed))
-    beside = beside + sum(np.outer(d, d) for d in moved)
+    # Mean square over the choices, the one taken among them: the interval about reaches what the others find.
+    beside = beside + sum(np.outer(d, d) for d in moved) / (len(moved) + 1)
     estimates = estimates_of(vector, u, spread, beside, signed_scale)
     accepted = feasible(law, vector.law_parameters(u))
     assert accepted is not None

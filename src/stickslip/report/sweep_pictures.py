@@ -134,6 +134,7 @@ def _lines(
     levels: Array, lines: dict[str, Array], names: list[str], factor: float, label: str, note: str
 ) -> Panel:
     curves = [Curve(levels, factor * lines[n], n, style_of(n, list(lines))) for n in names]
+    curves.sort(key=lambda c: c.style.dashes != "-")  # whole lines below: broken ones show where they agree
     return Panel(curves, label, "uncertainty of what varies, ±%", note=note, y_scale="log")
 
 
