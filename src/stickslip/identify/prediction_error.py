@@ -12,10 +12,11 @@ knowledge of the controller. Three things keep the truth near the minimum:
 
 The residuals are correlated and uneven for the same reason, so that the covariance comes from leaving stretches of
 time out (`stickslip.identify.jackknife`), and the quantile from the degrees of freedom that this has. What the
-linearisation does not see, contacts that stick or slip by chance, is added from the steps that the estimate takes
-when the corrections are given to the torque once more as noise (dependent wild bootstrap: Shao 2010), and from what
-a slower observer, one that is firm in slow motion and a stricter view of outliers would have found: none is better
-founded than the others. The search (`stickslip.identify.axis_prediction`) takes the firm one, under which the true
+linearisation does not see, contacts that stick or slip by chance, shows in the steps that the estimate takes when
+the corrections are given to the torque once more as noise (dependent wild bootstrap: Shao 2010). Both say how far
+the same noise moves the estimate: of the two the larger counts, not the sum. Added is what a slower observer, one
+that is firm in slow motion and a stricter view of outliers would have found: none is better founded than the others.
+The search (`stickslip.identify.axis_prediction`) takes the firm one, under which the true
 parameters are a minimum also where the soft one parts from a contact that sticks by chance.
 """
 
@@ -74,8 +75,10 @@ class PredictionError:
         Sum of squares at it, outliers weighed.
     spread : BlockCovariance
         Of the coordinates, by leaving stretches out.
+    shaken : array, shape (p, p)
+        The same from noise; of the two the larger counts.
     beside : array, shape (p, p)
-        What is added to its covariance: from noise, and from other choices that would do as well.
+        What is added: from other choices that would do as well.
     estimates : tuple of Estimate
     corrections : tuple of array
         Per motion the torque that the model lacks, N·m, in the band.
@@ -87,6 +90,7 @@ class PredictionError:
     mechanics: Mechanics
     cost: float
     spread: BlockCovariance
+    shaken: Array
     beside: Array
     estimates: tuple[Estimate, ...]
     corrections: tuple[Array, ...]
@@ -94,7 +98,8 @@ class PredictionError:
     def correlation(self) -> Array:
         """Of the estimates, in their order, shape (free parameters, free parameters)."""
         change = self.vector.jacobian(self.u)
-        covariance = change @ (self.spread.covariance + self.beside) @ change.T
+        within = 0.5 * (self.spread.covariance + self.shaken)
+        covariance = change @ (within + self.beside) @ change.T
         std = np.sqrt(np.diag(covariance))
         with np.errstate(invalid="ignore", divide="ignore"):
             return covariance / np.outer(std, std)
@@ -170,16 +175,24 @@ def prediction_error(
         replace(criterion, freedom=STRICTER),
     ]
     moved = [c.adapted(u).descend(u, 6, 1e-3).u - u for c in others]
-    beside = shaken_steps(criterion, optimum, np.random.default_rng(seed))
-    # Mean square over the choices, the one taken among them: the interval about reaches what the others find.
-    beside = beside + sum(np.outer(d, d) for d in moved) / (len(moved) + 1)
-    estimates = estimates_of(vector, u, spread, beside, signed_scale)
+    shaken = shaken_steps(criterion, optimum, np.random.default_rng(seed))
+    beside = sum((np.outer(d, d) for d in moved), np.zeros_like(shaken))
+    estimates = estimates_of(vector, u, spread, shaken, beside, signed_scale)
     accepted = feasible(law, vector.law_parameters(u))
     assert accepted is not None
     model = Model(law, **accepted._asdict())
     named = mechanics(vector.named(u))
     return PredictionError(
-        vector, u, model, named, optimum.cost, spread, beside, estimates, tuple(criterion.corrections(u))
+        vector,
+        u,
+        model,
+        named,
+        optimum.cost,
+        spread,
+        shaken,
+        beside,
+        estimates,
+        tuple(criterion.corrections(u)),
     )
 
 
@@ -254,6 +267,7 @@ def estimates_of(
     vector: Vector,
     u: Array,
     spread: BlockCovariance,
+    shaken: Array,
     beside: Array,
     signed_scale: float | Mapping[str, float],
 ) -> tuple[Estimate, ...]:
@@ -264,7 +278,8 @@ def estimates_of(
     change = vector.jacobian(u)
     out: list[Estimate] = []
     for k, p in enumerate(vector.free):
-        variance = float(change[k] @ (spread.covariance + beside) @ change[k])
+        within = max(float(change[k] @ c @ change[k]) for c in (spread.covariance, shaken))
+        variance = within + float(change[k] @ beside @ change[k])
         std = math.sqrt(variance) if variance >= 0.0 else math.inf
         dof = max(spread.freedom(change[k]) - 1.0, 1.0)
         width = float(special.stdtrit(dof, 0.975))
