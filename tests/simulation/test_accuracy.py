@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
@@ -60,7 +58,6 @@ def test_simulate_tells_when_asked():
 def test_the_adaptive_integrator_is_held_to_ten_times_the_tolerance():
     record = simulate(AXIS, PD, SINE, 0.2, integrator="adaptive", tolerance=1e-8, check=True)
     assert 0.0 < record.meta["accuracy"]["error_rad"] < 1e-7
-    assert math.isfinite(record.meta["accuracy"]["error_rad"])
 
 
 def test_the_fixed_integrator_has_no_tolerance():

@@ -181,6 +181,8 @@ def commissioned(args: argparse.Namespace) -> int:
     data = [described(folder / f"{name}.npz", len(record)) for name, record in records.items()]
     model = write_model(folder / "model.toml", found.result, data=data)
     advice = found.recommended
+    # One of an earlier commissioning must not be run when nothing is recommended now.
+    (folder / "recommended.toml").unlink(missing_ok=True)
     if advice and advice.chosen:
         write_recommended(folder / "recommended.toml", advice)
     sources = [Source(s.name, s.performed.record, findings_of(s.performed)) for s in stages]
