@@ -11,7 +11,7 @@ no law at all.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,8 +19,9 @@ import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
+from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.hysteresis import correlation_lags
+from stickslip.identify.lugre_scan import plain_scan, plain_verdict, response_picture, scan_picture
 from stickslip.identify.noise import Noise, as_noise
 from stickslip.identify.optimum import Residuals
 from stickslip.identify.secant import descend_by_secants
@@ -37,8 +38,6 @@ Rows = np.ndarray[Any, np.dtype[np.intp]]
 
 NEAR = 0.15
 """Part of the static torque up to which the load counts as near zero: there LuGre and other laws have one slope."""
-SCAN = np.geomspace(0.02, 50.0, 18)
-"""Multiples of the small-signal stiffness at which the plain position misfit is looked at."""
 STEP = 2e-4
 """s, longest step of the simulation, whose error is extrapolated to none from this one and half of it."""
 ROUGH = 1e-3
@@ -49,9 +48,6 @@ BUSY = (0.1, 10.0)
 """Times the Stribeck velocity: between these speeds friction falls and rises, and nearly all error is made there."""
 GRADES = ((0.02, STEP), (0.002, 5e-5))
 """s before and after these speeds, and the longest step there, s; what rings after a stop has died away by then."""
-FLAT = 1.1
-"""Misfits within this factor are not told apart."""
-
 DIFFERENCE = 1e-3
 """Of the coordinates, for Jacobians: where a reversal falls between two steps leaves the simulation 7 digits."""
 
@@ -269,6 +265,49 @@ def fit_position(
     )  # fmt: skip
 
 
+def fit_bristles(
+    response: Response, simulation: Simulation, pieces: Sequence[Rows], vs: float, noise: Noise | None
+) -> Fit:
+    """Fit of the displacements within the parts that stick, each without its mean; vs in rad/s."""
+    vector = simulation.vector
+
+    def bristles(position: Array) -> Array:
+        return np.concatenate([position[p] - np.mean(position[p]) for p in pieces])
+
+    wanted = bristles(response.position)
+    enough = ENOUGH / wanted.size
+
+    def apart(stepped: Simulation) -> Residuals:
+        return lambda u: bristles(stepped.position(u)) - wanted
+
+    def descended(u: Array) -> tuple[Array, float]:
+        return descend_by_secants(
+            apart(simulation.graded(u, vs)), u, vector.lower, vector.upper, tolerance=enough,
+            difference=DIFFERENCE,
+        )  # fmt: skip
+
+    # sigma1 hardly matters here, and may end at either of its bounds.
+    undamped = vector.start.copy()
+    undamped[vector.names.index("sigma1")] = 0.0
+    near = min((descended(u) for u in (vector.start, undamped)), key=lambda found: found[1])[0]
+    return fit(
+        apart(simulation.graded(near, vs)), vector, noise=noise, size=float(np.max(np.abs(wanted))),
+        starts=near[None, :], tolerance=enough, difference=DIFFERENCE,
+    )  # fmt: skip
+
+
+def left_open(found: Fit) -> list[str]:
+    """What this record cannot tell."""
+    notes: list[str] = []
+    if any(e.name == "sigma1" and not e.identified for e in found.estimates):
+        notes.append(
+            "sigma1 is not determined by this record: near zero load its torque is a tiny part of the spring's."
+        )
+    if not found.noise.known:
+        notes.append("The noise of the position is unknown; give it, or nothing can be called identified.")
+    return notes
+
+
 def identify_lugre_dynamics(
     response: Response, inertia: float, sliding: Mapping[str, float], *, noise: Noise | float | None = None,
 ) -> Identification:  # fmt: skip
@@ -304,43 +343,10 @@ def identify_lugre_dynamics(
     vector = lugre_vector(sliding, begin, 0.1 * critical, critical)
     simulation = Simulation(response, vector, inertia)
     pieces = sticking_pieces(response, sliding["fs"])
-
-    def bristles(position: Array) -> Array:
-        return np.concatenate([position[p] - np.mean(position[p]) for p in pieces])
-
-    wanted = bristles(response.position)
-
-    def descended(u: Array) -> tuple[Array, float]:
-        stepped = simulation.graded(u, sliding["vs"])
-        return descend_by_secants(
-            lambda u: bristles(stepped.position(u)) - wanted, u, vector.lower, vector.upper, tolerance=enough,
-            difference=DIFFERENCE,
-        )  # fmt: skip
-
-    # sigma1 hardly matters here, and may end at either of its bounds.
-    enough, undamped = ENOUGH / wanted.size, vector.start.copy()
-    undamped[vector.names.index("sigma1")] = 0.0
-    near = min((descended(u) for u in (vector.start, undamped)), key=lambda found: found[1])[0]
-    stepped = simulation.graded(near, sliding["vs"])
-    found = fit(
-        lambda u: bristles(stepped.position(u)) - wanted,
-        vector,
-        noise=known,
-        size=float(np.max(np.abs(wanted))),
-        starts=near[None, :],
-        tolerance=enough,
-        difference=DIFFERENCE,
-    )
-    scan = plain_scan(response, simulation, found)
+    found = fit_bristles(response, simulation, pieces, sliding["vs"], known)
+    scan = plain_scan(response.position, simulation.position, found)
     decides, sentence = plain_verdict(scan, found.values["sigma0"])
     simulated = simulation.position(found.u)
-    notes = [sentence]
-    if any(e.name == "sigma1" and not e.identified for e in found.estimates):
-        notes.append(
-            "sigma1 is not determined by this record: near zero load its torque is a tiny part of the spring's."
-        )
-    if not found.noise.known:
-        notes.append("The noise of the position is unknown; give it, or nothing can be called identified.")
     next_steps = (
         ()
         if decides
@@ -354,69 +360,7 @@ def identify_lugre_dynamics(
             "presliding_rms_rad": found.rms,
             "position_rms_rad": float(np.sqrt(np.mean((simulated - response.position) ** 2))),
         },
-        tuple(notes), next_steps,
-        (response_picture(response, simulated), scan_picture(scan, found.values["sigma0"])),
+        (sentence, *left_open(found)), next_steps,
+        (response_picture(response.time, response.position, simulated), scan_picture(scan, found.values["sigma0"])),
         {"scan": scan, "plain_determines_sigma0": decides, "pieces": len(pieces)},
-    )  # fmt: skip
-
-
-def plain_scan(response: Response, simulation: Simulation, found: Fit) -> Array:
-    """sigma0 (N·m/rad) and the root mean square position error (rad) there, shape (m, 2)."""
-    rows: list[tuple[float, float]] = []
-    for factor in SCAN:
-        values = dict(found.values, sigma0=found.values["sigma0"] * float(factor))
-        position = simulation.position(simulation.vector.coordinates(values))
-        rows.append((values["sigma0"], float(np.sqrt(np.mean((position - response.position) ** 2)))))
-    return np.array(rows)
-
-
-def plain_verdict(scan: Array, sigma0: float) -> tuple[bool, str]:
-    """Whether the plain misfit has a minimum at the pre-sliding stiffness, and the sentence that says so."""
-    finite = scan[np.isfinite(scan[:, 1])]
-    best = int(np.argmin(finite[:, 1]))
-    near = finite[finite[:, 1] <= FLAT * finite[best, 1], 0]
-    at_edge = best in (0, finite.shape[0] - 1)
-    if at_edge:
-        side = "grows" if best else "shrinks"
-        return False, (
-            "Plain least squares on the position does not determine sigma0 and sigma1: the misfit falls as "
-            f"sigma0 {side}, to {finite[best, 1]:.3g} rad at {finite[best, 0]:.3g} N·m/rad, the last value "
-            "tried. Gross sliding dominates it; sigma0 comes from the pre-sliding parts, weighted for themselves."
-        )
-    if not (near[0] <= sigma0 <= near[-1]) or near[-1] > 2.0 * near[0]:
-        return False, (
-            "Plain least squares on the position does not determine sigma0 and sigma1: misfits within 10 % of "
-            f"the least reach from sigma0 = {near[0]:.3g} to {near[-1]:.3g} N·m/rad; "
-            f"the pre-sliding parts say {sigma0:.3g}."
-        )
-    return (
-        True,
-        "Plain least squares on the position has its minimum at the stiffness of the pre-sliding parts too.",
-    )
-
-
-# ---- pictures ------------------------------------------------------------------------------------------------
-
-
-def response_picture(response: Response, simulated: Array) -> Picture:
-    """Measured and simulated position (thesis figures 3.12, 4.13, 4.37)."""
-    error = float(np.sqrt(np.mean((simulated - response.position) ** 2)))
-    time, origin = response.time - response.time[0], response.position[0]
-    traces = (Trace("measured", time, response.position - origin), Trace("LuGre", time, simulated - origin))
-    return Picture(
-        "lugre-response", "Open-loop response", f"Root mean square difference {1e3 * error:.3g} mrad", "time (s)",
-        "position (rad)", traces,
-    )  # fmt: skip
-
-
-def scan_picture(scan: Array, sigma0: float) -> Picture:
-    """The plain position misfit over sigma0, and the stiffness of the pre-sliding parts."""
-    traces = (
-        Trace("position misfit", scan[:, 0], scan[:, 1]),
-        Trace("pre-sliding parts", np.array([sigma0]), np.array([math.nan]), "vertical"),
-    )
-    return Picture(
-        "lugre-misfit", "What the whole position says about the stiffness",
-        "A curve without a minimum near the vertical line does not determine sigma0",
-        "sigma0 (N·m/rad)", "RMS position misfit (rad)", traces, "log",
     )  # fmt: skip

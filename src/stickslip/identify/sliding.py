@@ -236,22 +236,11 @@ def identify_sliding(
     unknown = [e.name for e in found.estimates if not e.identified]
     settling = next_velocity(points, found, fastest) if unknown and found.noise.known else None
     model, notes = model_of(found)
-    notes += _noise_notes(found)
     untouched = untouched_parameters(template, frozen, found.vector)
-    if untouched:
-        notes.append(
-            f"Nothing here tells {_listed(untouched)}: these act only away from constant velocity, and stay at the "
-            "values that the search was given."
-        )
-    told: list[str] = []
-    if unknown and found.noise.known:
-        notes.append(f"The data do not determine {_listed(unknown)}: equally good curves differ in them.")
-    if settling is not None:
-        told.append(f"Measure the torque at a constant velocity of {settling:.3g} {points.unit[0]}.")
-    elif not found.noise.known:
-        told.append("Repeat some velocities, so that the noise level is known.")
+    notes += _noise_notes(found) + _open_notes(unknown if found.noise.known else [], untouched)
     return Identification(
-        "sliding", model, found.estimates, found.correlation, _misfit(points, found), tuple(notes), tuple(told),
+        "sliding", model, found.estimates, found.correlation, _misfit(points, found), tuple(notes),
+        _measure_next(points, found, settling),
         (curve_picture(points, found, settling), residual_picture(points, found)),
         {
             "free": found.vector.names,
@@ -315,6 +304,26 @@ def _noise_notes(found: Fit) -> list[str]:
             "The noise level is unknown, so that nothing can be called identified; give it or repeat velocities."
         ]
     return [f"Noise of a point: {found.noise.std:.3g} N·m ({found.noise.source})."]
+
+
+def _open_notes(unknown: Sequence[str], untouched: Sequence[str]) -> list[str]:
+    """Which parameters these points leave open."""
+    notes: list[str] = []
+    if untouched:
+        notes.append(
+            f"Nothing here tells {_listed(untouched)}: these act only away from constant velocity, and stay at the "
+            "values that the search was given."
+        )
+    if unknown:
+        notes.append(f"The data do not determine {_listed(unknown)}: equally good curves differ in them.")
+    return notes
+
+
+def _measure_next(points: SlidingPoints, found: Fit, settling: float | None) -> tuple[str, ...]:
+    """What would tell more."""
+    if settling is not None:
+        return (f"Measure the torque at a constant velocity of {settling:.3g} {points.unit[0]}.",)
+    return () if found.noise.known else ("Repeat some velocities, so that the noise level is known.",)
 
 
 def _misfit(points: SlidingPoints, found: Fit) -> dict[str, float]:

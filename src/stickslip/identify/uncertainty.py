@@ -6,7 +6,7 @@ The noise level is in `stickslip.identify.noise`, the search in `optimum`, profi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -138,19 +138,10 @@ def fit(
     optima = search(residuals, first, low, high, tolerance=tolerance, difference=difference)
     if optima[0].residuals.size == 0:
         raise InputError("no data to fit; give at least one point")
-    level = noise_of_fit(optima[0].cost, optima[0].residuals.size, vector.size, known, size)
-    followed = Profiles({}, optima[0].u[None, :], None)
-    for _ in range(8 if profiles and level.known else 0):
-        followed = profiles_of(residuals, optima[0], level, low, high, lags, difference)
-        if followed.better is None:
-            break
-        # A profile met a better minimum: start again from there.
-        found = descend(residuals, followed.better, low, high, tolerance=tolerance, difference=difference)
-        optima = distinct(sorted([found, *optima], key=lambda o: o.cost), 1e-4)
-        level = noise_of_fit(optima[0].cost, optima[0].residuals.size, vector.size, known, size)
-        followed = Profiles({}, optima[0].u[None, :], None)
-        if not level.known:
-            break
+    optima, level, followed = follow_profiles(
+        residuals, vector, optima, known, size=size, profiles=profiles, lags=lags, tolerance=tolerance,
+        difference=difference,
+    )  # fmt: skip
     best = optima[0]
     threshold = quantile(level) * level.std**2 if level.known else math.inf
     others = tuple(o for o in optima[1:] if o.cost - best.cost < threshold)
@@ -158,6 +149,28 @@ def fit(
     family = np.vstack([followed.family, *(o.u for o in others)])
     estimates = _estimates(vector, best, family, level, covariance, followed.bounds, signed_scale)
     return Fit(vector, best, others, level, covariance, correlation, estimates, family)
+
+
+def follow_profiles(
+    residuals: Residuals, vector: Vector, optima: Sequence[Optimum], known: Noise | None, *, size: float,
+    profiles: bool, lags: int, tolerance: float, difference: float,
+) -> tuple[Sequence[Optimum], Noise, Profiles]:  # fmt: skip
+    """Optima, best first, their noise and their profiles, which start again from every better minimum that one meets.
+
+    The profiles are empty where none are asked for, the noise is unknown, or the last of 8 still met a better minimum.
+    """
+    low, high = vector.lower, vector.upper
+    level = noise_of_fit(optima[0].cost, optima[0].residuals.size, vector.size, known, size)
+    for _ in range(8 if profiles else 0):
+        if not level.known:
+            break
+        followed = profiles_of(residuals, optima[0], level, low, high, lags, difference)
+        if followed.better is None:
+            return optima, level, followed
+        found = descend(residuals, followed.better, low, high, tolerance=tolerance, difference=difference)
+        optima = distinct(sorted([found, *optima], key=lambda o: o.cost), 1e-4)
+        level = noise_of_fit(optima[0].cost, optima[0].residuals.size, vector.size, known, size)
+    return optima, level, Profiles({}, optima[0].u[None, :], None)
 
 
 def covariance_of(vector: Vector, best: Optimum, noise: Noise, lags: int) -> tuple[Array, Array]:
