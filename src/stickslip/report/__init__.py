@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stickslip.errors import InputError
 from stickslip.study.result import StudyResult
 
 if TYPE_CHECKING:
@@ -57,15 +55,12 @@ def write(result: StudyResult) -> Path:
     """
     from stickslip.report._view import StudyView
     from stickslip.report.html import render
+    from stickslip.report.page import replaced, unwritable
 
     view = StudyView(result)
     target = result.folder / "report.html"
     try:
-        figures = draw(result)
-        draft = target.with_name("report.html.part")
-        draft.write_text(render(view, figures), encoding="utf-8")
-        os.replace(draft, target)
+        html = render(view, draw(result))
     except OSError as error:
-        raise InputError(f"cannot write {error.filename or target} ({error.strerror or error}); "
-                         "choose another place with --out") from None  # fmt: skip
-    return target
+        raise unwritable(target, error) from None
+    return replaced(target, html)

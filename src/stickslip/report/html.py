@@ -13,6 +13,7 @@ from stickslip.report._tables import metrics_tables
 from stickslip.report._view import StudyView, is_thesis
 from stickslip.report.captions import case_message, figure_of_merit, ranking
 from stickslip.report.figures import COMMON, Figure
+from stickslip.report.page import filled
 from stickslip.report.plots import embedded
 
 __all__ = ["image", "render"]
@@ -22,15 +23,10 @@ MARKS = {True: ("yes", "holds"), False: ("no", "does not hold"), None: ("open", 
 
 def render(view: StudyView, figures: Sequence[Figure]) -> str:
     """The report's HTML."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     verdicts = {rule: judge(view, rule) for rule in view.rules} if is_thesis(view.result) else {}
-    environment = Environment(
-        loader=PackageLoader("stickslip.report", "."), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True,
-    )  # fmt: skip
     manifest = view.result.manifest
-    return environment.get_template("template.html").render(
+    return filled(
+        "study.html",
         title=manifest.get("title")
         or view.result.config.get("title")
         or f"Study {manifest.get('study', '')}".strip(),

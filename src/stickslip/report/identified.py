@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.record import Record
 from stickslip.report.axis_pictures import data_pictures, pictures_of
 from stickslip.report.identification import draw_picture_to
+from stickslip.report.page import filled, replaced
 from stickslip.report.plots import embedded
 
 __all__ = ["Source", "comparison_of", "number", "write_identification"]
@@ -70,28 +70,13 @@ def write_identification(
     InputError
         If the file cannot be written.
     """
-    target = Path(path)
-    html = rendered(found, sources, title, versions or {})
-    draft = target.with_name(target.name + ".part")
-    try:
-        draft.write_text(html, encoding="utf-8")
-        os.replace(draft, target)
-    except OSError as error:
-        raise InputError(
-            f"{target} cannot be written ({error.strerror}); choose another place with --out"
-        ) from None
-    return target
+    return replaced(Path(path), rendered(found, sources, title, versions or {}))
 
 
 def rendered(
     found: Identification, sources: Sequence[Source], title: str, versions: Mapping[str, str]
 ) -> str:
     """The HTML."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("stickslip.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-    )  # fmt: skip
     pictures = pictures_of(found)
     rest = [p for p in pictures if p.name.startswith("residual-") or p.name.endswith("-residuals")]
     law = found.model.law if found.model else None
@@ -103,7 +88,8 @@ def rendered(
             "fits": figures([p for p in pictures if p not in rest], Path(folder)),
             "residuals": figures(rest, Path(folder)),
         }
-    return environment.get_template("identification.html").render(
+    return filled(
+        "identification.html",
         title=title or f"Friction identified: {sources[0].name if sources else method}",
         ran=ran(found, sources, versions),
         law=f"{law.title or law.name}" if law else "",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyse.rig_verdicts import Judged, judged_over, main_share
-from stickslip.errors import InputError
 from stickslip.report.html import image
+from stickslip.report.page import filled, replaced, unwritable
 from stickslip.report.plots import REFERENCE, Curve, Panel, draw, envelope, style_of
 from stickslip.study.rig_cases import GROUPS, Group
 from stickslip.study.rig_study import NOMINAL, RigResult, RigView
@@ -127,32 +126,24 @@ def write_rig_report(result: RigResult) -> Path:
     InputError
         If the folder cannot be written.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     judged = judged_over(RigView(result), result.variants)
-    environment = Environment(
-        loader=PackageLoader("stickslip.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )  # fmt: skip
     target = result.folder / "report.html"
     try:
-        text = environment.get_template("rig.html").render(
-            title="Chapter 4 of the thesis on a virtual machine",
-            ran=f"{len(result.runs)} runs, {len(result.variants)} variants, {result.manifest['wall_s']:.0f} s",
-            tally=list(_tally(judged)),
-            mains=[{"text": t, "held": a, "of": b} for t, (a, b) in main_share(judged).items()],
-            rows=verdict_table(judged),
-            seeds=result.manifest["seeds"],
-            ablation=_ablation(result),
-            columns=[text for *_, text in ABLATED],
-            figures=draw_groups(result, result.folder / "figures"),
-            stopped=[run for run in result.runs if run.stopped and run.variant == NOMINAL],
-            manifest=json.dumps(result.manifest, indent=1),
-        )
-        draft = target.with_name("report.html.part")
-        draft.write_text(text, encoding="utf-8")
-        os.replace(draft, target)
+        figures = draw_groups(result, result.folder / "figures")
     except OSError as error:
-        raise InputError(
-            f"cannot write {error.filename or target} ({error.strerror or error}); choose another place with --out"
-        ) from None
-    return target
+        raise unwritable(target, error) from None
+    html = filled(
+        "rig.html",
+        title="Chapter 4 of the thesis on a virtual machine",
+        ran=f"{len(result.runs)} runs, {len(result.variants)} variants, {result.manifest['wall_s']:.0f} s",
+        tally=list(_tally(judged)),
+        mains=[{"text": t, "held": a, "of": b} for t, (a, b) in main_share(judged).items()],
+        rows=verdict_table(judged),
+        seeds=result.manifest["seeds"],
+        ablation=_ablation(result),
+        columns=[text for *_, text in ABLATED],
+        figures=figures,
+        stopped=[run for run in result.runs if run.stopped and run.variant == NOMINAL],
+        manifest=json.dumps(result.manifest, indent=1),
+    )
+    return replaced(target, html)

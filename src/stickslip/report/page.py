@@ -1,0 +1,45 @@
+"""A report as one HTML file that needs nothing but itself: the templates filled, and the file put in place whole."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from stickslip.errors import InputError
+
+__all__ = ["filled", "replaced", "unwritable"]
+
+
+def filled(template: str, **values: Any) -> str:
+    """The HTML of a template beside this file; a value that it lacks is an error."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("stickslip.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )  # fmt: skip
+    return environment.get_template(template).render(**values)
+
+
+def replaced(target: Path, html: str) -> Path:
+    """Write the file in one move, so that an older one stays whole until then; returns it.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    draft = target.with_name(target.name + ".part")
+    try:
+        draft.write_text(html, encoding="utf-8")
+        os.replace(draft, target)
+    except OSError as error:
+        raise unwritable(target, error) from None
+    return target
+
+
+def unwritable(target: Path, error: OSError) -> InputError:
+    """What to tell of a file that cannot be written."""
+    return InputError(
+        f"cannot write {error.filename or target} ({error.strerror or error}); choose another place with --out"
+    )
