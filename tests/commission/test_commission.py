@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.analyse.tracking import tracking_metrics
+from stickslip.commission import commission as commissioning
 from stickslip.commission.candidates import Following
 from stickslip.commission.commission import commission, tried
 from stickslip.commission.recommended import write_recommended
@@ -16,6 +17,7 @@ from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError, LimitCrossed
+from stickslip.identify.estimate import Identification
 from stickslip.identify.model_file import write_model
 from stickslip.identify.segments import constant_velocity_segments
 from stickslip.machines.contact import Contact
@@ -27,7 +29,7 @@ from stickslip.report.identified import Source, write_identification
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.procedures._moves import holder, move
 from stickslip.rigs.procedures.base import perform
-from stickslip.rigs.procedures.track import Track
+from stickslip.rigs.procedures.track import RECOMMENDED, Track
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import VirtualRig
 
@@ -136,6 +138,42 @@ def test_a_recommendation_that_fails_leaves_the_model(error):
     found, said = tried(fails)
     assert found is None
     assert str(error) in said[0]
+
+
+def test_what_is_recommended_is_run_as_it_was_measured_and_nothing_beside_it_is_lost(tmp_path):
+    file = tmp_path / "recommended.toml"
+    file.write_text(
+        write_model_text(tmp_path)
+        + '[recommended]\ncompensator = "feedback"\nbandwidth = 8.0\ndamping = 1.0\ninertia = 1e-3\ngain = 0.9\n'
+    )
+    options = {"compensator": "recommended", "model": str(file)}
+    rig = VirtualRig(replace(OTHER, filter=10.0))
+    using = Track(**options).controller(rig)
+    assert using.compensator.filter_hz is None  # not the machine's own: it was measured without one
+    assert using.gains == place("PD", 1e-3, 8.0, 1.0)
+    for name in RECOMMENDED:
+        with pytest.raises(InputError, match=f"{name} = .* beside compensator = recommended"):
+            Track.with_options({**options, name: str(getattr(Track, name))})
+    with pytest.raises(InputError, match="bandwidth = 12"):
+        Track(**options, bandwidth=12.0).controller(rig)
+
+
+def write_model_text(folder):
+    """A model.toml of Coulomb friction."""
+    law = Model("coulomb", fc=0.3)
+    return write_model(folder / "law.toml", Identification("test", law, (), np.eye(0), {})).read_text()
+
+
+def test_a_stick_slip_stage_that_is_left_out_is_said(monkeypatch):
+    def crosses(self, procedure, **_):
+        raise LimitCrossed("speed: 41 rad/s beyond 40")
+
+    monkeypatch.setattr(commissioning._Course, "run", crosses)
+    course = commissioning._Course(VirtualRig(OTHER), None, print, False)
+    found, said = commissioning._stickslip(course, 1e-3, 0.4, {"fs": 0.5, "fc": 0.4})
+    assert found is None
+    assert "LuGre" in said[0]
+    assert "41 rad/s beyond 40" in said[0]
 
 
 @pytest.mark.slow

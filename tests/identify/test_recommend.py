@@ -91,6 +91,31 @@ def test_a_setting_that_is_unsafe_on_an_axis_drawn_later_gives_way(monkeypatch: 
     assert all("rough motion on an axis drawn later" in c.unsafe for c in fed)
 
 
+@pytest.mark.parametrize(("why", "margin"), [("useless", 3.0), ("unsafe", 1.8), ("unsafe beyond", 1.98)])
+def test_the_margin_counts_only_what_is_not_safe(
+    monkeypatch: pytest.MonkeyPatch, why: str, margin: float
+) -> None:
+    """At 0.9 there is less error than at 0.5, but for the reason `why` it is not taken; at 1.5 everything is rough."""
+
+    def judged(bench: recommending.Bench, setting: Setting) -> recommending.Candidate:
+        later = len(bench.plants) > 2
+        rough = setting.kind == "feedback" or setting.gain >= 1.5
+        rough |= why == "unsafe" and later and setting.gain == 0.9
+        rough |= why == "unsafe beyond" and setting.gain == pytest.approx(0.99)
+        left = 0.98 if why == "useless" and later and setting.gain == 0.9 else 1.0 - 0.5 * setting.gain
+        return recommending.Candidate(setting, (left,) * len(bench.plants), ("rough motion",) * rough)
+
+    monkeypatch.setattr(recommending.Bench, "judged", judged)
+    monkeypatch.setattr(recommending, "GAINS", (0.5, 0.9))
+    advice = recommend(identified(0.02), Drive(20.0), axes=1, confirm=2)
+    assert advice.chosen
+    assert advice.chosen.setting.gain == 0.5
+    assert advice.margin == pytest.approx(margin)
+    table = [c for c in advice.candidates if c.setting.gain == 0.9 and c.setting.kind == "feedforward"]
+    assert any(c.refused for c in table)
+    assert any(c.useless for c in table) == (why == "useless")
+
+
 def test_a_law_without_intervals_is_simulated_once_and_promises_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -89,9 +89,8 @@ def show(result: Recommendation, unit: Callable[[str], str]) -> None:
     for c in result.candidates:
         x = c.setting
         mark = "<- " if result.chosen and (x.law, x.kind, x.gain, x.deadband) == same(result.chosen) else ""
-        why = "yes" if not c.unsafe else f"no: {', '.join(c.unsafe)}"
         print(f"{x.law:<16}{x.kind:<13}{x.gain:>5.3g}  {x.deadband:>8.3g}  {100 * c.errors[0]:>8.1f} %  "
-              f"{100 * c.worst:>5.1f} %  {mark}{why}")  # fmt: skip
+              f"{100 * c.worst:>5.1f} %  {mark}{safety(c)}")  # fmt: skip
     print()
     print(f"linear controller: kp {result.gains['kp']:.5g}, kd {result.gains['kd']:.5g}; RMS error alone "
           f"{result.linear_error:.3g} {unit('rad')}")  # fmt: skip
@@ -108,6 +107,13 @@ def show(result: Recommendation, unit: Callable[[str], str]) -> None:
         print(f"margin of gain:    {edge}")
     for note in result.notes:
         print(note)
+
+
+def safety(c: Candidate) -> str:
+    """Whether it is safe; why it is not, or not worth it."""
+    if c.unsafe:
+        return f"no: {', '.join(c.unsafe)}"
+    return f"yes, but {c.useless}" if c.useless else "yes"
 
 
 def same(chosen: Candidate) -> tuple[str, str, float, float]:

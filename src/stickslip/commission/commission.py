@@ -61,6 +61,8 @@ BELOW, BEYOND = 0.6, 1.25
 """Of the break-away torque: amplitudes that stick, and that slip."""
 MOST = 0.1
 """Of the sample rate: bandwidth taken as that which rings where none does."""
+GENTLER = 5
+"""Amplitudes of the stick-slip stage that are tried."""
 QUIET = 0.04
 """Of the break-away torque, RMS of the noise that looks for the sticking mode."""
 
@@ -191,8 +193,9 @@ def commission(
     sliding, curve, angle = _sliding(course, j, fs, tuple(v for v in velocities if v <= 1.05 * top))
     stuck = _presliding(course, fs, sliding)
     _attraction(course, j)
-    lugre = _stickslip(course, j, fs, sliding) if lugre_too else None
+    lugre, missed = _stickslip(course, j, fs, sliding) if lugre_too else (None, ())
     model, stiffness, said = joined_model(curve, stuck)
+    said = (*said, *missed)
     recommended = None
     if track_too:
         recommended, unsaid = tried(
@@ -270,23 +273,30 @@ def _attraction(course: _Course, j: float) -> None:
     )
 
 
-def _stickslip(course: _Course, j: float, fs: float, sliding: Mapping[str, float]) -> Identification | None:
-    """LuGre's sigma0 and sigma1; the amplitude is lowered where the axis would run too fast."""
-    amplitude = BEYOND * max(fs, sliding["fs"], sliding["fc"])
-    for _ in range(5):
+def _stickslip(
+    course: _Course, j: float, fs: float, sliding: Mapping[str, float]
+) -> tuple[Identification | None, tuple[str, ...]]:
+    """LuGre's sigma0 and sigma1, or why there are none; the amplitude is lowered where the axis would run too fast."""
+    first = amplitude = BEYOND * max(fs, sliding["fs"], sliding["fc"])
+    crossed: LimitCrossed | None = None
+    for _ in range(GENTLER):
         try:
             done = course.run(Stickslip(amplitude=amplitude, cycles=2.0), insist=False)
-        except LimitCrossed:
-            amplitude *= 0.93
+        except LimitCrossed as error:
+            crossed, amplitude = error, amplitude * 0.93
             continue
         try:
             found = identify_lugre_dynamics(Response.of(done.record), j, sliding)
         except InputError as error:
-            course.add("stickslip", done, None, str(error))
-            return None
+            course.add("stickslip", done, None, str(error).rstrip("."))
+            return None, ()
         course.add("stickslip", done, found)
-        return found
-    return None
+        return found, ()
+    return None, (
+        f"LuGre's dynamics are not identified and LuGre was not tried as a compensator: the stick-slip stage crossed a "
+        f"limit at each of {GENTLER} amplitudes from {first:.3g} down to {amplitude / 0.93:.3g} N·m (the last time: "
+        f"{str(crossed).rstrip('.')}). Widen the rig's limits, or identify LuGre from a record of your own.",
+    )
 
 
 # ---- the whole ------------------------------------------------------------------------------------------------

@@ -85,11 +85,19 @@ class Candidate:
         estimate first. The first axis on which it is not safe is the last.
     unsafe : tuple of str
         Why it is not safe to switch on; empty where it is.
+    useless : str
+        Why it is not worth it where it is safe; empty where that is not known.
     """
 
     setting: Setting
     errors: tuple[float, ...]
     unsafe: tuple[str, ...]
+    useless: str = ""
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        """Why it is not to be switched on; empty where it may be."""
+        return (*self.unsafe, *([self.useless] if self.useless else []))
 
     @property
     def worst(self) -> float:
@@ -98,7 +106,8 @@ class Candidate:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return {**asdict(self.setting), "errors": list(self.errors), "unsafe": list(self.unsafe)}
+        return {**asdict(self.setting), "errors": list(self.errors), "unsafe": list(self.unsafe),
+                "useless": self.useless}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,18 +256,14 @@ def recommend(
     for setting in settings:
         candidates.append(bench.judged(setting))
         progress(len(candidates), total)
-    chosen, rejected = confirmed(candidates, bench, others)
+    chosen, rejected, unsafe = confirmed(candidates, bench, others)
+    unsafe += [c.setting for c in candidates if c.unsafe]
     candidates = [rejected.get(c.setting, c) for c in candidates]
     margin = math.inf
     if chosen:
-        higher = [
-            c for c in candidates if alike(c.setting, chosen.setting) and c.setting.gain > chosen.setting.gain
-        ]
         beyond = [bench.judged(replace(chosen.setting, gain=gain)) for gain in BEYOND]
         candidates += beyond
-        margin = min(
-            (c.setting.gain / chosen.setting.gain for c in (*higher, *beyond) if c.unsafe), default=math.inf
-        )
+        margin = margin_of(chosen.setting, [*unsafe, *(c.setting for c in beyond if c.unsafe)])
     progress(total, total)
     return Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, dict(linear.gains._asdict()),
@@ -304,6 +309,12 @@ def alike(one: Setting, other: Setting) -> bool:
     return (one.law, one.kind, one.deadband) == (other.law, other.kind, other.deadband)
 
 
+def margin_of(chosen: Setting, unsafe: Sequence[Setting]) -> float:
+    """The lowest higher gain that is not safe, over the chosen one."""
+    higher = [s.gain for s in unsafe if alike(s, chosen) and s.gain > chosen.gain]
+    return min(higher, default=math.inf) / chosen.gain
+
+
 def best_of(candidates: Sequence[Candidate]) -> Candidate | None:
     """The safe candidate with the least worst error; among those alike the lowest gain, feedforward first."""
     safe = [c for c in candidates if not c.unsafe and c.worst <= WORTH]
@@ -318,19 +329,24 @@ def best_of(candidates: Sequence[Candidate]) -> Candidate | None:
 
 def confirmed(
     candidates: Sequence[Candidate], bench: Bench, others: Bench
-) -> tuple[Candidate | None, dict[Setting, Candidate]]:
-    """The best that is safe on other axes too, with its errors there; and those that were not."""
+) -> tuple[Candidate | None, dict[Setting, Candidate], list[Setting]]:
+    """The best that is safe on other axes too, with its errors there; those that were not taken; what was not safe."""
     rejected: dict[Setting, Candidate] = {}
+    unsafe: list[Setting] = []
     while best := best_of([c for c in candidates if c.setting not in rejected]):
         led = with_lead(best, bench)
         more = bench.judged(replace(led.setting, gain=GUARD * led.setting.gain))
         final = others.judged(led.setting) if not more.unsafe else more
         if not final.unsafe and final.worst <= WORTH:
-            return final, rejected
+            return final, rejected, unsafe
         where = f" with {GUARD:g} times the gain" if more.unsafe else " on an axis drawn later"
-        why = final.unsafe or ("hardly less error",)
-        rejected[best.setting] = Candidate(best.setting, best.errors, tuple(w + where for w in why))
-    return None, rejected
+        if final.unsafe:
+            unsafe.append(final.setting)
+            last = replace(best, unsafe=tuple(w + where for w in final.unsafe))
+        else:
+            last = replace(best, useless=f"hardly less error{where}")
+        rejected[best.setting] = last
+    return None, rejected, unsafe
 
 
 def with_lead(candidate: Candidate, bench: Bench) -> Candidate:
@@ -353,7 +369,7 @@ def notes_on(found: Identified, chosen: Candidate | None, candidates: Sequence[C
     elif unknown:
         yield f"Not identified: {', '.join(unknown)}; the axes drawn cover at most a factor of 9 to each side for them."
     if chosen is None:
-        reasons = sorted({r for c in candidates for r in c.unsafe}) or ["none reduces the error by 5 %"]
+        reasons = sorted({r for c in candidates for r in c.refused}) or ["none reduces the error by 5 %"]
         yield f"No compensator is recommended: {', '.join(reasons)}."
         return
     stiffer = [c for c in candidates if c.setting.kind == "feedback" and c.setting.gain == 1.0 and c.unsafe]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -32,6 +33,8 @@ REFERENCES = {
 }
 """Thesis eqs. 3.23 and 3.24, and figure 3.17's step; with their durations, s."""
 COMPENSATORS = {"feedforward": Feedforward, "feedback": Feedback}
+RECOMMENDED = ("linear", "bandwidth", "damping", "inertia", "gain", "filter", "lead")
+"""Options that a recommendation sets: it was simulated and measured with these, and with no others."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +44,9 @@ class Track(Procedure):
     ``reference`` is low, high or step; ``linear`` PD, PID or PR with ``bandwidth`` (Hz), ``damping`` and ``inertia``
     (kg·m²) of its placement; ``compensator`` none, feedforward or feedback with ``model``, a model.toml or the name of
     one of the machine's, its ``gain``, ``filter`` (Hz, 0: the machine's) and ``lead`` (s, of feedforward); or
-    recommended: all of that from the ``model``, a recommended.toml of `stickslip rig commission`. What a file knows of
-    the angle (``[angle]``) is compensated as well. ``duration`` in s (0: the reference's own).
+    recommended: all of that from the ``model``, a recommended.toml of `stickslip rig commission`, and none of it given
+    beside it. What a file knows of the angle (``[angle]``) is compensated as well. ``duration`` in s (0: the
+    reference's own).
     """
 
     name: ClassVar[str] = "track"
@@ -60,6 +64,14 @@ class Track(Procedure):
     lead: float = 0.0
     duration: float = 0.0
     wait: float = 1.0
+
+    @classmethod
+    def with_options(cls, given: Mapping[str, str]) -> Procedure:
+        """As `Procedure`; beside a recommendation nothing that it sets."""
+        beside = [name for name in RECOMMENDED if name in given]
+        if beside and given.get("compensator") == "recommended":
+            raise InputError(beside_recommended(beside[0], given[beside[0]]))
+        return super().with_options(given)
 
     @property
     def wanted(self) -> tuple[Reference, float]:
@@ -89,17 +101,23 @@ class Track(Procedure):
             raise UnknownName("compensator", self.compensator, ("none", *COMPENSATORS, "recommended"))
         machine: Any = getattr(rig, "machine", None)
         corner = self.filter or (machine.filter if machine is not None else 0.0)
+        corner = corner if math.isfinite(corner) else 0.0
         law = self.angle().on(self.law(rig))
         helper = COMPENSATORS[self.compensator](law, self.gain, corner or None, lead=self.lead)
         return Controller(gains, helper, limit, rig.sample_time)
 
     def recommended(self) -> Track:
-        """This with what the file of the model recommends.
+        """This with what the file of the model recommends; without a filter where the file names none.
 
         Raises
         ------
         InputError
+            If the file recommends nothing, or an option that it sets was given too.
         """
+        usual = {f.name: f.default for f in dataclasses.fields(Track)}
+        for name in RECOMMENDED:
+            if getattr(self, name) != usual[name]:
+                raise InputError(beside_recommended(name, getattr(self, name)))
         table = read_toml(Path(self.model)) if self.model.endswith(".toml") else None
         if table is None or not table.has("recommended"):
             raise InputError(
@@ -110,7 +128,7 @@ class Track(Procedure):
                 self, linear="PD", compensator=given.choice("compensator", COMPENSATORS, "feedforward"),
                 bandwidth=given.positive("bandwidth", "Hz"), damping=given.positive("damping", ""),
                 inertia=given.positive("inertia", "kg·m²"), gain=given.positive("gain", ""),
-                filter=given.number("filter", "Hz", 0.0, 0.0), lead=given.number("lead", "s", 0.0, 0.0),
+                filter=given.number("filter", "Hz", 0.0, 0.0) or math.inf, lead=given.number("lead", "s", 0.0, 0.0),
             )  # fmt: skip
 
     def angle(self) -> AngleMap:
@@ -178,6 +196,14 @@ class Track(Procedure):
                 f"error {rms:.4g} rad RMS, {worst:.4g} at most; torque at its limit {100 * cut:.3g} %",
             ),
         )  # fmt: skip
+
+
+def beside_recommended(name: str, value: object) -> str:
+    """What is wrong with an option that the recommendation sets."""
+    return (
+        f"{name} = {value} beside compensator = recommended, which sets it; leave it out, or give compensator = "
+        f"feedforward or feedback with its own {', '.join(RECOMMENDED)}"
+    )
 
 
 PROCEDURE = Track
