@@ -18,6 +18,7 @@ from stickslip.jit import kernel
 HIGH_PASS = 2.0 * math.pi * 50.0  # rad/s
 TRIGGER = 1e-3  # rad/s, Schmitt trigger of the reversals, and standstill
 MOVING = 2e-3  # rad/s, the reference moves
+NEARLY = 0.9  # of it; between nodes that are lower no crest passes it
 STANDSTILL = 10e-3  # s, shortest standstill that counts
 MAX_WINDOW = 2e-3  # s
 LONG_WINDOW = 16e-3  # s, where only the metrics of COARSE are wanted
@@ -140,6 +141,47 @@ def extremes(nodes: Any, d: float) -> tuple[float, float]:
 
 
 @kernel(exact=False)
+def speed_at(nodes: Any, x: float) -> float:
+    """The quartic through the velocities at the five nodes, at x = 0 to 4."""
+    d1 = nodes[SPEED, 1] - nodes[SPEED, 0]
+    d2 = nodes[SPEED, 2] - 2.0 * nodes[SPEED, 1] + nodes[SPEED, 0]
+    d3 = nodes[SPEED, 3] - 3.0 * nodes[SPEED, 2] + 3.0 * nodes[SPEED, 1] - nodes[SPEED, 0]
+    d4 = (
+        nodes[SPEED, 4]
+        - 4.0 * nodes[SPEED, 3]
+        + 6.0 * nodes[SPEED, 2]
+        - 4.0 * nodes[SPEED, 1]
+        + nodes[SPEED, 0]
+    )
+    rise = d3 + 0.25 * (x - 3.0) * d4
+    return nodes[SPEED, 0] + x * (d1 + 0.5 * (x - 1.0) * (d2 + (x - 2.0) / 3.0 * rise))
+
+
+@kernel(exact=False)
+def crest(nodes: Any, i: int) -> float:
+    """The velocity at node i, or, where only a crest between the node before and it passes TRIGGER, that crest.
+
+    Else the place of the nodes, which is the step's and not the motion's, would decide whether it counts.
+    """
+    v = nodes[SPEED, i]
+    near = max(abs(v), abs(nodes[SPEED, i - 1]))
+    if near > TRIGGER or near < NEARLY * TRIGGER:
+        return v
+    top = v
+    for j in range(1, 8):
+        now = speed_at(nodes, i - 1.0 + 0.125 * j)
+        if abs(now) > abs(top):
+            top = now
+            at = i - 1.0 + 0.125 * j
+            before = speed_at(nodes, at - 0.125)
+            after = speed_at(nodes, at + 0.125)
+            bend = before - 2.0 * now + after
+            if bend * now < 0.0:
+                top = now - (after - before) * (after - before) / (8.0 * bend)
+    return top
+
+
+@kernel(exact=False)
 def peak(nodes: Any, so_far: float) -> float:
     """Largest |v| of the quartic through the five nodes, where it may exceed the one so far; else 0.
 
@@ -157,22 +199,10 @@ def peak(nodes: Any, so_far: float) -> float:
         < so_far
     ):
         return 0.0
-    d1 = nodes[SPEED, 1] - nodes[SPEED, 0]
-    d2 = nodes[SPEED, 2] - 2.0 * nodes[SPEED, 1] + nodes[SPEED, 0]
-    d3 = nodes[SPEED, 3] - 3.0 * nodes[SPEED, 2] + 3.0 * nodes[SPEED, 1] - nodes[SPEED, 0]
-    d4 = (
-        nodes[SPEED, 4]
-        - 4.0 * nodes[SPEED, 3]
-        + 6.0 * nodes[SPEED, 2]
-        - 4.0 * nodes[SPEED, 1]
-        + nodes[SPEED, 0]
-    )
     top = 0.0
     before, middle = 0.0, 0.0
     for i in range(33):
-        x = i / 8.0
-        rise = d3 + 0.25 * (x - 3.0) * d4
-        now = abs(nodes[SPEED, 0] + x * (d1 + 0.5 * (x - 1.0) * (d2 + (x - 2.0) / 3.0 * rise)))
+        now = abs(speed_at(nodes, i / 8.0))
         bend = before - 2.0 * middle + now
         if i > 1 and middle >= before and middle >= now and bend < 0.0:
             top = max(top, middle - (now - before) * (now - before) / (8.0 * bend))
@@ -227,10 +257,11 @@ def reversals(acc: Any, turns: Any, t: float, h: float, nodes: Any, second: bool
             f = nodes[SPEED, i - 1] / (nodes[SPEED, i - 1] - nodes[SPEED, i])
             acc[TURN_TIME] = t + 0.25 * h * (i - 1 + f)
             acc[TURN_POSITION] = nodes[AT, i - 1] + f * (nodes[AT, i] - nodes[AT, i - 1])
+        v = crest(nodes, i)
         side = 0.0
-        if nodes[SPEED, i] > TRIGGER:
+        if v > TRIGGER:
             side = 1.0
-        elif nodes[SPEED, i] < -TRIGGER:
+        elif v < -TRIGGER:
             side = -1.0
         if side != 0.0:
             if side * acc[SIDE] < 0.0:
@@ -254,7 +285,8 @@ def reversals(acc: Any, turns: Any, t: float, h: float, nodes: Any, second: bool
 def standstill(acc: Any, t: float, h: float, nodes: Any) -> None:
     """Find standstills: |v| below the trigger for at least 10 ms while the reference moves."""
     for i in range(5):
-        still = abs(nodes[SPEED, i]) < TRIGGER and abs(nodes[WANTED, i]) > MOVING
+        v = nodes[SPEED, i] if i == 0 else crest(nodes, i)
+        still = abs(v) < TRIGGER and abs(nodes[WANTED, i]) > MOVING
         now = t + 0.25 * h * i
         if still and acc[STILL_SINCE] < 0.0:
             acc[STILL_SINCE] = now
