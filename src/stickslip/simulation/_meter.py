@@ -168,16 +168,14 @@ def crest(nodes: Any, i: int) -> float:
     if near > TRIGGER or near < NEARLY * TRIGGER:
         return v
     top = v
-    for j in range(1, 8):
-        now = speed_at(nodes, i - 1.0 + 0.125 * j)
-        if abs(now) > abs(top):
-            top = now
-            at = i - 1.0 + 0.125 * j
-            before = speed_at(nodes, at - 0.125)
-            after = speed_at(nodes, at + 0.125)
-            bend = before - 2.0 * now + after
-            if bend * now < 0.0:
-                top = now - (after - before) * (after - before) / (8.0 * bend)
+    before = nodes[SPEED, i - 1]
+    now = speed_at(nodes, i - 0.875)
+    for j in range(2, 9):
+        after = speed_at(nodes, i - 1.0 + 0.125 * j)
+        bend = before - 2.0 * now + after
+        if abs(now) > abs(top) and (now - before) * (after - now) <= 0.0 and bend * now < 0.0:
+            top = now - (after - before) * (after - before) / (8.0 * bend)
+        before, now = now, after
     return top
 
 
