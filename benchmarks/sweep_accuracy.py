@@ -65,8 +65,8 @@ def main() -> None:
             flagged = np.concatenate([b.flagged for b in blocks])
             values = sweep.values(run, sweep.drawn.block(0, options.cases))
             exact = replace(run, numerics=replace(run.numerics, tolerance=EXACT))
-            sure, _ = block.measured(exact, values, sweep.metrics, options.cases)
-            off = block.differ(found, sure, sweep.metrics, run.duration, WANTED)
+            sure = block.measured(exact, values, sweep.metrics, options.cases)
+            off = block.differ(found, sure.metrics, sweep.metrics, run.duration, WANTED)
             well = run.controller not in NOT_W[reference]
             share, missed = float(flagged.mean()), int(np.sum(off & ~flagged))
             fine = missed == 0 and (share <= MOST_FLAGGED or not well)

@@ -34,9 +34,13 @@ def test_a_ratio_that_rose_by_half_fails(benchmark):
         benchmark.gate(measured([1.9]), record=False)
 
 
-def test_one_slow_measurement_does_not_fail(benchmark):
+def test_one_slow_measurement_does_not_fail(benchmark, capsys):
     benchmark.gate(measured([1.2]), record=True)
     benchmark.gate(measured([5.0, 1.3]), record=False)
+    # The first compensation is measured again; the others give what is left.
+    assert capsys.readouterr().out.splitlines()[-1].endswith("1.30, 1.30, 1.30")
+    with pytest.raises(SystemExit, match=r"none: 4\.00 times"):
+        benchmark.gate(measured([5.0, 4.5, 4.0]), record=False)
 
 
 def test_a_missing_record_is_told(benchmark):

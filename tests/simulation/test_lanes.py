@@ -46,6 +46,12 @@ def test_the_error_falls_with_the_square_of_the_step():
     assert errors[0] > 8.0 * errors[1]
 
 
+def test_a_step_with_more_switches_than_are_followed_is_told():
+    """At 2e-3 s the elements that are fed back turn more than 16 times in a step; at 2e-4 s they do not."""
+    assert not loops("gms", "FB-gms", duration=0.4, step=2e-4)[2].run(()).unresolved.any()
+    assert loops("gms", "FB-gms", duration=0.4, step=2e-3)[2].run(()).unresolved.any()
+
+
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 code")
 def test_the_step_runs_in_vectors():
     _, _, many = loops("gms", "FB-gms", n=2, duration=0.01)

@@ -1,6 +1,8 @@
 """Sweeps: what varies, which cases, the data set after any interruption, and bad ones told before anything runs."""
 
+import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +18,7 @@ import pytest
 from stickslip.cli import main
 from stickslip.errors import ConfigError, InputError, UnknownName
 from stickslip.identify.estimate import Estimate
+from stickslip.simulation import adaptive, lanes
 from stickslip.sweep import block, dataset, execute, numbers, summary
 from stickslip.sweep.plan import load
 from stickslip.sweep.sample import Drawn, Spread
@@ -116,14 +119,27 @@ def test_numbers_of_a_run_are_read_and_varied(small):
 def test_a_batch_gives_what_the_loops_give_alone(small, name):
     run = small.runs[1]
     values = {name: numbers.value_of(run, name) * np.array([0.9, 1.1])}
-    together, _ = block.measured(run, values, small.metrics, 2)
+    together = block.measured(run, values, small.metrics, 2).metrics
     alone = [block._alone(run, {name: float(v)}, small.metrics)[0] for v in values[name]]
     assert together == pytest.approx(np.array(alone), rel=2e-4)
     assert together[0] != pytest.approx(together[1], rel=1e-6)
 
 
+def test_only_the_exact_integrator_is_made_wrong_in_two_ways(small, monkeypatch):
+    ran = []
+    monkeypatch.setattr(adaptive, "run", lambda case, run=adaptive.run: ran.append(1) or run(case))
+    planned = replace(small.runs[0], duration=0.05)
+    planned = replace(planned, numerics=replace(planned.numerics, integrator="adaptive", tolerance=1e-6))
+    values = {"friction.fs": np.array([0.3])}
+    found = block.measured(planned, values, small.metrics, 1)
+    sure, flagged = block.checked(planned, values, small.metrics, found)
+    assert sure.integrators == ["adaptive"]
+    assert not flagged.any()
+    assert len(ran) == 2  # as it is, and looser
+
+
 def test_a_case_out_of_bounds_is_a_failure_of_its_own(small):
-    found, why = block.measured(small.runs[0], {"friction.fs": np.array([0.3, -0.1])}, small.metrics, 2)
+    found, why, _ = block.measured(small.runs[0], {"friction.fs": np.array([0.3, -0.1])}, small.metrics, 2)
     assert np.isfinite(found[0]).all()
     assert np.isnan(found[1]).all()
     assert why[0] == ""
@@ -336,8 +352,34 @@ def test_lanes_are_within_a_percent_or_flagged(tmp_path):
     assert sweep.fingerprint(0) != replace(sweep, step=0.0).fingerprint(0)
 
 
+def test_a_step_with_more_switches_than_were_followed_is_flagged(tmp_path, monkeypatch):
+    sweep = load(in_lanes(tmp_path, 'check = "no"'))
+    assert not block.compute(sweep, 0, 0).flagged.any()
+
+    def run(many, *args, run=lanes.Lanes.run, **more):
+        return replace(run(many, *args, **more), unresolved=np.arange(12) % 3)
+
+    monkeypatch.setattr(lanes.Lanes, "run", run)
+    assert block.compute(sweep, 0, 0).flagged.tolist() == [False, True, True] * 4
+
+
+def test_a_run_that_lanes_refuse_is_told_of(tmp_path, capsys):
+    path, data = in_lanes(tmp_path), SMALL.parents[1] / "data"
+    study = (data / "small_study.toml").read_text().replace("motion.csv", (data / "motion.csv").as_posix())
+    (tmp_path / "study.toml").write_text(study.replace('"signed"', '"literal"'))
+    path.write_text(re.sub("study = .*", 'study = "study.toml"', path.read_text()))
+    assert main(["sweep", str(path), "--out", str(tmp_path / "out"), "--no-report"]) == 0
+    told = capsys.readouterr().err
+    assert "FF-lugre: integrator exact, not in lanes: no lanes: slip rule 'literal' needs its events" in told
+    run = json.loads((tmp_path / "out" / "manifest.json").read_text())["runs"][0]
+    assert run["integrator"] == "exact"
+    assert "needs its events" in run["because"]
+    assert set(table(tmp_path / "out")["integrator"].to_pylist()) == {"exact"}
+
+
 def test_a_missing_gpu_is_told_before_anything_runs(tmp_path, capsys):
     path = in_lanes(tmp_path, 'device = "gpu"')
+    assert load(path).device == "gpu"  # Reading needs none: another machine may run it.
     assert main(["sweep", str(path), "--out", str(tmp_path / "out")]) == 2
     assert "looked for NVIDIA's driver" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -24,7 +24,7 @@ def found():
 def score(sweep, settings):
     values = sweep.values(sweep.runs[0], sweep.drawn.block(0, sweep.drawn.cases))
     fixed = {name: np.full(sweep.drawn.cases, x) for name, x in settings.items()}
-    metrics, _ = measured(sweep.runs[0], values | fixed, sweep.metrics, sweep.drawn.cases)
+    metrics, *_ = measured(sweep.runs[0], values | fixed, sweep.metrics, sweep.drawn.cases)
     return np.sort(metrics[:, 0])[5]  # the sixth of eight: the 75th percentile
 
 

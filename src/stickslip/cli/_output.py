@@ -37,6 +37,13 @@ def say(what: str) -> None:
         print(what, file=sys.stderr)
 
 
+def warn(what: str) -> None:
+    """Say on stderr what a reader of the results must know, above a bar if there is one."""
+    from tqdm import tqdm
+
+    tqdm.write(f"stickslip: {what}", file=sys.stderr)
+
+
 def print_json(data: Any) -> None:
     """Print data as JSON that any reader takes: NaN becomes null."""
     print(json.dumps(_plain(data), indent=1, allow_nan=False, ensure_ascii=False))
@@ -73,6 +80,12 @@ def print_accuracy(meta: Mapping[str, Any]) -> None:
             f"accuracy: this run is sensitive: errors within the tolerance, {tolerance:g} rad, move its position by"
             f" about {error:.1g} rad; compare its metrics with those at another tolerance before you rely on them"
         )
+
+
+def print_integrator(meta: Mapping[str, Any]) -> None:
+    """What ran a case where the integrators that come first could not; else nothing."""
+    if refused := meta.get("refused"):
+        print(f"integrator: {meta['integrator']}; {'; '.join(refused.values())}")
 
 
 def result_as_data(result: StudyResult, report: Path | None) -> dict[str, Any]:

@@ -72,5 +72,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         _output.print_metrics(executed.metrics)
         _output.print_accuracy(executed.record.meta)
+        _output.print_integrator(executed.record.meta)
         print(f"record: {out} ({len(executed.record)} rows)")
     return _output.report_failures([(planned.key, executed.failure, out)] if executed.failure else [])

@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         with _output.progress_bar(sweep.name) as progress:
             backend = "processes" if args.processes else "threads"
-            manifest = execute.run(sweep, out, args.jobs, backend, args.scheduler, progress)
+            manifest = execute.run(sweep, out, args.jobs, backend, args.scheduler, progress, _output.warn)
         rows = summarise(out, sweep)
         written = [write_summary(out, sweep, rows), out / "manifest.json"]
         if not args.no_report:

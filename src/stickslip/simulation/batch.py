@@ -54,6 +54,8 @@ class Results:
         Where it ended, s, rad, rad/s.
     metrics : mapping of str to array, shape (n,)
         NaN where there is none; empty if none was asked for.
+    unresolved : array of int, shape (n,)
+        Steps with more switches than were followed; only in lanes, the exact integrator follows all.
     """
 
     codes: np.ndarray[Any, np.dtype[np.int64]]
@@ -61,6 +63,7 @@ class Results:
     position: Array
     velocity: Array
     metrics: Mapping[str, Array]
+    unresolved: np.ndarray[Any, np.dtype[np.int64]]
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,7 @@ class Batch:
         found = _meter.columns(accs, cycles[:, 0], cycles[:, 1])
         ran = codes == _case.DONE
         wanted = {name: np.where(ran, found[name], np.nan) for name in metrics}
-        return Results(codes, ends[:, 0], ends[:, 1], ends[:, 2], wanted)
+        return Results(codes, ends[:, 0], ends[:, 1], ends[:, 2], wanted, np.zeros(n, dtype=np.int64))
 
 
 def refusal(case: Case, names: Sequence[str]) -> str:

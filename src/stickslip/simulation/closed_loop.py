@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from stickslip.simulation import _case
 from stickslip.simulation._case import COLUMNS, UNITS, Case, Outcome, lay_out
 from stickslip.simulation._meter import metrics
 
-__all__ = ["INTEGRATORS", "integrator_for", "prepare", "simulate"]
+__all__ = ["INTEGRATORS", "Choice", "integrator_for", "prepare", "simulate"]
 
 INTEGRATORS = ("exact", "adaptive", "fixed")
 """In the order in which `integrator="auto"` tries them."""
@@ -93,6 +93,7 @@ def simulate(
         ``record.meta["energy"]`` the balance: motor work = friction loss + kinetic energy + residual, J;
         ``record.meta["accuracy"]``, if asked for, ``error_rad``, the estimate of the largest error in position, and
         ``well_conditioned``, whether that is at most ten times the tolerance (`stickslip.simulation.accuracy`).
+        ``record.meta["refused"]``, where "auto" did not take the first integrator, says why, by integrator.
 
     Raises
     ------
@@ -106,9 +107,11 @@ def simulate(
         axis, controller, reference, duration,
         tolerance=tolerance, slip_rule=slip_rule, output=output, initial=initial, metered=metered,
     )  # fmt: skip
-    name, run = integrator_for(case, integrator)
+    name, run, refused = integrator_for(case, integrator)
     outcome: Outcome = run(case, time_step) if name == "fixed" else run(case)
     how: dict[str, Any] = {"integrator": name, "slip_rule": slip_rule}
+    if refused:
+        how["refused"] = dict(refused)
     if check and name != "fixed" and outcome.code == _case.DONE:
         found = importlib.import_module("stickslip.simulation.accuracy").estimate(case, name)
         how["accuracy"] = {"error_rad": found.error, "well_conditioned": found.well_conditioned}
@@ -163,23 +166,33 @@ def _grid(output: float | Sequence[float] | np.ndarray[Any, Any], duration: floa
     return times
 
 
-def integrator_for(case: Case, name: str = "auto") -> tuple[str, Any]:
-    """Name and ``run`` of that integrator, or of the first that can run the case; `InputError` if it cannot."""
+class Choice(NamedTuple):
+    """The integrator for a case: its name, its ``run``, and why those that "auto" tries before it cannot run it."""
+
+    name: str
+    run: Any
+    refused: Mapping[str, str]
+
+
+def integrator_for(case: Case, name: str = "auto") -> Choice:
+    """That integrator, or the first that can run the case; `InputError` if it cannot."""
     if name != "auto":
         if name not in INTEGRATORS:
             raise UnknownName("integrator", name, (*INTEGRATORS, "auto"))
         module = importlib.import_module(f"stickslip.simulation.{name}")
         if why := module.can_run(case):
             raise InputError(f"the {name} integrator cannot run this: {why}")
-        return name, module.run
-    reasons: list[str] = []
+        return Choice(name, module.run, {})
+    refused: dict[str, str] = {}
     for candidate in INTEGRATORS:
         module = importlib.import_module(f"stickslip.simulation.{candidate}")
         why = module.can_run(case)
         if not why:
-            return candidate, module.run
-        reasons.append(f"{candidate}: {why}")
-    raise InputError("no integrator can run this (" + "; ".join(reasons) + ")")
+            return Choice(candidate, module.run, refused)
+        refused[candidate] = why
+    raise InputError(
+        "no integrator can run this (" + "; ".join(f"{k}: {why}" for k, why in refused.items()) + ")"
+    )
 
 
 def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:

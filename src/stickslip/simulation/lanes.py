@@ -160,7 +160,9 @@ class Lanes:
         codes = np.where(fine, _case.DONE, _case.NOT_FINITE)
         found = self._metrics(sums, ends)
         wanted = {name: np.where(fine, found[name], np.nan) for name in metrics}
-        return Results(codes, np.full(n, self.case.numbers[DURATION]), ends[:, 0], ends[:, 1], wanted)
+        times = np.full(n, self.case.numbers[DURATION])
+        unresolved = np.where(fine, ends[:, 2], 0.0).astype(np.int64)
+        return Results(codes, times, ends[:, 0], ends[:, 1], wanted, unresolved)
 
     def _metrics(self, sums: Array, ends: Array) -> dict[str, Array]:
         duration, half = float(self.case.numbers[DURATION]), 0.5 * float(self.case.numbers[DURATION])

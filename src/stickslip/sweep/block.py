@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from stickslip.study.plan import PlannedRun
 from stickslip.sweep.numbers import as_columns, varied
 from stickslip.sweep.plan import BLOCK, Sweep
 
-__all__ = ["FLOORS", "Block", "compute", "differ"]
+__all__ = ["FLOORS", "Block", "Measured", "compute", "differ", "integrator_of", "measured"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TIGHTER, FINEST = (0.1, 0.01), 1e-9
@@ -47,9 +47,12 @@ class Block:
         NaN where there is none.
     flagged : array of bool, shape (n,)
         The metrics are not sure, not even at the tightest tolerance: wrong steps change one of them by more than 1 %,
-        or a count of reversals by more than one. In lanes: twice the step does, by more than 0.3 %.
+        or a count of reversals by more than one. In lanes: twice the step does, by more than 0.3 %, or a step had more
+        switches than were followed.
     failures : list of str
         Why a case ended early or could not be run, else "".
+    integrators : list of str
+        What ran a case: "exact", "adaptive", "fixed" or "lanes"; "" where it could not be run.
     """
 
     run: int
@@ -58,6 +61,15 @@ class Block:
     metrics: Array
     flagged: np.ndarray[Any, np.dtype[np.bool_]]
     failures: list[str]
+    integrators: list[str]
+
+
+class Measured(NamedTuple):
+    """What cases gave: metrics, shape (n, metrics), why each ended early or could not be run, and what ran it."""
+
+    metrics: Array
+    failures: list[str]
+    integrators: list[str]
 
 
 def compute(sweep: Sweep, run: int, start: int) -> Block:
@@ -67,64 +79,70 @@ def compute(sweep: Sweep, run: int, start: int) -> Block:
     values = sweep.values(planned, numbers)
     flagged = np.zeros(len(numbers), dtype=np.bool_)
     if sweep.step > 0.0 and (many := as_lanes(planned, values, sweep.step)) is not None:
-        found, failures = _read(many.run(sweep.metrics, device=sweep.device), sweep.metrics)
+        results = many.run(sweep.metrics, device=sweep.device)
+        found = _read(results, sweep.metrics, "lanes")
+        flagged = results.unresolved > 0
         if sweep.check:
-            flagged = doubtful(many, sweep, found, failures)
-        return Block(run, start, numbers, found, flagged, failures)
-    found, failures = measured(planned, values, sweep.metrics, len(numbers))
-    if sweep.check:
-        found, failures, flagged = checked(planned, values, sweep.metrics, found, failures)
-    return Block(run, start, numbers, found, flagged, failures)
+            flagged = flagged | doubtful(many, sweep, found)
+    else:
+        found = measured(planned, values, sweep.metrics, len(numbers))
+        if sweep.check:
+            found, flagged = checked(planned, values, sweep.metrics, found)
+    return Block(run, start, numbers, found.metrics, flagged, found.failures, found.integrators)
 
 
-def doubtful(
-    many: lanes.Lanes, sweep: Sweep, found: Array, failures: Sequence[str]
-) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def doubtful(many: lanes.Lanes, sweep: Sweep, found: Measured) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Which cases in lanes differ at twice the step."""
     wide = lanes.prepare(many.case, many.varied, LONGER * sweep.step)
-    again, failed = _read(wide.run(sweep.metrics, device=sweep.device), sweep.metrics)
+    again = _read(wide.run(sweep.metrics, device=sweep.device), sweep.metrics, "lanes")
     duration = float(many.case.numbers[_case.DURATION])
-    ends = np.array([a != b for a, b in zip(failures, failed)], dtype=np.bool_)
-    return differ(found, again, sweep.metrics, duration, SURE_OF_STEPS) | ends
+    ends = np.array([a != b for a, b in zip(found.failures, again.failures)], dtype=np.bool_)
+    return differ(found.metrics, again.metrics, sweep.metrics, duration, SURE_OF_STEPS) | ends
 
 
 def checked(
-    planned: PlannedRun, values: Mapping[str, Array], metrics: Sequence[str], found: Array, failures: Sequence[str]
-) -> tuple[Array, list[str], np.ndarray[Any, np.dtype[np.bool_]]]:  # fmt: skip
+    planned: PlannedRun, values: Mapping[str, Array], metrics: Sequence[str], found: Measured
+) -> tuple[Measured, np.ndarray[Any, np.dtype[np.bool_]]]:
     """Hold every case against wrong steps, and what differs then at ever tighter tolerances.
 
     Returns
     -------
-    metrics, failures, flagged
+    found, flagged
         Of every case at the tightest tolerance that it was run at; whether it differs there, too.
     """
-    tolerance, found, failures = planned.numerics.tolerance, found.copy(), list(failures)
-    cases = np.arange(len(found))
-    flagged = np.zeros(len(found), dtype=np.bool_)
+    best = Measured(found.metrics.copy(), list(found.failures), list(found.integrators))
+    flagged = np.zeros(len(best.metrics), dtype=np.bool_)
 
-    def again(times: float, kick: float = 0.0) -> tuple[Array, list[str]]:
-        run = replace(planned, numerics=replace(planned.numerics, tolerance=times * tolerance))
-        return measured(run, {k: v[cases] for k, v in values.items()}, metrics, len(cases), kick)
+    def again(cases: Any, times: float, kick: float = 0.0) -> Measured:
+        n = planned.numerics
+        # The fixed integrator is of second order in its step.
+        finer = replace(n, tolerance=times * n.tolerance, time_step=math.sqrt(times) * n.time_step)
+        some = {k: v[cases] for k, v in values.items()}
+        return measured(replace(planned, numerics=finer), some, metrics, len(cases), kick)
 
-    def differs(other: tuple[Array, list[str]], part: float = SURE) -> Any:
-        """Where metrics or failures of the cases in hand are others."""
-        ends = np.array([failures[i] != why for i, why in zip(cases, other[1])], dtype=np.bool_)
-        return differ(found[cases], other[0], metrics, planned.duration, part) | ends
+    def differs(cases: Any, other: Measured, part: float = SURE) -> Any:
+        ends = np.array([best.failures[i] != why for i, why in zip(cases, other.failures)], dtype=np.bool_)
+        return differ(best.metrics[cases], other.metrics, metrics, planned.duration, part) | ends
 
-    for kick in KICKS:
-        flagged |= differs(again(1.0, kick), SUSPECT)
+    def kicked(cases: Any, times: float, part: float) -> None:
+        for kick in KICKS:
+            # Only the exact integrator can be wrong in two ways.
+            some = cases if kick == KICKS[0] else cases[[best.integrators[i] == "exact" for i in cases]]
+            if some.size:
+                flagged[some] |= differs(some, again(some, times, kick), part)
+
+    kicked(np.arange(len(flagged)), 1.0, SUSPECT)
     for times in TIGHTER:
         cases = np.flatnonzero(flagged)
-        if not cases.size or times * tolerance < FINEST * (1.0 - 1e-9):
+        if not cases.size or times * planned.numerics.tolerance < FINEST * (1.0 - 1e-9):
             break
-        fine = again(times)
-        flagged[cases] = differs(fine)
-        found[cases] = fine[0]
-        for i, why in zip(cases, fine[1]):
-            failures[i] = why
-        for kick in KICKS:
-            flagged[cases] |= differs(again(times, kick))
-    return found, failures, flagged
+        fine = again(cases, times)
+        flagged[cases] = differs(cases, fine)
+        best.metrics[cases] = fine.metrics
+        for i, why in zip(cases, fine.failures):
+            best.failures[i] = why
+        kicked(cases, times, SUSPECT)
+    return best, flagged
 
 
 def differ(
@@ -151,8 +169,8 @@ def _floor(name: str, duration: float) -> float:
 
 def measured(
     planned: PlannedRun, values: Mapping[str, Array], metrics: Sequence[str], n: int, kick: float = 0.0
-) -> tuple[Array, list[str]]:
-    """Metrics, shape (n, metrics), and failures of every case; less exact with a kick.
+) -> Measured:
+    """What every case gives; less exact with a kick.
 
     The exact integrator's steps are then wrong on purpose, the adaptive one's tolerance is ten times wider, the fixed
     one's step twice as long (`stickslip.simulation.accuracy`).
@@ -162,15 +180,32 @@ def measured(
         rows = [
             _alone(planned, {k: v[i].tolist() for k, v in values.items()}, metrics, kick) for i in range(n)
         ]
-        return np.array([row for row, _ in rows]).reshape(n, len(metrics)), [why for _, why in rows]
+        found = np.array([row for row, *_ in rows]).reshape(n, len(metrics))
+        return Measured(found, [why for _, why, _ in rows], [name for *_, name in rows])
     many.parameters[:, _case.KICK] = kick
-    return _read(many.run(metrics), metrics)
+    return _read(many.run(metrics), metrics, "exact")
 
 
-def _read(results: batch.Results, metrics: Sequence[str]) -> tuple[Array, list[str]]:
-    """Metrics, shape (n, metrics), and failures."""
+def _read(results: batch.Results, metrics: Sequence[str], integrator: str) -> Measured:
     found = np.column_stack([results.metrics[name] for name in metrics])
-    return found, [_reason(int(code), float(t)) for code, t in zip(results.codes, results.time)]
+    failures = [_reason(int(code), float(t)) for code, t in zip(results.codes, results.time)]
+    return Measured(found, failures, [integrator] * len(failures))
+
+
+def integrator_of(sweep: Sweep, run: int) -> tuple[str, str]:
+    """What will run the cases of a run, as far as its first one tells, and why not what comes first; "" if it does."""
+    planned = sweep.runs[run]
+    reasons: list[str] = []
+    if sweep.step > 0.0:
+        try:
+            values = sweep.values(planned, sweep.drawn.block(0, 1))
+            lanes.prepare(_laid_out(planned), as_columns(planned, values), sweep.step)
+        except InputError as error:
+            reasons.append(str(error))
+        else:
+            return "lanes", ""
+    choice = integrator_for(_laid_out(planned), planned.numerics.integrator)
+    return choice.name, "; ".join([*reasons, *choice.refused.values()])
 
 
 def as_lanes(planned: PlannedRun, values: Mapping[str, Array], step: float) -> lanes.Lanes | None:
@@ -207,14 +242,15 @@ def _as_batch(planned: PlannedRun, values: Mapping[str, Array]) -> batch.Batch |
 
 def _alone(
     planned: PlannedRun, values: Mapping[str, Any], metrics: Sequence[str], kick: float = 0.0
-) -> tuple[list[float], str]:
+) -> tuple[list[float], str, str]:
+    """Metrics of one case, why it has none, and what ran it."""
     none = [np.nan] * len(metrics)
     try:
         run = varied(planned, values)
         case = _laid_out(run)
-        name, integrate = integrator_for(case, run.numerics.integrator)
+        name, integrate, _ = integrator_for(case, run.numerics.integrator)
     except ParameterError as error:
-        return none, str(error)
+        return none, str(error), ""
     step = run.numerics.time_step
     # Only the exact integrator reads the kick: without more the others would agree with themselves.
     if name == "exact":
@@ -224,6 +260,6 @@ def _alone(
         step *= LONGER
     outcome = integrate(case, step) if name == "fixed" else integrate(case)
     if outcome.code != _case.DONE:
-        return none, _reason(outcome.code, outcome.time)
+        return none, _reason(outcome.code, outcome.time), name
     found = read_meter(outcome.meter, outcome.turns)
-    return [found[name] for name in metrics], ""
+    return [found[name] for name in metrics], "", name

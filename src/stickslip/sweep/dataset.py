@@ -22,7 +22,7 @@ from stickslip.study.plan import PlannedRun
 from stickslip.sweep.block import Block
 from stickslip.sweep.plan import BLOCK, Sweep
 
-__all__ = ["block_path", "has_block", "keep_block", "read", "room_for"]
+__all__ = ["block_path", "has_block", "keep_block", "read", "read_block", "room_for", "rows_of"]
 
 OVERHEAD = 4000
 """Bytes that a file of a block takes besides its rows."""
@@ -64,6 +64,7 @@ def keep_block(folder: Path, sweep: Sweep, block: Block) -> None:
     columns |= {name: _numbers(pyarrow, block.metrics[:, i]) for i, name in enumerate(sweep.metrics)}
     columns["flagged"] = pyarrow.array(block.flagged.tolist(), pyarrow.bool_())
     columns["failure"] = pyarrow.array(block.failures, pyarrow.string())
+    columns["integrator"] = pyarrow.array(block.integrators, pyarrow.string())
     table = pyarrow.Table.from_arrays(list(columns.values()), names=list(columns))
     about = json.dumps({"fingerprint": sweep.fingerprint(block.run)}).encode()
     try:
@@ -114,13 +115,28 @@ def read(
     folder: Path, sweep: Sweep, run: PlannedRun, columns: Sequence[str]
 ) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
     """Columns of a run's cases, in order of the cases; NaN where there is no number."""
-    parquet: Any = importlib.import_module("pyarrow.parquet")
     index = list(sweep.runs).index(run)
     found: dict[str, list[Any]] = {name: [] for name in columns}
     for start in range(0, sweep.drawn.cases, BLOCK):
-        path = block_path(folder, sweep, index, start)
-        if path.exists():
-            table = parquet.ParquetFile(path).read(columns=list(columns))
-            for name in columns:
-                found[name].append(table.column(name).to_numpy().astype(np.float64))
+        for name, values in read_block(folder, sweep, index, start, columns).items():
+            found[name].append(values)
     return {name: np.concatenate(parts) if parts else np.zeros(0) for name, parts in found.items()}
+
+
+def rows_of(folder: Path, sweep: Sweep, run: int, start: int) -> int:
+    """Cases that a block's file holds; 0 where it is missing."""
+    parquet: Any = importlib.import_module("pyarrow.parquet")
+    path = block_path(folder, sweep, run, start)
+    return parquet.read_metadata(path).num_rows if path.exists() else 0
+
+
+def read_block(
+    folder: Path, sweep: Sweep, run: int, start: int, columns: Sequence[str]
+) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+    """Columns of one block's cases; empty ones where it is missing."""
+    parquet: Any = importlib.import_module("pyarrow.parquet")
+    path = block_path(folder, sweep, run, start)
+    if not path.exists():
+        return {name: np.zeros(0) for name in columns}
+    table = parquet.ParquetFile(path).read(columns=list(columns))
+    return {name: table.column(name).to_numpy().astype(np.float64) for name in columns}

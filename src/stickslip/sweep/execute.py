@@ -16,14 +16,15 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.errors import InputError
+from stickslip.simulation import lanes
 from stickslip.study.files import copy_inputs, prepared_folder, unwritable
 from stickslip.study.provenance import engine_hash, versions
 from stickslip.study.study import interrupts_between_runs
 from stickslip.sweep import dataset
-from stickslip.sweep.block import Block, compute
+from stickslip.sweep.block import Block, compute, integrator_of
 from stickslip.sweep.plan import BLOCK, Sweep, load
 
-__all__ = ["BACKENDS", "run"]
+__all__ = ["BACKENDS", "computed", "run"]
 
 BACKENDS = ("threads", "processes")
 MOST_TRIES = 5
@@ -38,6 +39,7 @@ def run(
     backend: str = "threads",
     scheduler: str = "",
     progress: Progress | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
     """Run a sweep, or what is missing of it, and write its data set and manifest.json.
 
@@ -53,6 +55,8 @@ def run(
         Address of a Dask scheduler (tcp://host:8786), whose workers run the blocks instead.
     progress : callable, optional
         ``progress(finished, all)`` in closed loops.
+    say : callable, optional
+        ``say(line)`` is told before anything runs which runs the first integrator cannot run, and why.
 
     Returns
     -------
@@ -62,20 +66,24 @@ def run(
     Raises
     ------
     InputError
-        If the folder or the scheduler cannot be used, or workers are killed again and again.
+        If the folder or the scheduler cannot be used, there is no GPU and one is asked for, or workers are killed
+        again and again.
     """
     if jobs < 0:
         raise InputError(f"jobs = {jobs} must be at least 1")
+    ready(sweep, scheduler)
     folder = claim(Path(out), sweep)
     dataset.room_for(folder, sweep)
-    for planned in sweep.runs:
-        planned.check()
+    integrators = [integrator_of(sweep, i) for i in range(len(sweep.runs))]
+    if say:
+        for line in departures(sweep, integrators):
+            say(line)
     dataset.clear_drafts(folder)
     clock, cpu = time.perf_counter(), time.process_time()
     missing = [b for b in sweep.blocks if not dataset.has_block(folder, sweep, *b)]
     done, found = sweep.cases - sum(_size(sweep, b) for b in missing), len(sweep.blocks) - len(missing)
     with interrupts_between_runs() as check:
-        for block in _computed(sweep, missing, jobs or os.cpu_count() or 1, backend, scheduler):
+        for block in computed(sweep, missing, jobs or os.cpu_count() or 1, backend, scheduler):
             dataset.keep_block(folder, sweep, block)
             done += len(block.numbers)
             if progress:
@@ -85,7 +93,35 @@ def run(
         "wall_s": time.perf_counter() - clock, "cpu_s": time.process_time() - cpu, "jobs": jobs,
         "blocks_computed": len(missing), "blocks_found": found,
     }  # fmt: skip
-    return write_manifest(folder, sweep, timings)
+    return write_manifest(folder, sweep, timings, integrators)
+
+
+def ready(sweep: Sweep, scheduler: str = "") -> None:
+    """Refuse what cannot run here.
+
+    Raises
+    ------
+    InputError
+        If a run is bad, or it needs a GPU and this machine, which runs it, has none.
+    """
+    if sweep.device == "gpu" and not scheduler:
+        lanes.check_gpu()
+    for planned in sweep.runs:
+        planned.check()
+
+
+def departures(sweep: Sweep, integrators: Sequence[tuple[str, str]]) -> list[str]:
+    """A line for every reason why runs are not integrated by what comes first."""
+    wanted = "in lanes" if sweep.step > 0.0 else "exactly"
+    groups: dict[tuple[str, str], list[str]] = {}
+    for planned, (name, why) in zip(sweep.runs, integrators):
+        if why:
+            groups.setdefault((name, why), []).append(planned.key)
+    return [
+        f"{', '.join(keys[:3])}{f' and {len(keys) - 3} more' if len(keys) > 3 else ''}:"
+        f" integrator {name}, not {wanted}: {why}"
+        for (name, why), keys in groups.items()
+    ]
 
 
 def claim(folder: Path, sweep: Sweep) -> Path:
@@ -111,8 +147,8 @@ def _size(sweep: Sweep, block: tuple[int, int]) -> int:
 # ---- where blocks are computed ---------------------------------------------------------------------------------
 
 
-def _computed(
-    sweep: Sweep, blocks: Sequence[tuple[int, int]], jobs: int, backend: str, scheduler: str
+def computed(
+    sweep: Sweep, blocks: Sequence[tuple[int, int]], jobs: int, backend: str = "threads", scheduler: str = ""
 ) -> Iterator[Block]:
     """The blocks as they get done; those of a killed worker are computed again."""
     left, last = dict.fromkeys(blocks), ""
@@ -222,7 +258,9 @@ def compute_parcel(parcel: Parcel, run: int, start: int) -> Block:
 # ---- the manifest ------------------------------------------------------------------------------------------------
 
 
-def write_manifest(folder: Path, sweep: Sweep, timings: Mapping[str, Any]) -> dict[str, Any]:
+def write_manifest(
+    folder: Path, sweep: Sweep, timings: Mapping[str, Any], integrators: Sequence[tuple[str, str]]
+) -> dict[str, Any]:
     """Write manifest.json and copy the sweep's inputs beside it."""
     try:
         everything = [(sweep.source.name, sweep.source), (sweep.study.source.name, sweep.study.source)]
@@ -239,7 +277,9 @@ def write_manifest(folder: Path, sweep: Sweep, timings: Mapping[str, Any]) -> di
             "metrics": list(sweep.metrics),
             "timings": dict(timings),
             "runs": [
-                {"run": p.key, "fingerprint": sweep.fingerprint(i)} for i, p in enumerate(sweep.runs)
+                {"run": p.key, "fingerprint": sweep.fingerprint(i), "integrator": name}
+                | ({"because": why} if why else {})
+                for i, (p, (name, why)) in enumerate(zip(sweep.runs, integrators))
             ],
         }  # fmt: skip
         draft = folder / "manifest.json.part"

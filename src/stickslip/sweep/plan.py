@@ -171,8 +171,6 @@ def _lanes(table: Table, metrics: Sequence[str]) -> tuple[float, str]:
             "metrics", f"has {unknown[0]!r}, which lanes do not measure; choose integrator exact"
         )
     device = table.choice("device", lanes.DEVICES, "cpu")
-    if device == "gpu":
-        lanes.check_gpu()
     return table.positive("time_step", "s", lanes.STEP), device
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,8 +15,8 @@ from stickslip.study.files import read_manifest
 from stickslip.study.provenance import versions
 from stickslip.study.rerun import Comparison
 from stickslip.sweep import dataset
-from stickslip.sweep.block import Block, compute
-from stickslip.sweep.execute import Progress
+from stickslip.sweep.block import Block
+from stickslip.sweep.execute import Progress, computed, ready
 from stickslip.sweep.plan import BLOCK, Sweep, load
 
 __all__ = ["is_sweep", "rerun"]
@@ -56,30 +55,26 @@ def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comp
         raise InputError(f"jobs = {jobs} must be at least 0")
     manifest = read_manifest(folder)
     sweep = _sweep_of(folder, manifest)
-    for planned in sweep.runs:
-        planned.check()
-    names = (*sweep.drawn.names, *sweep.metrics, "flagged")
-    before = [dataset.read(folder, sweep, run, names) for run in sweep.runs]
-    for run, columns in zip(sweep.runs, before):
-        if columns[names[0]].size != sweep.drawn.cases:
-            raise InputError(f"{folder}: {run.key} has {columns[names[0]].size} of {sweep.drawn.cases} cases;"
+    ready(sweep)
+    for i, run in enumerate(sweep.runs):
+        found = sum(dataset.rows_of(folder, sweep, i, at) for at in range(0, sweep.drawn.cases, BLOCK))
+        if found != sweep.drawn.cases:
+            raise InputError(f"{folder}: {run.key} has {found} of {sweep.drawn.cases} cases;"
                              " run the sweep again to complete it")  # fmt: skip
-    differences: list[str] = []
+    differences: list[tuple[int, int, str]] = []
     largest, done = 0.0, 0
-
-    def computed(at: tuple[int, int]) -> Block:
-        return compute(sweep, *at)
-
-    with ThreadPoolExecutor(jobs or os.cpu_count() or 1) as pool:
-        for block in pool.map(computed, sweep.blocks):
-            lines, off = _compared(sweep, block, before[block.run])
-            differences += lines[: max(0, MOST_LINES - len(differences))]
-            largest, done = max(largest, off), done + len(block.numbers)
-            if progress:
-                progress(done, sweep.cases)
+    for block in computed(sweep, sweep.blocks, jobs or os.cpu_count() or 1):
+        lines, off = _compared(folder, sweep, block)
+        left = max(0, MOST_LINES - len(differences))
+        differences += [(block.run, block.start, line) for line in lines[:left]]
+        largest, done = max(largest, off), done + len(block.numbers)
+        if progress:
+            progress(done, sweep.cases)
+    differences.sort(key=lambda found: found[:2])  # Blocks come as they get done.
     now, then = versions(), manifest["versions"]
     notes = [f"{n} {now.get(n)}, was {then.get(n)}" for n in {**then, **now} if now.get(n) != then.get(n)]
-    return Comparison(sweep.cases, sweep.cases * len(sweep.metrics), differences, largest, notes)
+    lines = [line for *_, line in differences]
+    return Comparison(sweep.cases, sweep.cases * len(sweep.metrics), lines, largest, notes)
 
 
 def _sweep_of(folder: Path, manifest: Mapping[str, Any]) -> Sweep:
@@ -90,14 +85,14 @@ def _sweep_of(folder: Path, manifest: Mapping[str, Any]) -> Sweep:
     return replace(sweep, drawn=replace(sweep.drawn, cases=int(manifest["cases"])))
 
 
-def _compared(sweep: Sweep, block: Block, before: Mapping[str, Any]) -> tuple[list[str], float]:
+def _compared(folder: Path, sweep: Sweep, block: Block) -> tuple[list[str], float]:
     """A line for every number of a block that differs, and the largest difference over the former value."""
-    at = slice(block.start, min(block.start + BLOCK, sweep.drawn.cases))
     columns = dict(zip(sweep.drawn.names, block.numbers.T)) | dict(zip(sweep.metrics, block.metrics.T))
     columns["flagged"] = block.flagged.astype(np.float64)
+    before = dataset.read_block(folder, sweep, block.run, block.start, list(columns))
     lines, largest = list[str](), 0.0
     for name, found in columns.items():
-        old = before[name][at]
+        old = before[name]
         for i in np.flatnonzero((found != old) & ~(np.isnan(found) & np.isnan(old))):
             a, b = float(old[i]), float(found[i])
             lines.append(f"{sweep.runs[block.run].key} case {block.start + i} {name}: {b!r}, was {a!r}")

@@ -87,8 +87,8 @@ def tune(sweep: Sweep, run: PlannedRun, progress: Callable[[int, int], None] | N
 
     def score(numbers: Array) -> Array:
         settings = {s.name: np.full(sweep.drawn.cases, x) for s, x in zip(spreads, numbers)}
-        found, _ = measured(run, uncertain | settings, sweep.metrics, sweep.drawn.cases)
-        return percentiles(found, sweep.percentile)
+        found = measured(run, uncertain | settings, sweep.metrics, sweep.drawn.cases)
+        return percentiles(found.metrics, sweep.percentile)
 
     def objective(u: Array) -> float:
         numbers = np.array([b * float(s.at(np.asarray(x))) for s, b, x in zip(spreads, bases, u)])
@@ -108,7 +108,7 @@ def tune(sweep: Sweep, run: PlannedRun, progress: Callable[[int, int], None] | N
     if not math.isfinite(every[best, 0]):
         raise InputError(f"run {run.key}: with no setting do enough cases run to their end; widen the ranges")
     before = np.array([float(value_of(run, s.name)) for s in spreads])
-    as_it_was, _ = measured(run, uncertain, sweep.metrics, sweep.drawn.cases)
+    as_it_was = measured(run, uncertain, sweep.metrics, sweep.drawn.cases).metrics
     return Tuned(
         run, tuple(s.name for s in spreads), before, tried[best], percentiles(as_it_was, sweep.percentile), every[best],
         np.array(tried), every,
