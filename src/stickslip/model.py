@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip import plugins
 from stickslip.config import read_toml
-from stickslip.errors import ParameterError, suggestion
+from stickslip.errors import InputError, ParameterError, suggestion
 from stickslip.spec import Law, ReferenceKind
 
 __all__ = ["MODEL_FORMAT", "Model", "Reference"]
@@ -57,7 +57,14 @@ class Model:
         file = Path(path)
         table = read_toml(file)
         if table.values.get("format", MODEL_FORMAT) != MODEL_FORMAT:
-            raise table.error("format", f"is of another version; this one reads {MODEL_FORMAT!r}")
+            raise table.error(
+                "format", f"is of another version; this one reads {MODEL_FORMAT!r}: identify the axis again"
+            )
+        if not (table.has("law") or table.has("parameters")):
+            held = f"but {', '.join(table.values)}" if table.values else "and nothing else"
+            raise InputError(
+                f"{file} holds no model (`law` and a table [parameters]) {held}; give what `stickslip identify` wrote"
+            )
         name = table.text("law")
         if name.endswith(".py"):
             name = str(file.parent / name)

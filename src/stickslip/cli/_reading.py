@@ -87,10 +87,15 @@ def open_record(path: Path, args: argparse.Namespace) -> Opened:
 
 
 def _drive(args: argparse.Namespace) -> Drive:
+    from stickslip.errors import InputError
     from stickslip.readers import Drive
 
     names = ("counts_per_rev", "rated_torque", "rated_current", "torque_constant", "gear_ratio", "side")
-    return Drive(**{n: getattr(args, n) for n in names if getattr(args, n) is not None})
+    given = {n: getattr(args, n) for n in names if getattr(args, n) is not None}
+    for name, value in given.items():
+        if value != value:  # to a `Drive`, NaN is a number that nobody gave
+            raise InputError(f"--{name.replace('_', '-')} {value} must be a number greater than 0")
+    return Drive(**given)
 
 
 def print_columns(opened: Opened) -> None:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 SUMMARY = "identify inertia and a friction law from records; writes model.toml and report.html"
 LOOP_NAMES = ("kp", "ki", "kd", "kr", "limit", "period", "count", "span")
+RANGES = {"limit": "greater than 0", "period": "0 or more", "count": "0 or more"}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -231,7 +232,7 @@ def checked(path: Path, args: argparse.Namespace, held_out: bool = False) -> Sou
         raise InputError(f"{path}: {diagnosis.errors[0].line()}; see `stickslip doctor {path}`")
     for finding in diagnosis.warnings:
         print(f"stickslip: {path}: {finding.line()}", file=sys.stderr)
-    return Source(path.name, record, diagnosis.findings, source_of(record), held_out)
+    return Source(path.name, diagnosis.record, diagnosis.findings, source_of(diagnosis.record), held_out)
 
 
 def axis_of(record: Record, args: argparse.Namespace) -> ServoAxis:
@@ -247,23 +248,41 @@ def axis_of(record: Record, args: argparse.Namespace) -> ServoAxis:
 
 def trial(record: Record, axis: ServoAxis, args: argparse.Namespace) -> Trial:
     """The record as a trial."""
+    from stickslip.errors import InputError
     from stickslip.identify.axis_trial import trial_of
 
     name = str(record.meta.get("reading", {}).get("file", "record"))
+    if args.loop and not {"position_reference", "reference"} & set(record.channels):
+        raise InputError(
+            f"{name}: --loop needs the reference position beside {', '.join(record.channels)}; map its column with "
+            "--map position_reference=COLUMN, or leave --loop out"
+        )
     return trial_of(record, axis, loop=loop_of(args.loop) if args.loop else None, name=name)
 
 
 def loop_of(text: str) -> Loop:
     """Read ``kp=..,kd=..``."""
-    from stickslip.errors import UnknownName
+    import math
+
+    from stickslip.errors import InputError, UnknownName
     from stickslip.simulation.driven import Loop
 
     given = values(text.split(","))
     for name in given:
         if name not in LOOP_NAMES:
             raise UnknownName("number of --loop", name, LOOP_NAMES)
-    span = int(given.pop("span", 1))
-    return Loop(velocity_span=span, **given)
+    for name, value in given.items():
+        above = math.isfinite(value) or name == "limit"
+        if (
+            not above
+            or (name in ("period", "count") and value < 0.0)
+            or (name == "limit" and not value > 0.0)
+        ):
+            raise InputError(f"--loop: {name} = {value:g} must be {RANGES.get(name, 'a finite number')}")
+    span = given.pop("span", 1.0)
+    if span not in (1.0, 2.0):
+        raise InputError(f"--loop: span = {span:g} must be 1 or 2 samples")
+    return Loop(velocity_span=int(span), **given)
 
 
 def source_of(record: Record) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics
 from stickslip.identify.axis_output import OutputError, output_error
 from stickslip.identify.axis_prediction import axis_prediction
-from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, fitted_axis
+from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, fitted_axis, require_start
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification, silent
 from stickslip.identify.prediction_error import PredictionError
@@ -130,6 +130,8 @@ def identify_axis(
         "free": free, "frozen": frozen, "values": values, "extras": extras, "robust": robust
     }  # fmt: skip
     inverse, notes = first_look(trials, axis, extras, per_direction)
+    if inverse is None:
+        require_start(trials, axis, found, dict(values or {}), extras)
     candidates: list[Candidate] = []
     chosen = found[0]
     if len(found) > 1:

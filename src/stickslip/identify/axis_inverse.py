@@ -141,8 +141,9 @@ def inverse_dynamics(
     y = np.concatenate([c.torque for c in columns])
     if y.size < 3 * len(names):
         raise InputError(
-            f"the records move for only {y.size} independent samples, too few for {len(names)} parameters; "
-            "give a longer record with more motion"
+            f"{sum(t.time.size for t in trials)} samples hold {y.size} independent ones in motion (the filters take "
+            f"{TAPER / corner:.2g} s at both ends of a record), too few for {len(names)} parameters; give a longer "
+            "record with more motion"
         )
     size = np.linalg.norm(w, axis=0)
     rank = np.linalg.matrix_rank(w / np.where(size > 0.0, size, 1.0), tol=1e-8)
@@ -239,7 +240,8 @@ def _columns(
     dt = 1.0 / rate
     if q.size < 12 * math.ceil(rate / cutoff):
         raise InputError(
-            f"{trial.name}: {q.size * dt:.3g} s are too short for a low-pass at {cutoff:.3g} Hz; give a longer record"
+            f"{trial.name}: {q.size} samples, {q.size * dt:.3g} s, are too few for a low-pass at {cutoff:.3g} Hz, "
+            f"which takes {12 * math.ceil(rate / cutoff)}; give a longer record"
         )
     density = white_noise(q, rate)
     q = low_pass(q, cutoff, rate)

@@ -7,14 +7,14 @@ the best starts are descended from, with weights and steps of the integration th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.identify.axis_inverse import InverseDynamics
+from stickslip.errors import InputError, UnknownName
+from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics
 from stickslip.identify.axis_problem import Problem, measured, mechanics_parameters
 from stickslip.identify.axis_start import frozen_by_default, starts
 from stickslip.identify.axis_trial import Trial
@@ -25,7 +25,7 @@ from stickslip.model import Model
 from stickslip.simulation.driven import Mechanics
 from stickslip.spec import Law
 
-__all__ = ["Extras", "FittedAxis", "fitted_axis", "laid_out", "starting_models"]
+__all__ = ["Extras", "FittedAxis", "fitted_axis", "laid_out", "require_start", "starting_models"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -39,6 +39,8 @@ SETTLED = 0.1
 """Change of the weights, relative, below which they need no other descent."""
 DESCENTS = 3
 """Of how many starts a rough descent is made."""
+LEVELS = {"fc", "sigma2"}
+"""Level and slope of friction, which may be given for any law."""
 REACH = 7.0
 """How far a logarithmic coordinate may go from its start: a factor of 1100."""
 
@@ -147,6 +149,8 @@ def fitted_axis(
     the sum of squares at which the last descent ends.
     """
     given = dict(values or {})
+    if first is None:
+        require_start(trials, axis, [law], given, extras)
     candidates = [
         laid_out(trials, axis, law, first, model, given, free, frozen, extras)
         for model in starting_models(trials, law, first, given)
@@ -203,7 +207,7 @@ def ranked_starts(
             out.append((cost, problem, vector.start))
     if not out:
         raise InputError(
-            f"{law.name}: no simulation from the starting values succeeds; give others by `values`"
+            f"{law.name}: no simulation from the starting values succeeds; give others with --set"
         )
     return sorted(out, key=lambda found: found[0])
 
@@ -246,11 +250,6 @@ def starting_models(
         return [Model(law, **known)]
     travel = max(float(np.ptp(t.position)) for t in trials)
     level = float(given.get("fc", 0.0))
-    if first is None and not level > 0.0:
-        raise InputError(
-            f"{law.name}: without the drive's torque the search needs starting values; give {', '.join(needed)}, "
-            "or the friction's level fc"
-        )
     if first is None:
         speeds = np.concatenate([np.diff(t.position) / np.diff(t.time) for t in trials])
         speed = math.sqrt(float(np.mean(speeds**2)))
@@ -276,13 +275,12 @@ def laid_out(
                 values |= {f"cos[{i}]": first[f"cos[{i}]"], f"sin[{i}]": first[f"sin[{i}]"]}
     law_names = {f.name for f in law.fields}
     values |= {k: float(v) for k, v in given.items() if k not in law_names}
-    if "inertia" not in values:
-        raise InputError(
-            "without the drive's torque the search needs a starting value of the inertia; give it"
-        )
     extra = mechanics_parameters(
         axis, trials[0].quantity, values, extras.harmonics, extras.friction_harmonics
     )
+    require_known([*free, *given], law_names | {p.name for p in extra} | LEVELS)
+    if not values["inertia"] > 0.0:
+        raise InputError(f"inertia = {values['inertia']:g} {axis.unit('kg·m²')} must be greater than 0")
     held = {"drive_gain", "back_emf", "backlash", "controller_gain", *frozen_by_default(law)}
     if axis.gravity != "pendulum":
         # Under a constant outer torque its part of the load is one with the level of friction.
@@ -293,6 +291,42 @@ def laid_out(
     size = abs(first.coulomb) if first is not None else 1.0
     extra = [scaled_parameter(p, size) for p in extra]
     return NearVector(model, frozen=sorted(held), extra=extra), values["inertia"]
+
+
+def require_start(
+    trials: Sequence[Trial], axis: ServoAxis, laws: Sequence[Law], given: Mapping[str, Any], extras: Extras
+) -> None:
+    """Refuse a search that has neither inverse dynamics nor starting values of any of the laws: it says why.
+
+    Raises
+    ------
+    InputError
+    """
+    whole = any(all(f.name in given for f in x.fields if f.par.default is None) for x in laws)
+    needed = [] if whole or given.get("fc", 0.0) > 0.0 else ["fc"]  # from which the others follow
+    if "inertia" not in given:
+        needed.append("inertia")
+    if not needed:
+        return
+    why = "the search has no start"
+    try:
+        inverse_dynamics(trials, axis, harmonics=extras.harmonics, harmonic_period=extras.harmonic_period)
+    except InputError as error:
+        why = str(error)
+    asked = " and ".join(f"--set {name}=.." for name in needed)
+    raise InputError(f"{why}; or say where the search starts with {asked}")
+
+
+def require_known(names: Iterable[str], known: set[str]) -> None:
+    """Refuse parameters that neither law nor axis has.
+
+    Raises
+    ------
+    UnknownName
+    """
+    for name in names:
+        if name not in known and name.partition("[")[0] not in known:
+            raise UnknownName("parameter", name, known)
 
 
 def first_inertia(first: InverseDynamics) -> float:

@@ -87,7 +87,9 @@ class Trial:
             )
         if self.drive is None and not self.closed_loop:
             raise InputError(
-                f"{self.name}: neither the drive's signal nor a reference with its controller is known; give one"
+                f"{self.name}: neither the drive's signal nor a reference position with its controller is known; map "
+                "the torque or current (--map torque=COLUMN:UNIT), or the reference (--map position_reference=COLUMN) "
+                "and give its controller (--loop kp=..,kd=..)"
             )
 
     @property

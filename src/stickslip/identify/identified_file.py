@@ -83,11 +83,16 @@ def read_identified(path: str | os.PathLike[str]) -> Identified:
         )  # fmt: skip
         matrix = np.array(content.get("correlation", {}).get("matrix", []), dtype=np.float64)
         matrix = matrix.reshape(len(estimates), len(estimates))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except KeyError as error:
+        raise InputError(f"{file}: one of its estimates lacks {error}; identify the axis again") from None
+    except (TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{file}: its estimates cannot be read ({error}); identify the axis again") from None
+    axis = dict(content.get("axis", {}))
+    if isinstance(axis.get("inertia", 0.0), (str, bool, list, dict)):
+        raise InputError(f"{file}: axis.inertia = {axis['inertia']!r} must be a number in kg·m² (kg)")
     return Identified(
         file, model, estimates, np.where(np.isfinite(matrix), matrix, np.eye(len(estimates))),
-        dict(content.get("axis", {})), str(content.get("motion", "rotary")), tuple(content.get("data", [])),
+        axis, str(content.get("motion", "rotary")), tuple(content.get("data", [])),
     )  # fmt: skip
 
 

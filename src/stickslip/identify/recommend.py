@@ -237,8 +237,11 @@ def recommend(
         If there is no inertia, or the linear controller alone cannot be simulated.
     """
     j = inertia if inertia is not None else found.axis.get("inertia")
-    if j is None or not float(j) > 0.0:
-        raise InputError(f"{found.path} holds no inertia; give --inertia in {found.unit('kg·m²')}")
+    unit = found.unit("kg·m²")
+    if j is None:
+        raise InputError(f"{found.path} holds no inertia; give --inertia in {unit}")
+    if not 0.0 < j < math.inf:
+        raise InputError(f"inertia = {j:g} {unit} must be greater than 0; give another one with --inertia")
     linear = Controller(
         place("PD", float(j), drive.bandwidth, drive.damping), None, drive.torque_limit, drive.sample_time,
         drive.encoder_counts,

@@ -52,11 +52,12 @@ class Drive:
                 raise ParameterError(f"drive: {name} = {getattr(self, name):g} must be greater than 0")
         if not self.encoder_counts >= 0.0:
             raise ParameterError(f"drive: encoder_counts = {self.encoder_counts:g} must be 0 or greater")
-        if self.bandwidth * self.sample_time > 0.1:
-            raise ParameterError(
-                f"drive: bandwidth = {self.bandwidth:g} Hz is more than a tenth of the sample rate "
-                f"{1.0 / self.sample_time:g} Hz; take a lower one, or a shorter sample time"
-            )
+        for name in ("bandwidth", "frequency"):
+            if getattr(self, name) * self.sample_time > 0.1:
+                raise ParameterError(
+                    f"drive: {name} = {getattr(self, name):g} Hz is more than a tenth of the sample rate "
+                    f"{1.0 / self.sample_time:g} Hz; take a lower one, or a shorter sample time"
+                )
 
     def deadband(self, counts: float) -> float:
         """The velocity of so many counts of the encoder per sample time, rad/s; 0 where it measures exactly."""

@@ -56,6 +56,8 @@ def open_table(path: str | os.PathLike[str]) -> Table:
         known = formats()
         found = next((f for f in known if f.recognise(head, source)), None)
         if found is None:
+            if source.is_dir():
+                raise InputError(f"{source} is a folder, and no ROS bag; give a file in it")
             titles = ", ".join(f.title for f in known)
             raise InputError(f"{source} is in no format that is known; formats are {titles}")
         with np.errstate(all="ignore"):

@@ -247,6 +247,10 @@ def read_manifest(folder: Path) -> dict[str, Any]:
             f"no study in {folder} ({path.name}: {error.strerror}); give a folder that `stickslip study` or"
             " `stickslip sweep` wrote"
         ) from None
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path} is not a study's manifest ({error!r}); run the study anew") from None
+    except ValueError as error:
+        raise InputError(f"{path} is not JSON ({error}); run the study anew") from None
+    except (KeyError, TypeError):
+        raise InputError(
+            f"{path} lists no inputs of a study with their SHA-256; run the study anew"
+        ) from None
     return manifest

@@ -210,6 +210,11 @@ def load_run(path: Path) -> PlannedRun:
     ConfigError
     """
     with read_toml(path) as table:
+        if table.has("law") and not table.has("friction"):
+            raise ConfigError(
+                f"{path} holds a model, not a closed loop; write a file with `law = {{model = {path.name!r}}}` in its "
+                "table [friction] (`stickslip simulate --help` shows one)"
+            )
         numerics = build.numerics(table, Numerics())
         rule = table.choice("slip_rule", SLIP_RULES, "signed")
         files = build.law_files(table)

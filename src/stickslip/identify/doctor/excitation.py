@@ -110,7 +110,7 @@ def reversed_and_slow(view: View, stribeck_velocity: float | None = None) -> Ite
     slow = float(np.mean((speed > low) & (speed < high)))
     if slow < 0.01:
         message = (
-            f"{100 * slow:.2g} % of the record lies between {low:.3g} and {high:.3g} {unit}/s: the Stribeck"
+            f"{100 * slow:.3g} % of the record lies between {low:.3g} and {high:.3g} {unit}/s: the Stribeck"
             " velocity stays unknown"
         )
         yield Finding("warning", "no-slow-motion", message, remedy="add slow motion in both directions")

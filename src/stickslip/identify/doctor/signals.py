@@ -27,7 +27,7 @@ def missing(view: View) -> Iterator[Finding]:
             continue
         share = bad.size / values.size
         where = row(int(bad[0]), view)
-        message = f"{channel} has {bad.size} missing or infinite values ({100 * share:.2g} %)"
+        message = f"{channel} has {bad.size} missing or infinite values ({100 * share:.3g} %)"
         if share > 0.2:
             yield Finding(
                 "error", "nan", message, where, f"log it again, or leave it out with --map {channel}=none"
@@ -51,7 +51,7 @@ def saturated(view: View) -> Iterator[Finding]:
         yield Finding(
             "warning",
             "saturation",
-            f"{channel} sits at its limit of {limits} {unit} in {100 * share:.2g} % of the rows",
+            f"{channel} sits at its limit of {limits} {unit} in {100 * share:.3g} % of the rows",
             row(index, view),
             "reduce the demand, or leave these rows out: what was cut off is lost",
         )

@@ -43,7 +43,7 @@ def ascending(view: View) -> Iterator[Finding]:
     same = known[1:][steps == 0.0]
     if same.size:
         share = same.size / max(steps.size, 1)
-        message = f"{same.size} rows ({100 * share:.2g} %) have the time of the row before"
+        message = f"{same.size} rows ({100 * share:.3g} %) have the time of the row before"
         if share > 0.2:
             remedy = "write the time with more digits, or give --sample-time SECONDS"
             yield Finding(

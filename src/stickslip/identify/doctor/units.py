@@ -25,12 +25,14 @@ def assumed(view: View) -> Iterator[Finding]:
     main = ("time", "position", "velocity", "motor_torque", "friction_torque", "current")
     quiet = [c for c in main if not view.stated(c)]
     if quiet:
-        listed = ", ".join(f"{c} as {'s' if c == 'time' else view.record.units[c]}" for c in quiet)
+        listed = ", ".join(
+            f"{view.name(c)!r} as {c} in {'s' if c == 'time' else view.record.units[c]}" for c in quiet
+        )
         channel = quiet[-1]
         yield Finding(
             "warning",
             "assumed-unit",
-            f"the file states no units; taken were {listed}",
+            f"the file states no unit that is known; taken were {listed}",
             remedy=f"say them, such as {view.mapped(channel, 'UNIT')}",
         )
 
