@@ -11,7 +11,8 @@ from stickslip.analyse.tracking import tracking_metrics
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError
-from stickslip.identify.train import fastest_pd, fit_train, identified_train, loop_response
+from stickslip.identify.nyquist import fastest_pd
+from stickslip.identify.train import fit_train, identified_train, loop_response
 from stickslip.machines.machine import machine
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.procedures.base import perform
@@ -40,7 +41,7 @@ def test_modes_spring_and_masses_are_those_of_the_machine(dry):
     assert train.axis.elasticity == pytest.approx(flexible.elasticity, rel=0.03)
     assert train.axis.disk == pytest.approx(flexible.disk, rel=0.03)
     assert train.axis.inertia == pytest.approx(DRY.inertia)
-    found = identified_train(dry, train, *fastest_pd(dry, DRY.inertia))
+    found = identified_train(dry, train, fastest_pd(dry, DRY.inertia).sentence)
     assert found["mode_sticking"].value < found["mode_sliding"].value
     assert found["spring"].lower < flexible.elasticity < found["spring"].upper
 
@@ -55,8 +56,9 @@ def standing(plant, bandwidth):
 
 
 def test_a_pd_is_calm_below_the_bandwidth_that_rings_and_rings_above(dry):
-    at, frequency, while_ = fastest_pd(dry[1:], DRY.inertia)
-    assert while_ == "sticking"
+    fastest = fastest_pd(dry[1:], DRY.inertia)
+    assert fastest.name == "sticking"
+    at, frequency = fastest.bandwidth, fastest.frequency
     assert standing(DRY, 0.85 * at) < 3e-5
     assert standing(DRY, 1.3 * at) > 1e-4
     assert 200.0 < frequency < 260.0

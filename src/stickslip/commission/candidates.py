@@ -23,6 +23,7 @@ from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import LimitCrossed
+from stickslip.identify.nyquist import Fastest
 from stickslip.identify.recommend import laws_of
 from stickslip.identify.train import Train
 from stickslip.machines.angle import AngleMap
@@ -114,9 +115,8 @@ class Known:
         Before sliding, at the encoder, N·m/rad.
     resolution : float
         Of the position, rad.
-    rings_at, rings_with, rings_while : float, float, str
-        Bandwidth from which on a PD rings, the frequency, and in which state; the state is empty where none up to that
-        bandwidth does.
+    fastest : Fastest
+        PD from which on the loop rings.
     """
 
     inertia: float
@@ -125,14 +125,12 @@ class Known:
     train: Train
     stiffness: float
     resolution: float
-    rings_at: float
-    rings_with: float
-    rings_while: str
+    fastest: Fastest
 
     @property
     def bandwidth(self) -> float:
         """Of the PD recommended, Hz."""
-        return self.rings_at / MARGIN
+        return self.fastest.bandwidth / MARGIN
 
     def machine(self, rig: Rig, level: float = 1.0) -> Machine:
         """The machine to simulate, with `level` times the friction; its offset is left out, as in the compensator."""

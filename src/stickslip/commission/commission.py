@@ -35,7 +35,8 @@ from stickslip.identify.hysteresis import Loop as Hysteresis
 from stickslip.identify.inertia import inertia
 from stickslip.identify.lugre_dynamics import Response, identify_lugre_dynamics
 from stickslip.identify.presliding import identify_presliding
-from stickslip.identify.train import fastest_pd, fit_train, identified_train, loop_response
+from stickslip.identify.nyquist import fastest_pd
+from stickslip.identify.train import fit_train, identified_train, loop_response
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
@@ -59,8 +60,6 @@ VELOCITIES = (25.0, 18.0, 10.0, 5.0, 3.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1
 """rad/s; those that the rig can run at are taken."""
 BELOW, BEYOND = 0.6, 1.25
 """Of the break-away torque: amplitudes that stick, and that slip."""
-MOST = 0.1
-"""Of the sample rate: bandwidth taken as that which rings where none does."""
 GENTLER = 5
 """Amplitudes of the stick-slip stage that are tried."""
 QUIET = 0.04
@@ -317,11 +316,9 @@ def _recommended(
     """The response of the loop, the bandwidth that it bears, the compensator, and what both do."""
     done = course.run(Resonance(speed=0.6 * top, inertia=j, stuck=QUIET * fs))
     sliding, sticking = (loop_response(done.part(label), label) for label in ("sliding", "sticking"))
-    train, (at, where, state) = fit_train(sliding, sticking, j), fastest_pd([sliding, sticking], j)
-    if math.isinf(at):
-        at = MOST / course.rig.sample_time
-    known = Known(j, model, angle, train, stiffness, resolution_of(done.part("sticking")), at, where, state)
-    course.add("resonance", done, identified_train([sliding, sticking], train, at, where, state))
+    train, fastest = fit_train(sliding, sticking, j), fastest_pd([sliding, sticking], j)
+    known = Known(j, model, angle, train, stiffness, resolution_of(done.part("sticking")), fastest)
+    course.add("resonance", done, identified_train([sliding, sticking], train, fastest.sentence))
     course.progress("recommend: simulating the machine that was identified")
 
     def follow(procedure: Following, name: str) -> Performed:

@@ -105,12 +105,8 @@ class Recommended:
     def lines(self) -> Iterator[str]:
         """What people read."""
         k = self.known
-        yield (
-            f"No PD up to {k.rings_at:.3g} Hz rings (measured response); recommended: {k.bandwidth:.3g} Hz."
-            if not k.rings_while
-            else f"A PD rings from {k.rings_at:.3g} Hz on, at {k.rings_with:.3g} Hz while {k.rings_while} (measured "
-            f"response); recommended: {k.bandwidth:.3g} Hz, a factor of {MARGIN:g} below."
-        )
+        below = f", a factor of {MARGIN:g} below" if k.fastest.name else ""
+        yield f"{k.fastest.sentence} (measured response); recommended: {k.bandwidth:.3g} Hz{below}."
         if self.chosen is None:
             yield "No compensator is recommended: none is calm on the identified machine and better than the PD alone."
             return

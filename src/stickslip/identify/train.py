@@ -1,4 +1,4 @@
-"""The response that a position loop closes over, its modes, and how fast a PD it bears.
+"""The response that a position loop closes over, and its modes.
 
 The response is the sampled one, from the torque command of a sample to the position that answers to it: hold, delay,
 amplifier and every mode are in it, whatever they are. It is estimated with the excitation as instrument,
@@ -21,7 +21,7 @@ from stickslip.identify.filters import cross_spectrum, spectrum
 from stickslip.machines.flexible import FlexibleAxis
 from stickslip.record import Record
 
-__all__ = ["LoopResponse", "Train", "fastest_pd", "fit_train", "identified_train", "loop_response", "rings"]
+__all__ = ["LoopResponse", "Train", "fit_train", "identified_train", "loop_response"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
@@ -42,7 +42,7 @@ class LoopResponse:
     ----------
     name : str
     frequency : array, shape (n,)
-        Hz, those at which the excitation is seen.
+        Hz, those at which the excitation is seen (`COHERENT`).
     response : array of complex, shape (n,)
         rad/(N·m).
     coherence : array, shape (n,)
@@ -56,6 +56,13 @@ class LoopResponse:
     response: Complex
     coherence: Array
     sample_time: float
+
+    @property
+    def gaps(self) -> tuple[tuple[float, float], ...]:
+        """Between the lowest and the highest, the frequencies that are seen with none seen between them, Hz."""
+        step = np.diff(self.frequency)
+        wide = np.flatnonzero(step > 1.5 * np.min(step))
+        return tuple((float(self.frequency[i]), float(self.frequency[i + 1])) for i in wide)
 
     @property
     def peak(self) -> float:
@@ -102,58 +109,6 @@ def loop_response(
         raise InputError(f"{name}: the position does not answer to the excitation; excite the axis more")
     response = (ry[inside] / ru[inside])[seen]
     return LoopResponse(name, f[inside][seen], response.astype(np.complex128), coherence[seen], dt)
-
-
-def controller(inertia: float, bandwidth: float, damping: float, f: Array, dt: float) -> Complex:
-    """A PD as it is sampled: kp + kd (1 - z^-1) / dt; thesis eq. 3.10."""
-    w = 2.0 * math.pi * bandwidth
-    difference = (1.0 - np.exp(-2j * math.pi * f * dt)) / dt
-    return (inertia * w * w + 2.0 * inertia * damping * w * difference).astype(np.complex128)
-
-
-def rings(found: LoopResponse, inertia: float, bandwidth: float, damping: float = 1.0) -> float:
-    """Where the loop under a PD of that bandwidth encircles -1, Hz; NaN where it does not (Nyquist).
-
-    Neither an inertia nor a spring under a PD crosses the real axis left of -1, so that any crossing there is a mode's.
-    """
-    f = found.frequency
-    loop = controller(inertia, bandwidth, damping, f, found.sample_time) * found.response
-    turned = np.flatnonzero(loop.imag[:-1] * loop.imag[1:] < 0.0)
-    share = loop.imag[turned] / (loop.imag[turned] - loop.imag[turned + 1])
-    there = loop.real[turned] + share * (loop.real[turned + 1] - loop.real[turned])
-    left = turned[there < -1.0]
-    return float(f[left[0]]) if left.size else math.nan
-
-
-def fastest_pd(
-    responses: Sequence[LoopResponse], inertia: float, *, damping: float = 1.0
-) -> tuple[float, float, str]:
-    """The bandwidth from which on a PD rings in some response.
-
-    Returns
-    -------
-    bandwidth : float
-        Hz; infinite where none up to a tenth of the sample rate does.
-    frequency : float
-        At which it rings, Hz.
-    name : str
-        Of the response.
-
-    Raises
-    ------
-    InputError
-        If it rings at every bandwidth tried.
-    """
-    tried = np.geomspace(0.5, 0.1 / responses[0].sample_time, 400)
-    for place, bandwidth in enumerate(tried):
-        for r in responses:
-            if math.isfinite(where := rings(r, inertia, float(bandwidth), damping)):
-                if not place:
-                    raise InputError(
-                        f"a PD of 0.5 Hz rings at {where:.3g} Hz on this axis; look at its response"
-                    )
-                return float(bandwidth), where, r.name
-    return math.inf, math.nan, ""
 
 
 @dataclass(frozen=True)
@@ -269,10 +224,8 @@ def modelled(x: Array, r: LoopResponse, inertia: float, stuck: bool) -> Complex:
     return plant * (1.0 - np.exp(-turn)) / turn * np.exp(-turn * x[3])
 
 
-def identified_train(
-    responses: Sequence[LoopResponse], train: Train, rings_at: float, frequency: float, name: str
-) -> Identification:
-    """Modes, delay and the bandwidth from which on a PD rings, as an identification without a law."""
+def identified_train(responses: Sequence[LoopResponse], train: Train, said: str) -> Identification:
+    """Modes and delay as an identification without a law; `said` is what is known of the PD that it bears."""
     estimates = [
         plain("mode_sticking", "Hz", "f_0", train.sticking),
         plain("delay", "samples", "d", train.delay),
@@ -291,13 +244,15 @@ def identified_train(
                    math.hypot(2.0 * mode, of_motor) * train.axis.elasticity),
             within("load_inertia", "kg·m²", "J_L", load, of_load * load),
         ]  # fmt: skip
-    notes = (
-        f"A PD rings from {rings_at:.3g} Hz on, at {frequency:.3g} Hz while {name}."
-        if name
-        else f"No PD up to {rings_at:.3g} Hz rings.",
-    )
+    notes = [f"{said}."]
+    for r in responses:
+        if r.gaps:
+            gaps = ", ".join(f"{a:.4g} to {b:.4g}" for a, b in r.gaps)
+            notes.append(
+                f"While {r.name} the position does not answer within: {gaps} Hz; nothing is known of these."
+            )
     return Identification(
-        "resonance", None, tuple(estimates), np.eye(len(estimates)), {}, notes, (),
+        "resonance", None, tuple(estimates), np.eye(len(estimates)), {}, tuple(notes), (),
         (picture_of(responses, train),), {"train": train, "responses": tuple(responses)},
     )  # fmt: skip
 

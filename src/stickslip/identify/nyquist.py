@@ -1,0 +1,148 @@
+"""How fast a PD a measured response bears: Nyquist's criterion on the frequencies that were seen.
+
+The axis itself is stable, but for the two poles of its free motion. The loop is then stable if the locus of its sampled
+response, from low to high frequencies, crosses the real axis left of -1 as often downwards as upwards. Two things are
+not seen and are assumed: below the lowest frequency the axis is an inertia or a spring, and beyond the highest the loop
+is weaker than 1. Where frequencies between are missing nothing is interpolated: a change of side over such a gap may be
+an encirclement or none (`Count.unseen`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.train import LoopResponse
+
+__all__ = ["Count", "encirclements", "fastest_pd", "pd_response"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Complex = np.ndarray[Any, np.dtype[np.complex128]]
+
+
+@dataclass(frozen=True)
+class Count:
+    """Encirclements of -1 as far as they were seen.
+
+    Attributes
+    ----------
+    turns : int
+        Clockwise, over positive frequencies; half the unstable poles of the closed loop.
+    frequency : float
+        Of the crossing that encircles, Hz; not a number where none does.
+    unseen : tuple of float
+        Ends of the first gap over which the locus may cross left of -1, Hz; empty where there is none.
+    """
+
+    turns: int
+    frequency: float
+    unseen: tuple[float, ...]
+
+    @property
+    def calm(self) -> bool:
+        """Whether the loop is seen to be stable."""
+        return self.turns == 0 and not self.unseen
+
+
+def pd_response(inertia: float, bandwidth: float, damping: float, f: Array, dt: float) -> Complex:
+    """A PD as it is sampled: kp + kd (1 - z^-1) / dt; thesis eq. 3.10."""
+    w = 2.0 * math.pi * bandwidth
+    difference = (1.0 - np.exp(-2j * math.pi * f * dt)) / dt
+    return (inertia * w * w + 2.0 * inertia * damping * w * difference).astype(np.complex128)
+
+
+def encirclements(found: LoopResponse, inertia: float, bandwidth: float, damping: float = 1.0) -> Count:
+    """How the loop under a PD of that bandwidth (Hz) goes around -1."""
+    f = found.frequency
+    locus = pd_response(inertia, bandwidth, damping, f, found.sample_time) * found.response
+    # An inertia under a PD comes from below the real axis, a spring from its right: the lowest frequency seen may
+    # already lie above it.
+    below = np.concatenate([[True], locus.imag < 0.0])
+    before = np.concatenate([[locus[0].real - 1j], locus])
+    gaps = {b for _, b in found.gaps}
+    turns, frequency = 0, math.nan
+    unseen: tuple[float, ...] = ()
+    for i in np.flatnonzero(below[:-1] != below[1:]):
+        one, other = before[i], before[i + 1]
+        if float(f[i]) in gaps:
+            if min(one.real, other.real) < 0.0 and max(abs(one), abs(other)) >= 1.0:
+                unseen = unseen or (float(f[i - 1]), float(f[i]))
+            continue
+        share = one.imag / (one.imag - other.imag)
+        if one.real + share * (other.real - one.real) >= -1.0:
+            continue
+        turns += 1 if below[i] else -1
+        last = max(i - 1, 0)
+        there = float(f[last] + share * (f[i] - f[last]))
+        frequency = (there if math.isnan(frequency) else frequency) if turns > 0 else math.nan
+    return Count(turns, frequency, unseen)
+
+
+@dataclass(frozen=True)
+class Fastest:
+    """How fast a PD may be.
+
+    Attributes
+    ----------
+    bandwidth : float
+        From which on it rings, or is not seen to be calm, Hz; the highest tried where neither happens.
+    frequency : float
+        At which it rings, Hz; not a number where it does not, or is not seen to.
+    name : str
+        Of the response in which it does; empty where in none.
+    unseen : tuple of float
+        Ends of the gap that hides whether it rings, Hz; empty where it is seen.
+    """
+
+    bandwidth: float
+    frequency: float = math.nan
+    name: str = ""
+    unseen: tuple[float, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """What people read, without a full stop."""
+        if not self.name:
+            return f"No PD up to {self.bandwidth:.3g} Hz rings"
+        if self.unseen:
+            return (
+                f"Whether a PD from {self.bandwidth:.3g} Hz on rings while {self.name} is not known: the response is "
+                f"not seen between {self.unseen[0]:.4g} and {self.unseen[1]:.4g} Hz"
+            )
+        return f"A PD rings from {self.bandwidth:.3g} Hz on, at {self.frequency:.3g} Hz while {self.name}"
+
+
+def fastest_pd(responses: Sequence[LoopResponse], inertia: float, *, damping: float = 1.0) -> Fastest:
+    """The bandwidth from which on a PD rings in some response, or is not seen to be calm.
+
+    Parameters
+    ----------
+    responses : sequence of LoopResponse
+    inertia : float
+        That places the PD, kg·m².
+    damping : float
+        Of the placement.
+
+    Raises
+    ------
+    InputError
+        If that holds for every bandwidth tried.
+    """
+    tried = np.geomspace(0.5, 0.1 / responses[0].sample_time, 400)
+    for place, bandwidth in enumerate(tried):
+        for r in responses:
+            count = encirclements(r, inertia, float(bandwidth), damping)
+            if count.calm:
+                continue
+            found = Fastest(
+                float(bandwidth), count.frequency, r.name, () if count.turns > 0 else count.unseen
+            )
+            if not place:
+                raise InputError(f"{found.sentence}: no PD can be recommended; look at the response")
+            return found
+    return Fastest(float(tried[-1]))
