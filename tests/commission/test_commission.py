@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import tomli_w
 
 from stickslip.analyse.tracking import tracking_metrics
 from stickslip.commission import commission as commissioning
@@ -17,8 +19,11 @@ from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError, LimitCrossed
+from stickslip.identify.drift import compare_models
 from stickslip.identify.estimate import Identification
+from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
+from stickslip.identify.recommend import notes_on, plants_of
 from stickslip.identify.segments import constant_velocity_segments
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
@@ -32,6 +37,8 @@ from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.track import RECOMMENDED, Track
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import VirtualRig
+from stickslip.sweep.numbers import varied
+from stickslip.sweep.plan import load
 
 OTHER = Machine(
     "other",
@@ -119,9 +126,64 @@ def test_a_machine_that_is_not_in_the_library(tmp_path):
     assert math.isfinite(done.model.parameters.c)
     written = Model.from_file(write_model(tmp_path / "model.toml", done.result))
     assert written.parameters == done.model.parameters
+    the_model_is_known_to_sweeps_recommendations_and_comparisons(tmp_path)
     sources = [Source(s.name, s.performed.record) for s in done.stages]
     report = write_identification(tmp_path / "report.html", done.result, sources, title="Commissioning")
     assert "Total pre-sliding stiffness" in report.read_text()
+
+
+STUDY = """
+[axis]
+inertia = 1.3e-3
+[friction.found]
+law = {model = "model.toml"}
+[references.sine]
+kind = "sine"
+amplitude = 0.1
+frequency = 2.0
+duration = 0.05
+placement = {bandwidth_hz = 10.0, damping = 1.0}
+[controllers.PD]
+linear = "PD"
+"""
+
+
+def the_model_is_known_to_sweeps_recommendations_and_comparisons(folder):
+    """A sweep varies the friction and says what it leaves out, and so do a recommendation and a comparison."""
+    (folder / "study.toml").write_text(STUDY)
+    (folder / "sweep.toml").write_text(
+        'study = "study.toml"\nmodel = "model.toml"\ncases = 16\ncheck = "no"\n'
+    )
+    sweep = load(folder / "sweep.toml")
+    names = set(sweep.drawn.names)
+    assert {"axis.inertia", "friction.fs", "friction.fc", "friction.k[0]", "friction.alpha[0]"} <= names
+    assert {"presliding.stiffness", "breakaway.fs_positive", "angle.ripple[1]"} <= set(sweep.left_out)
+    drawn = dict(zip(sweep.drawn.names, sweep.drawn.block(0, 512).T, strict=True))
+    assert all(np.ptp(x) > 0.0 for x in drawn.values())
+    # The elements are not told apart, but their sum is.
+    total = sum(x for name, x in drawn.items() if name.startswith("friction.k["))
+    assert np.std(total) < 0.05 * np.mean(total)
+    assert sum(x for name, x in drawn.items() if "alpha" in name) == pytest.approx(1.0)
+    for row in sweep.drawn.block(0, 64):
+        values = {k: v[0].tolist() for k, v in sweep.values(sweep.runs[0], row[None, :]).items()}
+        varied(sweep.runs[0], values)  # the law refuses none
+    found = read_identified(folder / "model.toml")
+    plants = list(plants_of(found, 1.3e-3, 4, 1))
+    assert len({p.friction.parameters for p in plants}) == 5
+    assert not any("no intervals" in note for note in notes_on(found, None, []))
+    content = tomllib.loads((folder / "model.toml").read_text())
+    for e in (e for e in content["estimates"] if e["name"] in ("fs", "fc")):
+        content["parameters"][e["name"]] *= 3.0
+        e |= {key: 3.0 * e[key] for key in ("value", "std", "lower", "upper")}
+    (folder / "worn.toml").write_text(tomli_w.dumps(content))
+    assert not compare_models(found, found, top=5.0).changed
+    assert compare_models(found, read_identified(folder / "worn.toml"), top=5.0).changed
+    # A file whose estimates the law does not know varies nothing in silence.
+    for e in (e for e in content["estimates"] if e["name"] != "inertia"):
+        e["name"] = f"stage.{e['name']}"
+    (folder / "model.toml").write_text(tomli_w.dumps(content))
+    with pytest.raises(InputError, match=r"no parameter of its law gms .*stage\.fs"):
+        load(folder / "sweep.toml")
 
 
 def test_a_record_of_tracking_names_the_lead():

@@ -119,7 +119,7 @@ def test_the_margin_counts_only_what_is_not_safe(
 def test_a_law_without_intervals_is_simulated_once_and_promises_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """As `stickslip rig commission` writes it: the estimates are the stages', not the law's."""
+    """The estimates are others' than the law's."""
     monkeypatch.setattr(recommending, "GAINS", (0.8,))
     found = identified(0.02)
     named = tuple(replace(e, name=f"sliding.{e.name}") for e in found.estimates)

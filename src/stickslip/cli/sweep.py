@@ -56,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
                 f"--cases {args.cases}: at least 1, and not for a grid; change its points instead"
             )
         sweep = replace(sweep, drawn=replace(sweep.drawn, cases=args.cases))
+    if sweep.left_out:
+        _output.say(f"not varied, as the model's law has no such parameters: {', '.join(sweep.left_out)}")
     out: Path = args.out or Path(f"sweep-{sweep.name}")
     try:
         with _output.progress_bar(sweep.name) as progress:
@@ -73,7 +75,8 @@ def run(args: argparse.Namespace) -> int:
             f"finished blocks are kept in {out}; run the same command again to go on"
         ) from None
     if args.json:
-        _output.print_json({"folder": str(out), "timings": manifest["timings"], "runs": rows})
+        _output.print_json({"folder": str(out), "timings": manifest["timings"], "runs": rows,
+                            "model_estimates_left_out": list(sweep.left_out)})  # fmt: skip
     else:
         _output.print_sweep(rows, sweep.metrics[0], manifest["timings"]["wall_s"], written)
     return 0

@@ -34,8 +34,8 @@ from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.identify.hysteresis import Loop as Hysteresis
 from stickslip.identify.inertia import inertia
 from stickslip.identify.lugre_dynamics import Response, identify_lugre_dynamics
-from stickslip.identify.presliding import identify_presliding
 from stickslip.identify.nyquist import fastest_pd
+from stickslip.identify.presliding import identify_presliding
 from stickslip.identify.train import fit_train, identified_train, loop_response
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.servo import ServoAxis
@@ -188,8 +188,8 @@ def commission(
     """
     course = _Course(rig, folder, progress or (lambda _: None), without_watchdog)
     j, top = _inertia(course, duration)
-    fs = _breakaway(course, j, interval)
-    sliding, curve, angle = _sliding(course, j, fs, tuple(v for v in velocities if v <= 1.05 * top))
+    fs, fs_std = _breakaway(course, j, interval)
+    sliding, curve, angle = _sliding(course, j, (fs, fs_std), tuple(v for v in velocities if v <= 1.05 * top))
     stuck = _presliding(course, fs, sliding)
     _attraction(course, j)
     lugre, missed = _stickslip(course, j, fs, sliding) if lugre_too else (None, ())
@@ -219,16 +219,17 @@ def _inertia(course: _Course, duration: float) -> tuple[float, float]:
     return found["inertia"].value, float(np.max(done.record["velocity_reference"]))
 
 
-def _breakaway(course: _Course, j: float, interval: float) -> float:
-    """Mean break-away torque of both directions."""
+def _breakaway(course: _Course, j: float, interval: float) -> tuple[float, float]:
+    """Mean break-away torque of both directions, and its standard deviation."""
     done = course.run(Breakaway(inertia=j, interval=interval))
     found = identify_breakaway(done.record)
     course.add("breakaway", done, found)
-    return float(np.mean([e.value for e in found.estimates if e.name.startswith("fs_")]))
+    levels = [e for e in found.estimates if e.name.startswith("fs_")]
+    return float(np.mean([e.value for e in levels])), math.hypot(*(e.std for e in levels)) / len(levels)
 
 
 def _sliding(
-    course: _Course, j: float, fs: float, velocities: tuple[float, ...]
+    course: _Course, j: float, breaking: tuple[float, float], velocities: tuple[float, ...]
 ) -> tuple[Mapping[str, float], Identification, AngleMap]:
     """A Stribeck curve for the methods that need one, the best curve, and what depends on the angle."""
     if len(velocities) < 5:
@@ -236,10 +237,10 @@ def _sliding(
             f"sliding: the rig runs at {velocities} only of the velocities asked for; give five slower ones"
         )
     done = course.run(Sliding(velocities=velocities, inertia=j), insist=False)
-    points, slid, notes = moving(done.record)
-    plain, chosen = fitted_curve(points, fs, notes)
+    runs = moving(done.record)
+    plain, chosen = fitted_curve(runs, *breaking)
     course.add("sliding", done, chosen)
-    around = identify_angle(done.record, slid)
+    around = identify_angle(done.record, runs.segments)
     course.add("angle", done, around)
     return plain, chosen, around.details["angle"]
 
@@ -348,10 +349,7 @@ def _result(
         if stage.found is None:
             notes.append(f"{stage.name}: {stage.note}.")
             continue
-        estimates += [
-            dataclasses.replace(e, name=e.name if e.name == "inertia" else f"{stage.name}.{e.name}")
-            for e in stage.found.estimates
-        ]
+        estimates += [dataclasses.replace(e, name=named(stage, e, model)) for e in stage.found.estimates]
         pictures += stage.found.pictures
         if stage.name != "resonance":  # `Recommended.lines` says it
             notes += [f"{stage.name}: {n}" for n in stage.found.notes]
@@ -363,6 +361,16 @@ def _result(
         "commission", model, tuple(estimates), correlation, misfit, tuple(notes), (), tuple(pictures),
         {"mechanics": Mechanics(j), "stiffness": stiffness, "angle": angle},
     )  # fmt: skip
+
+
+OF_THE_LAW = ("sliding", "presliding", "attraction")
+"""Stages whose estimates are parameters of the law, so that sweeps, recommendations and comparisons know them."""
+
+
+def named(stage: Stage, e: Estimate, model: Model) -> str:
+    """The law's own name where the estimate is its parameter; else that of the stage before its own."""
+    own = stage.name in OF_THE_LAW and e.name.partition("[")[0] in {f.name for f in model.law.fields}
+    return e.name if own or e.name == "inertia" else f"{stage.name}.{e.name}"
 
 
 def blocks(found: Sequence[Identification]) -> Array:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Identification, Picture, Trace
+from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identify.segments import Segment, constant_velocity_segments
 from stickslip.identify.sliding import SlidingPoints, identify_sliding
 from stickslip.identify.sliding_choice import choose_sliding
@@ -18,7 +19,9 @@ from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.simulation.steady import Steady
 
-__all__ = ["fitted_curve", "moving"]
+__all__ = ["Slid", "fitted_curve", "moving"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
 
 RESTING, STANDING, SLOW = 0.02, 0.7, 0.2
 """Shares of the time in which a motion goes slower than this part of its mean speed: from which it sticks and slips,
@@ -26,23 +29,48 @@ and from which its mean torque is no friction any more. On thesis-grease that me
 curve up to a share of 0.67 (0.014 rad/s), 4 % too low at 0.74, and 10 % too low at 0.005 rad/s."""
 CLOSE = 0.015
 """Largest error of a curve by parameters; beyond it the curve is the table of the points."""
+FEW = 6
+"""Points up to which a curve with five parameters takes its noise from the runs themselves."""
 ELEMENTS = {"k": [300.0], "alpha": [1.0], "c": 50.0}
 
 
-def moving(record: Record) -> tuple[SlidingPoints, list[Segment], list[str]]:
+@dataclass(frozen=True, eq=False)
+class Slid:
+    """Runs of constant velocity in which the axis slid.
+
+    Attributes
+    ----------
+    points : SlidingPoints
+        Mean of both directions at every speed.
+    std : array, shape (n,)
+        Of these means, N·m: from the parts of each run, so that what varies over a revolution counts in full.
+    segments : list of Segment
+    notes : list of str
+    """
+
+    points: SlidingPoints
+    std: Array
+    segments: list[Segment]
+    notes: list[str]
+
+
+def moving(record: Record) -> Slid:
     """Mean torque per speed, both directions folded, and the runs; without those in which the axis mostly stood."""
     segments = constant_velocity_segments(record)
     shares = {id(s): resting(record, s) for s in segments}
     slid = [s for s in segments if shares[id(s)] <= STANDING]
     stuck = sorted({round(abs(s.velocity), 4) for s in slid if shares[id(s)] > RESTING})
     left = sorted({round(abs(s.velocity), 4) for s in segments} - {round(abs(s.velocity), 4) for s in slid})
-    by_speed: dict[float, list[float]] = {}
+    by_speed: dict[float, list[Segment]] = {}
     for s in slid:
-        by_speed.setdefault(float(f"{abs(s.velocity):.2g}"), []).append(math.copysign(s.torque, 1.0))
+        by_speed.setdefault(float(f"{abs(s.velocity):.2g}"), []).append(s)
     if len(by_speed) < 4:
         raise InputError("sliding: the axis slid steadily at fewer than 4 speeds; run it faster")
     speeds = np.array(sorted(by_speed))
-    torque = np.array([float(np.mean(by_speed[v])) for v in speeds.tolist()])
+    torque = np.array([float(np.mean([abs(s.torque) for s in by_speed[v]])) for v in speeds.tolist()])
+    std = np.array([
+        math.sqrt(math.fsum(s.std**2 for s in by_speed[v])) / len(by_speed[v]) for v in speeds.tolist()
+    ])  # fmt: skip
     notes = [f"{len(slid)} runs at {speeds.size} speeds, mean of both directions."]
     if stuck:
         notes.append(
@@ -50,7 +78,7 @@ def moving(record: Record) -> tuple[SlidingPoints, list[Segment], list[str]]:
         )
     if left:
         notes.append(f"Mostly stood, left out: {', '.join(f'{v:g}' for v in left)} rad/s.")
-    return SlidingPoints(speeds, torque), slid, notes
+    return Slid(SlidingPoints(speeds, torque), std, slid, notes)
 
 
 def resting(record: Record, s: Segment) -> float:
@@ -61,26 +89,28 @@ def resting(record: Record, s: Segment) -> float:
     return float(np.mean(speed < SLOW)) if speed.size > 2 else 0.0
 
 
-def fitted_curve(
-    slid: SlidingPoints, fs: float, notes: list[str]
-) -> tuple[Mapping[str, float], Identification]:
+def fitted_curve(runs: Slid, fs: float, fs_std: float) -> tuple[Mapping[str, float], Identification]:
     """A Stribeck curve, as some methods need one, and the curve that is nearest: by parameters, else the table.
 
-    The mean break-away torque `fs` counts as the torque at zero velocity (thesis 4.3.1.1.2).
+    The mean break-away torque `fs` (N·m, with its standard deviation) counts as the torque at zero velocity (thesis
+    4.3.1.1.2).
     """
+    slid = runs.points
     points = SlidingPoints(np.array([0.0]), np.array([fs])) + slid
     level, fast = float(np.median(points.torque)), float(np.max(points.velocity))
     stribeck = Model(
         "gms", {}, **ELEMENTS, fs=float(points.torque[0]), fc=level, vs=0.1, delta_s=1.0, sigma2=0.01
     )
-    plain = identify_sliding(points, stribeck, starts=20)
+    # As many points as parameters leave no residual that tells the noise.
+    noise = float(np.mean(runs.std)) if len(points) <= FEW else None
+    plain = identify_sliding(points, stribeck, noise=noise, starts=20)
     best = plain
     if error(plain, slid) > CLOSE:
         templates = {"stribeck": stribeck, **_flexible(level, fast)}
-        _, best, _ = choose_sliding(points, templates, starts=20)
+        _, best, _ = choose_sliding(points, templates, noise=noise, starts=20)
     if best.model is None or error(best, slid) > CLOSE:
-        best = _table(slid, fs, best)
-    return simple(slid, fs), dataclasses.replace(best, notes=(*notes, *best.notes))
+        best = _table(runs, fs, fs_std, best)
+    return simple(slid, fs), dataclasses.replace(best, notes=(*runs.notes, *best.notes))
 
 
 def simple(slid: SlidingPoints, fs: float) -> dict[str, float]:
@@ -117,21 +147,31 @@ def error(found: Identification, points: SlidingPoints) -> float:
     return float(np.max(np.abs(torque / points.torque - 1.0)))
 
 
-def _table(points: SlidingPoints, fs: float, tried: Identification) -> Identification:
+def _table(runs: Slid, fs: float, fs_std: float, tried: Identification) -> Identification:
     """The points themselves, joined by a monotone cubic; break-away at rest, constant beyond the fastest."""
+    points = runs.points
+    torque, std = [fs, *points.torque.tolist()], [fs_std, *runs.std.tolist()]
     model = Model(
         "gms", {"curve": "table"}, **ELEMENTS, sigma2=0.0, curve_velocity=[0.0, *points.velocity.tolist()],
-        curve_torque=[fs, *points.torque.tolist()],
+        curve_torque=torque,
     )  # fmt: skip
     note = (
         f"No curve by parameters came within {100 * CLOSE:g} % of every point (nearest "
         f"{100 * error(tried, points):.2g} %): the curve is the table of the points."
     )
+    estimates = tuple(point_of(i, t, s) for i, (t, s) in enumerate(zip(torque, std, strict=True)))
     return dataclasses.replace(
-        tried, model=model, notes=(note,), estimates=(), correlation=np.eye(0), measure_next=(),
+        tried, model=model, notes=(note,), estimates=estimates, correlation=np.eye(len(estimates)), measure_next=(),
         pictures=(_picture(points, fs, model),),
         misfit={"rms_Nm": 0.0, "points": float(len(points))},
     )  # fmt: skip
+
+
+def point_of(i: int, torque: float, std: float) -> Estimate:
+    """A point of the table with its interval."""
+    low, high = torque - 1.96 * std, torque + 1.96 * std
+    why = "" if low > 0.0 and high <= 2.0 * low else "its interval is too wide"
+    return Estimate(f"curve_torque[{i}]", "N·m", "s", torque, std, low, high, not why, why)
 
 
 def _picture(points: SlidingPoints, fs: float, model: Model) -> Picture:

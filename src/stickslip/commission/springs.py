@@ -11,6 +11,7 @@ import numpy as np
 
 from stickslip.identify.attraction import largest_without_overshoot
 from stickslip.identify.breakaway import student
+from stickslip.identify.draws import WIDEST
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.model import Model
 from stickslip.record import Record
@@ -26,13 +27,17 @@ FIRST = 0.3
 """Of a swing of the torque, along which all elements still stick."""
 LEAST = 0.01
 """Of the amplitude of the pre-sliding loop, below which an element is not resolved."""
+SOFTEST = 0.003
+"""Of the total stiffness, below which an element is none: it would take up its share only after a long way."""
 
 
 def resolved(found: Identification, amplitude: float) -> Identification:
-    """Without the elements that carry less than `LEAST` of the loop: their stiffness is that of the noise."""
+    """Without the elements that carry less than `LEAST` of the loop, whose stiffness is that of the noise, and those
+    softer than `SOFTEST`."""
     assert found.model is not None
     p: Any = found.model.parameters
-    keep = [i for i in range(len(p.k)) if p.alpha[i] * p.fs >= LEAST * amplitude]
+    stiff = SOFTEST * math.fsum(p.k)
+    keep = [i for i in range(len(p.k)) if p.alpha[i] * p.fs >= LEAST * amplitude and p.k[i] >= stiff]
     if len(keep) == len(p.k):
         return found
     total = math.fsum(p.alpha[i] for i in keep)
@@ -44,8 +49,8 @@ def resolved(found: Identification, amplitude: float) -> Identification:
     note = f"Left out, since the loop does not resolve them: elements of {gone}."
     estimates = tuple(e for e in found.estimates if not e.name.startswith(("k[", "alpha[")))
     estimates += tuple(
-        dataclasses.replace(found[f"{n}[{i}]"], name=f"{n}[{keep.index(i)}]")
-        for n in ("k", "alpha")
+        scaled(dataclasses.replace(found[f"{n}[{i}]"], name=f"{n}[{keep.index(i)}]"), over)
+        for n, over in (("k", 1.0), ("alpha", 1.0 / total))
         for i in keep
         if f"{n}[{i}]" in [e.name for e in found.estimates]
     )
@@ -53,6 +58,13 @@ def resolved(found: Identification, amplitude: float) -> Identification:
         found, model=Model(found.model.law, {}, **values), estimates=estimates, notes=(*found.notes, note),
         correlation=np.eye(len(estimates)),
     )  # fmt: skip
+
+
+def scaled(e: Estimate, factor: float) -> Estimate:
+    """The estimate with its interval times a factor."""
+    return dataclasses.replace(
+        e, value=factor * e.value, std=factor * e.std, lower=factor * e.lower, upper=factor * e.upper
+    )
 
 
 def joined_model(curve: Identification, stuck: Identification) -> tuple[Model, float, tuple[str, ...]]:
@@ -100,18 +112,62 @@ def with_stiffness(found: Identification, record: Record) -> Identification:
     good = total - half > 0.0 and half < 0.33 * total
     why = "" if good else "the slopes after the reversals scatter too much"
     whole = Estimate("stiffness", "N·m/rad", "k", total, std, total - half, total + half, good, why)
-    return dataclasses.replace(
-        found, estimates=(*found.estimates, whole), correlation=np.pad(found.correlation, ((0, 1), (0, 1))) + last(
-            len(found.estimates)
-        ),
-    )  # fmt: skip
+    spread = half / (1.96 * total) if good else WIDEST
+    rest = [e for e in found.estimates if not e.name.startswith(("k[", "alpha["))]
+    elements, correlation = within_total(found, spread)
+    n = len(elements)
+    whole_matrix = np.eye(n + len(rest) + 1)
+    whole_matrix[:n, :n] = correlation
+    return dataclasses.replace(found, estimates=(*elements, *rest, whole), correlation=whole_matrix)
 
 
-def last(size: int) -> Array:
-    """One in the last place of the diagonal, shape (size + 1, size + 1)."""
-    out = np.zeros((size + 1, size + 1))
-    out[size, size] = 1.0
-    return out
+def within_total(found: Identification, spread: float) -> tuple[list[Estimate], Array]:
+    """Stiffnesses and shares of the elements, given their sums; with their correlation.
+
+    One loop hardly tells the elements apart, but it does tell their total stiffness, and their shares add up to 1. As a
+    normal distribution of the logarithms: the fit's own, where it set limits, and no element beyond the total, given
+    that the sums, linear around the estimate, are known.
+
+    Parameters
+    ----------
+    found : Identification
+        With ``k[i]`` and ``alpha[i]``.
+    spread : float
+        Standard deviation of the logarithm of the total stiffness.
+    """
+    assert found.model is not None
+    names = [f"{n}[{i}]" for n in ("k", "alpha") for i in range(len(found.model.parameters.k))]
+    known = {e.name: i for i, e in enumerate(found.estimates)}
+    kept = [n for n in names if n in known]
+    own = [found.estimates[known[n]] for n in kept]
+    k_rows = np.array([e.name.startswith("k[") for e in own])
+    value = np.array([e.value for e in own])
+    total = np.where(k_rows, np.sum(value[k_rows]), 1.0)
+    std = np.array([own_spread(e, t) for e, t in zip(own, total.tolist(), strict=True)])
+    places = [known[n] for n in kept]
+    matrix = found.correlation[np.ix_(places, places)]
+    prior = std[:, None] * np.where(np.isfinite(matrix), matrix, np.eye(len(own))) * std[None, :]
+    # Weights of the logarithms in those of both sums.
+    sums = np.array([np.where(k_rows, value / total, 0.0), np.where(k_rows, 0.0, value / total)])
+    gain = prior @ sums.T @ np.linalg.pinv(sums @ prior @ sums.T, hermitian=True)
+    after = prior - gain @ sums @ prior + gain @ np.diag([spread**2, 0.0]) @ gain.T
+    left = np.sqrt(np.maximum(np.diag(after), 1e-12))
+    out: list[Estimate] = []
+    for e, s in zip(own, left.tolist(), strict=True):
+        low, high = e.value * math.exp(-1.96 * s), e.value * math.exp(1.96 * s)
+        why = "" if high <= 2.0 * low else "the loop tells the sum of the elements, not each"
+        out.append(
+            dataclasses.replace(e, std=e.value * s, lower=low, upper=high, identified=not why, verdict=why)
+        )
+    return out, np.clip(after / np.outer(left, left), -1.0, 1.0)
+
+
+def own_spread(e: Estimate, total: float) -> float:
+    """Standard deviation of an element's logarithm: its interval's, but up to the total at most."""
+    above = math.log(max(min(e.upper, total) / e.value, 1.0)) / 1.96
+    if e.lower > 0.0 and math.isfinite(e.upper):
+        return min(math.log(e.upper / e.lower) / 3.92, WIDEST)
+    return min(max(above, 1e-6), WIDEST)
 
 
 def slopes_after_reversals(torque: Array, position: Array) -> list[float]:

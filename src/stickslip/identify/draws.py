@@ -26,7 +26,8 @@ PER_STD = 3.92
 def draw_values(estimates: Sequence[Estimate], correlation: Array, count: int, seed: int = 0) -> Array:
     """Draw values of all estimates, shape (count, n); those without a spread stay at their value.
 
-    Positive ones are drawn log-normally, with the standard deviation that their 95 % interval has.
+    Positive ones are drawn log-normally, with the standard deviation that their 95 % interval has: to each side its own
+    where the data do not tell them from 0.
     """
     z: Array = np.random.default_rng(seed).standard_normal((count, len(estimates)))
     return spread_values(estimates, correlation, z)
@@ -42,10 +43,16 @@ def spread_values(estimates: Sequence[Estimate], correlation: Array, z: Array) -
     out = np.empty((len(z), n))
     for i, e in enumerate(estimates):
         if e.value > 0.0 and e.lower > 0.0:
-            spread = log_spread(e)
-            out[:, i] = e.value * np.exp(spread * z[:, i])
+            out[:, i] = e.value * np.exp(log_spread(e) * z[:, i])
+        elif e.value > 0.0 and e.lower == 0.0:
+            above = min(math.log(max(e.upper / e.value, 1.0)) / (0.5 * PER_STD), WIDEST)
+            out[:, i] = e.value * np.exp(np.where(z[:, i] > 0.0, above, WIDEST) * z[:, i])
         else:
             out[:, i] = e.value + (e.std if math.isfinite(e.std) else 0.0) * z[:, i]
+    # The shares of GMS's elements add up to 1 (thesis eq. 2.19), and the law refuses others.
+    shares = [i for i, e in enumerate(estimates) if e.name.startswith("alpha[")]
+    if shares and math.isclose(math.fsum(estimates[i].value for i in shares), 1.0, abs_tol=1e-6):
+        out[:, shares] /= np.sum(out[:, shares], axis=1, keepdims=True)
     return out
 
 

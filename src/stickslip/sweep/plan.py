@@ -59,6 +59,8 @@ class Sweep:
         Of lanes, s (`stickslip.simulation.lanes`); 0 runs every case exactly.
     device : {"cpu", "gpu"}
         Where lanes run.
+    left_out : tuple of str
+        Estimates of the model that do not vary: they are not parameters of its law.
     """
 
     name: str
@@ -75,6 +77,7 @@ class Sweep:
     percentile: float = 95.0
     step: float = 0.0
     device: str = "cpu"
+    left_out: tuple[str, ...] = ()
 
     @property
     def blocks(self) -> list[tuple[int, int]]:
@@ -147,7 +150,7 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
     runs = [replace(r, numerics=replace(r.numerics, tolerance=tolerance, output=r.duration)) for r in runs]
     metrics = table.texts("metrics", METRICS) if table.has("metrics") else list(USUAL)
     check = table.choice("check", ("yes", "no"), "yes") == "yes"
-    drawn = _drawn(table)
+    drawn, left_out = _drawn(table)
     tuned = _spreads(table, "tune", drawn.method) if table.has("tune") else []
     step, device = _lanes(table, metrics)
     percentile = table.positive("percentile", "%", 95.0) if tuned else 95.0
@@ -155,7 +158,7 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
         raise table.error("percentile", "must be at most 100 %")
     found = Sweep(
         name, title, runs, drawn, tuple(metrics), check, study, table.values, path, dict(table.document.files),
-        tuple(tuned), percentile, step, device,
+        tuple(tuned), percentile, step, device, left_out,
     )  # fmt: skip
     _check(found, table)
     return found
@@ -189,10 +192,11 @@ def _names(study: Study) -> list[str]:
 # ---- what varies ---------------------------------------------------------------------------------------------
 
 
-def _drawn(table: Table) -> Drawn:
+def _drawn(table: Table) -> tuple[Drawn, tuple[str, ...]]:
+    """The cases, and the model's estimates that do not vary."""
     method = table.choice("method", METHODS, "sobol")
     spreads = _spreads(table, "vary", method) if table.has("vary") else []
-    estimates, correlation = _estimates(table)
+    estimates, correlation, left_out = _estimates(table)
     if not spreads and not estimates:
         raise ConfigError(f'{table.label("vary")} is missing; give at least one [vary."friction.fs"]')
     if method == "grid":
@@ -209,7 +213,7 @@ def _drawn(table: Table) -> Drawn:
     nested = table.choice("nested", ("yes", "no"), "no") == "yes"
     if nested and (method == "grid" or not spreads):
         raise table.error("nested", "needs ranges and the method sobol or latin")
-    return Drawn(method, tuple(spreads), cases, seed, estimates, correlation, nested)
+    return Drawn(method, tuple(spreads), cases, seed, estimates, correlation, nested), left_out
 
 
 def _spreads(table: Table, key: str, method: str) -> list[Spread]:
@@ -253,21 +257,30 @@ def _spread(name: str, table: Table, method: str) -> Spread:
     return Spread(name, float(numbers[0]), float(numbers[1]), factor, points, logarithmic=logarithmic)
 
 
-def _estimates(table: Table) -> tuple[tuple[Estimate, ...], tuple[tuple[float, ...], ...]]:
-    """What `model = "model.toml"` says is uncertain: the law's parameters and the inertia."""
+def _estimates(
+    table: Table,
+) -> tuple[tuple[Estimate, ...], tuple[tuple[float, ...], ...], tuple[str, ...]]:
+    """What `model = "model.toml"` says is uncertain: the law's parameters and the inertia; and what else it holds."""
     if not table.has("model"):
-        return (), ()
+        return (), (), ()
     found = read_identified(table.document.locate(table.text("model")))
     law = {f.name for f in found.model.law.fields}
-    kept = [
-        i for i, e in enumerate(found.estimates) if e.name.partition("[")[0] in law or e.name == "inertia"
-    ]
+    own = [i for i, e in enumerate(found.estimates) if e.name.partition("[")[0] in law]
+    kept = sorted([*own, *(i for i, e in enumerate(found.estimates) if e.name == "inertia")])
+    left_out = tuple(e.name for i, e in enumerate(found.estimates) if i not in kept)
     if not kept:
         raise table.error(
             "model", "has no estimates with intervals; give a file that `stickslip identify` wrote"
         )
+    if left_out and not own:
+        raise table.error(
+            "model",
+            f"has intervals of no parameter of its law {found.model.law.name} (it has {', '.join(left_out)}), so that "
+            "the inertia alone would vary; identify the law, or name the inertia in [vary]",
+        )
     matrix = found.correlation[np.ix_(kept, kept)]
-    return tuple(found.estimates[i] for i in kept), tuple(tuple(map(float, row)) for row in matrix)
+    rows = tuple(tuple(map(float, row)) for row in matrix)
+    return tuple(found.estimates[i] for i in kept), rows, left_out
 
 
 # ---- bad sweeps are told before anything runs ------------------------------------------------------------------
