@@ -269,3 +269,41 @@ def test_inertia_from_a_frequency_response(tmp_path: Path, capsys: pytest.Captur
     found = {e["name"]: e for e in json.loads(capsys.readouterr().out)["estimates"]}
     assert found["inertia"]["value"] == pytest.approx(inertia, rel=0.02)
     assert (tmp_path / "o" / "report.html").exists()
+
+
+def test_a_saved_profile_is_never_used_in_silence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("STICKSLIP_CONFIG", str(tmp_path / "config"))
+    t = np.arange(1500) * 1e-3
+    degrees = 0.3 * np.sin(2.0 * np.pi * t) * 180.0 / np.pi
+    torque = 0.285 * np.sign(np.cos(2.0 * np.pi * t))
+    np.savetxt(
+        "log.csv",
+        np.column_stack((t, degrees, torque)),
+        "%.9g",
+        ",",
+        header="time [s],q,tau [N·m]",
+        comments="",
+    )
+    calls = ["identify", "log.csv", "--inverse", "--out", "."]
+    assert main([*calls, "--map", "position=q:deg"]) == 0
+    kept = next((tmp_path / "config" / "profiles").glob("*.toml"))
+    first = capsys.readouterr()
+    assert (
+        f"how to read files with these columns is kept in the profile {kept}; delete that file" in first.err
+    )
+    assert main(calls) == 0
+    second = capsys.readouterr()
+    line = f"read by the saved profile {kept}, which says position=q:deg; delete that file to forget it"
+    assert line in second.err
+    assert line in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert second.out == first.out
+    assert main([*calls, "--map", "position=q:deg"]) == 0  # all that the profile says
+    assert "saved profile" not in capsys.readouterr().err
+    kept.unlink()
+    assert main(calls) == 0
+    third = capsys.readouterr()
+    assert "saved profile" not in third.err
+    assert third.out != first.out

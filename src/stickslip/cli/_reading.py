@@ -8,19 +8,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from stickslip.finding import Finding
     from stickslip.readers import Drive
+    from stickslip.readers.profiles import Profile
     from stickslip.record import Record
 
-__all__ = ["Opened", "add_arguments", "open_record", "print_columns"]
+__all__ = ["Opened", "add_arguments", "open_record", "print_columns", "read_record"]
+
+FORGET = "delete that file to forget it"
 
 
 @dataclass(frozen=True)
 class Opened:
-    """A record, the profile that was used, and the one that was written."""
+    """A record, the profile that was used, the one that was written, and what is to be said of them."""
 
     record: Record
     used: Path | None
     written: Path | None
+    notes: tuple[Finding, ...] = ()
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,8 +63,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def read_record(path: Path, args: argparse.Namespace) -> Record:
+    """As `open_record`, for verbs that show no columns: stderr says where a saved profile had a part in it.
+
+    Raises
+    ------
+    InputError
+    """
+    import sys
+
+    opened = open_record(path, args)
+    for finding in opened.notes:
+        print(f"stickslip: {path}: {finding.line()}", file=sys.stderr)
+    return opened.record
+
+
 def open_record(path: Path, args: argparse.Namespace) -> Opened:
     """Read a file as the options say, with the profile of its layout; keep what `--map` and the others say.
+
+    What a profile has done that the options do not say is among the record's findings.
 
     Raises
     ------
@@ -83,7 +105,35 @@ def open_record(path: Path, args: argparse.Namespace) -> Opened:
         or (args.profile and not used)
     ):
         written = profiles.save(profiles.merged(args.map, drive, args.sample_time, kept), table, args.profile)
-    return Opened(with_source(record, path), used, written)
+    notes: tuple[Finding, ...] = ()
+    if args.profile is None:
+        said = profiles.merged(args.map, drive, args.sample_time, None)
+        notes = profile_notes(used, kept, said, written)
+        record.meta["reading"]["findings"] += [note.as_data() for note in notes]
+    return Opened(with_source(record, path), used, written, notes)
+
+
+def profile_notes(
+    used: Path | None, kept: Profile | None, said: Profile, written: Path | None
+) -> tuple[Finding, ...]:
+    """That a profile which nobody named now says more than the options, and that one was written."""
+    from stickslip.finding import Finding
+
+    notes: list[Finding] = []
+    if kept:
+        now, before = said.drive.known(), kept.drive.known()
+        more = [f"{role}={text}" for role, text in kept.mapping.items() if role not in said.mapping]
+        more += [f"{name} = {value}" for name, value in before.items() if name not in now]
+        more += ["side = load"] if (before["side"], now["side"]) == ("load", "motor") else []
+        if kept.sample_time is not None and said.sample_time is None:
+            more.append(f"sample_time = {kept.sample_time:g} s")
+        if more:
+            words = f"read by the saved profile {used}, which says {', '.join(more)}"
+            notes.append(Finding("note", "profile", words, remedy=FORGET))
+    if written and not notes:
+        words = f"how to read files with these columns is kept in the profile {written}"
+        notes.append(Finding("note", "profile", words, remedy=FORGET))
+    return tuple(notes)
 
 
 def _drive(args: argparse.Namespace) -> Drive:

@@ -59,7 +59,7 @@ def _opened(args: argparse.Namespace) -> list[tuple[str, Record]]:
     for text in args.records:
         name, equals, path = str(text).partition("=")
         path = Path(path if equals else text)
-        out.append((name if equals else path.stem, _reading.open_record(path, args).record))
+        out.append((name if equals else path.stem, _reading.read_record(path, args)))
     return out
 
 

@@ -226,7 +226,7 @@ def checked(path: Path, args: argparse.Namespace, held_out: bool = False) -> Sou
     from stickslip.identify.doctor import examine
     from stickslip.report.identified import Source
 
-    record = _reading.open_record(path, args).record
+    record = _reading.read_record(path, args)
     diagnosis = examine(record)
     if diagnosis.errors:
         raise InputError(f"{path}: {diagnosis.errors[0].line()}; see `stickslip doctor {path}`")
