@@ -21,6 +21,7 @@ from stickslip.identify.axis_prediction import axis_prediction
 from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, fitted_axis, require_start
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification, silent
+from stickslip.identify.load_check import ADVICE, judged_load
 from stickslip.identify.prediction_error import PredictionError
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
@@ -275,6 +276,7 @@ def assembled(
 ) -> Identification:  # fmt: skip
     """Everything in one `Identification`."""
     misfit = dict(result.errors)
+    estimates = judged_load(result.estimates, inverse, result.mechanics)
     if inverse is not None:
         misfit["inverse_dynamics_relative"] = inverse.relative_error
     if validation:
@@ -282,11 +284,11 @@ def assembled(
     return Identification(
         "axis",
         result.model,
-        result.estimates,
+        estimates,
         result.fit.correlation,
         misfit,
-        (*notes, *narrow_note(result), *missing_note(result.estimates)),
-        measure_next=advice(result.estimates, result.problem.law),
+        (*notes, *narrow_note(result), *missing_note(estimates)),
+        measure_next=advice(estimates, result.problem.law),
         details={
             "mechanics": result.mechanics, "inverse": inverse, "output": result, "candidates": tuple(candidates),
             "axis": result.problem.axis,
@@ -297,6 +299,7 @@ def assembled(
 def with_prediction(found: Identification, result: PredictionError) -> Identification:
     """The same with law, estimates and intervals of the prediction error; the misfits stay the output error's."""
     estimates = tuple(replace(e, unit=found.details["axis"].unit(e.unit)) for e in result.estimates)
+    estimates = judged_load(estimates, found.details["inverse"], result.mechanics)
     kept = [n for n in found.notes if not n.startswith((MISSING, NARROW))]
     said = "Values and intervals are the prediction error's; the misfits are those of the output error."
     return replace(
@@ -335,7 +338,9 @@ def advice(estimates: Sequence[Estimate], law: Law) -> tuple[str, ...]:
         out.append(
             "Record slow reversals with a finer position sensor: the pre-sliding range was hardly seen."
         )
-    if "inertia" in missing:
+    if "load_motor" in missing:
+        out.append(ADVICE)
+    elif "inertia" in missing:
         out.append("Record stronger accelerations.")
     return tuple(out)
 
