@@ -64,3 +64,23 @@ def test_the_fixed_integrator_has_no_tolerance():
     case = prepare(AXIS, PD, SINE, 0.1)
     with pytest.raises(ValueError, match="no tolerance"):
         accuracy.estimate(case, "fixed")
+
+
+def test_a_finer_tolerance_finds_what_a_sensitive_run_does():
+    """PID creeps along an unstable slide, where an error grows ten thousandfold."""
+    friction = Model("gms", **{**PLANT, "fs": 0.32143, "fc": 0.2923, "sigma2": 0.01741})
+    axis, pid = RigidAxis(3.7e-4, friction), Controller(place("PID", INERTIA, 36.0, 1.0))
+
+    def run(tolerance):
+        case = prepare(axis, pid, SINE, 2.5, tolerance=tolerance, metered=False)
+        return case, exact.prepare(case).run()[0][:, 0]
+
+    truth = run(3.3e-11)[1]
+    errors, estimates = [], []
+    for tolerance in (1e-8, 1e-9, 1e-10):
+        case, found = run(tolerance)
+        errors.append(np.max(np.abs(found - truth)))
+        estimates.append(accuracy.estimate(case).error)
+    assert errors[2] < 0.01 * errors[0]
+    assert estimates[2] < 0.01 * estimates[0]
+    assert all(error <= found for error, found in zip(errors, estimates))

@@ -95,7 +95,7 @@ from stickslip.simulation._exact_stretch import (
 
 SAFETY = 0.0015
 """Share of the tolerance that one step may be wrong by."""
-FINEST = 2e-12  # rad
+FINEST = 5e-14  # rad
 LONGEST_STEP = 64e-3
 FIRST_STEP = 2.5e-4
 """Longest step after an event, s."""

@@ -81,9 +81,9 @@ from stickslip.simulation._exact_stretch import (
 )
 
 NOT_CONVERGED = 1e9
-UNCHANGED, FINEST_CHANGE, ROUNDING = 0.01, 1e-12, 4e-16
-"""The corrector ends at a change in position below the largest of: parts of the tolerance, 1e-12 rad, parts of the
-particular solution."""
+UNCHANGED, FINEST_CHANGE, ROUNDING = 0.01, 1e-14, 4e-16
+"""The corrector ends at a change in position below the largest of: parts of the tolerance, 1e-14 rad, parts of the
+particular solution. What it leaves must be less than `stickslip.simulation.accuracy` makes steps wrong by."""
 WIDEST = 1.0
 """Change of velocity over half a stretch, in parts of v_s, above which s(v) is not resolved near v = 0."""
 CALM_SHARE = 0.2

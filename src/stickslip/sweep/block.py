@@ -21,11 +21,11 @@ from stickslip.sweep.plan import BLOCK, Sweep
 __all__ = ["FLOORS", "Block", "Measured", "compute", "differ", "integrator_of", "measured"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-TIGHTER, FINEST = (0.1, 0.01), 1e-9
+TIGHTER, FINEST = (0.1, 0.01, 0.001), 1e-10
 """Times the tolerance, at which those that are not sure are run again; least tolerance, rad."""
-SUSPECT, SURE = 0.005, 0.01
-"""Parts of a metric by which they may differ: at first half of the 1 % that is wanted, since motions without a truth
-may agree by chance."""
+SETTLED, SURE = 0.001, 0.01
+"""Parts of a metric: by which wrong steps may change it, and by which it may differ from that at the tolerance before. The
+first is a tenth of the 1 % that is wanted: motions without a truth scatter by about that, and would often agree."""
 LONGER, SURE_OF_STEPS = 2.0, 0.003
 """Times the step of lanes, at which they run again, and the part of a metric by which the two may differ: a third of
 `SURE`, since where an axis switches often two steps can agree by chance."""
@@ -46,7 +46,7 @@ class Block:
     metrics : array, shape (n, metrics)
         NaN where there is none.
     flagged : array of bool, shape (n,)
-        The metrics are not sure, not even at the tightest tolerance: wrong steps change one of them by more than 1 %,
+        The metrics are not sure, not even at the tightest tolerance: wrong steps change one of them by more than 0.1 %,
         or a count of reversals by more than one. In lanes: twice the step does, by more than 0.3 %, or a step had more
         switches than were followed.
     failures : list of str
@@ -120,28 +120,28 @@ def checked(
         some = {k: v[cases] for k, v in values.items()}
         return measured(replace(planned, numerics=finer), some, metrics, len(cases), kick)
 
-    def differs(cases: Any, other: Measured, part: float = SURE) -> Any:
+    def differs(cases: Any, other: Measured, part: float) -> Any:
         ends = np.array([best.failures[i] != why for i, why in zip(cases, other.failures)], dtype=np.bool_)
         return differ(best.metrics[cases], other.metrics, metrics, planned.duration, part) | ends
 
-    def kicked(cases: Any, times: float, part: float) -> None:
+    def kicked(cases: Any, times: float) -> None:
         for kick in KICKS:
             # Only the exact integrator can be wrong in two ways.
             some = cases if kick == KICKS[0] else cases[[best.integrators[i] == "exact" for i in cases]]
             if some.size:
-                flagged[some] |= differs(some, again(some, times, kick), part)
+                flagged[some] |= differs(some, again(some, times, kick), SETTLED)
 
-    kicked(np.arange(len(flagged)), 1.0, SUSPECT)
+    kicked(np.arange(len(flagged)), 1.0)
     for times in TIGHTER:
         cases = np.flatnonzero(flagged)
         if not cases.size or times * planned.numerics.tolerance < FINEST * (1.0 - 1e-9):
             break
         fine = again(cases, times)
-        flagged[cases] = differs(cases, fine)
+        flagged[cases] = differs(cases, fine, SURE)
         best.metrics[cases] = fine.metrics
         for i, why in zip(cases, fine.failures):
             best.failures[i] = why
-        kicked(cases, times, SUSPECT)
+        kicked(cases, times)
     return best, flagged
 
 
