@@ -1,9 +1,9 @@
 """What a sweep's flags are worth: random cases of every run of the study against runs at a tight tolerance.
 
 Friction and inertia are drawn as in the shipped sweep (up to 30 % off), the cases computed as `stickslip sweep` does,
-at its tolerance, and once more at 3.3e-11 rad, a third of the finest that a sweep goes to. A metric that is not within 1 % of that (a count of reversals: not within
-one) must belong to a flagged case, and at most 5 % may be flagged where the study's nominal run is well-conditioned
-(class W: two independent integrators agree on it to within their own errors).
+at its tolerance, and once more at 3.3e-11 rad, a third of the finest that a sweep goes to. A metric that is not within
+1 % of that (a count of reversals: not within one) must belong to a flagged case, and at most 5 % may be flagged where
+the study's nominal run is well-conditioned (class W: two independent integrators agree on it to within their errors).
 
     python benchmarks/sweep_accuracy.py [--cases 200] [--references low,high,step]
 """

@@ -24,8 +24,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 TIGHTER, FINEST = (0.1, 0.01, 0.001), 1e-10
 """Times the tolerance, at which those that are not sure are run again; least tolerance, rad."""
 SETTLED, SURE = 0.001, 0.01
-"""Parts of a metric: by which wrong steps may change it, and by which it may differ from that at the tolerance before. The
-first is a tenth of the 1 % that is wanted: motions without a truth scatter by about that, and would often agree."""
+"""Parts of a metric: by which wrong steps may change it, and by which it may differ from that at the tolerance before.
+The first is a tenth of the 1 % that is wanted: motions without a truth scatter by about that, and would often agree."""
 LONGER, SURE_OF_STEPS = 2.0, 0.003
 """Times the step of lanes, at which they run again, and the part of a metric by which the two may differ: a third of
 `SURE`, since where an axis switches often two steps can agree by chance."""
