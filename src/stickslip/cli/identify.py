@@ -300,7 +300,7 @@ def show(found: Identification) -> None:
         print(f"{e.name:<{width}}{e.value:>12.5g}  {interval(e):<26} {e.unit:<11} {verdict(e)}".rstrip())
     print()
     for name, number in found.misfit.items():
-        print(f"{name:<32}{number:>12.5g}")
+        print(f"{name:<32}{number:>12.5g}  {found.misfit_unit(name)}".rstrip())
     for sentence in found.notes:
         print(sentence)
     for sentence in found.measure_next:

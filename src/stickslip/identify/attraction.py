@@ -22,6 +22,10 @@ __all__ = ["identify_attraction", "largest_without_overshoot"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+FASTER = (
+    "Swing the velocity faster and over the same few degrees: the lag grows with the rate, and what depends on the "
+    "angle no longer hides it."
+)
 OVERSHOOT = 1e-3
 """Part of the steady torque beyond which a response overshoots."""
 
@@ -66,14 +70,21 @@ def identify_attraction(
     lags = 0 if known else correlation_lags(first.optimum.residuals)
     found, along = fit_loop(loop, template, rows, starts=first.u[None, :], lags=lags, **options)
     curve = curve_of(along, found.vector, found.u)
-    traces = (Trace("measured", v, loop.torque[rows]), Trace("GMS", v, curve[rows]))
+    traces = (Trace("measured", v, loop.torque[rows], "dense"), Trace("GMS", v, curve[rows]))
+    best, *_ = found.estimates
+    said = f"C = {best.value:.4g} N·m/s" if best.identified else f"C is not identified: {best.verdict}"
     picture = Picture(
-        "attraction", "Lag of friction in sliding", f"C = {found.values['c']:.4g} N·m/s", "velocity (rad/s)",
-        f"friction torque ({loop.unit[1]})", traces,
-    )  # fmt: skip
+        "attraction",
+        "Lag of friction in sliding",
+        said,
+        "velocity (rad/s)",
+        f"friction torque ({loop.unit[1]})",
+        traces,
+    )
     return Identification(
         "attraction", found.vector.model(found.u), found.estimates, found.correlation,
-        loop_misfit(loop, curve, rows, np.zeros(0, dtype=np.intp), found), (), (), (picture,),
+        loop_misfit(loop, curve, rows, np.zeros(0, dtype=np.intp), found), (), () if best.identified else (FASTER,),
+        (picture,),
     )  # fmt: skip
 
 

@@ -291,7 +291,7 @@ def assembled(
         measure_next=advice(estimates, result.problem.law),
         details={
             "mechanics": result.mechanics, "inverse": inverse, "output": result, "candidates": tuple(candidates),
-            "axis": result.problem.axis,
+            "axis": result.problem.axis, "units": result.problem.units,
         },
     )  # fmt: skip
 

@@ -126,6 +126,12 @@ class Problem:
             harmonic_period,
         )
 
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each signal that is compared."""
+        drive = self.axis.unit(UNITS[self.trials[0].quantity])
+        return {s: self.axis.unit("rad") if s == "position" else drive for s in self.signals}
+
     def weighted(self, u: Array) -> Problem:
         """This problem with the weights that the misfits at u suggest (robust standard deviations)."""
         misfits = self.misfits(u)

@@ -119,7 +119,7 @@ class Identification:
     correlation : array, shape (n, n)
         Of the estimates, in their order; not a number where it is undefined.
     misfit : mapping of str to float
-        Numbers that say how well it fits, the unit at the end of the name: ``rms_Nm``.
+        Numbers that say how well it fits; `misfit_unit` gives their units.
     notes : tuple of str
         What the user must know, one sentence each.
     measure_next : tuple of str
@@ -147,6 +147,16 @@ class Identification:
             if estimate.name == name:
                 return estimate
         raise UnknownName("estimate", name, [e.name for e in self.estimates])
+
+    def misfit_unit(self, name: str) -> str:
+        """Unit of a number of `misfit`; empty for a ratio or a count."""
+        for ending, unit in (("_Nm", "N·m"), ("_rad", "rad")):
+            if name.endswith(ending):
+                return unit
+        if not name.endswith(("_rms", "_mean_absolute")):
+            return ""
+        units: Mapping[str, str] = self.details.get("units", {})
+        return units.get(name.removeprefix("held_out_").partition("_")[0], "")
 
     @property
     def not_identified(self) -> tuple[str, ...]:

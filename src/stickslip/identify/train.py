@@ -283,7 +283,7 @@ def picture_of(responses: Sequence[LoopResponse], train: Train) -> Picture:
     if train.axis:
         modes += f", at {train.sliding:.4g} Hz while sliding"
     return Picture(
-        "resonance", "Response that the loop closes over", modes, "frequency in Hz",
+        "resonance", "Response that the loop closes over", modes, "frequency (Hz)",
         "acceleration per torque (dB of Hz² rad/(N·m))", tuple(traces), "log",
     )  # fmt: skip
 

@@ -251,5 +251,6 @@ def verdict_on(p: Parameter, value: float, low: float, high: float, noise: Noise
         return ""
     half = 0.5 * (high - low)
     if not half <= SHARE * scale:
-        return f"the interval's half-width of {half:.3g} {p.par.unit} exceeds {SHARE:.0%} of {scale:.3g} {p.par.unit}"
+        unit = p.par.unit
+        return f"the interval's half-width of {half:.3g} {unit} exceeds {100.0 * SHARE:g} % of {scale:.3g} {unit}"
     return ""

@@ -14,7 +14,7 @@ from stickslip.identify.axis_problem import PLACE, measured
 from stickslip.identify.draws import curve_band, sliding_torque
 from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.record import Record
-from stickslip.report.plots import envelope
+from stickslip.report.plots import envelope, quantity
 
 __all__ = ["data_pictures", "pictures_of"]
 
@@ -25,14 +25,16 @@ FAR = 20.0
 """Times the motion, that its first position is away from 0."""
 SHOWN = 4
 """Records that are drawn one by one; the residuals hold all of them."""
-QUANTITIES = {"torque": "N·m", "current": "A", "rated_torque": "%", "voltage": "V"}
 
 
-def data_pictures(records: Sequence[Record]) -> tuple[Picture, ...]:
+def data_pictures(records: Sequence[Record], names: Sequence[str]) -> tuple[Picture, ...]:
     """Position and drive signal of the first records over time."""
     out: list[Picture] = []
     for place, record in enumerate(records[:SHOWN]):
-        name = str(record.meta.get("reading", {}).get("file", f"record {place + 1}"))
+        seconds = float(record.time[-1] - record.time[0])
+        # A clock that has run for long tells nothing.
+        late = abs(record.time[0]) > seconds
+        time = record.time - (record.time[0] if late else 0.0)
         for channel in ("position", "torque", "motor_torque", "current", "voltage"):
             if channel not in record.channels or not np.any(np.isfinite(record[channel])):
                 continue
@@ -41,7 +43,7 @@ def data_pictures(records: Sequence[Record]) -> tuple[Picture, ...]:
             far = channel == "position" and abs(values[0]) > FAR * np.ptp(values)
             if far:
                 values, words = values - values[0], "position from the first"
-            traces = [over_time("measured", record.time, values)]
+            traces = [over_time("measured", time, values)]
             # A reference that never changes belongs to an open loop.
             if (
                 channel == "position"
@@ -49,13 +51,12 @@ def data_pictures(records: Sequence[Record]) -> tuple[Picture, ...]:
                 and np.ptp(record.channels.get("position_reference", np.zeros(1))) > 0.0
             ):
                 traces = [
-                    over_time("measured", record.time, record[channel]),
-                    over_time("reference", record.time, record["position_reference"]),
+                    over_time("measured", time, record[channel]),
+                    over_time("reference", time, record["position_reference"]),
                 ]
-            seconds = float(record.time[-1] - record.time[0])
             out.append(Picture(
-                f"data-{place + 1}-{channel}", f"{name}: {channel.replace('_', ' ')}",
-                f"{len(record)} samples over {seconds:.3g} s", "time (s)",
+                f"data-{place + 1}-{channel}", f"{names[place]}: {channel.replace('_', ' ')}",
+                f"{len(record)} samples over {seconds:.4g} s", "time from the first sample (s)" if late else "time (s)",
                 f"{words} ({record.units[channel]})", tuple(traces),
             ))  # fmt: skip
     return tuple(out)
@@ -102,10 +103,10 @@ def fits(output: OutputError) -> list[Picture]:
         for signal in problem.signals:
             seen, simulated = measured(trial, signal), run[:, PLACE[signal]]
             off = float(np.sqrt(np.mean((simulated - seen)[trial.rows] ** 2)))
-            unit = unit_of(output, signal)
+            unit = problem.units[signal]
             out.append(Picture(
                 f"fit-{place + 1}-{signal}", f"{trial.name}: {signal}, measured and simulated",
-                f"Root mean square of the difference: {off:.3g} {unit}", "time (s)", f"{signal} ({unit})",
+                f"Root mean square of the difference: {quantity(off, unit)}", "time (s)", f"{signal} ({unit})",
                 (over_time("measured", trial.time, seen), over_time("simulated", trial.time, simulated)),
             ))  # fmt: skip
     return out
@@ -124,19 +125,11 @@ def output_residuals(output: OutputError) -> list[Picture]:
         rest = np.concatenate([
             (run[:, PLACE[signal]] - measured(t, signal))[t.rows] for run, t in zip(runs, problem.trials, strict=True)
         ])  # fmt: skip
-        label = f"simulated minus measured {signal} ({unit_of(output, signal)})"
+        label = f"simulated minus measured {signal} ({problem.units[signal]})"
         out += residuals(
             signal, label, rest, position, velocity, time, axis.unit("rad"), axis.unit("rad/s"),
         )  # fmt: skip
     return out
-
-
-def unit_of(output: OutputError, signal: str) -> str:
-    """Unit of a signal of the axis."""
-    axis = output.problem.axis
-    if signal == "position":
-        return axis.unit("rad")
-    return axis.unit(QUANTITIES[output.problem.trials[0].quantity])
 
 
 def inverse_pictures(inverse: InverseDynamics, motion: str) -> list[Picture]:
@@ -182,7 +175,7 @@ def residuals(
         )  # fmt: skip
         out.append(Picture(
             f"residual-{signal}-over-{name}", f"Residual of the {signal} over {name}",
-            f"Root mean square {rms:.3g} {unit}; {word}", x_label, label, traces,
+            f"Root mean square {quantity(rms, unit)}; {word}", x_label, label, traces,
         ))  # fmt: skip
     return out
 

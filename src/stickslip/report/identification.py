@@ -75,13 +75,15 @@ def _readable(label: str, values: Sequence[Array]) -> tuple[float, str]:
 
 
 def _curve(trace: Trace, x_factor: float, y_factor: float, styles: Iterator[tuple[str, Any]]) -> plots.Curve:
-    if trace.kind == "points":
+    if trace.label == "reference":
+        style = plots.REFERENCE
+    elif trace.kind == "points":
         style = plots.Style("#000000", "", 1.1)
     elif trace.kind == "open points":
         style = plots.Style("#D55E00", "", 1.1)
     elif trace.kind == "faint":
         style = plots.Style("#E69F00", "-", 0.5)
-    elif trace.kind == "band":
+    elif trace.kind in ("band", "dense"):
         style = plots.Style("#56B4E9", "-", 0.6)
     elif trace.kind == "vertical":
         style = plots.Style("#D55E00", (0, (1.5, 1)), 1.3)

@@ -23,6 +23,9 @@ __all__ = ["Source", "comparison_of", "number", "write_identification"]
 
 DENSE = 3000
 """Points of a picture beyond which it is embedded as pixels: drawing both forms to compare them takes as long again."""
+TABLE = 15
+"""Estimates beyond which a table of all correlations is too wide to read."""
+STRONG = 0.9
 LABELS = {
     "parameters": ("free parameters", "", 1.0),
     "held_out": ("held-out misfit", "standard deviations", 1.0),
@@ -84,7 +87,9 @@ def rendered(
     columns, rows = comparison_of(found)
     with tempfile.TemporaryDirectory() as folder:
         parts = {
-            "data": figures(data_pictures([s.record for s in sources]), Path(folder)),
+            "data": figures(
+                data_pictures([s.record for s in sources], [s.name for s in sources]), Path(folder)
+            ),
             "fits": figures([p for p in pictures if p not in rest], Path(folder)),
             "residuals": figures(rest, Path(folder)),
         }
@@ -98,7 +103,10 @@ def rendered(
         missing=[e for e in found.estimates if not e.identified],
         measure_next=found.measure_next,
         notes=found.notes,
-        misfit=[(k, number(float(v))) for k, v in found.misfit.items()],
+        misfit=[
+            {"name": k.replace("_", " "), "value": number(float(v)), "unit": found.misfit_unit(k)}
+            for k, v in found.misfit.items()
+        ],
         sources=[source(s) for s in sources],
         columns=columns, rows=rows, parts=parts,
         correlation=correlation(found),
@@ -192,16 +200,23 @@ def comparison_of(found: Identification) -> tuple[list[str], list[dict[str, Any]
 def correlation(found: Identification) -> dict[str, Any]:
     """Names and rows of the correlation, those beyond 0.9 marked."""
     names = [e.name for e in found.estimates]
+    none: dict[str, Any] = {"names": [], "rows": [], "pairs": [], "many": 0}
     if len(names) < 2 or found.correlation.shape != (len(names), len(names)):
-        return {"names": [], "rows": []}
+        return none
+    if len(names) > TABLE:
+        strong = [
+            {"names": f"{names[i]}, {names[j]}", "text": f"{found.correlation[i, j]:.2f}"}
+            for i in range(len(names)) for j in range(i) if abs(found.correlation[i, j]) > STRONG
+        ]  # fmt: skip
+        return {**none, "pairs": strong, "many": len(names)}
     rows = [
         {"name": n, "cells": [
-            {"text": f"{c:.2f}" if math.isfinite(c) else "-", "strong": i != j and math.isfinite(c) and abs(c) > 0.9}
+            {"text": f"{c:.2f}" if math.isfinite(c) else "-", "strong": i != j and math.isfinite(c) and abs(c) > STRONG}
             for j, c in enumerate(row)
         ]}
         for i, (n, row) in enumerate(zip(names, found.correlation.tolist(), strict=True))
     ]  # fmt: skip
-    return {"names": names, "rows": rows}
+    return {**none, "names": names, "rows": rows}
 
 
 def figures(pictures: Sequence[Picture], folder: Path) -> list[dict[str, Any]]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.errors import InputError
+from stickslip.report.plots import tied
 
 __all__ = ["filled", "replaced", "unwritable"]
 
@@ -18,6 +19,7 @@ def filled(template: str, **values: Any) -> str:
     environment = Environment(
         loader=PackageLoader("stickslip.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )  # fmt: skip
+    environment.filters["tied"] = tied
     return environment.get_template(template).render(**values)
 
 

@@ -18,7 +18,19 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Curve", "Panel", "Style", "draw", "embedded", "envelope", "save", "scaled", "style_of"]
+__all__ = [
+    "Curve",
+    "Panel",
+    "Style",
+    "draw",
+    "embedded",
+    "envelope",
+    "quantity",
+    "save",
+    "scaled",
+    "style_of",
+    "tied",
+]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -26,6 +38,7 @@ WIDTH = 4.4  # inches: printed at half a page's width, 8 points stay above 5
 DPI = 144
 LEGEND = 80  # characters in a row of the legend, 9 of them an entry's line and gap
 FORMATS = (".svg", ".png", ".pdf")
+BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:[mµ]?(?:rad|N·m|s|Hz|A|V|N)|kg·m²|%|/s)(?![\w·]))")
 DATES = {".svg": "Date", ".pdf": "CreationDate"}
 RC: dict[str, Any] = {
     "font.size": 8.0,
@@ -159,6 +172,17 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
     return (1e3, f"m{unit}") if largest >= 1e-4 else (1e6, f"µ{unit}")
 
 
+def quantity(value: float, unit: str) -> str:
+    """A quantity to three digits in the unit in which it reads well: 3.67 mN·m."""
+    factor, shown = scaled(abs(value), unit)
+    return f"{factor * value:.3g} {shown}"
+
+
+def tied(text: str) -> str:
+    """The text with a number and its unit on one line wherever it is wrapped."""
+    return BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text)
+
+
 def draw(path: Path, title: str, message: str, panels: Sequence[Panel], height: float = 2.0) -> None:
     """Draw panels one above the other and save them as path.svg and path.png.
 
@@ -225,8 +249,8 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
     longest = max((len(name) for name in named), default=0)
     columns = max(1, min(4, len(named), LEGEND // (longest + 9)))
     rows = math.ceil(len(named) / columns)
-    heading = textwrap.wrap(title, 64)
-    lines = textwrap.wrap(message, 74, break_on_hyphens=False)
+    heading = textwrap.wrap(title, 60)
+    lines = textwrap.wrap(tied(message), 74, break_on_hyphens=False)
     head = 0.24 + 0.13 * (len(heading) + max(1, len(lines)))
     shared = len({p.x_label for p in panels if p.x_label}) == 1
     total = head + height * len(panels) + (0.26 if common or shared else 0.0) + 0.17 * rows
@@ -281,6 +305,8 @@ def _line(axes: Any, curve: Curve) -> None:
                 linewidth=style.width,
                 label="_",
             )
+            axes.plot([], [], color=style.colour, linewidth=6.0, alpha=0.35, label=label)
+            label = "_"
         axes.plot(
             curve.x, curve.y, color=style.colour, linestyle=style.dashes, linewidth=style.width, label=label,
             marker=style.marker, markersize=3.5,

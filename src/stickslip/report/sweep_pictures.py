@@ -48,7 +48,7 @@ def draw(folder: Path, sweep: Sweep) -> list[Path]:
         if GAIN in sweep.drawn.names:
             made += [p for p in [_gains(target / f"gain-{stem}", folder, sweep, runs)] if p]
         elif sweep.drawn.nested:
-            made.append(_uncertainty(target / f"uncertainty-{stem}", folder, sweep, runs))
+            made += [p for p in [_uncertainty(target / f"uncertainty-{stem}", folder, sweep, runs)] if p]
         made += [_tornado(target / f"tornado-{stem}-{run.controller}", folder, sweep, run) for run in runs]
     return made
 
@@ -77,7 +77,8 @@ def _saved(stem: Path, title: str, message: str, panels: list[Panel], height: fl
 # ---- which controller for how much uncertainty ----------------------------------------------------------------
 
 
-def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Path:
+def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Path | None:
+    """Percentiles over the uncertainty; None where the cases are too few for one."""
     what, unit = named(sweep.metrics[0])
     data: dict[str, tuple[Array, Array]] = {}
     for run in runs:
@@ -85,6 +86,8 @@ def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun])
         data[run.controller] = drawn[sweep.drawn.names.index(LEVEL)], values
     levels = np.linspace(0.0, 1.0, LEVELS + 1)[1:]
     lines = {name: within(levels, off, values, HIGH) for name, (off, values) in data.items()}
+    if not any(np.any(np.isfinite(y)) for y in lines.values()):
+        return None
     factor, shown = scaled(
         max(_or_zero(float(np.max(y[np.isfinite(y)], initial=0.0))) for y in lines.values()), unit
     )
@@ -96,10 +99,10 @@ def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun])
         rest = [n for n in lines if not n.startswith(tuple(families.values()))]
         if members:
             panels.append(
-                _lines(percent * levels, lines, [*rest, *members], factor, f"{what}, {shown}", family)
+                _lines(percent * levels, lines, [*rest, *members], factor, f"{what} ({shown})", family)
             )
     if not panels:
-        panels.append(_lines(percent * levels, lines, list(lines), factor, f"{what}, {shown}", ""))
+        panels.append(_lines(percent * levels, lines, list(lines), factor, f"{what} ({shown})", ""))
     message = (
         f"{_choice(lines, percent)} 95th percentile over {sweep.drawn.cases} cases, every number that varies anywhere "
         "within that distance"
@@ -119,8 +122,6 @@ def _choice(lines: dict[str, Array], percent: float) -> str:
         return f"{first} up to {percent * until / LEVELS:.0f} %, {last} at {percent * (known[-1] + 1) / LEVELS:.0f} %"
 
     known = [i for i in range(LEVELS) if any(math.isfinite(y[i]) for y in lines.values())]
-    if not known:
-        return "Too few cases to choose by."
     said = f"Least error: {best(list(lines))}"
     compensated = [n for n in lines if n.startswith(("FF-", "FB-"))]
     return (
@@ -135,7 +136,7 @@ def _lines(
 ) -> Panel:
     curves = [Curve(levels, factor * lines[n], n, style_of(n, list(lines))) for n in names]
     curves.sort(key=lambda c: c.style.dashes != "-")  # whole lines below: broken ones show where they agree
-    return Panel(curves, label, "uncertainty of what varies, ±%", note=note, y_scale="log")
+    return Panel(curves, label, "uncertainty of what varies (±%)", note=note, y_scale="log")
 
 
 def _or_zero(value: float) -> float:
@@ -168,7 +169,7 @@ def _percentiles(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun])
             Curve(np.array([middle]), at[:1], "median" if place == 0 else "", MEDIAN, "points")
         )  # fmt: skip
     message = f"{what} over {sweep.drawn.cases} cases each; best 95th percentile on top"
-    panel = Panel(curves, "", f"{what}, {shown}", y_names=[runs[i].controller for i in order], x_scale="log")
+    panel = Panel(curves, "", f"{what} ({shown})", y_names=[runs[i].controller for i in order], x_scale="log")
     return _saved(stem, sweep.title, message, [panel], 0.7 + 0.17 * len(runs))
 
 
@@ -200,7 +201,7 @@ def _tornado(stem: Path, folder: Path, sweep: Sweep, run: PlannedRun) -> Path:
         f"{_symbol(names[order[0]])} matters most"
     )
     panel = Panel(
-        curves, "", f"{what}, {shown}", y_names=[_symbol(names[i]) for i in order]
+        curves, "", f"{what} ({shown})", y_names=[_symbol(names[i]) for i in order]
     )  # fmt: skip
     return _saved(stem, sweep.title, message, [panel], 0.75 + 0.2 * len(pairs))
 
@@ -234,7 +235,7 @@ def _gains(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Pa
         for n, c in found.items()
     ]
     said = ", ".join(f"{n} {c.gain:.2f}" for n, c in found.items())
-    panels = [Panel([*curves, *marks], f"{what}, {shown}", "gain of the compensator")]
+    panels = [Panel([*curves, *marks], f"{what} ({shown})", "gain of the compensator")]
     message = f"recommended gain (least 95th percentile): {said}"
     return _saved(stem, sweep.title, message, panels, 2.1)
 
@@ -258,5 +259,5 @@ def trade_off(stem: Path, sweep: Sweep, tuned: Tuned) -> Path:
     chosen = ", ".join(f"{_symbol(n)} {v:.3g}" for n, v in zip(tuned.names, tuned.after))
     over = f"{sweep.percentile:g}th percentiles over {sweep.drawn.cases} cases each"
     message = f"{tuned.run.controller}: {chosen}; {over}"
-    panel = Panel(curves, f"{price}, {y_shown}", f"{what}, {x_shown}", x_scale="log")
+    panel = Panel(curves, f"{price} ({y_shown})", f"{what} ({x_shown})", x_scale="log")
     return _saved(stem, sweep.title, message, [panel], 2.4)
