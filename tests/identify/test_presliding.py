@@ -11,7 +11,12 @@ from stickslip.errors import InputError
 from stickslip.identify.attraction import identify_attraction, largest_without_overshoot
 from stickslip.identify.hysteresis import Loop, choose_hysteresis, identify_hysteresis, templates_for
 from stickslip.identify.presliding import cycles, identify_presliding
+from stickslip.machines.machine import machine
 from stickslip.report.identification import draw_identification
+from stickslip.rigs.procedures.base import perform
+from stickslip.rigs.procedures.presliding import Presliding
+from stickslip.rigs.virtual import VirtualRig
+from stickslip.simulation.along import Along
 
 SLIDING = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
 PLANT = Model("gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, **SLIDING)
@@ -61,6 +66,39 @@ def test_cycles_leave_out_the_transient(loop: Loop) -> None:
         identify_presliding(Loop(loop.time, loop.time, loop.torque), SLIDING)
     with pytest.raises(InputError, match="'free' or 'equal'"):
         identify_presliding(loop, SLIDING, shares="some")
+
+
+@pytest.mark.parametrize(
+    ("name", "frequency"),
+    [
+        ("ideal", 0.1), ("ideal", 1.0), ("ideal", 4.0), pytest.param("thesis-dry", 1.0, marks=pytest.mark.slow),
+        pytest.param("thesis-grease", 4.0, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_the_stiffness_of_a_loop_does_not_depend_on_its_frequency(name: str, frequency: float) -> None:
+    """The torque's lag behind the motion is no infinitely stiff element."""
+    m = machine(name)
+    record = perform(Presliding(amplitude=0.13, frequency=frequency), VirtualRig(m)).record
+    level = {"fs": 0.3, "fc": 0.3, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.0}
+    found = identify_presliding(
+        Loop.of(record, "motor_torque"), level, elements=3, offset=True, inertia=m.inertia
+    )
+    assert sum(found.model.parameters.k) == pytest.approx(m.visible_stiffness, rel=0.04)
+
+
+def test_what_accelerates_the_inertia_is_no_spring() -> None:
+    """J w^2 is 16 % of the stiffness here: a loop at 4 Hz of an axis with 100 times the thesis's inertia."""
+    spring, inertia, w = 400.0, 0.1, 2.0 * np.pi * 4.0
+    time = np.arange(0.0, 0.75, 1e-3)
+    position = 4e-4 * np.sin(w * time)
+    truth = Model("gms", k=[240.0, 160.0], alpha=[0.2, 0.8], c=90.0, **(SLIDING | {"fs": 0.3, "fc": 0.3}))
+    friction = Along(truth.law, time, position).of(truth)
+    loop = Loop(time, position, friction - inertia * w**2 * position)
+    level = SLIDING | {"fs": 0.3, "fc": 0.3}
+    known = identify_presliding(loop, level, elements=2, noise=1e-3, inertia=inertia)
+    assert sum(known.model.parameters.k) == pytest.approx(spring, rel=0.02)
+    unknown = identify_presliding(loop, level, elements=2, noise=1e-3)
+    assert sum(unknown.model.parameters.k) < 0.9 * spring
 
 
 def test_attraction_parameter_of_table_5() -> None:

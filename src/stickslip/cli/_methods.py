@@ -140,7 +140,10 @@ def presliding(records: Sequence[Record], args: argparse.Namespace) -> Identific
 
     record = single(records, args)
     loop = Loop.of(record, torque_channel(records, args))
-    return identify_presliding(loop, curve_values(args), elements=args.elements, noise=args.noise)
+    inertia = values(args.set).get("inertia", 0.0)
+    return identify_presliding(
+        loop, curve_values(args), elements=args.elements, noise=args.noise, inertia=inertia
+    )
 
 
 def attraction(records: Sequence[Record], args: argparse.Namespace) -> Identification:

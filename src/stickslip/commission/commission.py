@@ -190,7 +190,7 @@ def commission(
     j, top = _inertia(course, duration)
     fs, fs_std = _breakaway(course, j, interval)
     sliding, curve, angle = _sliding(course, j, (fs, fs_std), tuple(v for v in velocities if v <= 1.05 * top))
-    stuck = _presliding(course, fs, sliding)
+    stuck = _presliding(course, j, fs, sliding)
     _attraction(course, j)
     lugre, missed = _stickslip(course, j, fs, sliding) if lugre_too else (None, ())
     model, stiffness, said = joined_model(curve, stuck)
@@ -245,7 +245,7 @@ def _sliding(
     return plain, chosen, around.details["angle"]
 
 
-def _presliding(course: _Course, fs: float, sliding: Mapping[str, float]) -> Identification:
+def _presliding(course: _Course, j: float, fs: float, sliding: Mapping[str, float]) -> Identification:
     """Elements of GMS from a loop below break-away; a loop that breaks away is made smaller."""
     share = BELOW
     while True:
@@ -255,7 +255,8 @@ def _presliding(course: _Course, fs: float, sliding: Mapping[str, float]) -> Ide
         share *= 0.75
     done.insist()
     level = {**sliding, "fs": fs, "fc": fs, "sigma2": 0.0}
-    found = identify_presliding(Hysteresis.of(done.record, "motor_torque"), level, elements=3, offset=True)
+    loop = Hysteresis.of(done.record, "motor_torque")
+    found = identify_presliding(loop, level, elements=3, offset=True, inertia=j)
     found = with_stiffness(resolved(found, share * fs), done.record)
     course.add("presliding", done, found)
     return found

@@ -6,6 +6,7 @@ square of the error over that of the torque.
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,6 +29,7 @@ __all__ = ["Loop", "choose_hysteresis", "correlation_lags", "identify_hysteresis
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 
+DAMPING = "N·m·s/rad"
 OFFSET = Par("N·m", "T_0", "torque that acts besides friction")
 
 ELASTIC = 0.95
@@ -68,6 +70,22 @@ class Loop:
         middle = 0.5 * (self.torque[1:] + self.torque[:-1])
         return float(np.sum((middle - float(np.mean(self.torque))) * np.diff(self.position)))
 
+    def without_inertia(self, inertia: float) -> Loop:
+        """This loop with the torque of friction alone: without that which accelerates an inertia (kg·m²).
+
+        The acceleration is that of cubic polynomials over a twentieth of the time between two turns of the motion
+        to either side (Savitzky and Golay 1964).
+        """
+        signal: Any = importlib.import_module("scipy.signal")
+        dt = float(np.median(np.diff(self.time)))
+        turns = turning_points(self.position)
+        swing = float(np.median(np.diff(turns))) if len(turns) > 1 else float(self.time.size)
+        half = max(2, round(swing / 20.0))
+        if 2 * half + 1 > self.time.size:
+            return self
+        acceleration = signal.savgol_filter(self.position, 2 * half + 1, 3, deriv=2, delta=dt)
+        return replace(self, torque=self.torque - inertia * np.asarray(acceleration))
+
     def righted(self) -> tuple[Loop, tuple[str, ...]]:
         """This loop, or with the torque's sign changed where it would feed energy in; and a note that says so."""
         # A loop that is nearly elastic does no work to speak of: there the sign of its stiffness decides.
@@ -80,35 +98,41 @@ class Loop:
 def fit_loop(
     loop: Loop, template: Model, rows: Rows, *, frozen: Iterable[str] = (), noise: Noise | None = None,
     offset: bool = True, starts: int | Array = 6, profiles: bool = True, reach: float = 1.5, lags: int = 0,
-    tolerance: float = 1e-12,
+    tolerance: float = 1e-12, damping: float = 0.0,
 ) -> tuple[Fit, Along]:  # fmt: skip
-    """Fit a law's torque along the motion on some rows; it is simulated over all of them."""
+    """Fit a law's torque along the motion on some rows; it is simulated over all of them.
+
+    With `damping` (N·m·s/rad) a torque in step with the velocity is fitted along, up to that to either side.
+    """
     along = Along(template.law, loop.time, loop.position, loop.velocity)
     level = float(np.sqrt(np.mean(loop.torque[rows] ** 2)))
-    extra = (Parameter("offset", OFFSET, 0.0, offset, scale=level),)
-    if offset:
-        vector = Vector(template, frozen=frozen, extra=extra)
-    else:
-        vector = Vector(template, frozen=frozen)
+    extra: tuple[Parameter, ...] = (Parameter("offset", OFFSET, 0.0, scale=level),) if offset else ()
+    if damping > 0.0:
+        par = Par(DAMPING, "d", "torque in step with the velocity", lower=-damping, upper=damping)
+        extra += (Parameter("damping", par, 0.0, scale=damping),)
+    vector = Vector(template, frozen=frozen, extra=extra)
     idle = idle_parameters(along, vector, rows)
     if idle:
-        vector = Vector(template, frozen=[*frozen, *idle], extra=extra if offset else ())
+        vector = Vector(template, frozen=[*frozen, *idle], extra=extra)
     target = loop.torque[rows]
 
     def residuals(u: Array) -> Array:
         return curve_of(along, vector, u)[rows] - target
 
+    scale = {"offset": level, "damping": damping} if damping > 0.0 else level
     found = fit(
-        residuals, vector, noise=noise, size=float(np.max(np.abs(target))), signed_scale=level, starts=starts,
+        residuals, vector, noise=noise, size=float(np.max(np.abs(target))), signed_scale=scale, starts=starts,
         reach=reach, profiles=profiles, lags=lags, tolerance=tolerance,
     )  # fmt: skip
     return found, along
 
 
 def curve_of(along: Along, vector: Vector, u: Array) -> Array:
-    """The law's torque and the offset at every sample."""
+    """The law's torque, the offset, and what is in step with the velocity, at every sample."""
     named = vector.named(u)
-    return along.torque(vector.packed(u), vector.law_parameters(u)) + named.get("offset", 0.0)
+    torque = along.torque(vector.packed(u), vector.law_parameters(u)) + named.get("offset", 0.0)
+    damping = named.get("damping", 0.0)
+    return torque + damping * along.velocity if damping else torque
 
 
 def idle_parameters(along: Along, vector: Vector, rows: Rows) -> list[str]:
@@ -116,7 +140,7 @@ def idle_parameters(along: Along, vector: Vector, rows: Rows) -> list[str]:
     here = curve_of(along, vector, vector.start)[rows]
     idle: list[str] = []
     for p in vector.free:
-        if p.shares or p.name == "offset":
+        if p.shares or p.name in ("offset", "damping"):
             continue
         values = {q.name: q.value for q in vector.free}
         values[p.name] = p.value * 1.2 if p.value else 0.2 * p.scale

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import importlib
 import itertools
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -29,8 +30,10 @@ from stickslip.identify.hysteresis import (
     turning_points,
 )
 from stickslip.identify.noise import Noise, as_noise
+from stickslip.identify.uncertainty import Fit
 from stickslip.identify.vector import Vector
 from stickslip.model import Model
+from stickslip.simulation.along import Along
 
 __all__ = ["cycles", "identify_presliding", "maxwell_start"]
 
@@ -41,6 +44,11 @@ GRID = 30
 """Displacements at which elements of the first, linear fit slip."""
 MOST = 6
 """Elements up to which the automatic choice looks."""
+LAG, TURNED = 5e-3, 0.02
+"""s by which torque and position may be apart, by sampling, converters and filters; and the angle by which such a lag
+turns a loop, rad, from which on it is fitted along."""
+RESOLVED = 0.005
+"""Of the travel to either side, within which an element that slips shows a torque but no stiffness."""
 ENOUGH = 1.1
 """Fewest elements whose loop error is within this factor of the best."""
 
@@ -119,6 +127,7 @@ def identify_presliding(
     c: float = 24.0,
     noise: Noise | float | None = None,
     offset: bool = False,
+    inertia: float = 0.0,
 ) -> Identification:
     """Find the elements of a GMS law from loops of torque over displacement.
 
@@ -138,6 +147,8 @@ def identify_presliding(
         Standard deviation of a sample, N·m; else from the residual, with its correlation.
     offset : bool
         Whether a constant torque is fitted along.
+    inertia : float
+        kg·m² between where the torque is measured and the contact: what accelerates it is no friction.
 
     Returns
     -------
@@ -153,23 +164,35 @@ def identify_presliding(
     if shares not in ("free", "equal"):
         raise InputError(f"shares = {shares!r} must be 'free' or 'equal'")
     straight, notes = loop.righted()
+    straight = straight.without_inertia(inertia) if inertia > 0.0 else straight
     found = cycles(loop.position)
     if not found:
         raise InputError("no full cycle of displacement; record at least two cycles of a slow sinusoid")
     rows = found[0]
     rest = np.concatenate(found[1:]) if len(found) > 1 else np.zeros(0, dtype=np.intp)
     known, errors = as_noise(noise), dict[int, float]()
-    options: dict[str, Any] = {"equal": shares == "equal", "sliding": sliding, "c": c, "offset": offset}
+    # A lag of the torque makes it lead or follow the velocity, which the elements would take for a stiffness without
+    # bound: the faster the loop the more.
+    cycle = float(straight.time[rows[-1]] - straight.time[rows[0]])
+    damping = LAG * float(np.ptp(straight.torque[rows]) / np.ptp(straight.position[rows]))
+    damping = damping if 2.0 * math.pi * LAG > TURNED * cycle else 0.0
+    along_with: dict[str, Any] = {"offset": offset, "damping": damping}
+    options: dict[str, Any] = {"equal": shares == "equal", "sliding": sliding, "c": c, **along_with}
     if elements == 0:
         errors = loop_errors(straight, rows, rest if rest.size else rows, **options)
         elements = next(n for n in sorted(errors) if errors[n] <= ENOUGH * min(errors.values()) + 1e-4)
-    template = start_model(straight, rows, elements, shares == "equal", sliding, c)
-    frozen = frozen_of(template, shares == "equal")
-    first, along = fit_loop(straight, template, rows, frozen=frozen, noise=known, offset=offset, starts=6,
-                            profiles=False, reach=0.7)  # fmt: skip
-    lags = 0 if known else correlation_lags(first.optimum.residuals)
-    fitted, along = fit_loop(straight, template, rows, frozen=frozen, noise=known, offset=offset,
-                             starts=stiffest_first(first.vector, first.u)[None, :], lags=lags)  # fmt: skip
+    equal, wanted = shares == "equal", elements
+    while True:
+        fitted, along = fitted_elements(straight, rows, elements, equal, sliding, c, known, along_with)
+        unresolved = stiffest_of(fitted.vector.model(fitted.u), straight, rows)
+        if not unresolved or elements <= len(unresolved):
+            break
+        elements -= len(unresolved)
+    if elements < wanted:
+        notes += (
+            f"{elements} elements of {wanted}: more would slip within {100.0 * RESOLVED:g} % of the travel, where the "
+            "loop shows no stiffness.",
+        )
     curve = curve_of(along, fitted.vector, fitted.u)
     model = fitted.vector.model(fitted.u)
     return Identification(
@@ -178,6 +201,26 @@ def identify_presliding(
         (loop_picture(straight, curve, rows, rest, model),),
         {"elements": elements, "loop_errors": errors, "curve": curve, "rows": rows},
     )  # fmt: skip
+
+
+def fitted_elements(
+    loop: Loop, rows: Rows, elements: int, equal: bool, sliding: Mapping[str, float], c: float, noise: Noise | None,
+    along_with: Mapping[str, Any],
+) -> tuple[Fit, Along]:  # fmt: skip
+    """The law's elements fitted from several starts, then with the residuals' own correlation."""
+    template = start_model(loop, rows, elements, equal, sliding, c)
+    options: dict[str, Any] = {"frozen": frozen_of(template, equal), "noise": noise, **along_with}
+    first, _ = fit_loop(loop, template, rows, starts=6, profiles=False, reach=0.7, **options)
+    lags = 0 if noise else correlation_lags(first.optimum.residuals)
+    starts = stiffest_first(first.vector, first.u)[None, :]
+    return fit_loop(loop, template, rows, starts=starts, lags=lags, **options)
+
+
+def stiffest_of(model: Model, loop: Loop, rows: Rows) -> list[int]:
+    """Elements that slip within `RESOLVED` of the travel."""
+    p = model.parameters
+    reach = 0.5 * float(np.ptp(loop.position[rows]))
+    return [i for i in range(len(p.k)) if p.alpha[i] * p.fs < RESOLVED * reach * p.k[i]]
 
 
 def stiffest_first(vector: Vector, u: Array) -> Array:
@@ -198,14 +241,21 @@ def frozen_of(template: Model, equal: bool) -> list[str]:
 
 
 def loop_errors(
-    loop: Loop, rows: Rows, test: Rows, equal: bool, sliding: Mapping[str, float], c: float, offset: bool
+    loop: Loop,
+    rows: Rows,
+    test: Rows,
+    equal: bool,
+    sliding: Mapping[str, float],
+    c: float,
+    offset: bool,
+    damping: float,
 ) -> dict[int, float]:
     """Relative error on the test rows by the number of elements."""
     out: dict[int, float] = {}
     for n in range(1, MOST + 1):
         template = start_model(loop, rows, n, equal, sliding, c)
         fitted, along = fit_loop(loop, template, rows, frozen=frozen_of(template, equal), offset=offset, starts=2,
-                                 profiles=False, reach=0.7)  # fmt: skip
+                                 damping=damping, profiles=False, reach=0.7)  # fmt: skip
         out[n] = relative_error(loop, curve_of(along, fitted.vector, fitted.u), test)
         if n > 2 and out[n] > 0.97 * min(out[m] for m in range(1, n)):
             break  # one element more no longer helps

@@ -56,6 +56,12 @@ class Along:
         self._before = flat(mean if velocity is None else velocity[:-1])
         self._after = flat(mean if velocity is None else velocity[1:])
 
+    @property
+    def velocity(self) -> Array:
+        """Velocity at every sample, rad/s, shape (n,): the mean of that before and after it."""
+        both = 0.5 * (self._after[:-1] + self._before[1:])
+        return np.concatenate([self._before[:1], both, self._after[-1:]])
+
     def torque(self, packed: Array, parameters: Any) -> Array:
         """Torque at every sample, N·m, shape (n,).
 
