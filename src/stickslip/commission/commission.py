@@ -29,7 +29,7 @@ from stickslip.commission.springs import joined_model, resolved, with_stiffness
 from stickslip.errors import InputError, LimitCrossed
 from stickslip.identify.angle import identify_angle
 from stickslip.identify.axis_trial import trial_of
-from stickslip.identify.breakaway import identify_breakaway
+from stickslip.identify.breakaway import WINDOW, identify_breakaway
 from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.identify.hysteresis import Loop as Hysteresis
 from stickslip.identify.inertia import inertia
@@ -60,6 +60,10 @@ VELOCITIES = (25.0, 18.0, 10.0, 5.0, 3.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1
 """rad/s; those that the rig can run at are taken."""
 BELOW, BEYOND = 0.6, 1.25
 """Of the break-away torque: amplitudes that stick, and that slip."""
+RAMP = 1.5
+"""s in which a break-away ramp reaches the torque of running, at least."""
+SLOWEST, COUNTS = 0.01, 4.0
+"""rad/s, and counts of the encoder within `WINDOW`, that are motion."""
 GENTLER = 5
 """Amplitudes of the stick-slip stage that are tried."""
 QUIET = 0.04
@@ -187,10 +191,10 @@ def commission(
         If a stage that the others rest on cannot be performed or identified.
     """
     course = _Course(rig, folder, progress or (lambda _: None), without_watchdog)
-    j, top = _inertia(course, duration)
-    fs, fs_std = _breakaway(course, j, interval)
+    j, top, level = _inertia(course, duration)
+    fs, fs_std, resolution = _breakaway(course, j, level, interval)
     sliding, curve, angle = _sliding(course, j, (fs, fs_std), tuple(v for v in velocities if v <= 1.05 * top))
-    stuck = _presliding(course, j, fs, sliding)
+    stuck = _presliding(course, j, fs, sliding, resolution)
     _attraction(course, j)
     lugre, missed = _stickslip(course, j, fs, sliding) if lugre_too else (None, ())
     model, stiffness, said = joined_model(curve, stuck)
@@ -210,22 +214,28 @@ def commission(
 # ---- stages ---------------------------------------------------------------------------------------------------
 
 
-def _inertia(course: _Course, duration: float) -> tuple[float, float]:
-    """Inertia, and the speed at which the axis ran."""
+def _inertia(course: _Course, duration: float) -> tuple[float, float, float]:
+    """Inertia, and the speed and the mean torque with which the axis ran."""
     done = course.run(Inertia(duration=duration))
     axis = ServoAxis()
     found = inertia([trial_of(done.part(label), axis, name=label) for label, *_ in done.segments], axis)
     course.add("inertia", done, found)
-    return found["inertia"].value, float(np.max(done.record["velocity_reference"]))
+    running = float(np.max(done.record["velocity_reference"])), float(np.mean(done.record["motor_torque"]))
+    return found["inertia"].value, running[0], abs(running[1])
 
 
-def _breakaway(course: _Course, j: float, interval: float) -> tuple[float, float]:
-    """Mean break-away torque of both directions, and its standard deviation."""
-    done = course.run(Breakaway(inertia=j, interval=interval))
-    found = identify_breakaway(done.record)
+def _breakaway(course: _Course, j: float, level: float, interval: float) -> tuple[float, float, float]:
+    """Mean break-away torque of both directions, its standard deviation, and the position's resolution (rad); `level`
+    is the torque while running."""
+    done = course.run(Breakaway(inertia=j, interval=interval, rate=min(Breakaway.rate, level / RAMP)))
+    # A few counts of the encoder are creep before break-away, or noise.
+    resolution = resolution_of(done.record)
+    threshold = max(SLOWEST, COUNTS * resolution / WINDOW)
+    found = identify_breakaway(done.record, threshold=threshold)
     course.add("breakaway", done, found)
     levels = [e for e in found.estimates if e.name.startswith("fs_")]
-    return float(np.mean([e.value for e in levels])), math.hypot(*(e.std for e in levels)) / len(levels)
+    mean, std = float(np.mean([e.value for e in levels])), math.hypot(*(e.std for e in levels)) / len(levels)
+    return mean, std, resolution
 
 
 def _sliding(
@@ -237,7 +247,7 @@ def _sliding(
             f"sliding: the rig runs at {velocities} only of the velocities asked for; give five slower ones"
         )
     done = course.run(Sliding(velocities=velocities, inertia=j), insist=False)
-    runs = moving(done.record)
+    runs = moving(done.record, breaking[0])
     plain, chosen = fitted_curve(runs, *breaking)
     course.add("sliding", done, chosen)
     around = identify_angle(done.record, runs.segments)
@@ -245,7 +255,9 @@ def _sliding(
     return plain, chosen, around.details["angle"]
 
 
-def _presliding(course: _Course, j: float, fs: float, sliding: Mapping[str, float]) -> Identification:
+def _presliding(
+    course: _Course, j: float, fs: float, sliding: Mapping[str, float], resolution: float
+) -> Identification:
     """Elements of GMS from a loop below break-away; a loop that breaks away is made smaller."""
     share = BELOW
     while True:
@@ -257,7 +269,7 @@ def _presliding(course: _Course, j: float, fs: float, sliding: Mapping[str, floa
     level = {**sliding, "fs": fs, "fc": fs, "sigma2": 0.0}
     loop = Hysteresis.of(done.record, "motor_torque")
     found = identify_presliding(loop, level, elements=3, offset=True, inertia=j)
-    found = with_stiffness(resolved(found, share * fs), done.record)
+    found = with_stiffness(resolved(found, share * fs), done.record, resolution)
     course.add("presliding", done, found)
     return found
 

@@ -27,6 +27,9 @@ RESTING, STANDING, SLOW = 0.02, 0.7, 0.2
 """Shares of the time in which a motion goes slower than this part of its mean speed: from which it sticks and slips,
 and from which its mean torque is no friction any more. On thesis-grease that mean lies within 2 % of the sliding
 curve up to a share of 0.67 (0.014 rad/s), 4 % too low at 0.74, and 10 % too low at 0.005 rad/s."""
+ALIKE = 0.1
+"""Of the torque at the slowest speed without sticking, by which break-away may differ from it: where an axis sticks and
+slips, friction is between the two, and their mean over time is the sliding torque only where they are alike."""
 CLOSE = 0.015
 """Largest error of a curve by parameters; beyond it the curve is the table of the points."""
 FEW = 6
@@ -54,11 +57,19 @@ class Slid:
     notes: list[str]
 
 
-def moving(record: Record) -> Slid:
-    """Mean torque per speed, both directions folded, and the runs; without those in which the axis mostly stood."""
+def moving(record: Record, fs: float) -> Slid:
+    """Mean torque per speed, both directions folded, and the runs; without those whose mean is no sliding torque.
+
+    These are the runs in which the axis mostly stood, and all that stuck and slipped where the break-away torque `fs`
+    (N·m) is another than that of sliding.
+    """
     segments = constant_velocity_segments(record)
     shares = {id(s): resting(record, s) for s in segments}
-    slid = [s for s in segments if shares[id(s)] <= STANDING]
+    steady = [s for s in segments if shares[id(s)] <= RESTING]
+    slowest = min((abs(s.velocity) for s in steady), default=0.0)
+    level = [abs(s.torque) for s in steady if abs(s.velocity) < 1.01 * slowest]
+    alike = bool(level) and abs(fs / float(np.mean(level)) - 1.0) <= ALIKE
+    slid = [s for s in segments if shares[id(s)] <= (STANDING if alike else RESTING)]
     stuck = sorted({round(abs(s.velocity), 4) for s in slid if shares[id(s)] > RESTING})
     left = sorted({round(abs(s.velocity), 4) for s in segments} - {round(abs(s.velocity), 4) for s in slid})
     by_speed: dict[float, list[Segment]] = {}
@@ -77,7 +88,10 @@ def moving(record: Record) -> Slid:
             f"Stuck and slipped at {', '.join(f'{v:g}' for v in stuck)} rad/s: the torque there is the mean of both."
         )
     if left:
-        notes.append(f"Mostly stood, left out: {', '.join(f'{v:g}' for v in left)} rad/s.")
+        why = "Mostly stood" if alike else "Stuck and slipped, where the mean torque is none of sliding"
+        notes.append(
+            f"{why}, left out: {', '.join(f'{v:g}' for v in left)} rad/s; below, the curve is not measured."
+        )
     return Slid(SlidingPoints(speeds, torque), std, slid, notes)
 
 

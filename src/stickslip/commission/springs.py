@@ -99,18 +99,23 @@ def stuck_level(stuck: Identification) -> float:
     return float(stuck.model.parameters.fs)
 
 
-def with_stiffness(found: Identification, record: Record) -> Identification:
-    """The total stiffness beside the elements, with the interval that its reversals give.
+def with_stiffness(found: Identification, record: Record, resolution: float) -> Identification:
+    """The total stiffness beside the elements, with the interval that its reversals and the encoder give.
 
-    After each reversal of the torque every element sticks: the slope there is the sum of all stiffnesses.
+    After each reversal of the torque every element sticks: the slope there is the sum of all stiffnesses. A motion of
+    few counts (`resolution`, rad) is known to a count.
     """
     assert found.model is not None
     total = math.fsum(found.model.parameters.k)
     slopes = np.array(slopes_after_reversals(record["motor_torque"], record["position"]))
     std = float(np.std(slopes, ddof=1)) / math.sqrt(slopes.size) if slopes.size > 1 else math.nan
+    moved = float(np.ptp(record["position"]))
     half = student(slopes.size - 1) * std if slopes.size > 1 else math.inf
+    half = math.hypot(half, total * resolution / moved)
     good = total - half > 0.0 and half < 0.33 * total
     why = "" if good else "the slopes after the reversals scatter too much"
+    if not good and resolution > 0.1 * moved:
+        why = f"the axis moved by {moved / resolution:.2g} counts of the encoder only"
     whole = Estimate("stiffness", "N·m/rad", "k", total, std, total - half, total + half, good, why)
     spread = half / (1.96 * total) if good else WIDEST
     rest = [e for e in found.estimates if not e.name.startswith(("k[", "alpha["))]
@@ -159,7 +164,9 @@ def within_total(found: Identification, spread: float) -> tuple[list[Estimate], 
         out.append(
             dataclasses.replace(e, std=e.value * s, lower=low, upper=high, identified=not why, verdict=why)
         )
-    return out, np.clip(after / np.outer(left, left), -1.0, 1.0)
+    matrix = np.clip(after / np.outer(left, left), -1.0, 1.0)
+    np.fill_diagonal(matrix, 1.0)
+    return out, matrix
 
 
 def own_spread(e: Estimate, total: float) -> float:

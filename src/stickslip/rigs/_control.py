@@ -20,7 +20,17 @@ from stickslip.rigs.safety import Bounds as BoundNames
 from stickslip.spec import Law, Surroundings, fields_of
 from stickslip.subset import Layout, law_layouts
 
-__all__ = ["COLUMNS", "UNITS", "Control", "addresses", "control_of", "decide", "decide_at", "finished"]
+__all__ = [
+    "COLUMNS",
+    "UNITS",
+    "Control",
+    "addresses",
+    "control_of",
+    "decide",
+    "decide_at",
+    "finished",
+    "nothing_at",
+]
 
 UNITS = {
     "time": "s", "position": "rad", "velocity": "rad/s", "motor_torque": "N·m", "torque_command": "N·m",
@@ -143,6 +153,12 @@ def decide_at(a: Any) -> float:
         a[0], pointer_at(a[1]), pointer_at(a[2]), pointer_at(a[3]), pointer_at(a[4]), pointer_at(a[5]),
         pointer_at(a[6]), pointer_at(a[7]), pointer_at(a[8]), pointer_at(a[9]), pointer_at(a[10]),
     )  # fmt: skip
+
+
+@kernel()
+def nothing_at(_: Any) -> float:
+    """What `decide_at` takes for being called."""
+    return 0.0
 
 
 SETPOINT, ROW = 2, 10  # places in the addresses that change from sample to sample

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import math
 import os
-import signal
-import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -28,10 +26,11 @@ from stickslip.errors import InputError, Interrupted, RigError
 from stickslip.record import Record
 from stickslip.rigs import safety
 from stickslip.rigs._control import COLUMNS, REASON, STATE, UNITS, Control, control_of
-from stickslip.rigs.pace import Account, Pace, soft_real_time
+from stickslip.rigs.pace import TIMES, Account, Pace, soft_real_time
 from stickslip.rigs.reasons import crossed, told
 from stickslip.rigs.rig import BlockRig, Limits, Measurement, Rig, Setpoint, setpoints
 from stickslip.rigs.safety import ASKED, RUNNING, STOPPED, STOPPING, Bounds, Safety
+from stickslip.rigs.signals import Signals
 from stickslip.rigs.step import Step
 from stickslip.stream import Stream
 
@@ -103,7 +102,7 @@ class Loop:
         self._controls: dict[int, tuple[Any, Control]] = {}
         self._control = self.prepare(None)
         self._fault: BaseException | None = None
-        self._signal = 0
+        self._signals = Signals()
         self._undo = ExitStack()
         self._scratch = np.zeros(len(COLUMNS))
         self._wanted = np.zeros(len(Setpoint._fields))
@@ -118,7 +117,7 @@ class Loop:
             self._step.rehearse()  # compiles what the loop calls before anything moves
             if self.realtime:
                 self._pace.granted = undo.enter_context(soft_real_time())
-            self._hear_signals(undo)
+            self._signals.hear(undo)
             undo.callback(self.rig.close)
             first = self.rig.open()
             self._control.measured[:] = first
@@ -128,8 +127,8 @@ class Loop:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         with self._undo:
             self._ramp_down()
-            if self._signal and self._fault is None:
-                self._fault = self._interrupted()  # it came between two runs
+            if self._signals.number and self._fault is None:
+                self._fault = self._signals.error  # it came between two runs
         if kind is None and isinstance(self._fault, Interrupted):
             raise self._fault
 
@@ -141,20 +140,6 @@ class Loop:
         able = self.rig.capabilities
         lacks = {"sensor_torque": not able.torque_sensor, "temperature": not able.temperature}
         return [name for name, missing in lacks.items() if missing]
-
-    def _hear_signals(self, undo: ExitStack) -> None:
-        """SIGINT and SIGTERM end the run by its ramp; only the main thread may ask to hear them."""
-        if threading.current_thread() is not threading.main_thread():
-            return
-        for number in (signal.SIGINT, signal.SIGTERM):
-            undo.callback(signal.signal, number, signal.getsignal(number))
-            signal.signal(number, self._on_signal)
-
-    def _interrupted(self) -> Interrupted:
-        return Interrupted(f"{signal.Signals(self._signal).name} asked for the end")
-
-    def _on_signal(self, number: int, _: object) -> None:
-        self._signal = number
 
     def _end_record(self) -> None:
         if self._stream is not None:
@@ -293,24 +278,29 @@ class Loop:
         """Sample by sample through `Rig.exchange`."""
         times = self._pace.room(len(wanted))
         place, stride = wanted.ctypes.data, wanted.strides[0]
-        for k in range(len(wanted)):
-            if python is None:
-                self._sample(stream, place + k * stride, times[k])
-            else:
-                self._ask_python(python, wanted[k])
-                self._sample(stream, self._wanted.ctypes.data, times[k])
-            if self._control.safety[STATE] >= STOPPED:
-                return
+        with self._pace.counting():
+            for k in range(len(wanted)):
+                if python is None:
+                    self._sample(stream, place + k * stride, times[k])
+                else:
+                    self._ask_python(python, wanted[k])
+                    self._sample(stream, self._wanted.ctypes.data, times[k])
+                if self._control.safety[STATE] >= STOPPED:
+                    return
 
     def _sample(self, stream: Stream | None, setpoint: int, times: Any) -> None:
         """One sample: control, record, keep pace, exchange. No exception leaves it: each is a reason to stop."""
         begin = time.perf_counter_ns()
         row = self._row(stream)
-        if self._signal:
-            self._ask(self._interrupted())
+        if self._signals.number:
+            self._ask(self._signals.error)
         before = time.thread_time_ns()
         torque = self._step.decide(setpoint, row)
-        times[2] = time.thread_time_ns() - before
+        between = time.thread_time_ns()
+        times[2] = between - before
+        if self.realtime:
+            self._step.idle()
+            times[3] = time.thread_time_ns() - between
         if stream is not None and row != self._scratch.ctypes.data:
             stream.commit()
             stream.touch()
@@ -347,7 +337,7 @@ class Loop:
         """In compiled blocks through `BlockRig.exchange_block`."""
         rig = cast(BlockRig, self.rig)
         done = 0
-        while done < len(wanted) and self._control.safety[STATE] < STOPPED and not self._signal:
+        while done < len(wanted) and self._control.safety[STATE] < STOPPED and not self._signals.number:
             if stream.fault is not None:
                 break
             try:
@@ -358,8 +348,8 @@ class Loop:
                 return
             stream.commit(count)
             done += count
-        if self._signal:
-            self._ask(self._interrupted())
+        if self._signals.number:
+            self._ask(self._signals.error)
         if stream.fault is not None:
             self._ask(stream.fault)
 
@@ -376,7 +366,7 @@ class Loop:
     def _ramp(self, stream: Stream | None) -> None:
         """Samples until the torque is zero; the ramp is the compiled one, so its length is bounded."""
         self._wanted[:] = 0.0
-        times = np.zeros(3, dtype=np.int64)
+        times = np.zeros(len(TIMES), dtype=np.int64)
         while self._control.safety[STATE] != STOPPED:
             self._sample(stream, self._wanted.ctypes.data, times)
 

@@ -20,7 +20,10 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Account", "Pace", "soft_real_time"]
+__all__ = ["TIMES", "Account", "Pace", "soft_real_time"]
+
+TIMES = ("lateness", "own", "control", "empty")
+"""What is timed of every sample, in ns."""
 
 AWAKE = 80_000
 """ns before a deadline that are waited for awake: what a sleep may come late on an ordinary kernel"""
@@ -45,6 +48,11 @@ class Account:
         What the loop itself does in a sample, by the clock: limits, control, recording.
     control : tuple of float
         CPU time of the compiled control step (limits, controller and safety).
+    empty : tuple of float
+        CPU time of a compiled function that does nothing, by the same clock in the same samples: what calling it, the
+        clock itself and the machine's interrupts take, which are in `control` too. Only in real time.
+    faults, preempted : int
+        Pages that the loop's thread had to fetch during its samples, and how often the processor was taken from it.
     granted : tuple of str
         What the system granted: real-time priority, locked memory, precise sleeps.
     """
@@ -55,6 +63,9 @@ class Account:
     own: tuple[float, ...]
     control: tuple[float, ...]
     granted: tuple[str, ...]
+    empty: tuple[float, ...] = ()
+    faults: int = 0
+    preempted: int = 0
 
     def plain(self) -> dict[str, Any]:
         """As plain data, for a record's meta."""
@@ -67,6 +78,7 @@ class Account:
             ("late", self.lateness),
             ("own time", self.own),
             ("control, CPU", self.control),
+            ("  empty step", self.empty),
         ):
             if values:
                 figures = ", ".join(
@@ -74,6 +86,8 @@ class Account:
                     for label, value in zip(("median", "99 %", "99.9 %", "greatest"), values, strict=True)
                 )
                 out.append(f"{name:<13} {figures} µs")
+        if self.empty:
+            out.append(f"{self.faults} pages fetched, {self.preempted} times preempted")
         return out
 
 
@@ -86,14 +100,26 @@ class Pace:
         self.missed = 0
         self.granted: tuple[str, ...] = ()
         self._taken: list[np.ndarray[Any, np.dtype[np.int64]]] = []
+        self._faults = self._preempted = 0
 
     def restart(self) -> None:
         """The next deadline is a sample time from now: what took long before is no miss."""
         self._due = 0
 
+    @contextmanager
+    def counting(self) -> Generator[None]:
+        """Count page faults and preemptions while the samples run."""
+        faults, preempted = usage()
+        try:
+            yield
+        finally:
+            now = usage()
+            self._faults += now[0] - faults
+            self._preempted += now[1] - preempted
+
     def room(self, count: int) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """Where the times of the next `count` samples go: lateness, own time, control, in ns."""
-        table = np.full((count, 3), -1, dtype=np.int64)
+        """Where the times of the next `count` samples go: `TIMES`, in ns."""
+        table = np.full((count, len(TIMES)), -1, dtype=np.int64)
         self._taken.append(table)
         return table
 
@@ -120,12 +146,33 @@ class Pace:
 
     def account(self) -> Account:
         """What has been measured so far."""
-        taken = np.concatenate(self._taken) if self._taken else np.zeros((0, 3), dtype=np.int64)
+        taken = np.concatenate(self._taken) if self._taken else np.zeros((0, len(TIMES)), dtype=np.int64)
         columns = [column[column >= 0] for column in taken.T]
-        late, own, control = (
+        late, own, control, empty = (
             tuple(float(1e-9 * x) for x in np.percentile(c, PERCENTILES)) if c.size else () for c in columns
         )
-        return Account(columns[1].size, self.missed, late, own, control, self.granted)
+        return Account(
+            columns[1].size,
+            self.missed,
+            late,
+            own,
+            control,
+            self.granted,
+            empty,
+            self._faults,
+            self._preempted,
+        )
+
+
+def usage() -> tuple[int, int]:
+    """Page faults of this thread so far, and how often it was preempted; zeros where the system does not say."""
+    try:
+        import resource
+
+        found = resource.getrusage(getattr(resource, "RUSAGE_THREAD", resource.RUSAGE_SELF))
+    except ImportError:
+        return 0, 0
+    return found.ru_minflt + found.ru_majflt, found.ru_nivcsw
 
 
 # ---- what the system can be asked for -----------------------------------------------------------------------

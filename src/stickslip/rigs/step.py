@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stickslip.rigs._control import COLUMNS, ROW, SETPOINT, Control, addresses, decide_at
+from stickslip.rigs._control import COLUMNS, ROW, SETPOINT, Control, addresses, decide_at, nothing_at
 from stickslip.rigs.rig import Measurement, Setpoint
 
 __all__ = ["Step"]
@@ -41,3 +41,8 @@ class Step:
     def rehearse(self) -> None:
         """Run the sample on copies: its code is then in the caches of the processor."""
         decide_at(self._rehearsal)
+        nothing_at(self._rehearsal)
+
+    def idle(self) -> None:
+        """A compiled function that does nothing, called as the sample is: what calling and clock take."""
+        nothing_at(self._addresses)
