@@ -162,7 +162,9 @@ def test_real_time_is_kept_and_accounted_for(tmp_path):
     assert took >= 0.499
     assert account.samples >= 510
     assert account.own[0] < 1e-3
-    assert len(account.lines()) == 4
+    assert len(account.lines()) == 6
+    assert 0.0 < account.empty[0] <= account.control[0]
+    assert account.faults < 100
     assert Record.load(tmp_path / "run.stream").meta["loop"]["missed"] == account.missed
 
 

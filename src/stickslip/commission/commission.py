@@ -7,9 +7,8 @@ but its rig's limits.
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,19 +17,19 @@ import numpy as np
 
 from stickslip.commission.candidates import Following, Known, resolution_of
 from stickslip.commission.curve import fitted_curve, moving
+from stickslip.commission.lag import lag_of
 from stickslip.commission.recommended import (
     SLOWER,
     Recommended,
-    picture_of_candidates,
-    picture_of_tracking,
     recommend_on,
 )
-from stickslip.commission.springs import joined_model, resolved, with_stiffness
+from stickslip.commission.result import Stage, result_of
+from stickslip.commission.springs import joined_model, resolved, with_lag, with_stiffness
 from stickslip.errors import InputError, LimitCrossed
 from stickslip.identify.angle import identify_angle
 from stickslip.identify.axis_trial import trial_of
 from stickslip.identify.breakaway import WINDOW, identify_breakaway
-from stickslip.identify.estimate import Estimate, Identification, Picture
+from stickslip.identify.estimate import Identification
 from stickslip.identify.hysteresis import Loop as Hysteresis
 from stickslip.identify.inertia import inertia
 from stickslip.identify.lugre_dynamics import Response, identify_lugre_dynamics
@@ -50,7 +49,6 @@ from stickslip.rigs.procedures.sliding import Sliding
 from stickslip.rigs.procedures.stickslip import Stickslip
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
-from stickslip.simulation.driven import Mechanics
 
 __all__ = ["VELOCITIES", "Commissioned", "Stage", "commission", "planned"]
 
@@ -66,19 +64,11 @@ SLOWEST, COUNTS = 0.01, 4.0
 """rad/s, and counts of the encoder within `WINDOW`, that are motion."""
 GENTLER = 5
 """Amplitudes of the stick-slip stage that are tried."""
+SWUNG, LIVELY = ((0.3, 0.5), (0.3, 0.25), (0.6, 0.5), (0.6, 0.25)), 4.0
+"""Mean velocities of the attraction stage, rad/s, and the part of them by which they swing, the first that does not
+stick; and its frequency, Hz: above what the angle brings at these speeds."""
 QUIET = 0.04
 """Of the break-away torque, RMS of the noise that looks for the sticking mode."""
-
-
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """One procedure with what was identified from its record; `found` is None where that was impossible, and `note`
-    says why."""
-
-    name: str
-    performed: Performed
-    found: Identification | None
-    note: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +135,8 @@ def planned(rig: Rig, velocities: tuple[float, ...] = VELOCITIES, duration: floa
     """The plans of all stages, with what is known before the first of them."""
     speeds = tuple(v for v in velocities if v <= 0.5 * rig.limits.speed)
     stages: tuple[Procedure, ...] = (
-        Inertia(duration=duration), Breakaway(), Sliding(velocities=speeds), Presliding(), Stickslip(), Attraction(),
-        Resonance(), *[Track()] * 2 * (1 + len(SLOWER)),
+        Inertia(duration=duration), Breakaway(), Sliding(velocities=speeds), Presliding(), Stickslip(),
+        *(Attraction(mean=m, swing=s * m, frequency=LIVELY) for m, s in SWUNG), Resonance(), *[Track()] * 2 * (1 + len(SLOWER)),
     )  # fmt: skip
     return tuple(s.plan(rig) for s in stages)
 
@@ -195,9 +185,9 @@ def commission(
     fs, fs_std, resolution = _breakaway(course, j, level, interval)
     sliding, curve, angle = _sliding(course, j, (fs, fs_std), tuple(v for v in velocities if v <= 1.05 * top))
     stuck = _presliding(course, j, fs, sliding, resolution)
-    _attraction(course, j)
-    lugre, missed = _stickslip(course, j, fs, sliding) if lugre_too else (None, ())
     model, stiffness, said = joined_model(curve, stuck)
+    model, said = with_lag(model, _attraction(course, j, angle, model), said)
+    lugre, missed = _stickslip(course, j, fs, sliding) if lugre_too else (None, ())
     said = (*said, *missed)
     recommended = None
     if track_too:
@@ -205,7 +195,7 @@ def commission(
             lambda: _recommended(course, j, top, fs, model, stiffness, angle, lugre.model if lugre else None)
         )
         said = (*said, *unsaid)
-    result = _result(course, model, j, stiffness, said, angle, recommended)
+    result = result_of(course.stages, model, j, stiffness, said, angle, recommended)
     return Commissioned(
         tuple(course.stages), j, model, lugre.model if lugre else None, angle, recommended, stiffness, result,
     )  # fmt: skip
@@ -274,16 +264,22 @@ def _presliding(
     return found
 
 
-def _attraction(course: _Course, j: float) -> None:
-    """Recorded for the report; C itself follows the thesis's rule (4.3.1.1.5)."""
-    mean = 0.3
-    done = course.run(Attraction(inertia=j, mean=mean, swing=0.5 * mean), insist=False)
-    course.add(
-        "attraction",
-        done,
-        None,
-        "what depends on the angle hides the lag: C by the thesis's rule (4.3.1.1.5)",
-    )
+def _attraction(course: _Course, j: float, angle: AngleMap, model: Model) -> Identification | None:
+    """What the lag of friction tells of C: nothing where the axis does not run in one direction."""
+    done, why = None, ""
+    for mean, swing in SWUNG:
+        procedure = Attraction(inertia=j, mean=mean, swing=swing * mean, frequency=LIVELY)
+        done = course.run(procedure, insist=False)
+        try:
+            found = lag_of(done.record, j, angle, model, course.rig.sample_time)
+        except InputError as error:
+            why = str(error).rstrip(".")
+            continue
+        course.add("attraction", done, found)
+        return found
+    assert done is not None
+    course.add("attraction", done, None, why)
+    return None
 
 
 def _stickslip(
@@ -339,59 +335,3 @@ def _recommended(
         return course.run(procedure, name=name)
 
     return recommend_on(known, course.rig, lugre, follow)
-
-
-def _result(
-    course: _Course, model: Model, j: float, stiffness: float, said: tuple[str, ...], angle: AngleMap,
-    recommended: Recommended | None,
-) -> Identification:  # fmt: skip
-    estimates: list[Estimate] = []
-    pictures: list[Picture] = []
-    notes: list[str] = [
-        f"Total pre-sliding stiffness at the encoder: {stiffness:.4g} N·m/rad. It is that of the contact in series "
-        "with all that twists between the encoder and the contact; the springs of the model are this.",
-        "The sliding curve is the mean of both directions.",
-        *said,
-        *(recommended.lines() if recommended else ()),
-    ]
-    misfit: dict[str, float] = {}
-    for i, stage in enumerate(course.stages):
-        again = any(s.performed is stage.performed for s in course.stages[:i])
-        failed = [c for c in stage.performed.checks if not c.passed and not again]
-        notes += [f"{stage.name}: {c.name}: {c.text}" for c in failed]
-        if stage.found is None:
-            notes.append(f"{stage.name}: {stage.note}.")
-            continue
-        estimates += [dataclasses.replace(e, name=named(stage, e, model)) for e in stage.found.estimates]
-        pictures += stage.found.pictures
-        if stage.name != "resonance":  # `Recommended.lines` says it
-            notes += [f"{stage.name}: {n}" for n in stage.found.notes]
-        misfit |= {f"{stage.name}_{k}": float(v) for k, v in stage.found.misfit.items()}
-    if recommended and recommended.chosen:
-        pictures += [picture_of_candidates(recommended), picture_of_tracking(recommended)]
-    correlation = blocks([s.found for s in course.stages if s.found])
-    return Identification(
-        "commission", model, tuple(estimates), correlation, misfit, tuple(notes), (), tuple(pictures),
-        {"mechanics": Mechanics(j), "stiffness": stiffness, "angle": angle},
-    )  # fmt: skip
-
-
-OF_THE_LAW = ("sliding", "presliding", "attraction")
-"""Stages whose estimates are parameters of the law, so that sweeps, recommendations and comparisons know them."""
-
-
-def named(stage: Stage, e: Estimate, model: Model) -> str:
-    """The law's own name where the estimate is its parameter; else that of the stage before its own."""
-    own = stage.name in OF_THE_LAW and e.name.partition("[")[0] in {f.name for f in model.law.fields}
-    return e.name if own or e.name == "inertia" else f"{stage.name}.{e.name}"
-
-
-def blocks(found: Sequence[Identification]) -> Array:
-    """Correlation of all estimates: the stages' own, and none between stages, whose records are others."""
-    sizes = [len(f.estimates) for f in found]
-    whole, begin = np.eye(sum(sizes)), 0
-    for f, size in zip(found, sizes, strict=True):
-        if f.correlation.shape == (size, size):
-            whole[begin : begin + size, begin : begin + size] = f.correlation
-        begin += size
-    return whole

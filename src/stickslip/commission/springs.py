@@ -16,7 +16,7 @@ from stickslip.identify.estimate import Estimate, Identification
 from stickslip.model import Model
 from stickslip.record import Record
 
-__all__ = ["joined_model", "listed", "resolved", "with_stiffness"]
+__all__ = ["joined_model", "listed", "resolved", "with_lag", "with_stiffness"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
@@ -86,6 +86,38 @@ def joined_model(curve: Identification, stuck: Identification) -> tuple[Model, f
             f"No C overshoots up to {FASTEST:g} N·m/s (thesis 4.3.1.1.5): C is that of a lag of {1e3 * LAG:g} ms.",
         )
     return Model(curve.model.law, {}, **{**plain, "c": c}), math.fsum(springs.k), said
+
+
+def with_lag(
+    model: Model, lag: Identification | None, said: tuple[str, ...]
+) -> tuple[Model, tuple[str, ...]]:
+    """The law with the C that its record tells, else with that of the rule, within what the record allows.
+
+    Parameters
+    ----------
+    model : Model
+        With the C of the rule.
+    lag : Identification or None
+        Of `stickslip.commission.lag`.
+    said : tuple of str
+        What is to be said of the rule.
+    """
+    if lag is None:
+        return model, said
+    c = lag["c"]
+    rule = float(model.parameters.c)
+    value = c.value if c.identified else min(max(rule, c.lower), c.upper)
+    if c.identified:
+        said = (f"C = {value:.3g} N·m/s is that of the lag of friction in sliding.",)
+    else:
+        what = (
+            ""
+            if value == rule
+            else f"; the rule's {rule:.3g} N·m/s lies outside, so that the nearest is taken"
+        )
+        said = (*said, f"C = {value:.3g} N·m/s is not identified: {c.verdict}{what}.")
+    values: dict[str, Any] = {k: listed(v) for k, v in model.parameters._asdict().items()}
+    return Model(model.law, {}, **{**values, "c": value}), said
 
 
 def listed(value: Any) -> Any:
