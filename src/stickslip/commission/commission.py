@@ -136,7 +136,8 @@ def planned(rig: Rig, velocities: tuple[float, ...] = VELOCITIES, duration: floa
     speeds = tuple(v for v in velocities if v <= 0.5 * rig.limits.speed)
     stages: tuple[Procedure, ...] = (
         Inertia(duration=duration), Breakaway(), Sliding(velocities=speeds), Presliding(), Stickslip(),
-        *(Attraction(mean=m, swing=s * m, frequency=LIVELY) for m, s in SWUNG), Resonance(), *[Track()] * 2 * (1 + len(SLOWER)),
+        *(Attraction(mean=m, swing=s * m, frequency=LIVELY) for m, s in SWUNG), Resonance(),
+        *[Track()] * 2 * (1 + len(SLOWER)),
     )  # fmt: skip
     return tuple(s.plan(rig) for s in stages)
 
