@@ -16,12 +16,15 @@ record is a .npz file that `stickslip identify` and `stickslip doctor` read.
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from stickslip.finding import Finding
-    from stickslip.rigs.procedures.base import Performed, Plan
+    from stickslip.rigs.procedures.base import Performed, Plan, Procedure
     from stickslip.rigs.rig import Rig
 
 SHOWN = 4
@@ -117,9 +120,10 @@ def performed(args: argparse.Namespace) -> int:
 
     kind = procedure(args.procedure)
     chosen = kind.with_options(pairs(args.set))
+    sensible(chosen, pairs(args.set))
     rig = rig_of(args)
     out: Path = args.out or Path(f"{args.procedure}.npz")
-    plan = chosen.plan(rig)
+    plan = plan_of(chosen, rig, args.set)
     if args.dry_run:
         return told(plan, rig, args)
     if out.is_dir():
@@ -134,6 +138,40 @@ def performed(args: argparse.Namespace) -> int:
     except OSError as error:
         raise unwritable(out, error) from None
     return shown(result, out, args)
+
+
+def sensible(chosen: Procedure, given: Mapping[str, str]) -> None:
+    """Refuse numbers below 0 or that are none: no option of a procedure has a sign.
+
+    Raises
+    ------
+    InputError
+    """
+    from stickslip.errors import InputError
+
+    for name, text in given.items():
+        value: Any = getattr(chosen, name)
+        values: list[Any] = list(value) if isinstance(value, tuple) else [value]  # type: ignore[reportUnknownArgumentType]
+        if any(isinstance(v, (int, float)) and not 0.0 <= v < math.inf for v in values):
+            raise InputError(f"{chosen.name}: {name} = {text} must be 0 or greater")
+
+
+def plan_of(chosen: Procedure, rig: Rig, given: list[str]) -> Plan:
+    """The plan of a procedure.
+
+    Raises
+    ------
+    InputError
+        If the options make none.
+    """
+    from stickslip.errors import InputError
+
+    try:
+        return chosen.plan(rig)
+    except (ZeroDivisionError, OverflowError, ValueError, MemoryError) as error:
+        raise InputError(
+            f"{chosen.name}: no plan can be made with {', '.join(given)} ({error}); give other numbers"
+        ) from None
 
 
 def told(plan: Plan, rig: Rig, args: argparse.Namespace) -> int:

@@ -56,6 +56,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 VELOCITIES = (25.0, 18.0, 10.0, 5.0, 3.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.06, 0.04, 0.02)
 """rad/s; those that the rig can run at are taken."""
+FEWEST = 5
+"""Velocities that a sliding curve takes."""
 BELOW, BEYOND = 0.6, 1.25
 """Of the break-away torque: amplitudes that stick, and that slip."""
 RAMP = 1.5
@@ -134,6 +136,11 @@ class _Course:
 def planned(rig: Rig, velocities: tuple[float, ...] = VELOCITIES, duration: float = 60.0) -> tuple[Plan, ...]:
     """The plans of all stages, with what is known before the first of them."""
     speeds = tuple(v for v in velocities if v <= 0.5 * rig.limits.speed)
+    if len(speeds) < FEWEST:
+        raise InputError(
+            f"the limit speed = {rig.limits.speed:g} rad/s leaves {len(speeds)} of the velocities that friction is "
+            f"measured at; allow {2.0 * sorted(velocities)[FEWEST - 1]:g} rad/s for {FEWEST} of them"
+        )
     stages: tuple[Procedure, ...] = (
         Inertia(duration=duration), Breakaway(), Sliding(velocities=speeds), Presliding(), Stickslip(),
         *(Attraction(mean=m, swing=s * m, frequency=LIVELY) for m, s in SWUNG), Resonance(),
@@ -233,7 +240,7 @@ def _sliding(
     course: _Course, j: float, breaking: tuple[float, float], velocities: tuple[float, ...]
 ) -> tuple[Mapping[str, float], Identification, AngleMap]:
     """A Stribeck curve for the methods that need one, the best curve, and what depends on the angle."""
-    if len(velocities) < 5:
+    if len(velocities) < FEWEST:
         raise InputError(
             f"sliding: the rig runs at {velocities} only of the velocities asked for; give five slower ones"
         )
