@@ -464,3 +464,27 @@ def test_a_unit_that_nobody_knows_is_named(
     assert (
         "no unit that is known; taken were 'position [furlong]' as position in rad" in capsys.readouterr().out
     )
+
+
+DAMAGED = [
+    (lambda m: m.pop("runs"), "'runs' is missing"),
+    (lambda m: m.pop("versions"), "'versions' is missing"),
+    (lambda m: m["runs"][0].pop("metrics"), "'metrics' is missing"),
+    (lambda m: m["runs"][0].update(metrics=[1]), "is damaged"),
+    (lambda m: m.update(runs=3), "is damaged"),
+    (lambda m: m.update(inputs=[]), "is damaged"),
+    (lambda m: m["inputs"][0].update(copy="nowhere.toml"), "nowhere.toml, an input of the study"),
+]
+
+
+def test_a_damaged_manifest_is_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = folder / "out"
+    argv = ["study", str(folder / "small_study.toml"), "--only", "PD", "--out", str(out), "--no-report"]
+    assert main(argv) == 0
+    capsys.readouterr()
+    whole = (out / "manifest.json").read_text(encoding="utf-8")
+    for damage, named in DAMAGED:
+        manifest = json.loads(whole)
+        damage(manifest)
+        (out / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+        assert named in complaint(capsys, "rerun", out)

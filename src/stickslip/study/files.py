@@ -243,6 +243,11 @@ def read_manifest(folder: Path) -> dict[str, Any]:
                     f"{folder / entry['copy']} was changed since; restore it, or run the study anew"
                 )
     except OSError as error:
+        if error.filename and Path(error.filename) != path:
+            raise InputError(
+                f"{error.filename}, an input of the study in {folder}, cannot be read ({error.strerror}); restore it, "
+                "or run the study anew"
+            ) from None
         raise InputError(
             f"no study in {folder} ({path.name}: {error.strerror}); give a folder that `stickslip study` or"
             " `stickslip sweep` wrote"

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from stickslip.errors import InputError
 from stickslip.study.files import read_manifest
@@ -40,6 +41,31 @@ class Comparison:
     notes: Sequence[str]
 
 
+Former = tuple[str, dict[str, float]]
+"""Why a run ended early (empty: it did not), and its metrics."""
+
+
+def _former(folder: Path) -> tuple[Path, dict[str, Path], dict[str, Former], dict[str, Any]]:
+    """The study's file, the copies of the others by where they lay, every run as it was, and the versions."""
+    manifest = read_manifest(folder)
+    try:
+        source, *others = manifest["inputs"]
+        moved = {str(entry["written"]): (folder / entry["copy"]).resolve() for entry in others}
+        before = {
+            str(e["run"]): (
+                str(e["failure"]),
+                {k: math.nan if v is None else float(v) for k, v in e["metrics"].items()},
+            )
+            for e in manifest["runs"]
+        }
+        return folder / source["copy"], moved, before, dict(manifest["versions"])
+    except KeyError as error:
+        why = f"an entry {error} is missing"
+    except (TypeError, ValueError, AttributeError) as error:
+        why = str(error)
+    raise InputError(f"{folder / 'manifest.json'} is damaged ({why}); restore it, or run the study anew")
+
+
 def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comparison:
     """Simulate every run of a study's manifest anew, from the copies of its inputs, and compare the metrics.
 
@@ -50,12 +76,9 @@ def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comp
     """
     if jobs < 1:
         raise InputError(f"jobs = {jobs} must be at least 1")
-    manifest = read_manifest(folder)
-    source, *others = manifest["inputs"]
-    moved = {entry["written"]: (folder / entry["copy"]).resolve() for entry in others}
-    study = load(folder / source["copy"], moved)
+    source, moved, before, then = _former(folder)
+    study = load(source, moved)
     everything = [*study.runs, *study.extras]
-    before = {entry["run"]: entry for entry in manifest["runs"]}
     planned = [p for p in everything if p.key in before]
     if missing := sorted(before.keys() - {p.key for p in planned}):
         raise InputError(
@@ -67,12 +90,10 @@ def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comp
     count, largest = 0, 0.0
     with ThreadPoolExecutor(jobs) as pool:
         for done, (p, executed) in enumerate(zip(planned, pool.map(execute, planned)), 1):
-            old = {k: math.nan if v is None else v for k, v in before[p.key]["metrics"].items()}
+            failure, old = before[p.key]
             count += len(old)
-            if executed.failure != before[p.key]["failure"]:
-                differences.append(
-                    f"{p.key}: {executed.failure or 'finished'}, was {before[p.key]['failure'] or 'finished'}"
-                )
+            if executed.failure != failure:
+                differences.append(f"{p.key}: {executed.failure or 'finished'}, was {failure or 'finished'}")
             for name in old.keys() | executed.metrics.keys():
                 a, b = old.get(name, math.nan), executed.metrics.get(name, math.nan)
                 if a != b and not (math.isnan(a) and math.isnan(b)):
@@ -80,7 +101,7 @@ def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comp
                     largest = max(largest, abs(b - a) / abs(a) if a and not math.isnan(b - a) else math.inf)
             if progress:
                 progress(done, len(planned))
-    now, then = versions(), manifest["versions"]
+    now = versions()
     notes = [
         f"{name} {now.get(name)}, was {then.get(name)}"
         for name in {**then, **now}
