@@ -18,6 +18,7 @@ __all__ = [
     "beats",
     "below",
     "cases",
+    "claims_of",
     "close",
     "compared",
     "rises",
@@ -145,3 +146,12 @@ class Claim:
     text: str
     check: Check
     why: str = ""
+
+
+def claims_of(prefix: str, section: str) -> Callable[[str, tuple[str, ...], str, Check], Claim]:
+    """What makes the statements of a section: their ids begin alike."""
+
+    def claim(id: str, figures: tuple[str, ...], text: str, check: Check) -> Claim:
+        return Claim(f"{prefix}-{id}", section, figures, text, check)
+
+    return claim

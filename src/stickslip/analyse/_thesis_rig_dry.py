@@ -16,6 +16,7 @@ from stickslip.analyse._checks import (
     beats,
     below,
     cases,
+    claims_of,
     close,
     compared,
     rises,
@@ -98,8 +99,7 @@ def _high() -> list[Claim]:
     helped = [*ff, *cases(HIGH, "FB", OTHERS), f"{HIGH}/FB-gms10"]
     alone = f"{HIGH_PID}/PID"
 
-    def claim(id: str, figures: tuple[str, ...], text: str, check: Check) -> Claim:
-        return Claim(f"dry-high-{id}", "4.3.1.2.2", figures, text, check)
+    claim = claims_of("dry-high", "4.3.1.2.2")
 
     return [
         claim("sticks", ("4.17",), "PD alone shows stick-slip", above("sticking", [pd], 0.0)),
@@ -127,8 +127,7 @@ def _high() -> list[Claim]:
 def _step() -> list[Claim]:
     pd, pid, alone = f"{STEP}/PD", f"{STEP}/PID", f"{STEP_PID}/PID"
 
-    def claim(id: str, figures: tuple[str, ...], text: str, check: Check) -> Claim:
-        return Claim(f"dry-step-{id}", "4.3.1.2.3", figures, text, check)
+    claim = claims_of("dry-step", "4.3.1.2.3")
 
     return [
         claim("PD", ("4.23",), "PD ends with a steady-state error and chatters a little (more than a count)",

@@ -14,6 +14,7 @@ from stickslip.analyse._checks import (
     beats,
     below,
     cases,
+    claims_of,
     close,
     rises,
 )
@@ -46,8 +47,7 @@ def _low() -> list[Claim]:
     pd, pid, alone = f"{LOW}/PD", f"{LOW}/PID", f"{LOW_PID}/PID"
     best = f"{LOW}/FF-lugre"
 
-    def claim(id: str, figures: tuple[str, ...], text: str, check: Check) -> Claim:
-        return Claim(f"grease-low-{id}", "4.3.2.2.1", figures, text, check)
+    claim = claims_of("grease-low", "4.3.2.2.1")
 
     return [
         claim("PD36", ("7.2", "7.3"), "PD of 36 Hz oscillates without compensation already",
@@ -86,8 +86,7 @@ def _low() -> list[Claim]:
 def _high() -> list[Claim]:
     pd, pid, alone = f"{HIGH}/PD", f"{HIGH}/PID", f"{HIGH_PID}/PID"
 
-    def claim(id: str, figures: tuple[str, ...], text: str, check: Check) -> Claim:
-        return Claim(f"grease-high-{id}", "4.3.2.2.2", figures, text, check)
+    claim = claims_of("grease-high", "4.3.2.2.2")
 
     return [
         claim("sticks", ("4.43",), "PD alone shows stick-slip", above("sticking", [pd], 0.0)),
@@ -116,8 +115,7 @@ def _high() -> list[Claim]:
 def _step() -> list[Claim]:
     pd, pid, alone = f"{STEP}/PD", f"{STEP}/PID", f"{STEP_PID}/PID"
 
-    def claim(id: str, figures: tuple[str, ...], text: str, check: Check) -> Claim:
-        return Claim(f"grease-step-{id}", "4.3.2.2.3", figures, text, check)
+    claim = claims_of("grease-step", "4.3.2.2.3")
 
     return [
         claim("PD35", ("7.4", "7.5"), "PD of 35 Hz oscillates without compensation already",
@@ -146,29 +144,28 @@ def _step() -> list[Claim]:
     ]  # fmt: skip
 
 
+def most(found: list[bool], words: str) -> tuple[bool, str]:
+    """Whether `MOST` of the runs do, and how many."""
+    return sum(found) >= MOST * len(found), f"{sum(found)} of {len(found)} runs {words}"
+
+
 def _most_improve(evidence: Evidence) -> tuple[bool, str]:
     """Feedforward improves on the linear controller alone in most runs."""
     found = [evidence("rms", c) < evidence("rms", linear_of(g)) for g in GROUPS for c in cases(g, "FF")]
-    return sum(found) >= MOST * len(
-        found
-    ), f"{sum(found)} of {len(found)} runs with feedforward are better than without"
+    return most(found, "with feedforward are better than without")
 
 
 def _most_oscillate(evidence: Evidence) -> tuple[bool, str]:
     """Feedback oscillates visibly in most runs."""
     found = [evidence("shake", c) > VISIBLE[g.split("-")[1]] for g in GROUPS for c in cases(g, "FB")]
-    return sum(found) >= MOST * len(
-        found
-    ), f"{sum(found)} of {len(found)} runs with feedback oscillate visibly"
+    return most(found, "with feedback oscillate visibly")
 
 
 def _feedforward_calmer(evidence: Evidence) -> tuple[bool, str]:
     """Feedforward oscillates less than feedback of the same law in most runs."""
     pairs = [(a, b) for g in GROUPS for a, b in zip(cases(g, "FF"), cases(g, "FB"), strict=True)]
     found = [evidence("shake", a) < evidence("shake", b) for a, b in pairs]
-    return sum(found) >= MOST * len(
-        found
-    ), f"{sum(found)} of {len(found)} runs oscillate less with feedforward"
+    return most(found, "oscillate less with feedforward")
 
 
 def _resonance(case: str) -> Check:

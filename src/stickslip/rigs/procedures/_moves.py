@@ -14,7 +14,7 @@ from stickslip.errors import RigError
 from stickslip.rigs.procedures.base import POSITION, Step
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["brake", "holder", "move", "now", "rough_inertia", "smooth", "uniform"]
+__all__ = ["brake", "holder", "move", "now", "rough_inertia", "smooth", "speed_up", "uniform"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -77,6 +77,14 @@ def uniform(
     t = dt * np.arange(1, count + 1)
     level = setpoints(count, position=start + speed * t, velocity=speed, closed=1.0)
     return ramp, level, start + speed * count * dt
+
+
+def speed_up(
+    rig: Rig, controller: Controller, begin: float, speed: float, inertia: float
+) -> tuple[Step, float]:
+    """A closed-loop step from rest to a speed, which is then held for a second; and where it ends, rad."""
+    ramp, level, end = uniform(rig, begin, speed, abs(speed), inertia)
+    return Step(np.concatenate([ramp, level]), controller), end
 
 
 def rough_inertia(rig: Rig) -> Generator[Step, Array, tuple[float, float]]:

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.record import Record
-from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, uniform
+from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, speed_up
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
@@ -52,8 +52,8 @@ class Attraction(Procedure):
         """Speed up to the mean, vary, stop."""
         loop, dt = holder(rig, self.inertia, self.bandwidth), rig.sample_time
         rows = yield now(rig)
-        ramp, level, end = uniform(rig, float(rows[-1, POSITION]), self.mean, self.mean, self.inertia)
-        yield Step(np.concatenate([ramp, level]), loop)
+        running, end = speed_up(rig, loop, float(rows[-1, POSITION]), self.mean, self.inertia)
+        yield running
         count = round(self.cycles / self.frequency / dt)
         t, w = dt * np.arange(1, count + 1), 2.0 * math.pi * self.frequency
         position = end + self.mean * t + self.swing / w * (1.0 - np.cos(w * t))

@@ -20,7 +20,15 @@ from stickslip.control.linear import Gains
 from stickslip.errors import RigError
 from stickslip.record import Record
 from stickslip.rigs._control import COLUMNS
-from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, rough_inertia, uniform
+from stickslip.rigs.procedures._moves import (
+    ROOM,
+    brake,
+    holder,
+    now,
+    rough_inertia,
+    speed_up,
+    uniform,
+)
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
@@ -120,8 +128,8 @@ class Inertia(Procedure):
         rms = self._applied(room, inertia, kd, v) * current / max(self.current)
         damp = Controller(Gains(2.0 * kd, 0.0, kd, kd), None, 0.4 * room, dt)
         rows = yield Step(setpoints(round(0.05 / dt)), pause=1.0)
-        ramp, level, end = uniform(rig, float(rows[-1, POSITION]), v, v, inertia)
-        yield Step(np.concatenate([ramp, level]), follow)
+        running, end = speed_up(rig, follow, float(rows[-1, POSITION]), v, inertia)
+        yield running
         count = round(self.duration / dt)
         t = dt * np.arange(1, count + 1)
         wanted = setpoints(

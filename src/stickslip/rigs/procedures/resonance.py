@@ -14,7 +14,7 @@ import numpy as np
 
 from stickslip.record import Record
 from stickslip.rigs._control import COLUMNS
-from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, uniform
+from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, speed_up
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
@@ -73,8 +73,8 @@ class Resonance(Procedure):
         """Run and excite, stop, rest and excite."""
         loop, v = holder(rig, self.inertia, HOLD), self.speed
         rows = yield Step(setpoints(2), pause=1.0)
-        ramp, level, end = uniform(rig, float(rows[-1, POSITION]), v, abs(v), self.inertia)
-        yield Step(np.concatenate([ramp, level]), loop)
+        running, end = speed_up(rig, loop, float(rows[-1, POSITION]), v, self.inertia)
+        yield running
         count = round(self.duration / rig.sample_time)
         t = rig.sample_time * np.arange(1, count + 1)
         wanted = setpoints(
