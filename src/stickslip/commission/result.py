@@ -40,8 +40,8 @@ def result_of(
     estimates: list[Estimate] = []
     pictures: list[Picture] = []
     notes: list[str] = [
-        f"Total pre-sliding stiffness at the encoder: {stiffness:.4g} N·m/rad. It is that of the contact in series "
-        "with all that twists between the encoder and the contact; the springs of the model are this.",
+        f"Total pre-sliding stiffness at the encoder: {stiffness:.4g} N·m/rad{doubt(stages)}. It is that of the "
+        "contact in series with all that twists between the encoder and the contact; the springs of the model are this.",
         "The sliding curve is the mean of both directions.",
         *said,
         *(recommended.lines() if recommended else ()),
@@ -66,6 +66,12 @@ def result_of(
         "commission", model, tuple(estimates), correlation, misfit, tuple(notes), (), tuple(pictures),
         {"mechanics": Mechanics(j), "stiffness": stiffness, "angle": angle},
     )  # fmt: skip
+
+
+def doubt(stages: Sequence[Stage]) -> str:
+    """Why the stiffness is not identified; empty where it is."""
+    found = [s.found["stiffness"] for s in stages if s.name == "presliding" and s.found is not None]
+    return "".join(f" (not identified: {e.verdict})" for e in found if not e.identified)
 
 
 OF_THE_LAW = ("sliding", "presliding", "attraction")

@@ -138,20 +138,20 @@ def stuck_level(stuck: Identification) -> float:
 def with_stiffness(found: Identification, record: Record, resolution: float) -> Identification:
     """The total stiffness beside the elements, with the interval that its reversals and the encoder give.
 
-    After each reversal of the torque every element sticks: the slope there is the sum of all stiffnesses. A motion of
-    few counts (`resolution`, rad) is known to a count.
+    After each reversal of the torque every element sticks: the slope there is the sum of all stiffnesses. It is taken
+    over a part of the swing, in which the motion is known to a count (`resolution`, rad).
     """
     assert found.model is not None
     total = math.fsum(found.model.parameters.k)
     slopes = np.array(slopes_after_reversals(record["motor_torque"], record["position"]))
     std = float(np.std(slopes, ddof=1)) / math.sqrt(slopes.size) if slopes.size > 1 else math.nan
-    moved = float(np.ptp(record["position"]))
+    moved = FIRST * float(np.ptp(record["motor_torque"])) / total
     half = student(slopes.size - 1) * std if slopes.size > 1 else math.inf
-    half = math.hypot(half, total * resolution / moved)
+    half = math.hypot(half, total * resolution / moved / math.sqrt(max(slopes.size, 1)))
     good = total - half > 0.0 and half < 0.33 * total
     why = "" if good else "the slopes after the reversals scatter too much"
     if not good and resolution > 0.1 * moved:
-        why = f"the axis moved by {moved / resolution:.2g} counts of the encoder only"
+        why = f"after a reversal the axis moved by {moved / resolution:.2g} counts of the encoder only"
     whole = Estimate("stiffness", "N·m/rad", "k", total, std, total - half, total + half, good, why)
     spread = half / (1.96 * total) if good else WIDEST
     rest = [e for e in found.estimates if not e.name.startswith(("k[", "alpha["))]
