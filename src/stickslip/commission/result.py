@@ -41,7 +41,7 @@ def result_of(
     pictures: list[Picture] = []
     notes: list[str] = [
         f"Total pre-sliding stiffness at the encoder: {stiffness:.4g} N·m/rad{doubt(stages)}. It is that of the "
-        "contact in series with all that twists between the encoder and the contact; the springs of the model are this.",
+        "contact in series with all that twists between it and the encoder; the springs of the model are this.",
         "The sliding curve is the mean of both directions.",
         *said,
         *(recommended.lines() if recommended else ()),
