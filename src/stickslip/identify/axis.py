@@ -33,10 +33,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 AUTOMATIC = ("coulomb", "stribeck", "lugre")
 """Laws among which the held-out error chooses where none is named."""
-MISSING = "Not identified:"
-NARROW = "Intervals come from the covariance of the output error:"
 NO_PREDICTION = "The prediction error cannot be had from these records:"
-ASK = " --intervals prediction gives honest ones."
 INTERVALS = ("prediction", "covariance")
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
@@ -126,7 +123,7 @@ def identify_axis(
         raise InputError("no law to identify; name at least one")
     if intervals not in INTERVALS:
         raise UnknownName("source of intervals", intervals, INTERVALS)
-    found = [plugins.law(x) if isinstance(x, str) else x for x in laws]
+    tried = [plugins.law(x) if isinstance(x, str) else x for x in laws]
     options: dict[str, Any] = {
         "free": free, "frozen": frozen, "values": values, "extras": extras, "robust": robust
     }  # fmt: skip
@@ -134,31 +131,33 @@ def identify_axis(
     if inverse is None:
         require_start(trials, axis, found, dict(values or {}), extras)
     candidates: list[Candidate] = []
-    chosen = found[0]
-    if len(found) > 1:
-        pairs = [t.split(HELD_OUT) for t in trials]
-        fitted = list(trials) if validation else [a for a, _ in pairs]
-        held = list(validation) if validation else [b for _, b in pairs]
-        candidates = compared(fitted, held, axis, found, inverse, options, progress)
+    chosen, start = tried[0], values
+    if len(tried) > 1:
+        candidates = compared(*held_out(trials, validation), axis, tried, inverse, options, progress)
         place = chosen_of(candidates)
-        chosen = found[place]
-        options["values"] = candidates[place].start
+        chosen, start = tried[place], candidates[place].start
         notes = [*notes, sentence_on(candidates, chosen.name)]
+    own = options_of(chosen, options, tried)
     progress(f"{chosen.name}: all of the data")
-    result = output_error(trials, axis, chosen, inverse, profiles=profiles, **options)
-    found_axis = assembled(result, inverse, validation, candidates, notes)
+    result = output_error(trials, axis, chosen, inverse, profiles=profiles, **dict[str, Any](own, values=start))
+    found = assembled(result, inverse, validation, candidates, notes)
     if intervals == "covariance":
-        return found_axis
+        return noted(found, narrow_note(result))
     progress(f"{chosen.name}: intervals from the prediction error")
-    given = {k: v for k, v in dict[str, Any](values or {}).items() if k in frozen or k in free}
+    del own["robust"]
     try:
-        prediction = axis_prediction(
-            trials, axis, chosen, first=inverse, values=given, free=free, frozen=frozen, extras=extras
-        )
+        prediction = axis_prediction(trials, axis, chosen, first=inverse, **own)
     except InputError as error:
-        kept = [n.removesuffix(ASK) for n in found_axis.notes]
-        return replace(found_axis, notes=(*kept, f"{NO_PREDICTION} {error}."))
-    return with_prediction(found_axis, prediction)
+        return noted(found, narrow_note(result, ask=False), f"{NO_PREDICTION} {error}.")
+    return with_prediction(found, prediction)
+
+
+def held_out(trials: Sequence[Trial], validation: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
+    """What laws are fitted to, and what they are compared on."""
+    if validation:
+        return list(trials), list(validation)
+    pairs = [t.split(HELD_OUT) for t in trials]
+    return [a for a, _ in pairs], [b for _, b in pairs]
 
 
 def first_look(
@@ -194,17 +193,7 @@ def compared(
     weights: Mapping[str, float] | None = None
     for number, law in enumerate(laws, 1):
         progress(f"{law.name}: law {number} of {len(laws)}")
-        own = dict(options)
-        names = {f.name for f in law.fields}
-        all_names = {f.name for x in laws for f in x.fields}
-        # A name that belongs to another of the laws is no mistake.
-        for key in ("free", "frozen"):
-            own[key] = [n for n in options[key] if n in names or n.partition("[")[0] not in all_names]
-        own["values"] = {
-            k: v
-            for k, v in dict[str, Any](options["values"] or {}).items()
-            if k in names or k not in all_names
-        }
+        own = options_of(law, options, laws)
         try:
             result = fitted_axis(fitted, axis, law, inverse, tolerance=COMPARABLE, **own)
         except InputError as error:
@@ -227,6 +216,21 @@ def compared(
     if all(c.failure for c in out):
         raise InputError("; ".join(c.failure for c in out))
     return out
+
+
+def options_of(law: Law, options: Mapping[str, Any], laws: Sequence[Law]) -> dict[str, Any]:
+    """The options without what belongs to another of the laws only: to name that is no mistake."""
+    own = {f.name for f in law.fields}
+    others = {f.name for x in laws for f in x.fields} - own
+
+    def meant(name: str) -> bool:
+        return name.partition("[")[0] not in others
+
+    values = {k: v for k, v in dict[str, Any](options["values"] or {}).items() if meant(k)}
+    return {
+        **options, "free": [*filter(meant, options["free"])], "frozen": [*filter(meant, options["frozen"])],
+        "values": values,
+    }  # fmt: skip
 
 
 def fitted_values(result: FittedAxis) -> dict[str, Any]:
@@ -274,7 +278,7 @@ def assembled(
     result: OutputError, inverse: InverseDynamics | None, validation: Sequence[Trial],
     candidates: Sequence[Candidate], notes: Sequence[str],
 ) -> Identification:  # fmt: skip
-    """Everything in one `Identification`."""
+    """Everything in one `Identification`, but for what is to be said of its intervals."""
     misfit = dict(result.errors)
     estimates = judged_load(result.estimates, inverse, result.mechanics)
     if inverse is not None:
@@ -287,8 +291,8 @@ def assembled(
         estimates,
         result.fit.correlation,
         misfit,
-        (*notes, *narrow_note(result), *missing_note(estimates)),
-        measure_next=advice(estimates, result.problem.law),
+        tuple(notes),
+        measure_next=advice(result.estimates, result.problem.law),
         details={
             "mechanics": result.mechanics, "inverse": inverse, "output": result, "candidates": tuple(candidates),
             "axis": result.problem.axis, "units": result.problem.units,
@@ -299,29 +303,33 @@ def assembled(
 def with_prediction(found: Identification, result: PredictionError) -> Identification:
     """The same with law, estimates and intervals of the prediction error; the misfits stay the output error's."""
     estimates = tuple(replace(e, unit=found.details["axis"].unit(e.unit)) for e in result.estimates)
-    estimates = judged_load(estimates, found.details["inverse"], result.mechanics)
-    kept = [n for n in found.notes if not n.startswith((MISSING, NARROW))]
-    said = "Values and intervals are the prediction error's; the misfits are those of the output error."
-    return replace(
+    changed = replace(
         found, model=result.model, estimates=estimates, correlation=result.correlation(),
-        notes=(*kept, said, *missing_note(estimates)), measure_next=advice(estimates, result.model.law),
+        measure_next=advice(estimates, result.model.law),
         details={**found.details, "mechanics": result.mechanics, "prediction": result},
     )  # fmt: skip
-
-
-def narrow_note(result: OutputError) -> tuple[str, ...]:
-    """That the intervals are too narrow where noise is coloured; where friction has a velocity of its own, by far."""
-    most = (
-        " most of all for what slow motion and break-away tell" if result.problem.law.velocity_scale else ""
+    return noted(
+        changed, "Values and intervals are the prediction error's; the misfits are those of the output error."
     )
-    remedy = "" if any(t.drive is None for t in result.problem.trials) else ASK
-    return (f"{NARROW} too narrow where noise is coloured,{most}.{remedy}".replace(",.", "."),)
 
 
-def missing_note(estimates: Sequence[Estimate]) -> tuple[str, ...]:
-    """What is not identified, in a sentence."""
-    missing = [e.name for e in estimates if not e.identified]
-    return (f"{MISSING} {', '.join(missing)}; their values are one choice among many.",) if missing else ()
+def noted(found: Identification, *more: str) -> Identification:
+    """The same with these notes, and which parameters are not identified."""
+    missing = [e.name for e in found.estimates if not e.identified]
+    last = (
+        [f"Not identified: {', '.join(missing)}; their values are one choice among many."] if missing else []
+    )
+    return replace(found, notes=(*found.notes, *more, *last))
+
+
+def narrow_note(result: OutputError, ask: bool = True) -> str:
+    """That the intervals are too narrow where noise is coloured; where friction has a velocity of its own, by far."""
+    said = "Intervals come from the covariance of the output error: too narrow where noise is coloured"
+    if result.problem.law.velocity_scale:
+        said += ", most of all for what slow motion and break-away tell"
+    if ask and all(t.drive is not None for t in result.problem.trials):
+        said += ". --intervals prediction gives honest ones"
+    return said + "."
 
 
 def advice(estimates: Sequence[Estimate], law: Law) -> tuple[str, ...]:

@@ -93,6 +93,11 @@ class InverseDynamics:
         return self["fv"] if self.has("fv") else 0.5 * (self["fv_plus"] + self["fv_minus"])
 
     @property
+    def usual_speed(self) -> float:
+        """Root mean square of the velocity, rad/s (m/s)."""
+        return float(np.sqrt(np.mean(self.velocity**2)))
+
+    @property
     def offset(self) -> float:
         """The constant torque against positive motion."""
         return self["offset"] if self.has("offset") else 0.5 * (self["fc_plus"] - self["fc_minus"])

@@ -85,7 +85,19 @@ def axis_prediction(
     given = dict(values or {})
     band = min(BAND, *(0.1 / t.period for t in trials))
     motions = [motion_of(t) for t in trials]
-    tried: list[tuple[float, Criterion, float]] = []
+    criterion, u = searched(trials, axis, law, motions, start, given, free, frozen, extras, band, seed)
+    return prediction_error(
+        motions, law, criterion.vector, criterion.mechanics, inertia=criterion.vector.named(u)["inertia"],
+        friction=abs(start.coulomb), start=u, signed_scale=abs(start.coulomb), band=band, seed=seed,
+    )  # fmt: skip
+
+
+def searched(
+    trials: Sequence[Trial], axis: ServoAxis, law: Law, motions: Sequence[Motion], start: InverseDynamics,
+    given: Mapping[str, Any], free: Sequence[str], frozen: Sequence[str], extras: Extras, band: float, seed: int,
+) -> tuple[Criterion, Array]:  # fmt: skip
+    """The criterion of the best minimum met under the firm observer, and its coordinates."""
+    tried: list[tuple[float, Criterion]] = []
     for model in starting_points(trials, axis, law, start, given):
         vector, inertia = laid_out(trials, axis, law, start, model, given, free, frozen, extras)
         problem = Problem.of(
@@ -95,32 +107,23 @@ def axis_prediction(
         criterion = Criterion.first(records, law, vector, problem.mechanics)
         cost = cost_of(criterion.residuals(vector.start))
         if math.isfinite(cost):
-            tried.append((cost, criterion, inertia))
+            tried.append((cost, criterion))
     if not tried:
         raise InputError(
             f"{law.name}: no simulation from the starting values succeeds; give others by `values`"
         )
     tried.sort(key=lambda entry: entry[0])
-    reached = [
-        (*descended(criterion, criterion.vector.start), criterion, inertia)
-        for _, criterion, inertia in tried[:DESCENTS]
-    ]
+    reached = [(*descended(c, c.vector.start), c) for _, c in tried[:DESCENTS]]
     best = min(reached, key=lambda entry: entry[0])
     # Outliers would choose among hops by plain squares: from here on the likelihood that weighs them decides.
     adapted = best[2].adapted(best[1])
-    best = (*descended(adapted, best[1]), adapted, best[3])
+    best = (*descended(adapted, best[1]), adapted)
     rng = np.random.default_rng(seed)
     for _ in range(HOPS):
-        cost, u, criterion, inertia = best
-        there = hop(criterion.vector, u, {f.name for f in law.fields}, rng)
-        if math.isfinite(cost_of(criterion.residuals(there))):
-            best = min(best, (*descended(criterion, there), criterion, inertia), key=lambda entry: entry[0])
-    _, u, criterion, _ = best
-    inertia = criterion.vector.named(u)["inertia"]
-    return prediction_error(
-        motions, law, criterion.vector, criterion.mechanics, inertia=inertia,
-        friction=abs(start.coulomb), start=u, signed_scale=abs(start.coulomb), band=band, seed=seed,
-    )  # fmt: skip
+        there = hop(adapted.vector, best[1], {f.name for f in law.fields}, rng)
+        if math.isfinite(cost_of(adapted.residuals(there))):
+            best = min(best, (*descended(adapted, there), adapted), key=lambda entry: entry[0])
+    return adapted, best[1]
 
 
 def descended(criterion: Criterion, start: Array) -> tuple[float, Array]:
@@ -189,7 +192,7 @@ def held_torque(trials: Sequence[Trial], axis: ServoAxis, first: InverseDynamics
         motion = motion_of(trial)
         reach = max(1, round(RESTING / float(motion.time[1] - motion.time[0])))
         moved = np.abs(motion.position[reach:] - motion.position[:-reach])
-        still = moved <= max(2.0 * motion.count, RESTING * SLOWEST * float(np.std(first.velocity)))
+        still = moved <= max(2.0 * motion.count, RESTING * SLOWEST * first.usual_speed)
         gain, _ = axis.drive_gains(trial.quantity)
         if np.any(still):
             torque = np.abs(gain * motion.torque[reach:][still] - first.offset)
@@ -213,7 +216,7 @@ def fitted_to_levels(
     torque = np.array([float(np.median(np.sign(v[g]) * friction[g])) for g in groups])
     if held_torque > 0.0:
         slow = max(1, LEVELS // 8)
-        speed[:slow], torque[:slow] = SLOWEST * float(np.std(v)), held_torque
+        speed[:slow], torque[:slow] = SLOWEST * first.usual_speed, held_torque
     out = steady_fit(model, speed, torque, held)
     steady = model.law.steady
     if steady is None:

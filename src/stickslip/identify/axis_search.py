@@ -254,9 +254,8 @@ def starting_models(
         speeds = np.concatenate([np.diff(t.position) / np.diff(t.time) for t in trials])
         speed = math.sqrt(float(np.mean(speeds**2)))
         return starts(law, level, float(given.get("sigma2", 0.0)), speed, travel, known)
-    speed = math.sqrt(float(np.mean(first.velocity**2)))
     coulomb = level or max(first.coulomb, 1e-3 * float(np.sqrt(np.mean(first.torque**2))))
-    return starts(law, coulomb, max(first.viscous, 0.0), speed, travel, known)
+    return starts(law, coulomb, max(first.viscous, 0.0), first.usual_speed, travel, known)
 
 
 def laid_out(

@@ -64,7 +64,9 @@ def seen_velocity(time: Array, position: Array, count: float) -> SeenVelocity:
     edges, passed = edges[kept], passed[kept]
     doubt = doubts(np.diff(edges), np.diff(passed), count)
     velocity = np.append(np.diff(np.interp(time, edges, passed)) / dt, 0.0)
-    return SeenVelocity(velocity, doubt[np.searchsorted(edges, time + 0.5 * dt)])
+    # An edge lies in the middle between two samples: what is known on either side of it holds for them together.
+    before, after = (doubt[np.searchsorted(edges, time + part * dt)] for part in (0.25, 0.75))
+    return SeenVelocity(velocity, np.maximum(before, after))
 
 
 def apart(samples: Array, counts: Array, rest: float) -> list[int]:

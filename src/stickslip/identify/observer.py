@@ -142,7 +142,7 @@ def grip_of(seen: SeenVelocity, firm: float, least: float, friction: float) -> A
     """Damping of the firm damper, N·m·s/rad; 0 where the axis is fast, or its velocity too unsure for one."""
     allowed = TOLERATED * friction / np.maximum(seen.doubt, 1e-300)
     grip = np.where(seen.doubt > 0.0, np.minimum(allowed, firm), firm)
-    slow = np.abs(seen.velocity) < SLOW * float(np.std(seen.velocity))
+    slow = np.abs(seen.velocity) < SLOW * float(np.sqrt(np.mean(seen.velocity**2)))
     return np.where(slow & (grip > least), grip, 0.0)
 
 

@@ -35,7 +35,7 @@ from stickslip.identify.corrections import BAND, Criterion, MakeMechanics, stude
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.jackknife import BlockCovariance, leave_blocks_out
 from stickslip.identify.noise import Noise
-from stickslip.identify.observer import GRASP, Motion, prepare
+from stickslip.identify.observer import GRASP, Motion, Prepared, prepare
 from stickslip.identify.optimum import Optimum
 from stickslip.identify.uncertainty import interval_of, verdict_on
 from stickslip.identify.vector import Vector
@@ -156,11 +156,11 @@ def prediction_error(
     InputError
         If a motion is too short for the band, or the model gives no finite values at the start.
     """
-    soft, slower, firm = (
-        [prepare(m, law, inertia, friction, band, speed, grasp) for m in motions]
-        for speed, grasp in ((1.0, math.inf), (SLOWER, math.inf), (1.0, GRASP))
-    )
-    criterion = Criterion.first(soft, law, vector, mechanics)
+
+    def observed(speed: float = 1.0, grasp: float = math.inf) -> list[Prepared]:
+        return [prepare(m, law, inertia, friction, band, speed, grasp) for m in motions]
+
+    criterion = Criterion.first(observed(), law, vector, mechanics)
     u = vector.start if start is None else start
     optimum = None
     for _ in range(rounds):
@@ -169,31 +169,21 @@ def prediction_error(
         u = optimum.u
     assert optimum is not None
     spread = spread_of(criterion, optimum)
+    shaken = shaken_steps(criterion, optimum, np.random.default_rng(seed))
     others = [
-        replace(criterion, records=slower),
-        replace(criterion, records=firm),
+        replace(criterion, records=observed(speed=SLOWER)),
+        replace(criterion, records=observed(grasp=GRASP)),
         replace(criterion, freedom=STRICTER),
     ]
     moved = [c.adapted(u).descend(u, 6, 1e-3).u - u for c in others]
-    shaken = shaken_steps(criterion, optimum, np.random.default_rng(seed))
     beside = sum((np.outer(d, d) for d in moved), np.zeros_like(shaken))
     estimates = estimates_of(vector, u, spread, shaken, beside, signed_scale)
     accepted = feasible(law, vector.law_parameters(u))
     assert accepted is not None
-    model = Model(law, **accepted._asdict())
-    named = mechanics(vector.named(u))
     return PredictionError(
-        vector,
-        u,
-        model,
-        named,
-        optimum.cost,
-        spread,
-        shaken,
-        beside,
-        estimates,
-        tuple(criterion.corrections(u)),
-    )
+        vector, u, Model(law, **accepted._asdict()), mechanics(vector.named(u)), optimum.cost, spread, shaken, beside,
+        estimates, tuple(criterion.corrections(u)),
+    )  # fmt: skip
 
 
 def spread_of(criterion: Criterion, optimum: Optimum) -> BlockCovariance:
