@@ -131,7 +131,10 @@ def test_an_observer_pulls_the_axis_to_what_was_measured() -> None:
     blind = drive_axis(Mechanics(INERTIA), example("coulomb"), drive)
     pulled = drive_axis(
         Mechanics(INERTIA), example("coulomb"),
-        Drive(drive.time, drive.signal, "linear", position=measured[:, 0], velocity=measured[:, 1], pull=(5.0, 0.1)),
+        Drive(
+            drive.time, drive.signal, "linear", position=measured[:, 0], spring=5.0,
+            damping=np.full(drive.time.size, 0.1), goal=np.append(measured[1:, 1], 0.0),
+        ),
     )  # fmt: skip
     assert np.std(pulled[:, 0] - measured[:, 0]) < 0.05 * np.std(blind[:, 0] - measured[:, 0])
     # What the model lacks, the observer supplies: the offset, while the axis moves.
@@ -150,8 +153,8 @@ def test_a_firm_observer_sticks_and_slips_with_the_axis() -> None:
     assert np.mean(np.abs(measured[:, 1]) < 1e-3) > 0.2  # it sticks between its slips
     velocity = np.append(np.diff(measured[:, 0]) / 1e-3, 0.0)
     firm = Drive(
-        time, measured[:, 2], "held", position=measured[:, 0], grip=np.full(time.size, INERTIA / 2e-4), goal=velocity,
-        returns=100.0,
+        time, measured[:, 2], "held", position=measured[:, 0], damping=np.full(time.size, INERTIA / 2e-4),
+        goal=velocity, firm=np.ones(time.size, dtype=np.bool_), returns=100.0,
     )  # fmt: skip
     found = drive_axis(true, contact, firm)
     assert np.max(np.abs(found[:, 0] - measured[:, 0])) < 1e-3

@@ -139,7 +139,9 @@ def identify_axis(
         notes = [*notes, sentence_on(candidates, chosen.name)]
     own = options_of(chosen, options, tried)
     progress(f"{chosen.name}: all of the data")
-    result = output_error(trials, axis, chosen, inverse, profiles=profiles, **dict[str, Any](own, values=start))
+    result = output_error(
+        trials, axis, chosen, inverse, profiles=profiles, **dict[str, Any](own, values=start)
+    )
     found = assembled(result, inverse, validation, candidates, notes)
     if intervals == "covariance":
         return noted(found, narrow_note(result))

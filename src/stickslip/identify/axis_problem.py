@@ -245,11 +245,11 @@ def drive_of(trial: Trial, inertia: float, max_step: float) -> Drive:
             max_step=max_step,
         )  # fmt: skip
     omega = 2.0 * math.pi * min(OBSERVER_HZ, 0.02 / trial.period)
-    pull = (inertia * omega**2, 2.0 * inertia * omega)
-    velocity = np.gradient(smooth(trial), trial.time)
+    even = smooth(trial)
     return Drive(
-        trial.time, trial.signal(), "held", None, trial.supply, trial.start(), 1.0, trial.position, velocity, pull,
-        max_step=max_step,
+        trial.time, trial.signal(), "held", None, trial.supply, trial.start(), position=trial.position,
+        spring=inertia * omega**2, damping=np.full(trial.time.size, 2.0 * inertia * omega),
+        goal=np.append(np.diff(even) / np.diff(trial.time), 0.0), max_step=max_step,
     )  # fmt: skip
 
 

@@ -12,18 +12,18 @@ from stickslip.simulation._driven_step import BACK_EMF, BACKLASH, DRIVE_GAIN, IN
 
 # ---- the drive's numbers ----------------------------------------------------------------------------------
 (
-    KIND, KP, KI, KD, KR, SPAN, LIMIT, CONTROL_PERIOD, MAX_STEP, TRACK_KP, TRACK_KD, TRACK_RETURNS, SIGNAL_GAIN,
-    START_POSITION, START_VELOCITY, COUNT, TRACK_SLACK, TRACK_FORGETS, DRIVE,
-) = range(19)  # fmt: skip
+    KIND, KP, KI, KD, KR, SPAN, LIMIT, CONTROL_PERIOD, MAX_STEP, SPRING, RETURNS, SIGNAL_GAIN, START_POSITION,
+    START_VELOCITY, COUNT, SLACK, DRIVE,
+) = range(17)  # fmt: skip
 HELD, LINEAR, FEEDBACK = 0.0, 1.0, 2.0  # KIND
 SPEED_LIMIT = 1e9  # rad/s, beyond which a simulation has diverged
 
 # ---- columns of the signals and of the result -------------------------------------------------------------
-TIME, SIGNAL, SUPPLY, POSITION, VELOCITY, GRIP, GOAL, SIGNALS = range(8)
+TIME, SIGNAL, SUPPLY, POSITION, DAMPING, GOAL, FIRM, SIGNALS = range(8)
 OUT_POSITION, OUT_VELOCITY, OUT_DRIVE, OUT_CORRECTION, OUTS = range(5)
 
 # ---- what a sampled controller remembers ------------------------------------------------------------------
-LAST, BEFORE_LAST, LAST_REFERENCE, ERROR_SUM, LAST_ERROR, STARTED, TRACKED, LAGGED, MEMORY = range(9)
+LAST, BEFORE_LAST, LAST_REFERENCE, ERROR_SUM, LAST_ERROR, STARTED, MEMORY = range(7)
 
 
 @kernel()
@@ -71,16 +71,7 @@ def counted(c: Any, position: float) -> float:
 @kernel()
 def beyond(c: Any, away: float) -> float:
     """How far the axis lies from where it was seen, beyond what the encoder leaves open."""
-    return away - limited(away, c[TRACK_SLACK])
-
-
-@kernel()
-def pull(c: Any, m: Any, signals: Any, k: int, y: float, dt: float) -> float:
-    """What the observer's spring and damper add: they see positions only, and none finer than the encoder's step."""
-    slower = signals[k, VELOCITY] - (y - m[TRACKED]) / dt
-    m[LAGGED] += c[TRACK_FORGETS] * (slower - m[LAGGED])
-    m[TRACKED] = y
-    return c[TRACK_KP] * beyond(c, signals[k, POSITION] - y) + c[TRACK_KD] * m[LAGGED]
+    return away - limited(away, c[SLACK])
 
 
 @kernel()
@@ -116,13 +107,12 @@ def follow(
     state, m = np.zeros(2), np.zeros(MEMORY)
     state[0], state[1] = c[START_POSITION], c[START_VELOCITY]
     y = state[0]
-    m[TRACKED] = y - state[1] * (signals[1, TIME] - signals[0, TIME])
     rows = signals.shape[0]
     loss = n[BACK_EMF]
     for k in range(rows):
         # Without supply the winding is open: no current flows, so nothing is lost to it.
-        grip = signals[k, GRIP]
-        n[BACK_EMF] = grip + (loss if signals[k, SUPPLY] != 0.0 else 0.0)
+        damping, wanted, firm = signals[k, DAMPING], signals[k, GOAL], signals[k, FIRM] != 0.0
+        n[BACK_EMF] = damping + (loss if signals[k, SUPPLY] != 0.0 else 0.0)
         out[k, OUT_POSITION], out[k, OUT_VELOCITY] = y, state[1]
         before = min(k, rows - 2)
         dt = signals[before + 1, TIME] - signals[before, TIME]
@@ -132,25 +122,24 @@ def follow(
         substeps = max(1, math.ceil(dt / acts / c[MAX_STEP] - 1e-9))
         h = dt / acts / substeps
         first = state[0]
-        wanted, pulled = signals[k, GOAL], 0.0
+        pulled = 0.0
         for act in range(acts):
             u = command(c, m, signals, k, y, dt / acts)
-            push = pull(c, m, signals, k, y, dt)
-            push = 0.0 if grip > 0.0 else push
+            push = 0.0 if firm else c[SPRING] * beyond(c, signals[k, POSITION] - y)
             if act == 0:
                 out[k, OUT_DRIVE], pulled = u, push
             if k == rows - 1:
                 break
             rate = slope(c, signals, k, dt)
             gain = n[DRIVE_GAIN] * signals[k, SUPPLY]
-            push += grip * wanted + disturbance[k]
+            push += damping * wanted + disturbance[k]
             for i in range(substeps):
                 advance(plant, state, z, gain * (u + rate * h * i) + push, gain * rate, h)
                 y = seen(n, y, state[0])
         moved = state[0] - first if k < rows - 1 else state[1] * dt
-        out[k, OUT_CORRECTION] = pulled + grip * (wanted - moved / dt)
-        if grip > 0.0 and k < rows - 1:
-            state[0] += min(dt * c[TRACK_RETURNS], 1.0) * beyond(c, signals[k + 1, POSITION] - state[0])
+        out[k, OUT_CORRECTION] = pulled + damping * (wanted - moved / dt)
+        if firm and k < rows - 1:
+            state[0] += min(dt * c[RETURNS], 1.0) * beyond(c, signals[k + 1, POSITION] - state[0])
             y = seen(n, y, state[0])
         if not (math.isfinite(state[0]) and abs(state[1]) < SPEED_LIMIT):
             return k + 1

@@ -130,22 +130,19 @@ class Drive:
         Position and velocity at the begin.
     gain : float
         Factor on the signal, or on the controller's output before its limit.
-    position, velocity : array, shape (n,), or None
+    position : array, shape (n,), or None
         A measured motion for an observer; what it adds to the torque is the column ``correction`` of the result.
-    pull : (float, float)
-        Spring and damper towards it, N·m/rad and N·m·s/rad, at every sample. `velocity` is compared with the mean over
-        the last step.
-    grip, goal : array, shape (n,), or None
+    spring : float
+        Torque towards it at every sample, N·m/rad.
+    damping, goal : array, shape (n,), or None
         Damping, N·m·s/rad, towards the velocity `goal`, the measured mean until the next sample. It is part of the
-        implicit step, so that it may be as firm as one likes. Where it is not 0, it takes the place of `pull`, and the
-        position is led back to the measured one without force.
+        implicit step, so that it may be as firm as one likes.
+    firm : array of bool, shape (n,), or None
+        Where no spring pulls: the position is led back to the measured one without force.
     returns : float
         Rate at which it is led back, 1/s.
     slack : float
         Distance from the measured position, rad, within which nothing pulls or leads back: half an encoder's count.
-    forgets : float
-        Share of the damper's memory (of `pull`) that every sample replaces, 1 for none: it damps the velocity behind a
-        first-order low-pass, so that an encoder's counts do not shake the axis.
     disturbance : array, shape (n,), or None
         A torque on the axis, held from sample to sample.
     max_step : float
@@ -160,13 +157,12 @@ class Drive:
     start: tuple[float, float] = (0.0, 0.0)
     gain: float = 1.0
     position: Array | None = None
-    velocity: Array | None = None
-    pull: tuple[float, float] = (0.0, 0.0)
-    grip: Array | None = None
+    spring: float = 0.0
+    damping: Array | None = None
     goal: Array | None = None
+    firm: np.ndarray[Any, np.dtype[np.bool_]] | None = None
     returns: float = 0.0
     slack: float = 0.0
-    forgets: float = 1.0
     disturbance: Array | None = None
     max_step: float = 1e-3
 
@@ -179,7 +175,7 @@ class Drive:
             )
         if (self.kind == "feedback") != (self.controller is not None):
             raise InputError("drive: a controller belongs to kind 'feedback'; give both or neither")
-        for name in ("signal", "supply", "position", "velocity", "grip", "goal", "disturbance"):
+        for name in ("signal", "supply", "position", "damping", "goal", "firm", "disturbance"):
             values = getattr(self, name)
             if values is not None and values.shape != self.time.shape:
                 raise InputError(f"drive: {name} has shape {values.shape}, time has {self.time.shape}")
@@ -191,10 +187,11 @@ class Drive:
         s = np.zeros((self.time.size, loop.SIGNALS))
         s[:, loop.TIME], s[:, loop.SIGNAL] = self.time, self.signal
         s[:, loop.SUPPLY] = 1.0 if self.supply is None else self.supply
-        s[:, loop.POSITION] = 0.0 if self.position is None else self.position
-        s[:, loop.VELOCITY] = 0.0 if self.velocity is None else self.velocity
-        s[:, loop.GOAL] = 0.0 if self.goal is None else self.goal
-        s[:, loop.GRIP] = 0.0 if self.grip is None else self.grip
+        observer = {
+            loop.POSITION: self.position, loop.DAMPING: self.damping, loop.GOAL: self.goal, loop.FIRM: self.firm
+        }  # fmt: skip
+        for column, values in observer.items():
+            s[:, column] = 0.0 if values is None else values
         return s
 
     def numbers(self) -> Array:
@@ -205,12 +202,7 @@ class Drive:
         c[[loop.KP, loop.KI, loop.KD, loop.KR]] = k.kp, k.ki, k.kd, k.kr
         c[loop.SPAN], c[loop.LIMIT], c[loop.CONTROL_PERIOD] = k.velocity_span, k.limit, k.period
         c[loop.COUNT] = k.count
-        c[loop.TRACK_KP], c[loop.TRACK_KD] = self.pull
-        c[loop.TRACK_RETURNS], c[loop.TRACK_SLACK], c[loop.TRACK_FORGETS] = (
-            self.returns,
-            self.slack,
-            self.forgets,
-        )
+        c[loop.SPRING], c[loop.RETURNS], c[loop.SLACK] = self.spring, self.returns, self.slack
         c[loop.START_POSITION], c[loop.START_VELOCITY] = self.start
         return c
 
