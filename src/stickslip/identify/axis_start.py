@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError, ParameterError
+from stickslip.identify.contact import stiffness_at_rest
 from stickslip.identify.optimum import descend
 from stickslip.identify.vector import Vector
 from stickslip.model import Model
@@ -188,13 +189,8 @@ def level_of(law: Law, p: Any, velocity: float) -> float:
 
 def length_of(law: Law, p: Any, torque: float) -> float:
     """The displacement over which torque builds up from rest, rad: torque over the stiffness at rest."""
-    from stickslip.spec import Surroundings
-
-    if not law.state_fields:
-        return 1e-5
-    z = law.state(p)
-    force = abs(law.step(1e-9, 1e-9, 1.0, z, p, Surroundings()))
-    return torque * 1e-9 / force if force > 0.0 else 1e-5
+    stiffness = stiffness_at_rest(law, p)
+    return torque / stiffness if stiffness > 0.0 else 1e-5
 
 
 def steady_fit(model: Model, v: Array, curve: Array, held: Sequence[str]) -> Model:

@@ -26,7 +26,7 @@ __all__ = ["Motion", "Prepared", "prepare"]
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LAG = 4.0
-"""Corner of the low-pass of the velocity that the slow damper follows, in natural frequencies of the observer."""
+"""Corner of the low-pass behind which the slow damper damps, in natural frequencies of the observer."""
 SLOW = 0.15
 """Part of the usual (RMS) speed below which the firm damper takes over."""
 GRASP = 0.6
@@ -127,14 +127,12 @@ def prepare(
     dt, seen = motion.period, motion.seen
     omega = 2.0 * math.pi * speed * band
     firm = firmness(seen, inertia / (grasp * dt), 2.0 * RETURNS * inertia * omega, friction)
-    # Where the axis is fast, an encoder's counts would shake it: the damper follows what a low-pass leaves of them.
-    smooth = signal.butter(2, min(LAG * omega / math.pi * dt, 0.9), output="sos")
-    even = signal.sosfiltfilt(smooth, np.diff(motion.position, append=motion.position[-1]) / dt)
     drive = Drive(
         motion.time, motion.torque, "held", start=(float(motion.position[0]), 0.0), position=motion.position,
         spring=inertia * omega**2, damping=np.where(firm > 0.0, firm, 2.0 * inertia * omega),
-        goal=np.where(firm > 0.0, seen.velocity, even), firm=firm > 0.0, returns=RETURNS * omega,
-        slack=0.5 * motion.count, max_step=min(dt, LONGEST),
+        goal=np.where(firm > 0.0, seen.velocity, np.append(np.diff(motion.position) / dt, 0.0)), firm=firm > 0.0,
+        forgets=-math.expm1(-LAG * omega * dt), returns=RETURNS * omega, slack=0.5 * motion.count,
+        max_step=min(dt, LONGEST),
     )  # fmt: skip
     low_pass = signal.butter(4, band, fs=1.0 / dt, output="sos")
     stride = max(1, int(1.0 / (3.0 * band * dt)))

@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.axis_start import feasible
+from stickslip.identify.contact import unseen_refused
 from stickslip.identify.corrections import BAND, Criterion, MakeMechanics, student_weight
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.jackknife import BlockCovariance, leave_blocks_out
@@ -178,10 +179,14 @@ def prediction_error(
     moved = [c.adapted(u).descend(u, 6, 1e-3).u - u for c in others]
     beside = sum((np.outer(d, d) for d in moved), np.zeros_like(shaken))
     estimates = estimates_of(vector, u, spread, shaken, beside, signed_scale)
-    accepted = feasible(law, vector.law_parameters(u))
+    accepted, named = feasible(law, vector.law_parameters(u)), vector.named(u)
     assert accepted is not None
+    speed = math.sqrt(float(np.mean(np.concatenate([m.seen.velocity for m in motions]) ** 2)))
+    estimates = unseen_refused(
+        estimates, law, accepted, named["inertia"], speed, max(m.period for m in motions)
+    )
     return PredictionError(
-        vector, u, Model(law, **accepted._asdict()), mechanics(vector.named(u)), optimum.cost, spread, shaken, beside,
+        vector, u, Model(law, **accepted._asdict()), mechanics(named), optimum.cost, spread, shaken, beside,
         estimates, tuple(criterion.corrections(u)),
     )  # fmt: skip
 

@@ -13,8 +13,8 @@ from stickslip.simulation._driven_step import BACK_EMF, BACKLASH, DRIVE_GAIN, IN
 # ---- the drive's numbers ----------------------------------------------------------------------------------
 (
     KIND, KP, KI, KD, KR, SPAN, LIMIT, CONTROL_PERIOD, MAX_STEP, SPRING, RETURNS, SIGNAL_GAIN, START_POSITION,
-    START_VELOCITY, COUNT, SLACK, DRIVE,
-) = range(17)  # fmt: skip
+    START_VELOCITY, COUNT, SLACK, FORGETS, DRIVE,
+) = range(18)  # fmt: skip
 HELD, LINEAR, FEEDBACK = 0.0, 1.0, 2.0  # KIND
 SPEED_LIMIT = 1e9  # rad/s, beyond which a simulation has diverged
 
@@ -23,7 +23,7 @@ TIME, SIGNAL, SUPPLY, POSITION, DAMPING, GOAL, FIRM, SIGNALS = range(8)
 OUT_POSITION, OUT_VELOCITY, OUT_DRIVE, OUT_CORRECTION, OUTS = range(5)
 
 # ---- what a sampled controller remembers ------------------------------------------------------------------
-LAST, BEFORE_LAST, LAST_REFERENCE, ERROR_SUM, LAST_ERROR, STARTED, MEMORY = range(7)
+LAST, BEFORE_LAST, LAST_REFERENCE, ERROR_SUM, LAST_ERROR, STARTED, BEHIND, MEMORY = range(8)
 
 
 @kernel()
@@ -111,7 +111,10 @@ def follow(
     loss = n[BACK_EMF]
     for k in range(rows):
         # Without supply the winding is open: no current flows, so nothing is lost to it.
-        damping, wanted, firm = signals[k, DAMPING], signals[k, GOAL], signals[k, FIRM] != 0.0
+        wanted, firm = signals[k, GOAL], signals[k, FIRM] != 0.0
+        # Behind a low-pass, the damper is what it remembers and a damper on the velocity that the step solves for.
+        forgets = 1.0 if firm else c[FORGETS]
+        damping, kept = forgets * signals[k, DAMPING], (1.0 - forgets) * signals[k, DAMPING] * m[BEHIND]
         n[BACK_EMF] = damping + (loss if signals[k, SUPPLY] != 0.0 else 0.0)
         out[k, OUT_POSITION], out[k, OUT_VELOCITY] = y, state[1]
         before = min(k, rows - 2)
@@ -125,7 +128,7 @@ def follow(
         pulled = 0.0
         for act in range(acts):
             u = command(c, m, signals, k, y, dt / acts)
-            push = 0.0 if firm else c[SPRING] * beyond(c, signals[k, POSITION] - y)
+            push = 0.0 if firm else kept + c[SPRING] * beyond(c, signals[k, POSITION] - y)
             if act == 0:
                 out[k, OUT_DRIVE], pulled = u, push
             if k == rows - 1:
@@ -138,6 +141,7 @@ def follow(
                 y = seen(n, y, state[0])
         moved = state[0] - first if k < rows - 1 else state[1] * dt
         out[k, OUT_CORRECTION] = pulled + damping * (wanted - moved / dt)
+        m[BEHIND] += c[FORGETS] * (wanted - moved / dt - m[BEHIND])
         if firm and k < rows - 1:
             state[0] += min(dt * c[RETURNS], 1.0) * beyond(c, signals[k + 1, POSITION] - state[0])
             y = seen(n, y, state[0])

@@ -137,8 +137,11 @@ class Drive:
     damping, goal : array, shape (n,), or None
         Damping, N·m·s/rad, towards the velocity `goal`, the measured mean until the next sample. It is part of the
         implicit step, so that it may be as firm as one likes.
+    forgets : float
+        Share of the damper's memory that every sample replaces, 1 for none: it damps the velocity behind a first-order
+        low-pass, so that an encoder's counts do not shake the axis.
     firm : array of bool, shape (n,), or None
-        Where no spring pulls: the position is led back to the measured one without force.
+        Where the damper remembers nothing and no spring pulls: the position is led back without force.
     returns : float
         Rate at which it is led back, 1/s.
     slack : float
@@ -160,6 +163,7 @@ class Drive:
     spring: float = 0.0
     damping: Array | None = None
     goal: Array | None = None
+    forgets: float = 1.0
     firm: np.ndarray[Any, np.dtype[np.bool_]] | None = None
     returns: float = 0.0
     slack: float = 0.0
@@ -202,7 +206,8 @@ class Drive:
         c[[loop.KP, loop.KI, loop.KD, loop.KR]] = k.kp, k.ki, k.kd, k.kr
         c[loop.SPAN], c[loop.LIMIT], c[loop.CONTROL_PERIOD] = k.velocity_span, k.limit, k.period
         c[loop.COUNT] = k.count
-        c[loop.SPRING], c[loop.RETURNS], c[loop.SLACK] = self.spring, self.returns, self.slack
+        c[loop.SPRING], c[loop.FORGETS] = self.spring, self.forgets
+        c[loop.RETURNS], c[loop.SLACK] = self.returns, self.slack
         c[loop.START_POSITION], c[loop.START_VELOCITY] = self.start
         return c
 
