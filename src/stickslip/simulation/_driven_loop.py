@@ -8,7 +8,16 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulation._driven_step import BACK_EMF, BACKLASH, DRIVE_GAIN, INERTIA, Plant, advance
+from stickslip.simulation._driven_step import (
+    BACK_EMF,
+    BACKLASH,
+    DRIVE_GAIN,
+    INERTIA,
+    LOSS,
+    PUSH,
+    Plant,
+    advance,
+)
 
 # ---- the drive's numbers ----------------------------------------------------------------------------------
 (
@@ -115,7 +124,8 @@ def follow(
         # Behind a low-pass, the damper is what it remembers and a damper on the velocity that the step solves for.
         forgets = 1.0 if firm else c[FORGETS]
         damping, kept = forgets * signals[k, DAMPING], (1.0 - forgets) * signals[k, DAMPING] * m[BEHIND]
-        n[BACK_EMF] = damping + (loss if signals[k, SUPPLY] != 0.0 else 0.0)
+        n[BACK_EMF] = loss if signals[k, SUPPLY] != 0.0 else 0.0
+        n[LOSS] = n[BACK_EMF] + damping
         out[k, OUT_POSITION], out[k, OUT_VELOCITY] = y, state[1]
         before = min(k, rows - 2)
         dt = signals[before + 1, TIME] - signals[before, TIME]
@@ -135,9 +145,9 @@ def follow(
                 break
             rate = slope(c, signals, k, dt)
             gain = n[DRIVE_GAIN] * signals[k, SUPPLY]
-            push += damping * wanted + disturbance[k]
+            n[PUSH] = push + damping * wanted + disturbance[k]
             for i in range(substeps):
-                advance(plant, state, z, gain * (u + rate * h * i) + push, gain * rate, h)
+                advance(plant, state, z, gain * (u + rate * h * i), gain * rate, h)
                 y = seen(n, y, state[0])
         moved = state[0] - first if k < rows - 1 else state[1] * dt
         out[k, OUT_CORRECTION] = pulled + damping * (wanted - moved / dt)

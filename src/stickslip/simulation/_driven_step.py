@@ -20,8 +20,9 @@ ROUNDING = 1e-11  # of the velocity, relative above 1e-2
 # ---- the plant's numbers ----------------------------------------------------------------------------------
 (
     INERTIA, OFFSET, GRAVITY, GRAVITY_ANGLE, DRIVE_GAIN, BACK_EMF, LOAD_MOTOR, LOAD_EXTERNAL, BACKLASH,
-    SCALED_BY_LOAD, PERIOD, HARMONICS, FOURIER,
-) = range(13)  # fmt: skip
+    SCALED_BY_LOAD, PERIOD, HARMONICS, PUSH, LOSS, FOURIER,
+) = range(15)  # fmt: skip
+# PUSH is a torque from outside that no gearing carries (an observer's), LOSS all damping: the back-EMF's and that.
 # From FOURIER on: for each harmonic the cosine's and sine's torque, then the cosine's and sine's share of friction.
 
 
@@ -94,7 +95,7 @@ def unbalance(
 ) -> float:
     """M (v - v0) - h (torques at the end of the stage): zero at the velocity that solves it."""
     n = plant.numbers
-    applied = drive - n[BACK_EMF] * v - outer(n, q0 + h * v)
+    applied = drive - n[LOSS] * v - outer(n, q0 + h * v)
     return n[INERTIA] * (v - v0) - h * (applied - friction(plant, z0, v, h, factor))
 
 
@@ -190,7 +191,8 @@ def advance(plant: Plant, state: Any, z: Any, drive: float, rate: float, h: floa
     u = plant.surroundings
     u[0], u[1] = q, load_of(n, q, v, drive)
     factor = share(n, q) * (u[1] if n[SCALED_BY_LOAD] != 0.0 else 1.0)
-    middle = stage(plant, z, q, v, drive + rate * part, part, factor, v, 0)
+    total = drive + n[PUSH]
+    middle = stage(plant, z, q, v, total + rate * part, part, factor, v, 0)
     ratio = rest / part
     # The second stage starts from the begin, moved on for `rest` with the slopes of the first.
     for i in range(plant.states):
@@ -200,7 +202,7 @@ def advance(plant: Plant, state: Any, z: Any, drive: float, rate: float, h: floa
         plant.base[i] = plant.trial[i]
     q_base = q + rest * middle
     v_base = v + ratio * (middle - v)
-    end = stage(plant, plant.base, q_base, v_base, drive + rate * h, part, factor, middle + (middle - v), 1)
+    end = stage(plant, plant.base, q_base, v_base, total + rate * h, part, factor, middle + (middle - v), 1)
     for i in range(plant.states):
         z[i] = plant.trial[i]
     state[0], state[1] = q_base + part * end, end
