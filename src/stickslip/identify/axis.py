@@ -18,11 +18,10 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics
 from stickslip.identify.axis_output import OutputError, output_error
 from stickslip.identify.axis_prediction import axis_prediction
-from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, fitted_axis, require_start
+from stickslip.identify.axis_problem import Problem
+from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, fitted_axis
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification, silent
-from stickslip.identify.load_check import ADVICE, judged_load
-from stickslip.identify.prediction_error import PredictionError
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
@@ -139,19 +138,36 @@ def identify_axis(
         notes = [*notes, sentence_on(candidates, chosen.name)]
     own = options_of(chosen, options, tried)
     progress(f"{chosen.name}: all of the data")
+    lacking = ""
+    if intervals == "prediction":
+        try:
+            return predicted(trials, axis, chosen, inverse, own, validation, candidates, notes)
+        except InputError as error:
+            lacking = f"{NO_PREDICTION} {error}."
     result = output_error(
         trials, axis, chosen, inverse, profiles=profiles, **dict[str, Any](own, values=start)
     )
-    found = assembled(result, inverse, validation, candidates, notes)
-    if intervals == "covariance":
-        return noted(found, narrow_note(result))
-    progress(f"{chosen.name}: intervals from the prediction error")
-    del own["robust"]
-    try:
-        prediction = axis_prediction(trials, axis, chosen, first=inverse, **own)
-    except InputError as error:
-        return noted(found, narrow_note(result, ask=False), f"{NO_PREDICTION} {error}.")
-    return with_prediction(found, prediction)
+    found = assembled(
+        result, result.estimates, result.fit.correlation, inverse, validation, candidates, notes
+    )
+    return noted(found, narrow_note(result, ask=not lacking), *filter(None, [lacking]))
+
+
+def predicted(
+    trials: Sequence[Trial], axis: ServoAxis, law: Law, inverse: InverseDynamics | None, options: Mapping[str, Any],
+    validation: Sequence[Trial], candidates: Sequence[Candidate], notes: Sequence[str],
+) -> Identification:  # fmt: skip
+    """Values and intervals of the prediction error, misfits of the simulation with these values."""
+    given = {k: v for k, v in options.items() if k != "robust"}
+    result = axis_prediction(trials, axis, law, first=inverse, **given)
+    problem = Problem.of(
+        trials, axis, law, result.vector, inertia=result.mechanics.inertia,
+        harmonic_period=options["extras"].harmonic_period,
+    )  # fmt: skip
+    fitted = FittedAxis(problem.weighted(result.u).resolved(result.u), result.u)
+    estimates = tuple(replace(e, unit=axis.unit(e.unit)) for e in result.estimates)
+    found = assembled(fitted, estimates, result.correlation(), inverse, validation, candidates, notes)
+    return noted(replace(found, details={**found.details, "prediction": result}))
 
 
 def held_out(trials: Sequence[Trial], validation: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
@@ -277,12 +293,12 @@ def sentence_on(candidates: Sequence[Candidate], chosen: str) -> str:
 
 
 def assembled(
-    result: OutputError, inverse: InverseDynamics | None, validation: Sequence[Trial],
-    candidates: Sequence[Candidate], notes: Sequence[str],
+    result: FittedAxis, estimates: Sequence[Estimate], correlation: Array, inverse: InverseDynamics | None,
+    validation: Sequence[Trial], candidates: Sequence[Candidate], notes: Sequence[str],
 ) -> Identification:  # fmt: skip
     """Everything in one `Identification`, but for what is to be said of its intervals."""
-    misfit = dict(result.errors)
-    estimates = judged_load(result.estimates, inverse, result.mechanics)
+    trials = result.problem.trials
+    misfit = errors_of(trials, result.problem.signals, result.misfits(trials))
     if inverse is not None:
         misfit["inverse_dynamics_relative"] = inverse.relative_error
     if validation:
@@ -290,29 +306,16 @@ def assembled(
     return Identification(
         "axis",
         result.model,
-        estimates,
-        result.fit.correlation,
+        tuple(estimates),
+        correlation,
         misfit,
         tuple(notes),
-        measure_next=advice(result.estimates, result.problem.law),
+        measure_next=advice(estimates, result.problem.law),
         details={
             "mechanics": result.mechanics, "inverse": inverse, "output": result, "candidates": tuple(candidates),
             "axis": result.problem.axis, "units": result.problem.units,
         },
     )  # fmt: skip
-
-
-def with_prediction(found: Identification, result: PredictionError) -> Identification:
-    """The same with law, estimates and intervals of the prediction error; the misfits stay the output error's."""
-    estimates = tuple(replace(e, unit=found.details["axis"].unit(e.unit)) for e in result.estimates)
-    changed = replace(
-        found, model=result.model, estimates=estimates, correlation=result.correlation(),
-        measure_next=advice(estimates, result.model.law),
-        details={**found.details, "mechanics": result.mechanics, "prediction": result},
-    )  # fmt: skip
-    return noted(
-        changed, "Values and intervals are the prediction error's; the misfits are those of the output error."
-    )
 
 
 def noted(found: Identification, *more: str) -> Identification:

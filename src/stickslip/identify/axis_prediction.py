@@ -19,7 +19,7 @@ from stickslip.identify.corrections import BAND, DIFFERENCE, Criterion
 from stickslip.identify.observer import Motion, prepare
 from stickslip.identify.optimum import cost_of
 from stickslip.identify.prediction_error import PredictionError, prediction_error
-from stickslip.identify.secant import descend_by_secants
+from stickslip.identify.secant import Secants
 from stickslip.identify.vector import Vector
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
@@ -32,8 +32,12 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 SLOWER = (0.02, 0.1, 0.5)
 """Parts of the usual speed at which a Stribeck effect is looked for."""
 WORSE = 1.1
-DESCENTS, HOPS, EVALUATIONS = 6, 3, 60
-"""Starts from which a few steps are taken; hops from the best of them; simulations that each may take."""
+ROUNDS = ((8, 20), (3, 50))
+"""Starts, the best so far, that go on until they have taken so many simulations."""
+HOPS, EVALUATIONS = 3, 60
+"""Hops from the best of them; simulations that each may take."""
+SETTLED = 1e-3
+"""Relative decrease of the sum of squares below which a descent ends."""
 HOP = 0.4
 """Standard deviation of a hop in the law's coordinates; a tenth of it in the others."""
 RESTING, SLOWEST = 0.02, 1e-3
@@ -97,7 +101,7 @@ def searched(
     given: Mapping[str, Any], free: Sequence[str], frozen: Sequence[str], extras: Extras, band: float, seed: int,
 ) -> tuple[Criterion, Array]:  # fmt: skip
     """The criterion of the best minimum met under the firm observer, and its coordinates."""
-    tried: list[tuple[float, Criterion]] = []
+    tried: dict[float, Criterion] = {}
     for model in starting_points(trials, axis, law, start, given):
         vector, inertia = laid_out(trials, axis, law, start, model, given, free, frozen, extras)
         problem = Problem.of(
@@ -105,19 +109,22 @@ def searched(
         )
         records = [prepare(m, law, inertia, abs(start.coulomb), band) for m in motions]
         criterion = Criterion.first(records, law, vector, problem.mechanics)
-        cost = cost_of(criterion.residuals(vector.start))
-        if math.isfinite(cost):
-            tried.append((cost, criterion))
+        # Several ways lead to one start: it counts once.
+        tried[float(f"{cost_of(criterion.residuals(vector.start)):.6g}")] = criterion
+    tried.pop(math.inf, None)
     if not tried:
         raise InputError(
             f"{law.name}: no simulation from the starting values succeeds; give others by `values`"
         )
-    tried.sort(key=lambda entry: entry[0])
-    reached = [(*descended(c, c.vector.start), c) for _, c in tried[:DESCENTS]]
-    best = min(reached, key=lambda entry: entry[0])
+    running = [(c, search_from(c, c.vector.start)) for _, c in sorted(tried.items())]
+    for count, evaluations in ROUNDS:
+        for _, search in running[:count]:
+            search.run(evaluations, SETTLED)
+        running = sorted(running[:count], key=lambda entry: entry[1].cost)
+    criterion, search = running[0]
     # Outliers would choose among hops by plain squares: from here on the likelihood that weighs them decides.
-    adapted = best[2].adapted(best[1])
-    best = (*descended(adapted, best[1]), adapted)
+    adapted = criterion.adapted(search.u)
+    best = (*descended(adapted, search.u), adapted)
     rng = np.random.default_rng(seed)
     for _ in range(HOPS):
         there = hop(adapted.vector, best[1], {f.name for f in law.fields}, rng)
@@ -126,14 +133,17 @@ def searched(
     return adapted, best[1]
 
 
+def search_from(criterion: Criterion, start: Array) -> Secants:
+    """A descent that stands at the start."""
+    vector = criterion.vector
+    return Secants(criterion.residuals, start, vector.lower, vector.upper, difference=DIFFERENCE)
+
+
 def descended(criterion: Criterion, start: Array) -> tuple[float, Array]:
     """Sum of squares and coordinates that a few steps from a start reach."""
-    vector = criterion.vector
-    u, cost = descend_by_secants(
-        criterion.residuals, start, vector.lower, vector.upper, evaluations=EVALUATIONS, tolerance=1e-3,
-        difference=DIFFERENCE,
-    )  # fmt: skip
-    return cost, u
+    search = search_from(criterion, start)
+    search.run(EVALUATIONS, SETTLED)
+    return search.cost, search.u
 
 
 def hop(vector: Vector, u: Array, law: set[str], rng: np.random.Generator) -> Array:

@@ -1,8 +1,8 @@
 """What a record can say of a contact that is stiff: it rings with the mass, and samples must show that.
 
-A contact at rest is a spring. Where it rings faster than the samples show, unseen vibration lowers the torque at which
-it breaks away, as a dither does (``armstrong1994``), and shifts all that slow motion tells of a law; sliding friction
-at speed is not touched.
+A contact at rest is a spring. A bristle whose inner loops do not close (LuGre) slips a little with every oscillation;
+where it rings faster than the samples show, unseen vibration lowers the torque at which it breaks away, as a dither
+does (``armstrong1994``), and shifts all that slow motion tells of the law. Sliding at speed is not touched.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def unseen_refused(
         Between samples, s.
     """
     ringing = contact_frequency(law, parameters, inertia)
-    if ringing * period * SAMPLES <= 1.0:
+    if law.non_local_memory or ringing * period * SAMPLES <= 1.0:
         return tuple(estimates)
     why = (
         f"the contact would ring at {ringing:.0f} Hz, which {1.0 / period:.0f} samples/s do not show: unseen vibration "

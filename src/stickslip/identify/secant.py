@@ -15,7 +15,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.optimum import MOST_TRIES, STEP, Quadratic, Residuals, cost_of, downhill
 
-__all__ = ["descend_by_secants", "forward_differences"]
+__all__ = ["Secants", "descend_by_secants", "forward_differences"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -81,8 +81,7 @@ def descend_by_secants(
         If the residuals at the start are not finite.
     """
     search = Secants(residuals, start, lower, upper, held, difference)
-    while search.spent < evaluations and search.step(tolerance):
-        pass
+    search.run(evaluations, tolerance)
     return search.u, search.cost
 
 
@@ -90,7 +89,8 @@ class Secants:
     """The state of a descent: where it stands, and the Jacobian it believes in."""
 
     def __init__(
-        self, residuals: Residuals, start: Array, lower: Array, upper: Array, held: Sequence[int], difference: float,
+        self, residuals: Residuals, start: Array, lower: Array, upper: Array, held: Sequence[int] = (),
+        difference: float = STEP,
     ) -> None:  # fmt: skip
         self.residuals, self.difference = residuals, difference
         self.u = np.clip(np.asarray(start, dtype=np.float64), lower, upper)
@@ -98,7 +98,8 @@ class Secants:
         stays = np.isin(np.arange(self.u.size), list(held))
         self.lower, self.upper = np.where(stays, self.u, lower), np.where(stays, self.u, upper)
         self.r = residuals(self.u)
-        self.cost, self.spent = cost_of(self.r), 1
+        self.cost = cost_of(self.r)
+        self.spent: int = 1
         if self.cost == math.inf:
             raise InputError(
                 "the fit cannot start: the model gives no finite values there; give another start"
@@ -107,6 +108,11 @@ class Secants:
         self.scale: Array = np.zeros(self.u.size)
         self.jacobian: Array = np.zeros((self.r.size, self.u.size))
         self.fresh = False
+
+    def run(self, evaluations: int, tolerance: float) -> None:
+        """Go on until so many residuals were called in all, or nothing is gained any more."""
+        while self.spent < evaluations and self.step(tolerance):
+            pass
 
     def step(self, tolerance: float) -> bool:
         """Go one step; False where one on differences taken at its begin gains too little to go on."""

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.axis_inverse import InverseDynamics
-from stickslip.identify.axis_output import OutputError
 from stickslip.identify.axis_problem import PLACE, measured
+from stickslip.identify.axis_search import FittedAxis
 from stickslip.identify.draws import curve_band, sliding_torque
 from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.record import Record
@@ -73,7 +73,7 @@ def pictures_of(found: Identification) -> tuple[Picture, ...]:
     """The method's own pictures, and what the report adds for a whole axis and for a law with intervals."""
     output, inverse = found.details.get("output"), found.details.get("inverse")
     out = list(found.pictures)
-    if isinstance(output, OutputError):
+    if isinstance(output, FittedAxis):
         out += [*fits(output), *output_residuals(output)]
     elif isinstance(inverse, InverseDynamics):
         out += inverse_pictures(inverse, str(getattr(found.details.get("axis"), "motion", "rotary")))
@@ -87,18 +87,18 @@ def fastest(output: Any, inverse: Any) -> float:
     """The greatest speed that the records reached, rad/s."""
     if isinstance(inverse, InverseDynamics):
         return float(np.max(np.abs(inverse.velocity)))
-    runs = output.problem.simulated(output.fit.u)
+    runs = output.problem.simulated(output.u)
     return max(float(np.nanmax(np.abs(run[:, 1]))) for run in runs)
 
 
 # ---- what was measured and what the fitted axis does ------------------------------------------------------------
 
 
-def fits(output: OutputError) -> list[Picture]:
+def fits(output: FittedAxis) -> list[Picture]:
     """Measured and simulated signals of the first records over time."""
     out: list[Picture] = []
     problem = output.problem
-    runs = problem.simulated(output.fit.u) or []
+    runs = problem.simulated(output.u) or []
     for place, (run, trial) in enumerate(zip(runs[:SHOWN], problem.trials[:SHOWN], strict=True)):
         for signal in problem.signals:
             seen, simulated = measured(trial, signal), run[:, PLACE[signal]]
@@ -112,10 +112,10 @@ def fits(output: OutputError) -> list[Picture]:
     return out
 
 
-def output_residuals(output: OutputError) -> list[Picture]:
+def output_residuals(output: FittedAxis) -> list[Picture]:
     """Residuals of every signal over position, velocity and time."""
     problem = output.problem
-    runs = problem.simulated(output.fit.u) or []
+    runs = problem.simulated(output.u) or []
     position = np.concatenate([t.position[t.rows] for t in problem.trials])
     velocity = np.concatenate([run[:, 1][t.rows] for run, t in zip(runs, problem.trials, strict=True)])
     time = np.concatenate([(t.time - t.time[0])[t.rows] for t in problem.trials])
