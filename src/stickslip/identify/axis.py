@@ -19,9 +19,10 @@ from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics
 from stickslip.identify.axis_output import OutputError, output_error
 from stickslip.identify.axis_prediction import axis_prediction
 from stickslip.identify.axis_problem import Problem
-from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, fitted_axis
+from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, fitted_axis, require_start
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification, silent
+from stickslip.identify.load_check import ADVICE, judged_load
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
@@ -128,7 +129,7 @@ def identify_axis(
     }  # fmt: skip
     inverse, notes = first_look(trials, axis, extras, per_direction)
     if inverse is None:
-        require_start(trials, axis, found, dict(values or {}), extras)
+        require_start(trials, axis, tried, dict(values or {}), extras)
     candidates: list[Candidate] = []
     chosen, start = tried[0], values
     if len(tried) > 1:
@@ -297,7 +298,7 @@ def assembled(
     validation: Sequence[Trial], candidates: Sequence[Candidate], notes: Sequence[str],
 ) -> Identification:  # fmt: skip
     """Everything in one `Identification`, but for what is to be said of its intervals."""
-    trials = result.problem.trials
+    trials, judged = result.problem.trials, judged_load(estimates, inverse, result.mechanics)
     misfit = errors_of(trials, result.problem.signals, result.misfits(trials))
     if inverse is not None:
         misfit["inverse_dynamics_relative"] = inverse.relative_error
@@ -306,11 +307,11 @@ def assembled(
     return Identification(
         "axis",
         result.model,
-        tuple(estimates),
+        judged,
         correlation,
         misfit,
         tuple(notes),
-        measure_next=advice(estimates, result.problem.law),
+        measure_next=advice(judged, result.problem.law),
         details={
             "mechanics": result.mechanics, "inverse": inverse, "output": result, "candidates": tuple(candidates),
             "axis": result.problem.axis, "units": result.problem.units,
