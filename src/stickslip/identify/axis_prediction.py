@@ -32,8 +32,11 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 SLOWER = (0.02, 0.1, 0.5)
 """Parts of the usual speed at which a Stribeck effect is looked for."""
 WORSE = 1.1
-ROUNDS = ((8, 20), (3, 50))
-"""Starts, the best so far, that go on until they have taken so many simulations."""
+BEST, SPREAD = 5, 5
+"""Starts that are followed: those of the lowest sums of squares, and some of all others, since a stiffness that is far
+off hides how right the rest of a start is."""
+ROUNDS = ((BEST + SPREAD, 20), (3, 50))
+"""Descents, the best so far, that go on until they have taken so many simulations."""
 HOPS, EVALUATIONS = 3, 60
 """Hops from the best of them; simulations that each may take."""
 SETTLED = 1e-3
@@ -116,7 +119,10 @@ def searched(
         raise InputError(
             f"{law.name}: no simulation from the starting values succeeds; give others by `values`"
         )
-    running = [(c, search_from(c, c.vector.start)) for _, c in sorted(tried.items())]
+    ranked = [tried[cost] for cost in sorted(tried)]
+    others = ranked[BEST:]
+    ranked = ranked[:BEST] + [others[i * len(others) // SPREAD] for i in range(min(SPREAD, len(others)))]
+    running = [(c, search_from(c, c.vector.start)) for c in ranked]
     for count, evaluations in ROUNDS:
         for _, search in running[:count]:
             search.run(evaluations, SETTLED)

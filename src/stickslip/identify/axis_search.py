@@ -18,6 +18,7 @@ from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics
 from stickslip.identify.axis_problem import Problem, measured, mechanics_parameters
 from stickslip.identify.axis_start import frozen_by_default, starts
 from stickslip.identify.axis_trial import Trial
+from stickslip.identify.load_check import tells_external
 from stickslip.identify.secant import descend_by_secants
 from stickslip.identify.vector import Parameter, Vector
 from stickslip.machines.servo import ServoAxis
@@ -282,8 +283,9 @@ def laid_out(
         raise InputError(f"inertia = {values['inertia']:g} {axis.unit('kg·m²')} must be greater than 0")
     held = {"drive_gain", "back_emf", "backlash", "controller_gain", *frozen_by_default(law)}
     if axis.gravity != "pendulum":
-        # Under a constant outer torque its part of the load is one with the level of friction.
-        held |= {"gravity", "gravity_angle", "load_external"}
+        held |= {"gravity", "gravity_angle"}
+        if first is None or not tells_external(first):
+            held.add("load_external")
     if not extras.load:
         held |= {"load_motor", "load_external"}
     held = (held - set(free)) | set(frozen)

@@ -18,7 +18,7 @@ from stickslip.identify.axis_inverse import InverseDynamics
 from stickslip.identify.estimate import Estimate
 from stickslip.simulation.driven import Mechanics
 
-__all__ = ["ADVICE", "judged_load", "own_part"]
+__all__ = ["ADVICE", "judged_load", "own_part", "tells_external"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -27,6 +27,8 @@ LEAST = 0.1
 0.8 came out between 0.1 and 0.7 where that part was below 0.06, and within 6 % of 0.8 where it was above 0.14."""
 MOVING = 0.05
 """Of the usual (RMS) speed, from which on an axis counts as moving: reversals would pass for an effect of the load."""
+SURE = 3.0
+"""Standard deviations by which a torque differs from 0 where it is taken as there."""
 OUTER = ("offset", "gravity_", "cos[", "sin[")
 """Names of the torques from outside among the columns of the inverse dynamics."""
 ADVICE = (
@@ -58,19 +60,29 @@ def own_part(inverse: InverseDynamics, mechanics: Mechanics) -> float:
     return float(np.linalg.norm(left) / np.linalg.norm(effect))
 
 
+def tells_external(inverse: InverseDynamics) -> bool:
+    """Whether records show a constant outer torque's own share of the load: the torque is there, and the drive brakes.
+
+    Where the drive never brakes, that share is one with the level of friction.
+    """
+    if not inverse.has("offset"):
+        return False
+    place = inverse.names.index("offset")
+    there = abs(inverse.values[place]) > SURE * inverse.robust_std[place]
+    return bool(there) and own_part(inverse, Mechanics(1.0, load_motor=1.0, load_external=1.0)) >= LEAST
+
+
 def judged_load(
     estimates: Sequence[Estimate], inverse: InverseDynamics | None, mechanics: Mechanics
 ) -> tuple[Estimate, ...]:
     """The estimates; where the records do not tell load_motor, neither it nor what goes with it is identified.
 
-    All torques and inertias go with it: they scale alike. Where they do tell it, a constant outer torque T_0 whose own
-    share of the load is taken as none comes out as T_0 (1 + load_external / load_motor).
+    All torques and inertias go with it: they scale alike.
     """
     names = {e.name for e in estimates}
     if "load_motor" not in names:
         return tuple(estimates)
     own = own_part(inverse, mechanics) if inverse is not None else 0.0
-    held = "load_external" not in names and mechanics.load_external == 0.0
     why: dict[str, str] = {}
     if own < LEAST:
         tied = [e.name for e in estimates if e.identified and e.unit.startswith(("N", "kg"))]
@@ -78,10 +90,5 @@ def judged_load(
         why["load_motor"] = (
             f"all but {100.0 * own:.2g} % of its effect looks like more friction and inertia; identified means at "
             f"least {100.0 * LEAST:g} %"
-        )
-    elif held and any(e.name == "offset" and e.lower * e.upper > 0.0 for e in estimates):
-        why["offset"] = (
-            "its own share of the load is in it: the outer torque is this over 1 + load_external / load_motor; give "
-            "load_external where you know it"
         )
     return tuple(replace(e, identified=False, verdict=why[e.name]) if e.name in why else e for e in estimates)
