@@ -28,6 +28,7 @@ import numpy as np
 
 import closed_loop
 import jax_step
+from baseline import compiled_baseline
 from stickslip.control.controller import Controller
 from stickslip.simulation import batch, lanes
 from stickslip.simulation._case import Case
@@ -257,7 +258,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         c: dict[str, Any] = {}
-        baseline = closed_loop.compiled_baseline(folder)
+        baseline = compiled_baseline(folder)
         if baseline is not None:
             c["baseline"] = baseline
         if options.prototypes:

@@ -9,24 +9,21 @@ raised; the records are identified by the prediction error and compared.
 from __future__ import annotations
 
 import argparse
+import multiprocessing
 import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-sys.path.insert(0, str(Path(__file__).parent))
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
-from coverage_records import make  # noqa: E402
-from stickslip.errors import StickslipError  # noqa: E402
-from stickslip.identify.axis import identify_axis  # noqa: E402
-from stickslip.identify.axis_trial import trial_of  # noqa: E402
-from stickslip.identify.drift import compare_models  # noqa: E402
-from stickslip.identify.identified_file import read_identified  # noqa: E402
-from stickslip.identify.model_file import write_model  # noqa: E402
-from stickslip.machines.servo import ServoAxis  # noqa: E402
+from coverage_records import make
+from stickslip.errors import StickslipError
+from stickslip.identify.axis import identify_axis
+from stickslip.identify.axis_trial import trial_of
+from stickslip.identify.drift import compare_models
+from stickslip.identify.identified_file import read_identified
+from stickslip.identify.model_file import write_model
+from stickslip.machines.servo import ServoAxis
 
 RAISED = 1.1
 
@@ -60,7 +57,10 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args()
     alarms, hits, count = 0, 0, 0
-    with ProcessPoolExecutor(options.jobs) as pool:
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    # Processes that begin anew read how many threads algebra may use.
+    with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
         for found in pool.map(study, range(options.first, options.first + options.records)):
             if found is None:
                 continue

@@ -18,11 +18,8 @@ of runs taken in turns, and what has risen is measured twice more, so that a bus
 from __future__ import annotations
 
 import argparse
-import ctypes
 import json
 import math
-import shutil
-import subprocess
 import sys
 import tempfile
 import time
@@ -33,6 +30,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from baseline import c_run, compiled_baseline
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
@@ -124,37 +122,6 @@ def numbers(name: str) -> Positions:
     head = [INERTIA, GAINS.kp, GAINS.kd, AMPLITUDE, 2.0 * math.pi * FREQUENCY, CODES[name]]
     lugre = LUGRE.parameters
     return np.array([*head, *contact(PLANT), *contact(GMS), lugre.sigma0, lugre.sigma1])
-
-
-def compiled_baseline(folder: str) -> Any | None:
-    """Compile baseline.c into `folder`; None where there is no gcc."""
-    if shutil.which("gcc") is None:
-        print("gcc is missing: the C baseline is left out")
-        return None
-    library = Path(folder) / "baseline.so"
-    source = Path(__file__).with_name("baseline.c")
-    flags = ["-O3", "-march=native", "-D_GNU_SOURCE", "-shared", "-fPIC"]
-    subprocess.run(["gcc", *flags, str(source), "-o", str(library), "-lm"], check=True)
-    function = ctypes.CDLL(str(library)).baseline
-    real, array = ctypes.c_double, ctypes.POINTER(ctypes.c_double)
-    function.argtypes = [array, real, real, real, real, ctypes.c_int, array]
-    return function
-
-
-def c_run(
-    function: Any, name: str, tolerance: float, longest: float, grid: Positions
-) -> Callable[[], Positions]:
-    """A run of the C baseline."""
-    p, out = numbers(name), np.zeros(grid.size)
-    spacing = float(grid[1] - grid[0])
-    real = ctypes.POINTER(ctypes.c_double)
-    a, b = p.ctypes.data_as(real), out.ctypes.data_as(real)
-
-    def run() -> Positions:
-        function(a, float(grid[-1]), tolerance, longest, spacing, grid.size, b)
-        return out
-
-    return run
 
 
 # ---- SciPy --------------------------------------------------------------------------------------------------
@@ -283,7 +250,7 @@ def fastest_c(
     """The C baseline at its fastest setting with an error below `wanted`, and the error."""
     best: tuple[float, Callable[[], Positions], float] | None = None
     for tolerance, longest in C_SETTINGS:
-        run = c_run(function, name, tolerance, longest, grid)
+        run = c_run(function, numbers(name), tolerance, longest, grid)
         error = float(np.max(np.abs(run() - truth)))
         if error <= wanted:
             spent = interleaved({"C": run}, {}, 5)["C"]

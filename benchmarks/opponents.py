@@ -25,6 +25,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import closed_loop as loop
+from baseline import compiled_baseline
 
 Positions = np.ndarray[Any, np.dtype[np.float64]]
 Solver = Callable[
@@ -208,7 +209,7 @@ def main() -> None:
     options = parser.parse_args()
     grid = np.arange(round((0.5 if options.short else 5.0) * 1000) + 1) * 1e-3
     with tempfile.TemporaryDirectory() as folder:
-        baseline = loop.compiled_baseline(folder)
+        baseline = compiled_baseline(folder)
         for name in loop.COMPENSATORS:
             compare(name, grid, options.error, baseline)
 

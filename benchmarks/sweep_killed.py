@@ -2,9 +2,13 @@
 
 In every round a sweep is begun in a new folder and something is killed (SIGKILL) at a random moment: a worker process,
 the client of a Dask scheduler, or the whole command with all its processes. Then the command is run to its end, and
-every row compared with those of a sweep that nothing disturbed. Moments and kinds come from `--seed`.
+every row compared with those of a sweep that nothing disturbed.
 
-    python benchmarks/sweep_killed.py [--rounds 20]
+The moment is drawn inside the run: after a number of blocks that is drawn, and a part of the time that an undisturbed
+run took for one. A round counts as a hit where what was killed lived and blocks were missing; rounds go on until
+`--hits` have hit. Kinds take turns, numbers come from `--seed`.
+
+    python benchmarks/sweep_killed.py [--hits 20]
 
 Needs Dask (`pip install 'stickslip[dask]'`) for the client; without it the other two are killed.
 """
@@ -20,6 +24,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -69,31 +74,60 @@ def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
     return [int(pid) for pid, *args in lines if args and "loky" in args[0] and "tracker" not in args[0]]
 
 
-def disturbed(process: subprocess.Popen[bytes], kind: str, rng: np.random.Generator, longest: float) -> str:
-    """Kill at a random moment; says what was killed, and when."""
-    after = rng.uniform(0.3, longest)
-    start = time.monotonic()
-    while time.monotonic() - start < after and process.poll() is None:
-        time.sleep(0.01)
-    killed = "nothing (it had ended)"
-    if process.poll() is None:
-        if kind == "worker":
-            while process.poll() is None and not (found := workers_of(process)):
-                time.sleep(0.02)
-            if process.poll() is None:
-                victim = int(rng.choice(found))
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(victim, signal.SIGKILL)
-                    killed = f"worker {victim}"
-        elif kind == "client":
+def blocks_in(folder: Path) -> int:
+    """Blocks that are kept there."""
+    return sum(1 for _ in folder.rglob("part-*.parquet"))
+
+
+def moments(line: list[str], out: Path) -> list[float]:
+    """Run the command undisturbed; seconds from its start to each block that it kept."""
+    process, start, found = begun(line), time.monotonic(), list[float]()
+    while process.poll() is None:
+        found += [time.monotonic() - start] * (blocks_in(out) - len(found))
+        time.sleep(0.005)
+    return found + [time.monotonic() - start] * (blocks_in(out) - len(found))
+
+
+def kill(process: subprocess.Popen[bytes], kind: str, rng: np.random.Generator) -> str:
+    """Kill it, or one of its workers; says what, "" where there was nothing to kill."""
+    if process.poll() is not None:
+        return ""
+    if kind == "worker":
+        found = workers_of(process)
+        while not found and process.poll() is None:
+            time.sleep(0.005)
+            found = workers_of(process)
+        if not found:
+            return ""
+        victim = int(rng.choice(found))
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(victim, signal.SIGKILL)
+            return f"worker {victim}"
+        return ""
+    with contextlib.suppress(ProcessLookupError):
+        if kind == "client":
             process.kill()
-            killed = "the client"
         else:
             os.killpg(process.pid, signal.SIGKILL)
-            killed = "the command"
-    moment = time.monotonic() - start
-    process.wait()
-    return f"{killed} after {moment:.2f} s"
+    return f"the {kind}"
+
+
+def disturbed(
+    line: list[str], out: Path, kind: str, undisturbed: list[float], rng: np.random.Generator
+) -> tuple[str, bool]:
+    """Run the command and kill at a random moment inside; says what was killed when, and whether it hit."""
+    process, start = begun(line), time.monotonic()
+    after = int(rng.integers(0, len(undisturbed)))
+    while process.poll() is None and blocks_in(out) < after:
+        time.sleep(0.005)
+    # After none the whole start counts: it may be killed before there is a worker.
+    pause = undisturbed[after] - (undisturbed[after - 1] if after else 0.0)
+    time.sleep(rng.uniform(0.0, 1.0) * pause)
+    kept, what, moment = blocks_in(out), kill(process, kind, rng), time.monotonic() - start
+    code = process.wait()
+    # Only a command that outlives its worker ends well.
+    hit = bool(what) and kept < len(undisturbed) and (kind == "worker" or code == -signal.SIGKILL)
+    return f"{what or 'nothing'} after {moment:.2f} s and {kept} of {len(undisturbed)} blocks", hit
 
 
 def rows(folder: Path) -> Any:
@@ -107,12 +141,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--rounds", type=int, default=20)
-    parser.add_argument("--cases", type=int, default=520)
+    parser.add_argument("--hits", type=int, default=20)
+    parser.add_argument("--cases", type=int, default=1040)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
-    kinds, good, hit = list(KINDS), 0, 0
+    kinds, rounds, good = list(KINDS), 0, 0
+    hits: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as place, contextlib.ExitStack() as stack:
         scheduler = ""
         try:
@@ -127,25 +162,26 @@ def main() -> None:
             kinds.remove("client")
         sweep = Path(place) / "killed.toml"
         sweep.write_text(SWEEP.format(cases=options.cases))
-        start = time.monotonic()
-        begun(command(sweep, Path(place) / "undisturbed", "worker", scheduler)).wait()
-        longest = time.monotonic() - start
-        sure = rows(Path(place) / "undisturbed")
-        for i in range(options.rounds):
-            kind = kinds[i % len(kinds)]
-            out = Path(place) / f"round-{i}"
+        undisturbed: dict[str, list[float]] = {}
+        for kind in kinds:
+            out = Path(place) / f"undisturbed-{kind}"
+            undisturbed[kind] = moments(command(sweep, out, kind, scheduler), out)
+            print(f"undisturbed, {kind}: first block after {undisturbed[kind][0]:.1f} s, last of"
+                  f" {len(undisturbed[kind])} after {undisturbed[kind][-1]:.1f} s", flush=True)  # fmt: skip
+        sure = rows(Path(place) / "undisturbed-worker")
+        while hits.total() < options.hits:
+            kind = kinds[rounds % len(kinds)]
+            out = Path(place) / f"round-{rounds}"
             line = command(sweep, out, kind, scheduler)
-            what = disturbed(begun(line), kind, rng, longest)
-            kept = len(list(out.rglob("*.parquet")))
+            what, hit = disturbed(line, out, kind, undisturbed[kind], rng)
             code = begun(line).wait()
             same = code == 0 and rows(out).equals(sure)
-            good += same
-            hit += "nothing" not in what
+            rounds, good = rounds + 1, good + same
+            hits[kind] += hit
             verdict = "equal" if same else f"DIFFERS (exit {code})"
-            print(f"{i + 1:3d} {kind:8} {what}; {kept} blocks were kept: {verdict}", flush=True)
-    print(f"{'PASS' if good == options.rounds else 'FAIL'}  {good} of {options.rounds} equal row for row,"
-          f" {hit} of them hit while running")  # fmt: skip
-    if good != options.rounds:
+            print(f"{rounds:3d} {kind:8} {'hit ' if hit else 'miss'} {what}, then {verdict}", flush=True)
+    print(f"{'PASS' if good == rounds else 'FAIL'}  {good} of {rounds} equal row for row; hits: {dict(hits)}")
+    if good != rounds:
         sys.exit(1)
 
 
