@@ -14,11 +14,13 @@ from stickslip.analyse.tracking import tracking_metrics
 from stickslip.commission import commission as commissioning
 from stickslip.commission.candidates import Following
 from stickslip.commission.commission import commission, tried
+from stickslip.commission.curve import moving
 from stickslip.commission.recommended import write_recommended
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError, LimitCrossed
+from stickslip.identify.breakaway import identify_breakaway
 from stickslip.identify.drift import compare_models
 from stickslip.identify.estimate import Identification
 from stickslip.identify.identified_file import read_identified
@@ -34,6 +36,7 @@ from stickslip.report.identified import Source, write_identification
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.procedures._moves import holder, move
 from stickslip.rigs.procedures.base import perform
+from stickslip.rigs.procedures.sliding import Sliding
 from stickslip.rigs.procedures.track import RECOMMENDED, Track
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import VirtualRig
@@ -224,6 +227,40 @@ def write_model_text(folder):
     """A model.toml of Coulomb friction."""
     law = Model("coulomb", fc=0.3)
     return write_model(folder / "law.toml", Identification("test", law, (), np.eye(0), {})).read_text()
+
+
+WEAK = Machine(
+    "weak",
+    6e-5,
+    Contact(Model("lugre", sigma0=60.0, sigma1=0.02, fs=0.022, fc=0.016, vs=0.08, delta_s=1.4, sigma2=4e-4)),
+    amplifier=Amplifier(0.05, 4.0, 1500.0, current_noise=0.002, monitor_noise=0.002),
+    encoder=Encoder(65536.0, 1e-6, 60.0),
+    limits={"torque": 0.15, "following_error": 1.0},
+    seed=3,
+)
+"""A tenth of the thesis's friction, seen by 16 bits, and a Stribeck effect of a third."""
+
+
+def test_creep_of_a_few_counts_is_no_break_away():
+    course = commissioning._Course(VirtualRig(WEAK), None, lambda _: None, False)
+    fs, std, resolution = commissioning._breakaway(course, WEAK.inertia, 0.016, 90.0)
+    assert resolution == pytest.approx(2.0 * math.pi / 65536.0)
+    assert fs == pytest.approx(0.022, rel=0.06)
+    assert std < 0.02 * fs
+    # A single count within the window of a velocity would be motion at the threshold for fine encoders.
+    early = identify_breakaway(course.stages[0].performed.record)
+    assert early["fs_positive"].value < 0.93 * fs
+
+
+def test_no_sliding_torque_is_read_from_sticking_and_slipping():
+    done = perform(Sliding(velocities=(1.0, 0.7, 0.5, 0.3, 0.06), inertia=WEAK.inertia), VirtualRig(WEAK))
+    slid = moving(done.record, 0.022)
+    assert slid.points.velocity == pytest.approx([0.3, 0.5, 0.7, 1.0])
+    assert "left out: 0.06" in slid.notes[-1]
+    truth = [WEAK.clutch.law.steady(v, WEAK.clutch.parameters) for v in slid.points.velocity.tolist()]
+    assert slid.points.torque == pytest.approx(truth, rel=0.02)
+    # Where break-away is the torque of sliding, the mean over sticking and slipping is it too.
+    assert len(moving(done.record, truth[0]).points) == 5
 
 
 def test_a_stick_slip_stage_that_is_left_out_is_said(monkeypatch):
