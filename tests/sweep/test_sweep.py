@@ -17,7 +17,9 @@ import pytest
 
 from stickslip.cli import main
 from stickslip.errors import ConfigError, InputError, UnknownName
-from stickslip.identify.estimate import Estimate
+from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.model_file import write_model
+from stickslip.model import Model
 from stickslip.simulation import adaptive, lanes
 from stickslip.sweep import block, dataset, execute, numbers, summary
 from stickslip.sweep.plan import load
@@ -88,6 +90,28 @@ def test_a_model_is_drawn_with_its_intervals_and_correlation():
     logs = np.log(drawn.block(0, 4096) / [0.3, 4e-4])
     assert logs.std(axis=0) == pytest.approx([0.1, 0.01], rel=0.02)
     assert np.corrcoef(logs.T)[0, 1] == pytest.approx(0.8, abs=0.01)
+
+
+def test_a_sweep_says_which_estimates_of_its_model_it_leaves_out(tmp_path, capsys):
+    estimate = Estimate("fs", "N·m", "F_S", 0.335, 0.01, 0.32, 0.35, True)
+    found = Identification(
+        "commission",
+        Model("gms", k=[1e4, 5e3], alpha=[0.5, 0.5], fs=0.335, fc=0.285, vs=0.01, delta_s=2.0, sigma2=0.018, c=24.0),
+        (estimate, replace(estimate, name="breakaway.fs_positive")), np.eye(2), {},
+    )  # fmt: skip
+    write_model(tmp_path / "model.toml", found)
+    (tmp_path / "study.toml").write_text(
+        '[axis]\ninertia = 4e-4\n[friction.it]\nlaw = {model = "model.toml"}\n[references.s]\nkind = "sine"\n'
+        "amplitude = 0.01\nfrequency = 4.0\nduration = 0.02\nplacement = {bandwidth_hz = 20.0, damping = 1.0}\n"
+        '[controllers.PD]\nlinear = "PD"\n'
+    )
+    (tmp_path / "s.toml").write_text('study = "study.toml"\nmodel = "model.toml"\ncases = 2\ncheck = "no"\n')
+    assert load(tmp_path / "s.toml").drawn.names == ("friction.fs",)
+    assert main(["sweep", str(tmp_path / "s.toml"), "--out", str(tmp_path / "out"), "--no-report"]) == 0
+    assert (
+        "not varied, as the model's law has no such parameters: breakaway.fs_positive"
+        in capsys.readouterr().err
+    )
 
 
 # ---- numbers -----------------------------------------------------------------------------------------------

@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
             )
         sweep = replace(sweep, drawn=replace(sweep.drawn, cases=args.cases))
     if sweep.left_out:
-        _output.say(f"not varied, as the model's law has no such parameters: {', '.join(sweep.left_out)}")
+        _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(sweep.left_out)}")
     out: Path = args.out or Path(f"sweep-{sweep.name}")
     try:
         with _output.progress_bar(sweep.name) as progress:

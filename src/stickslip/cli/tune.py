@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
             f'{args.tune} has no table [tune]; give at least one [tune."controller.bandwidth_hz"]'
         )
     if sweep.left_out:
-        _output.say(f"not varied, as the model's law has no such parameters: {', '.join(sweep.left_out)}")
+        _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(sweep.left_out)}")
     out: Path = prepared_folder(args.out or Path(f"tune-{sweep.name}"))
     found: list[dict[str, Any]] = []
     for planned in sweep.runs:
