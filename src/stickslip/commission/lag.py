@@ -21,12 +21,12 @@ from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.simulation.along import Along
 
-__all__ = ["TRIED", "lag_of"]
+__all__ = ["LAGS", "lag_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-TRIED = np.geomspace(1.0, 1e4, 81)
-"""Values of C that are looked at, N·m/s."""
+LAGS = np.geomspace(0.5, 1e-4, 81)
+"""Lags of friction that are looked at, s: C is the torque over the lag."""
 SKIPPED = 0.2
 """Of the record, at its start: the transient."""
 ALIVE = 0.25
@@ -84,8 +84,10 @@ def lag_of(
         )
     beside = np.column_stack([np.ones(rows.size), loop.velocity[rows], acceleration[rows]])
     plain, _ = np.linalg.qr(beside / np.linalg.norm(beside, axis=0))
+    level = float(np.mean(loop.torque[rows]))
+    tried = level / LAGS
     left: list[Array] = []
-    for c in TRIED.tolist():
+    for c in tried.tolist():
         own = Model(model.law, {}, **{**as_lists(model), "c": c})
         rest = (loop.torque - Along(model.law, loop.time, loop.position, loop.velocity).of(own))[rows]
         left.append(rest - plain @ (plain.T @ rest))
@@ -93,28 +95,30 @@ def lag_of(
     best = int(np.argmin(squares))
     independent = rows.size / max(1, correlation_lags(left[best]))
     allowed = squares <= squares[best] * (1.0 + CHI / max(independent - 4.0, 1.0))
-    # An element lags by s / C; the sample to either side.
-    level = float(np.mean(loop.torque[rows]))
-    longest, shortest = (level / float(c) for c in (TRIED[allowed][0], TRIED[allowed][-1]))
+    # The sample to either side.
+    longest, shortest = float(LAGS[allowed][0]), float(LAGS[allowed][-1])
     low, high = level / (longest + sample_time), level / max(shortest - sample_time, 1e-9)
-    low, high = 0.0 if low < TRIED[0] else low, math.inf if high > TRIED[-1] else high
+    low, high = 0.0 if allowed[0] else low, math.inf if high > tried[-1] else high
     why = "" if high <= RATIO * low else f"the record allows {told(low, high)}"
-    found = Estimate("c", "N·m/s", "C", float(TRIED[best]), math.nan, low, high, not why, why)
+    found = Estimate("c", "N·m/s", "C", float(tried[best]), math.nan, low, high, not why, why)
     rms = np.sqrt(squares / rows.size)
-    note = f"The lag of friction behind the velocity allows C of {told(low, high)}; least misfit at {found.value:.3g}."
+    allows = told(low, high)
+    note = (
+        f"The lag of friction behind the velocity allows for C: {allows}; least misfit at {found.value:.3g}."
+    )
     return Identification(
         "attraction", None, (found,), np.eye(1), {"rms_Nm": float(rms[best])}, (note,), (),
-        (_picture(rms, allowed),),
+        (_picture(tried, rms, allowed, f"The record allows {allows}"),),
     )  # fmt: skip
 
 
 def told(low: float, high: float) -> str:
     """A range of C for people."""
     if low == 0.0 and math.isinf(high):
-        return f"any value between {TRIED[0]:g} and {TRIED[-1]:g} N·m/s"
+        return "any value"
     if math.isinf(high):
         return f"{low:.3g} N·m/s and more"
-    return f"{max(low, float(TRIED[0])):.3g} to {high:.3g} N·m/s"
+    return f"{low:.3g} to {high:.3g} N·m/s" if low > 0.0 else f"{high:.3g} N·m/s and less"
 
 
 def as_lists(model: Model) -> dict[str, Any]:
@@ -123,13 +127,13 @@ def as_lists(model: Model) -> dict[str, Any]:
     return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}  # type: ignore[reportUnknownArgumentType]
 
 
-def _picture(rms: Array, allowed: Any) -> Picture:
+def _picture(tried: Array, rms: Array, allowed: Any, message: str) -> Picture:
     """Misfit over C."""
     traces = (
-        Trace("misfit", TRIED, 1e3 * rms),
-        Trace("within 95 %", TRIED[allowed], 1e3 * rms[allowed], "points"),
+        Trace("misfit", tried, 1e3 * rms),
+        Trace("within 95 %", tried[allowed], 1e3 * rms[allowed], "points"),
     )
     return Picture(
-        "attraction", "Lag of friction in sliding", "What C the record allows", "C (N·m/s)",
+        "attraction", "Lag of friction in sliding", message, "C (N·m/s)",
         "misfit (mN·m RMS)", traces, "log",
     )  # fmt: skip
