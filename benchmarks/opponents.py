@@ -5,8 +5,9 @@ with `--short`). Every opponent restarts at each located event, with the same co
 hand side, and takes steps of 1 ms at most, lest it step over an event. Each runs at its loosest tolerance whose
 largest error in position stays below `--error` (1e-6 rad) against a tight run of ours, or is marked as less
 accurate. SciPy's `solve_ivp` with BDF, Radau and LSODA; SciPy's BDF with the right-hand side in plain Python;
-CVODE (BDF) through scikit-sundae where it is installed; and the method of ours in C, compiled by gcc. MuJoCo's
-LuGre actuator steps at fixed times without events and is compared in `stiction_drift.py`.
+CVODE (BDF) through scikit-sundae where it is installed; Octave's ode15s where it is installed, whose events lie on
+straight lines between its steps, so that it takes steps of 0.1 ms; and the method of ours in C, compiled by gcc.
+MuJoCo's LuGre actuator steps at fixed times without events and is compared in `stiction_drift.py`.
 
     python benchmarks/opponents.py [--short]
 """
@@ -16,9 +17,12 @@ from __future__ import annotations
 import argparse
 import importlib
 import math
+import shutil
+import subprocess
 import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,7 +36,8 @@ Solver = Callable[
     ["Loop", float, Positions, Positions, float], tuple[Positions, Positions, float, Positions, bool]
 ]
 TOLERANCES = [1e-6, 1e-7, 1e-8, 1e-9, 1e-10]
-LONGEST = 1e-3
+LONGEST, OCTAVE_LONGEST = 1e-3, 1e-4  # s
+OCTAVE = "Octave ode15s"
 ROUNDS, QUICK_RUNS = 3, 20
 
 
@@ -152,6 +157,44 @@ def positions(name: str, solve: Solver, tolerance: float, grid: Positions, plain
     return out
 
 
+def octave_run(name: str, tolerance: float, grid: Positions) -> tuple[Positions, float] | None:
+    """Positions and CPU time (s) of Octave's ode15s; None where it is missing or gives up."""
+    program = shutil.which("octave-cli")
+    if program is None:
+        return None
+    one = Loop(name)
+    head = [tolerance, OCTAVE_LONGEST, float(grid[1] - grid[0]), grid.size, one.elements, one.size]
+    with tempfile.TemporaryDirectory() as folder:
+        numbers, result = Path(folder) / "numbers.txt", Path(folder) / "result.txt"
+        np.savetxt(numbers, [*head, *one.p], fmt="%.17g")
+        script = Path(__file__).with_name("ode15s.m")
+        subprocess.run(
+            [program, "--norc", "-q", script, numbers, result], capture_output=True, timeout=600, check=False
+        )
+        if not result.exists():
+            return None
+        found = np.loadtxt(result)
+    return found[1:], float(found[0])
+
+
+def with_octave(
+    name: str, grid: Positions, truth: Positions, wanted: float, errors: dict[str, float]
+) -> dict[str, float]:
+    """Time of Octave's ode15s, by its label, at the loosest tolerance that is accurate enough, or the best."""
+    times: dict[str, float] = {}
+    for tolerance in TOLERANCES[::2]:
+        if (found := octave_run(name, tolerance, grid)) is None:
+            continue
+        error = float(np.max(np.abs(found[0] - truth)))
+        if error < errors.get(OCTAVE, math.inf):
+            errors[OCTAVE], times[OCTAVE] = error, found[1]
+        if error <= wanted:
+            break
+    if not times:
+        print(f"{name}: Octave's ode15s is missing or gives up")
+    return times
+
+
 def in_turns(quick: dict[str, Callable[[], Any]], slow: dict[str, Callable[[], Any]]) -> dict[str, float]:
     """Median CPU times of runs taken in turns, s: a busy machine must not count against the slow ones."""
     times: dict[str, list[float]] = {label: [] for label in [*quick, *slow]}
@@ -190,7 +233,7 @@ def compare(name: str, grid: Positions, wanted: float, baseline: Any) -> None:
 
         tolerance, errors[label] = loop.loosest(run, truth, wanted, TOLERANCES)
         slow[label] = lambda run=run, tolerance=tolerance: run(tolerance)
-    times = in_turns(quick, slow)
+    times = in_turns(quick, slow) | with_octave(name, grid, truth, wanted, errors)
     print(f"\n| {name} | time | error | times ours |\n|---|---|---|---|")
     for label, spent in times.items():
         mark = "" if errors[label] <= wanted else " (less accurate)"

@@ -118,8 +118,12 @@ def _choice(lines: dict[str, Array], percent: float) -> str:
         first, last = each[known[0]], each[known[-1]]
         if first == last:
             return first
-        until = next(i for i in known if each[i] != first)
-        return f"{first} up to {percent * until / LEVELS:.0f} %, {last} at {percent * (known[-1] + 1) / LEVELS:.0f} %"
+        until = max(i for i in known if all(each[j] == first for j in known if j <= i))
+        since = min(i for i in known if all(each[j] == last for j in known if j >= i))
+        return (
+            f"{first} up to ±{percent * (until + 1) / LEVELS:.0f} %,"
+            f" {last} from ±{percent * (since + 1) / LEVELS:.0f} % on"
+        )
 
     known = [i for i in range(LEVELS) if any(math.isfinite(y[i]) for y in lines.values())]
     said = f"Least error: {best(list(lines))}"
