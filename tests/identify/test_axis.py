@@ -12,12 +12,12 @@ import pytest
 
 from stickslip import law_names
 from stickslip.errors import InputError, ParameterError, UnknownName
-from stickslip.identify.axis import identify_axis
+from stickslip.identify.axis import identify_axis, rising
 from stickslip.identify.axis_inverse import correlation_lags, inverse_dynamics
 from stickslip.identify.axis_output import Extras, output_error
 from stickslip.identify.axis_start import dimensions, starts
 from stickslip.identify.axis_trial import Trial, trial_of
-from stickslip.identify.estimate import Identification
+from stickslip.identify.estimate import Estimate, Identification
 from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.plugins import law
 from stickslip.simulation.driven import Drive, Harmonics, Loop, Mechanics, drive_axis
@@ -268,3 +268,13 @@ def braking_trial(**mechanics: float) -> Trial:
     out = drive_axis(Mechanics(1.6e-3, offset=0.1, **mechanics), cases.model("coulomb"), drive)
     position = cases.COUNT * np.round(out[:, 0] / cases.COUNT)
     return Trial("braking", time, position, out[:, 2], "torque", reference, loop)
+
+
+def test_friction_that_rises_from_rest_is_no_stribeck_effect() -> None:
+    def named(fs: float) -> list[Estimate]:
+        pairs = (("fs", fs), ("fc", 1.0))
+        return [Estimate(n, "N", n, v, 0.01, v - 0.02, v + 0.02, identified=True) for n, v in pairs]
+
+    assert "no Stribeck effect" in rising(named(0.9))[0]
+    assert rising(named(0.97)) == []  # the intervals overlap
+    assert rising(named(1.1)) == []

@@ -325,7 +325,15 @@ def noted(found: Identification, *more: str) -> Identification:
     last = (
         [f"Not identified: {', '.join(missing)}; their values are one choice among many."] if missing else []
     )
-    return replace(found, notes=(*found.notes, *more, *last))
+    return replace(found, notes=(*found.notes, *more, *rising(found.estimates), *last))
+
+
+def rising(estimates: Sequence[Estimate]) -> list[str]:
+    """That friction rises with the speed where a Stribeck effect would let it fall; empty where the data do not say."""
+    by_name = {e.name: e for e in estimates}
+    if not {"fs", "fc"} <= by_name.keys() or not by_name["fs"].upper < by_name["fc"].lower:
+        return []
+    return ["fs lies below fc: friction rises from rest to vs; these records show no Stribeck effect."]
 
 
 def narrow_note(result: OutputError, ask: bool = True) -> str:
