@@ -19,7 +19,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.train import LoopResponse
 
-__all__ = ["Count", "encirclements", "fastest_pd", "pd_response"]
+__all__ = ["Count", "Fastest", "encirclements", "fastest_pd", "pd_response"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
