@@ -9,8 +9,8 @@ position per step, rad.
 
 A law is taken as `Elements` or as a `Bristle` (LuGre, Dahl). `_exact_flow` the flow, `_exact_state` what is remembered,
 `_exact_step` one step, `_exact_stretch` the motion inside it, `_exact_bend` bristles and curves, `_exact_trigger` what
-ends a mode, `_exact_events` where, `_exact_rest` stiction, `_exact_output` rows and metrics, `_exact_kernel` the loop,
-`_forcing` feedforward.
+ends a mode, `_exact_events` where, `_exact_rest` stiction, `_exact_output` rows and metrics, `_exact_stand` where it
+stands, `_exact_kernel` the loop, `_forcing` feedforward.
 """
 
 from __future__ import annotations
