@@ -1,10 +1,11 @@
 """How fast a PD a measured response bears: Nyquist's criterion on the frequencies that were seen.
 
 The axis itself is stable, but for the two poles of its free motion. The loop is then stable if the locus of its sampled
-response, from low to high frequencies, crosses the real axis left of -1 as often downwards as upwards. Two things are
-not seen and are assumed: below the lowest frequency the axis is an inertia or a spring, and beyond the highest the loop
-is weaker than 1. Where frequencies between are missing nothing is interpolated: a change of side over such a gap may be
-an encirclement or none (`Count.unseen`).
+response, from low to high frequencies, crosses the real axis left of -1 as often downwards as upwards. Three things
+are not seen and are assumed: below the lowest frequency the axis is an inertia or a spring, beyond the highest the loop
+is weaker than 1, and no mode is damped less than `LIGHT` (ratio). A gap between the frequencies seen is passed over only
+where such a mode inside it would leave the loop weaker than 1 (`weak`): what happens in any other gap is not known
+(`Count.unseen`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,9 @@ __all__ = ["Count", "Fastest", "encirclements", "fastest_pd", "pd_response"]
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 
+WEAK, LIGHT = 0.5, 0.02
+"""Loop gain at the ends of a gap that is passed over, at most; and the least damping of a mode that may lie in it."""
+
 
 @dataclass(frozen=True)
 class Count:
@@ -36,7 +40,7 @@ class Count:
     frequency : float
         Of the crossing that encircles, Hz; not a number where none does.
     unseen : tuple of float
-        Ends of the first gap over which the locus may cross left of -1, Hz; empty where there is none.
+        Ends of the first gap at which the loop is not `weak`, Hz; empty where there is none.
     """
 
     turns: int
@@ -45,7 +49,7 @@ class Count:
 
     @property
     def calm(self) -> bool:
-        """Whether the loop is seen to be stable."""
+        """Whether the loop is seen to be stable: no encirclement, and no gap in which a mode may make one."""
         return self.turns == 0 and not self.unseen
 
 
@@ -64,14 +68,14 @@ def encirclements(found: LoopResponse, inertia: float, bandwidth: float, damping
     # already lie above it.
     below = np.concatenate([[True], locus.imag < 0.0])
     before = np.concatenate([[locus[0].real - 1j], locus])
-    gaps = {b for _, b in found.gaps}
+    size = np.abs(locus)
+    hiding = [(a, b) for a, b in found.gaps if np.max(size[(f == a) | (f == b)]) >= weak(a, b)]
+    unseen: tuple[float, ...] = hiding[0] if hiding else ()
+    ends = {b for _, b in found.gaps}
     turns, frequency = 0, math.nan
-    unseen: tuple[float, ...] = ()
     for i in np.flatnonzero(below[:-1] != below[1:]):
         one, other = before[i], before[i + 1]
-        if float(f[i]) in gaps:
-            if min(one.real, other.real) < 0.0 and max(abs(one), abs(other)) >= 1.0:
-                unseen = unseen or (float(f[i - 1]), float(f[i]))
+        if float(f[i]) in ends:
             continue
         share = one.imag / (one.imag - other.imag)
         if one.real + share * (other.real - one.real) >= -1.0:
@@ -81,6 +85,14 @@ def encirclements(found: LoopResponse, inertia: float, bandwidth: float, damping
         there = float(f[last] + share * (f[i] - f[last]))
         frequency = (there if math.isnan(frequency) else frequency) if turns > 0 else math.nan
     return Count(turns, frequency, unseen)
+
+
+def weak(low: float, high: float) -> float:
+    """Loop gain at the ends of a gap (Hz), below which a mode inside it would stay below 1.
+
+    A mode at f0 adds c / (f0² - f²), and c / (2 LIGHT f0²) at its peak: it rises most where it is as strong at both ends.
+    """
+    return min(WEAK, 2.0 * LIGHT * (high**2 + low**2) / (high**2 - low**2))
 
 
 @dataclass(frozen=True)
@@ -143,6 +155,8 @@ def fastest_pd(responses: Sequence[LoopResponse], inertia: float, *, damping: fl
                 float(bandwidth), count.frequency, r.name, () if count.turns > 0 else count.unseen
             )
             if not place:
-                raise InputError(f"{found.sentence}: no PD can be recommended; look at the response")
+                raise InputError(
+                    f"{found.sentence}: no PD can be recommended; look at the response, or excite the axis more"
+                )
             return found
     return Fastest(float(tried[-1]))
