@@ -3,9 +3,9 @@
 The axis itself is stable, but for the two poles of its free motion. The loop is then stable if the locus of its sampled
 response, from low to high frequencies, crosses the real axis left of -1 as often downwards as upwards. Three things
 are not seen and are assumed: below the lowest frequency the axis is an inertia or a spring, beyond the highest the loop
-is weaker than 1, and no mode is damped less than `LIGHT` (ratio). A gap between the frequencies seen is passed over only
-where such a mode inside it would leave the loop weaker than 1 (`weak`): what happens in any other gap is not known
-(`Count.unseen`).
+is weaker than 1, and no mode is damped less than `LIGHT` (ratio). A gap between the frequencies seen is passed over
+only where such a mode inside it would leave the loop weaker than 1 (`weak`): what happens in any other gap is not
+known (`Count.unseen`).
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def encirclements(found: LoopResponse, inertia: float, bandwidth: float, damping
 def weak(low: float, high: float) -> float:
     """Loop gain at the ends of a gap (Hz), below which a mode inside it would stay below 1.
 
-    A mode at f0 adds c / (f0² - f²), and c / (2 LIGHT f0²) at its peak: it rises most where it is as strong at both ends.
+    A mode at f0 is c / (f0² - f²) beside its peak and c / (2 LIGHT f0²) on it: it rises most from two ends alike.
     """
     return min(WEAK, 2.0 * LIGHT * (high**2 + low**2) / (high**2 - low**2))
 
