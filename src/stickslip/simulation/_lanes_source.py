@@ -24,8 +24,8 @@ __all__ = ["Numbers", "Refused", "source"]
 Array = np.ndarray[Any, np.dtype[np.float64]]
 INLINED = frozenset(
     {
-        "trial", "give", "held_by", "gap_ahead", "accept", "swap", "finish", "first_event", "gap_of", "go_to",
-        "between", "switch", "stick", "weighted", "measure", "measure_all", "highest", "torque",
+        "trial", "reached", "give", "held_by", "gap_ahead", "accept", "swap", "finish", "first_event", "gap_of",
+        "go_to", "between", "switch", "stick", "weighted", "measure", "measure_all", "highest", "torque",
     }
 )  # fmt: skip
 """Functions that run for all lanes at once."""

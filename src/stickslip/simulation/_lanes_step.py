@@ -128,7 +128,18 @@ def trial(z: Any, lane: int, c: Any, h: float, part: float, now: Any) -> bool:
     z[(AHEAD + POSITION) * LANES + lane] = x0 + d
     z[(AHEAD + VELOCITY) * LANES + lane] = v1
     z[(AHEAD + INTEGRAL) * LANES + lane] = integral + dt * (goal - x0 - 0.5 * d)
-    # ---- what is reached there ----
+    gap = reached(z, lane, c, v1, d, keep0, pull0, bend0, keep1, pull1, bend1)
+    turns = (
+        sigma * v1 < 0.0 if RIGID_0 or RIGID_1 else (z[SLIPPING * LANES + lane] > 0.0) & (sigma * v1 <= 0.0)
+    )
+    return (gap <= 0.0) | turns
+
+
+def reached(
+    z: Any, lane: int, c: Any, v1: float, d: float, keep0: float, pull0: float, bend0: float, keep1: float,
+    pull1: float, bend1: float,
+) -> float:  # fmt: skip
+    """Curves, bristles and forces at the end velocity into the rows ahead; torque to the next break-away, N·m."""
     side = select(v1 >= 0.0, 1.0, -1.0)
     end0 = curve(v1, c, z, lane, 0)
     z[(AHEAD + CURVE_0) * LANES + lane] = end0
@@ -146,10 +157,7 @@ def trial(z: Any, lane: int, c: Any, h: float, part: float, now: Any) -> bool:
         for i in range(FIRST_1, ELEMENTS):
             left = gap_ahead(z, lane, c, i, KIND_1, keep1, pull1, end1, side, d)
             gap = select(left < gap, left, gap)
-    turns = (
-        sigma * v1 < 0.0 if RIGID_0 or RIGID_1 else (z[SLIPPING * LANES + lane] > 0.0) & (sigma * v1 <= 0.0)
-    )
-    return (gap <= 0.0) | turns
+    return gap
 
 
 def give(z: Any, lane: int, c: Any, which: int, kind: int, dt: float, part: float) -> float:
