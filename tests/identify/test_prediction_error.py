@@ -132,7 +132,8 @@ def test_short_coverage_study(generator: Any, monkeypatch: pytest.MonkeyPatch) -
     # Errors in half-widths: their median is about 0.34 where intervals are right, and 0.69 were they half as wide. (One
     # record in twenty misses, with all its parameters together: it would rule a root mean square of so few.)
     errors = [2.0 * abs(r.value - r.truth) / (r.upper - r.lower) for r in sure]
-    assert 0.1 < float(np.median(errors)) < 0.55
+    assert 0.1 < float(np.median(errors)) < 0.5
+    assert max(errors) < 2.5
 
 
 def test_an_inertia_that_the_inverse_dynamics_misses_is_found(generator: Any) -> None:
@@ -149,12 +150,14 @@ def test_an_inertia_that_the_inverse_dynamics_misses_is_found(generator: Any) ->
 def test_slow_motion_is_not_judged_where_the_contact_rings_faster_than_the_samples_show() -> None:
     """LuGre slips a little with every oscillation, which lowers the torque at which it breaks away; GMS does not."""
     inertia = 4e-4
-    stiff = {"fs": 0.6, "fc": 0.4, "vs": 0.05, "sigma2": 0.02}
-    lugre = Model("lugre", **stiff, sigma0=3000.0, sigma1=0.1)
-    gms = Model("gms", **stiff, k=[2000.0, 1000.0], alpha=[0.5, 0.5], c=10.0)
+    slow = {"fs": 0.6, "fc": 0.4, "vs": 0.05}
+    lugre = Model("lugre", **slow, sigma0=3000.0, sigma1=0.1, sigma2=0.02)
+    gms = Model("gms", **slow, k=[2000.0, 1000.0], alpha=[0.5, 0.5], c=10.0, sigma2=0.02)
+    stiff = Model("lugre", **slow, sigma0=3000.0, sigma1=3.0, sigma2=0.0)
     ringing = math.sqrt(3000.0 / inertia) / (2.0 * math.pi)
-    assert contact_frequency(lugre.law, lugre.parameters, inertia) == pytest.approx(ringing, rel=1e-3)
+    assert contact_frequency(lugre.law, lugre.parameters, inertia) == pytest.approx(ringing, rel=5e-3)
     assert contact_frequency(gms.law, gms.parameters, inertia) == pytest.approx(ringing, rel=1e-3)
+    assert contact_frequency(stiff.law, stiff.parameters, inertia) == 0.0  # more than critically damped
     assert (
         contact_frequency(Model("coulomb", fc=0.4).law, Model("coulomb", fc=0.4).parameters, inertia) == 0.0
     )
@@ -162,9 +165,13 @@ def test_slow_motion_is_not_judged_where_the_contact_rings_faster_than_the_sampl
     sure = [Estimate(name, "", name, 1.0, 0.01, 0.98, 1.02, identified=True) for name in names]
 
     def refused(model: Model, period: float) -> set[str]:
-        judged = unseen_refused(sure, model.law, model.parameters, inertia, 2.0, period)
+        judged = unseen_refused(sure, model.law, model.parameters, inertia, 6.0, period)
         return {e.name for e in judged if not e.identified and "samples/s" in e.verdict}
 
     assert refused(lugre, 1e-3) == {"fs", "vs", "sigma0"}
+    assert refused(Model("lugre", **{**lugre.parameters._asdict(), "vs": 1.0, "sigma2": 0.0}), 1e-3) == {
+        "fs", "vs", "sigma0"
+    }  # fmt: skip
+    assert refused(stiff, 1e-3) == set()
     assert refused(lugre, 2e-4) == set()
     assert refused(gms, 1e-3) == set()

@@ -142,6 +142,23 @@ def test_an_observer_pulls_the_axis_to_what_was_measured() -> None:
     assert np.median(pulled[moving, 3]) == pytest.approx(-0.05, abs=0.01)
 
 
+@pytest.mark.parametrize("play", [0.0, 0.02, 0.1])
+def test_under_the_true_parameters_an_observer_adds_nothing(play: float) -> None:
+    time = 1e-3 * np.arange(3000)
+    axis, law = Mechanics(1e-3, backlash=play), example("lugre")
+    torque = 1.5 * np.sin(8.0 * time)
+    measured = drive_axis(axis, law, Drive(time, torque, "held"))
+    assert np.ptp(measured[:, 0]) > 0.5
+    velocity = np.append(np.diff(measured[:, 0]) / 1e-3, 0.0)
+    watched = Drive(
+        time, torque, "held", position=measured[:, 0], spring=4.0, damping=np.full(time.size, 0.126), goal=velocity,
+        forgets=0.6,
+    )  # fmt: skip
+    found = drive_axis(axis, law, watched)
+    assert np.max(np.abs(found[:, 0] - measured[:, 0])) < 1e-4
+    assert np.std(found[:, 3]) < 1e-3 * np.std(torque)
+
+
 def test_a_firm_observer_sticks_and_slips_with_the_axis() -> None:
     """Friction that falls steeply with velocity: the true model is told from a wrong one only where nothing parts."""
     contact = Model("stribeck", k=5000.0, fs=0.5, fc=0.3, vs=0.05, sigma2=0.01)

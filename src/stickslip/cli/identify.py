@@ -98,7 +98,11 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
         "--intervals", choices=("prediction", "covariance"), default="prediction",
         help="covariance: in half the time, but too narrow under coloured noise",
     )  # fmt: skip
-    parser.add_argument("--robust", action="store_true", help="outliers count linearly")
+    parser.add_argument(
+        "--robust",
+        action="store_true",
+        help="outliers count linearly in the output error; the prediction error weighs them anyway",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

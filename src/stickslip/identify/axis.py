@@ -56,7 +56,7 @@ class Candidate:
     score : array
         Mean squared misfit of each block of held-out data, over weights common to all laws.
     start : mapping
-        The values fitted: where the fit to all data starts.
+        The values fitted: where the output error of all data starts.
     failure : str
         Why it could not be fitted; empty otherwise.
     """
@@ -98,8 +98,11 @@ def identify_axis(
     validation : sequence of Trial
         Held out. Without any, and with several laws, the last 30 % of every record are held out for the choice,
         and the chosen law is then fitted to all.
-    free, frozen, values, extras, robust, profiles
+    free, frozen, values, extras
         As in `stickslip.identify.axis_output.output_error`.
+    robust, profiles
+        As there, for the output error alone: the comparison of laws and the covariance's intervals. The prediction
+        error weighs outliers anyway.
     per_direction : bool
         Whether the inverse dynamics reported beside it has friction of its own for each direction.
     intervals : {"prediction", "covariance"}
@@ -111,7 +114,7 @@ def identify_axis(
     Returns
     -------
     Identification
-        ``details`` holds ``mechanics``, ``inverse`` (`InverseDynamics` or None), ``output`` (`OutputError`) and
+        ``details`` holds ``mechanics``, ``inverse`` (`InverseDynamics` or None), ``output`` (`FittedAxis`) and
         ``candidates``.
 
     Raises

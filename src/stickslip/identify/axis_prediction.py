@@ -83,13 +83,18 @@ def axis_prediction(
     Raises
     ------
     InputError
-        If a record has no drive signal, moves too little, or no simulation from the starting values succeeds.
+        If a record has no drive signal, moves too little, the axis has backlash, or no simulation from the starting
+        values succeeds.
     """
     for t in trials:
         if t.drive is None:
             raise InputError(f"{t.name}: the drive's signal is missing; this method needs it")
-    start = first or inverse_dynamics(trials, axis)
     given = dict(values or {})
+    if given.get("backlash", axis.backlash) > 0.0 or "backlash" in free:
+        raise InputError(
+            "its observer takes the measured velocity for the axis's own, which backlash forbids"
+        )
+    start = first or inverse_dynamics(trials, axis)
     band = min(BAND, *(0.1 / t.period for t in trials))
     motions = [motion_of(t) for t in trials]
     criterion, u = searched(trials, axis, law, motions, start, given, free, frozen, extras, band, seed)
@@ -117,11 +122,11 @@ def searched(
     tried.pop(math.inf, None)
     if not tried:
         raise InputError(
-            f"{law.name}: no simulation from the starting values succeeds; give others by `values`"
+            f"{law.name}: no simulation from the starting values succeeds; give others with --set NAME=VALUE (values)"
         )
     ranked = [tried[cost] for cost in sorted(tried)]
     others = ranked[BEST:]
-    ranked = ranked[:BEST] + [others[i * len(others) // SPREAD] for i in range(min(SPREAD, len(others)))]
+    ranked = ranked[:BEST] + [others[i] for i in spread(len(others), SPREAD)]
     running = [(c, search_from(c, c.vector.start)) for c in ranked]
     for count, evaluations in ROUNDS:
         for _, search in running[:count]:
@@ -137,6 +142,12 @@ def searched(
         if math.isfinite(cost_of(adapted.residuals(there))):
             best = min(best, (*descended(adapted, there), adapted), key=lambda entry: entry[0])
     return adapted, best[1]
+
+
+def spread(count: int, most: int) -> list[int]:
+    """At most so many places, evenly among that many, the last among them."""
+    taken = min(most, count)
+    return [(i + 1) * count // taken - 1 for i in range(taken)]
 
 
 def search_from(criterion: Criterion, start: Array) -> Secants:

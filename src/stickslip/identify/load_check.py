@@ -88,7 +88,9 @@ def judged_load(
         tied = [e.name for e in estimates if e.identified and e.unit.startswith(("N", "kg"))]
         why = dict.fromkeys([*tied, "load_external"], "it goes with load_motor, which is not identified")
         why["load_motor"] = (
-            f"all but {100.0 * own:.2g} % of its effect looks like more friction and inertia; identified means at "
+            "without the inverse dynamics nothing tells its effect from that of friction and inertia"
+            if inverse is None
+            else f"all but {100.0 * own:.2g} % of its effect looks like more friction and inertia; identified means at "
             f"least {100.0 * LEAST:g} %"
         )
     return tuple(replace(e, identified=False, verdict=why[e.name]) if e.name in why else e for e in estimates)

@@ -88,10 +88,9 @@ class Prepared:
             return self.nothing()
         return signal.sosfiltfilt(self.low_pass, raw)[self.edge : -self.edge : self.stride]
 
-    def shaken(self, signal: Array) -> Prepared:
-        """The same with this added to the drive's signal, shape (n,)."""
-        drive = replace(self.course.drive, signal=self.course.drive.signal + signal)
-        return replace(self, course=Course(self.course.law, drive))
+    def shaken(self, torque: Array) -> Prepared:
+        """The same with this torque on the axis, N·m, shape (n,)."""
+        return replace(self, course=Course(self.course.law, replace(self.course.drive, disturbance=torque)))
 
     def nothing(self) -> Array:
         """Not a number, as many as there are corrections."""

@@ -181,9 +181,9 @@ def prediction_error(
     estimates = estimates_of(vector, u, spread, shaken, beside, signed_scale)
     accepted, named = feasible(law, vector.law_parameters(u)), vector.named(u)
     assert accepted is not None
-    speed = math.sqrt(float(np.mean(np.concatenate([m.seen.velocity for m in motions]) ** 2)))
+    highest = max(float(np.max(np.abs(m.seen.velocity))) for m in motions)
     estimates = unseen_refused(
-        estimates, law, accepted, named["inertia"], speed, max(m.period for m in motions)
+        estimates, law, accepted, named["inertia"], highest, max(m.period for m in motions)
     )
     return PredictionError(
         vector, u, Model(law, **accepted._asdict()), mechanics(named), optimum.cost, spread, shaken, beside,
@@ -222,7 +222,7 @@ def shaken_steps(criterion: Criterion, optimum: Optimum, rng: np.random.Generato
     r, jacobian = weighted(criterion, optimum)
     newton = -np.linalg.solve(jacobian.T @ jacobian + ridge_of(r, u.size), jacobian.T)
     parameters, axis = feasible(criterion.law, vector.law_parameters(u)), criterion.mechanics(vector.named(u))
-    lacking = [x.course.run(axis, parameters)[:, 3] / axis.drive_gain for x in criterion.records]
+    lacking = [x.course.run(axis, parameters)[:, 3] for x in criterion.records]
     steps: list[Array] = []
     for _ in range(DRAWS):
         records = [

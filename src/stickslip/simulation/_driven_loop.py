@@ -124,6 +124,9 @@ def follow(
         # Behind a low-pass, the damper is what it remembers and a damper on the velocity that the step solves for.
         forgets = 1.0 if firm else c[FORGETS]
         damping, kept = forgets * signals[k, DAMPING], (1.0 - forgets) * signals[k, DAMPING] * m[BEHIND]
+        if n[BACKLASH] > 0.0:
+            # What is measured lies behind the play: its velocity is no goal of the step, and is damped a sample later.
+            damping, kept = 0.0, signals[k, DAMPING] * m[BEHIND]
         n[BACK_EMF] = loss if signals[k, SUPPLY] != 0.0 else 0.0
         n[LOSS] = n[BACK_EMF] + damping
         out[k, OUT_POSITION], out[k, OUT_VELOCITY] = y, state[1]
@@ -134,7 +137,7 @@ def follow(
             acts = max(1, int(dt / c[CONTROL_PERIOD] + 0.5))
         substeps = max(1, math.ceil(dt / acts / c[MAX_STEP] - 1e-9))
         h = dt / acts / substeps
-        first = state[0]
+        first = y if n[BACKLASH] > 0.0 else state[0]
         pulled = 0.0
         for act in range(acts):
             u = command(c, m, signals, k, y, dt / acts)
@@ -149,7 +152,7 @@ def follow(
             for i in range(substeps):
                 advance(plant, state, z, gain * (u + rate * h * i), gain * rate, h)
                 y = seen(n, y, state[0])
-        moved = state[0] - first if k < rows - 1 else state[1] * dt
+        moved = (y if n[BACKLASH] > 0.0 else state[0]) - first if k < rows - 1 else wanted * dt
         out[k, OUT_CORRECTION] = pulled + damping * (wanted - moved / dt)
         m[BEHIND] += c[FORGETS] * (wanted - moved / dt - m[BEHIND])
         if firm and k < rows - 1:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import ast
 import functools
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -136,7 +136,8 @@ class Drive:
         Torque towards it at every sample, N·m/rad.
     damping, goal : array, shape (n,), or None
         Damping, N·m·s/rad, towards the velocity `goal`, the measured mean until the next sample. It is part of the
-        implicit step, so that it may be as firm as one likes.
+        implicit step, so that it may be as firm as one likes; behind backlash it acts a sample later, and has to be
+        soft.
     forgets : float
         Share of the damper's memory that every sample replaces, 1 for none: it damps the velocity behind a first-order
         low-pass, so that an encoder's counts do not shake the axis.
@@ -273,8 +274,3 @@ def control_signal(
 def drive_axis(mechanics: Mechanics, friction: Model, drive: Drive) -> Array:
     """Simulate an axis over the times of a drive; shape (n, 4), columns `COLUMNS` (see `Course.run`)."""
     return Course(friction.law, drive).run(mechanics, friction.parameters)
-
-
-def with_noise(drive: Drive, disturbance: Array) -> Drive:
-    """The same drive with a torque on the axis."""
-    return replace(drive, disturbance=disturbance)
