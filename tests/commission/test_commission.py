@@ -32,6 +32,7 @@ from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine, machine
 from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
+from stickslip.record import Record
 from stickslip.report.identified import Source, write_identification
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.procedures._moves import holder, move
@@ -256,11 +257,52 @@ def test_no_sliding_torque_is_read_from_sticking_and_slipping():
     done = perform(Sliding(velocities=(1.0, 0.7, 0.5, 0.3, 0.06), inertia=WEAK.inertia), VirtualRig(WEAK))
     slid = moving(done.record, 0.022)
     assert slid.points.velocity == pytest.approx([0.3, 0.5, 0.7, 1.0])
-    assert "left out: 0.06" in slid.notes[-1]
+    assert "left out with both directions: 0.06" in slid.notes[-1]
     truth = [WEAK.clutch.law.steady(v, WEAK.clutch.parameters) for v in slid.points.velocity.tolist()]
     assert slid.points.torque == pytest.approx(truth, rel=0.02)
     # Where break-away is the torque of sliding, the mean over sticking and slipping is it too.
     assert len(moving(done.record, truth[0]).points) == 5
+
+
+def run_at(v, torque, standing=0.0):
+    """Time, position, torque and velocity asked for: it stands a part of the time, and catches up."""
+    t = np.arange(0.0, 7.0 / abs(v), min(0.02, 0.002 / abs(v)))
+    phase = np.mod(t, t[-1] / 10.0) / (t[-1] / 10.0)
+    late = np.where(phase < standing, phase, standing * (1.0 - phase) / (1.0 - standing))
+    return t, v * (t - late * t[-1] / 10.0), np.full(t.size, torque), np.full(t.size, v)
+
+
+def test_a_speed_that_sticks_in_one_direction_is_left_out_with_both():
+    rows, time, place = [], 0.0, 0.0
+    for v in (2.0, 1.0, 0.5, 0.3, 0.2, 0.1):
+        for side, friction in ((1.0, 0.12), (-1.0, -0.08)):
+            t, x, torque, speed = run_at(side * v, friction, 0.05 if side * v == -0.1 else 0.0)
+            rows.append((time + t, place + x, torque, speed))
+            time, place = time + t[-1] + 1.0, place + x[-1]
+    t, x, torque, speed = (np.concatenate(c) for c in zip(*rows, strict=True))
+    channels = {"position": x, "motor_torque": torque, "velocity_reference": speed}
+    record = Record(t, channels, {"position": "rad", "motor_torque": "N·m", "velocity_reference": "rad/s"})
+    slid = moving(record, 0.2)
+    assert slid.points.velocity == pytest.approx([0.2, 0.3, 0.5, 1.0, 2.0])
+    assert slid.points.torque == pytest.approx(np.full(5, 0.1))
+    assert len(slid.segments) == 10
+    assert "left out with both directions: 0.1 rad/s" in slid.notes[-1]
+    # A speed with one direction only has no mean of both.
+    once = (speed != -0.5) & (speed != -0.1)
+    half = moving(Record(t[once], {k: c[once] for k, c in channels.items()}, record.units), 0.2)
+    assert half.points.velocity == pytest.approx([0.2, 0.3, 1.0, 2.0])
+    assert "one direction only, left out: 0.1, 0.5 rad/s" in half.notes[-1]
+
+
+@pytest.mark.parametrize("counts", [1e6, 2048.0])
+def test_a_coarse_count_is_no_rest(counts):
+    law = Model("lugre", sigma0=300.0, sigma1=0.3, fs=0.22, fc=0.16, vs=0.03, delta_s=1.4, sigma2=4e-3)
+    m = Machine("coarse", 1e-3, Contact(law), encoder=Encoder(counts), seed=3)
+    done = perform(Sliding(velocities=(1.0, 0.5, 0.3, 0.1), inertia=1e-3), VirtualRig(m))
+    assert not [c.text for c in done.checks if "sticks" in c.text]
+    slid = moving(done.record, 0.22, 2.0 * math.pi / counts)
+    assert slid.points.velocity == pytest.approx([0.1, 0.3, 0.5, 1.0])
+    assert len(slid.notes) == 1
 
 
 def test_a_stick_slip_stage_that_is_left_out_is_said(monkeypatch):

@@ -34,6 +34,7 @@ from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.rigs.procedures._moves import ROOM
+from stickslip.rigs.procedures._resting import resolution_in
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
@@ -186,13 +187,7 @@ class Candidate:
 
 def resolution_of(record: Record) -> float:
     """The least step of the position, rad; 0 where it is continuous."""
-    steps = np.abs(np.diff(np.unique(record["position"][:20000])))
-    steps = steps[steps > 1e-12]
-    if steps.size < 10:
-        return 0.0
-    least = float(np.min(steps))
-    whole = steps / least
-    return least if np.mean(np.abs(whole - np.round(whole)) < 0.01 * np.round(whole)) > 0.9 else 0.0
+    return resolution_in(record["position"][:20000])
 
 
 def controller_of(known: Known, rig: Rig, bandwidth: float, helper: Helper | None = None) -> Controller:

@@ -191,7 +191,8 @@ def commission(
     course = _Course(rig, folder, progress or (lambda _: None), without_watchdog)
     j, top, level = _inertia(course, duration)
     fs, fs_std, resolution = _breakaway(course, j, level, interval)
-    sliding, curve, angle = _sliding(course, j, (fs, fs_std), tuple(v for v in velocities if v <= 1.05 * top))
+    able = tuple(v for v in velocities if v <= 1.05 * top)
+    sliding, curve, angle = _sliding(course, j, (fs, fs_std), able, resolution)
     stuck = _presliding(course, j, fs, sliding, resolution)
     model, stiffness, said = joined_model(curve, stuck)
     model, said = with_lag(model, _attraction(course, j, angle, model), said)
@@ -237,7 +238,7 @@ def _breakaway(course: _Course, j: float, level: float, interval: float) -> tupl
 
 
 def _sliding(
-    course: _Course, j: float, breaking: tuple[float, float], velocities: tuple[float, ...]
+    course: _Course, j: float, breaking: tuple[float, float], velocities: tuple[float, ...], resolution: float
 ) -> tuple[Mapping[str, float], Identification, AngleMap]:
     """A Stribeck curve for the methods that need one, the best curve, and what depends on the angle."""
     if len(velocities) < FEWEST:
@@ -245,7 +246,7 @@ def _sliding(
             f"sliding: the rig runs at {velocities} only of the velocities asked for; give five slower ones"
         )
     done = course.run(Sliding(velocities=velocities, inertia=j), insist=False)
-    runs = moving(done.record, breaking[0])
+    runs = moving(done.record, breaking[0], resolution)
     plain, chosen = fitted_curve(runs, *breaking)
     course.add("sliding", done, chosen)
     around = identify_angle(done.record, runs.segments)

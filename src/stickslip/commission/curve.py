@@ -17,16 +17,16 @@ from stickslip.identify.sliding import SlidingPoints, identify_sliding
 from stickslip.identify.sliding_choice import choose_sliding
 from stickslip.model import Model
 from stickslip.record import Record
+from stickslip.rigs.procedures._resting import RESTING, resting
 from stickslip.simulation.steady import Steady
 
 __all__ = ["Slid", "fitted_curve", "moving"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-RESTING, STANDING, SLOW = 0.02, 0.7, 0.2
-"""Shares of the time in which a motion goes slower than this part of its mean speed: from which it sticks and slips,
-and from which its mean torque is no friction any more. On thesis-grease that mean lies within 2 % of the sliding
-curve up to a share of 0.67 (0.014 rad/s), 4 % too low at 0.74, and 10 % too low at 0.005 rad/s."""
+STANDING = 0.7
+"""Share of the time at rest from which the mean torque is no friction any more. On thesis-grease that mean lies within
+2 % of the sliding curve up to a share of 0.67 (0.014 rad/s), 4 % too low at 0.74, and 10 % too low at 0.005 rad/s."""
 ALIKE = 0.1
 """Of the torque at the slowest speed without sticking, by which break-away may differ from it: where an axis sticks and
 slips, friction is between the two, and their mean over time is the sliding torque only where they are alike."""
@@ -57,50 +57,60 @@ class Slid:
     notes: list[str]
 
 
-def moving(record: Record, fs: float) -> Slid:
-    """Mean torque per speed, both directions folded, and the runs; without those whose mean is no sliding torque.
+def moving(record: Record, fs: float, resolution: float = 0.0) -> Slid:
+    """Mean torque per speed, both directions folded, and the runs; without the speeds whose mean is no sliding torque.
 
-    These are the runs in which the axis mostly stood, and all that stuck and slipped where the break-away torque `fs`
-    (N·m) is another than that of sliding.
+    These are the speeds at which the axis mostly stood in a direction, ran in one direction only, or stuck and slipped
+    in a direction where the break-away torque `fs` (N·m) is another than that of sliding. `resolution` is that of the
+    encoder, rad.
     """
-    segments = constant_velocity_segments(record)
-    shares = {id(s): resting(record, s) for s in segments}
-    steady = [s for s in segments if shares[id(s)] <= RESTING]
-    slowest = min((abs(s.velocity) for s in steady), default=0.0)
-    level = [abs(s.torque) for s in steady if abs(s.velocity) < 1.01 * slowest]
-    alike = bool(level) and abs(fs / float(np.mean(level)) - 1.0) <= ALIKE
-    slid = [s for s in segments if shares[id(s)] <= (STANDING if alike else RESTING)]
-    stuck = sorted({round(abs(s.velocity), 4) for s in slid if shares[id(s)] > RESTING})
-    left = sorted({round(abs(s.velocity), 4) for s in segments} - {round(abs(s.velocity), 4) for s in slid})
     by_speed: dict[float, list[Segment]] = {}
-    for s in slid:
-        by_speed.setdefault(float(f"{abs(s.velocity):.2g}"), []).append(s)
-    if len(by_speed) < 4:
+    for s in constant_velocity_segments(record):
+        by_speed.setdefault(_speed(record, s), []).append(s)
+    single = sorted(v for v, runs in by_speed.items() if len({s.velocity > 0.0 for s in runs}) < 2)
+    rest = {
+        v: max(_resting(record, s, resolution) for s in runs)
+        for v, runs in sorted(by_speed.items())
+        if v not in single
+    }
+    steady = [v for v, share in rest.items() if share <= RESTING]
+    level = np.mean([abs(s.torque) for s in by_speed[steady[0]]]) if steady else math.inf
+    alike = abs(fs / float(level) - 1.0) <= ALIKE
+    speeds = [v for v, share in rest.items() if share <= (STANDING if alike else RESTING)]
+    if len(speeds) < 4:
         raise InputError("sliding: the axis slid steadily at fewer than 4 speeds; run it faster")
-    speeds = np.array(sorted(by_speed))
-    torque = np.array([float(np.mean([abs(s.torque) for s in by_speed[v]])) for v in speeds.tolist()])
-    std = np.array([
-        math.sqrt(math.fsum(s.std**2 for s in by_speed[v])) / len(by_speed[v]) for v in speeds.tolist()
-    ])  # fmt: skip
-    notes = [f"{len(slid)} runs at {speeds.size} speeds, mean of both directions."]
-    if stuck:
-        notes.append(
-            f"Stuck and slipped at {', '.join(f'{v:g}' for v in stuck)} rad/s: the torque there is the mean of both."
-        )
-    if left:
+    torque = np.array([float(np.mean([abs(s.torque) for s in by_speed[v]])) for v in speeds])
+    std = np.array([math.hypot(*(s.std for s in by_speed[v])) / len(by_speed[v]) for v in speeds])
+    slid = [s for v in speeds for s in by_speed[v]]
+    notes = [f"{len(slid)} runs at {len(speeds)} speeds, mean of both directions."]
+    if stuck := [v for v in speeds if rest[v] > RESTING]:
+        notes.append(f"Stuck and slipped at {_listed(stuck)}: the torque there is the mean of both.")
+    if single:
+        notes.append(f"Ran in one direction only, left out: {_listed(single)}.")
+    if left := [v for v in rest if v not in speeds]:
         why = "Mostly stood" if alike else "Stuck and slipped, where the mean torque is none of sliding"
         notes.append(
-            f"{why}, left out: {', '.join(f'{v:g}' for v in left)} rad/s; below, the curve is not measured."
+            f"{why}, left out with both directions: {_listed(left)}; there the curve is not measured."
         )
-    return Slid(SlidingPoints(speeds, torque), std, slid, notes)
+    return Slid(SlidingPoints(np.array(speeds), torque), std, slid, notes)
 
 
-def resting(record: Record, s: Segment) -> float:
+def _speed(record: Record, s: Segment) -> float:
+    """That was asked for, where the record says so: what was measured differs between the directions."""
+    if "velocity_reference" not in record.channels:
+        return float(f"{abs(s.velocity):.2g}")
+    inside = (record.time >= s.start) & (record.time <= s.end)
+    return float(f"{abs(float(np.median(record['velocity_reference'][inside]))):.6g}")
+
+
+def _resting(record: Record, s: Segment, resolution: float) -> float:
     """Share of the time in which the axis all but stands, by the record's own rows."""
     inside = (record.time >= s.start) & (record.time <= s.end)
-    t, x = record.time[inside], record["position"][inside]
-    speed = np.diff(x) / np.diff(t) / s.velocity
-    return float(np.mean(speed < SLOW)) if speed.size > 2 else 0.0
+    return resting(record.time[inside], record["position"][inside], s.velocity, resolution)
+
+
+def _listed(speeds: list[float]) -> str:
+    return f"{', '.join(f'{v:g}' for v in speeds)} rad/s"
 
 
 def fitted_curve(runs: Slid, fs: float, fs_std: float) -> tuple[Mapping[str, float], Identification]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from stickslip.record import Record
 from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, uniform
+from stickslip.rigs.procedures._resting import RESTING, resolution_in, resting
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
@@ -28,9 +29,6 @@ GREASED = (
 """rad/s, thesis eq. 4.3"""
 ROWS, LONGEST = 2000, 0.02
 """Rows of a velocity's record, about, and the longest that one may last, s: sticking must show in them."""
-
-STANDS, OFTEN = 0.2, 0.02
-"""Of the mean speed, below which the axis all but stands; share of the time from which it sticks and slips."""
 SHORT = 0.5
 """s of rest before the way back."""
 
@@ -101,10 +99,10 @@ class Sliding(Procedure):
         edges = np.flatnonzero(np.abs(np.diff(wanted)) > 1e-9 * np.abs(wanted[:-1])) + 1
         parts = [p for p in np.split(np.arange(len(record)), edges) if p.size > 2]
         for rows in parts:
-            out.append(self._held(record, rows))
+            out.append(self._held(record, rows, rig.sample_time))
         return tuple(out)
 
-    def _held(self, record: Record, rows: np.ndarray) -> Check:  # type: ignore[type-arg]
+    def _held(self, record: Record, rows: np.ndarray, sample_time: float) -> Check:  # type: ignore[type-arg]
         time, position, wanted = (
             record.time[rows],
             record["position"][rows],
@@ -116,10 +114,12 @@ class Sliding(Procedure):
             return Check(f"{v:g} rad/s", False, "the axis did not travel a revolution")
         mean = float((x[-1] - x[0]) / (t[-1] - t[0]))
         speed = np.diff(x) / np.diff(t)
-        ripple, still = float(np.std(speed)), float(np.mean(speed / v < STANDS))
+        # A row is the mean of some samples: its least step is a count over their number.
+        count = round(float(np.median(np.diff(t))) / sample_time) * resolution_in(position)
+        ripple, still = float(np.std(speed)), resting(t, x, v, count)
         words = (
             f"; it sticks and slips, {100.0 * still:.2g} % of the time all but at rest"
-            if still > OFTEN
+            if still > RESTING
             else ""
         )
         return Check(

@@ -1,0 +1,50 @@
+"""Whether an axis that should slide stood meanwhile, as far as its encoder tells."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+__all__ = ["RESTING", "resolution_in", "resting"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+SLOW, RESTING = 0.2, 0.02
+"""Of the mean speed, below which the axis all but stands; share of the time from which it sticks and slips."""
+COUNTS = 4.0
+"""Of the encoder, over which a speed is taken at least: a count more or less is then no rest."""
+
+
+def resolution_in(position: Array) -> float:
+    """The least step of a position, rad; 0 where it is continuous."""
+    steps = np.abs(np.diff(np.unique(position)))
+    steps = steps[steps > 1e-12]
+    if steps.size < 10:
+        return 0.0
+    least = float(np.min(steps))
+    whole = steps / least
+    return least if np.mean(np.abs(whole - np.round(whole)) < 0.01 * np.round(whole)) > 0.9 else 0.0
+
+
+def resting(time: Array, position: Array, velocity: float, resolution: float) -> float:
+    """Share of the time in which the axis all but stands.
+
+    Parameters
+    ----------
+    time, position : array, shape (n,)
+        s and rad, of a run at constant velocity.
+    velocity : float
+        Its mean, rad/s, with its sign.
+    resolution : float
+        Of the encoder, rad: rests that are shorter than `COUNTS` of it take at that velocity are not seen.
+    """
+    if time.size < 2:
+        return 0.0
+    row = float(np.median(np.diff(time)))
+    rows = max(1, math.ceil(COUNTS * resolution / (abs(velocity) * row)))
+    if time.size < rows + 3:
+        return 0.0
+    speed = (position[rows:] - position[:-rows]) / (time[rows:] - time[:-rows]) / velocity
+    return float(np.mean(speed < SLOW))
