@@ -13,8 +13,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SLOW, RESTING = 0.2, 0.02
 """Of the mean speed, below which the axis all but stands; share of the time from which it sticks and slips."""
-COUNTS = 4.0
-"""Of the encoder, over which a speed is taken at least: a count more or less is then no rest."""
+COUNTS = 3.0
+"""Of the encoder, over which a speed is taken at least: a count more or less at both ends is then no rest."""
 
 
 def resolution_in(position: Array) -> float:
