@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
@@ -136,6 +137,39 @@ def test_options_that_make_no_sense(name, options, says):
         run(name, virtual_rig("thesis-dry"), **options)
     with pytest.raises(UnknownName):
         procedure("breakaways")
+
+
+def test_an_option_with_a_direction_may_be_below_zero_and_a_plan_then_is_no_lighter(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    for name, option, text in (("resonance", "speed", "5"), ("sliding", "velocities", "1,0.5")):
+        plans = []
+        for given in (text, ",".join(f"-{v}" for v in text.split(","))):
+            line = [
+                "rig",
+                "run",
+                name,
+                "--rig",
+                "thesis-dry",
+                "--dry-run",
+                "--json",
+                "--set",
+                f"{option}={given}",
+            ]
+            assert main(line) == 0
+            plans.append({k: v for k, v in json.loads(capsys.readouterr().out).items() if k != "text"})
+        assert plans[0] == plans[1]
+    assert run("resonance", virtual_rig("thesis-dry"), speed="-5").passed
+
+
+@pytest.mark.parametrize(
+    ("name", "option"),
+    [("presliding", "amplitude"), ("breakaway", "rate"), ("attraction", "mean"), ("repeat", "interval")],
+)
+def test_an_option_that_is_a_size_may_not_be_below_zero(name, option):
+    with pytest.raises(InputError, match=f"{name}: {option} = -1 must be 0 or greater"):
+        procedure(name)(**{option: -1.0})
 
 
 def test_command_line(tmp_path, capsys, monkeypatch):

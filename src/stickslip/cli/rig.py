@@ -141,7 +141,7 @@ def performed(args: argparse.Namespace) -> int:
 
 
 def sensible(chosen: Procedure, given: Mapping[str, str]) -> None:
-    """Refuse numbers below 0 or that are none: no option of a procedure has a sign.
+    """Refuse numbers that are none; which may be below 0 is the procedure's to say.
 
     Raises
     ------
@@ -152,8 +152,8 @@ def sensible(chosen: Procedure, given: Mapping[str, str]) -> None:
     for name, text in given.items():
         value: Any = getattr(chosen, name)
         values: list[Any] = list(value) if isinstance(value, tuple) else [value]  # type: ignore[reportUnknownArgumentType]
-        if any(isinstance(v, (int, float)) and not 0.0 <= v < math.inf for v in values):
-            raise InputError(f"{chosen.name}: {name} = {text} must be 0 or greater")
+        if any(isinstance(v, (int, float)) and not math.isfinite(v) for v in values):
+            raise InputError(f"{chosen.name}: {name} = {text} must be finite")
 
 
 def plan_of(chosen: Procedure, rig: Rig, given: list[str]) -> Plan:

@@ -120,6 +120,16 @@ class Procedure:
 
     name: ClassVar[str] = ""
     title: ClassVar[str] = ""
+    signed: ClassVar[tuple[str, ...]] = ()
+    """Options that may be below 0, as they have a direction; no other may, whose value is held against limits."""
+
+    def __post_init__(self) -> None:
+        for option in (f.name for f in dataclasses.fields(self) if f.name not in self.signed):
+            value: Any = getattr(self, option)
+            numbers = cast("tuple[Any, ...]", value) if isinstance(value, tuple) else (value,)
+            for number in numbers:
+                if isinstance(number, (int, float)) and number < 0.0:
+                    raise InputError(f"{self.name}: {option} = {number:g} must be 0 or greater")
 
     def plan(self, rig: Rig) -> Plan:
         """What it will do on this rig."""

@@ -40,6 +40,7 @@ class Resonance(Procedure):
 
     name: ClassVar[str] = "resonance"
     title: ClassVar[str] = "modes while it slides and while it sticks, from torque noise (4.5)"
+    signed: ClassVar[tuple[str, ...]] = ("speed",)
 
     speed: float = 5.0
     inertia: float = 4.3e-4

@@ -43,6 +43,7 @@ class Sliding(Procedure):
 
     name: ClassVar[str] = "sliding"
     title: ClassVar[str] = "friction at constant velocities, both directions (4.3.1.1.2)"
+    signed: ClassVar[tuple[str, ...]] = ("velocities",)
 
     velocities: tuple[float, ...] = DRY
     degrees: float = 380.0

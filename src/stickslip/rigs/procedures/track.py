@@ -51,6 +51,7 @@ class Track(Procedure):
 
     name: ClassVar[str] = "track"
     title: ClassVar[str] = "follow one of the thesis's references (4.3.1.2)"
+    signed: ClassVar[tuple[str, ...]] = ("gain",)
 
     reference: str = "low"
     linear: str = "PD"
