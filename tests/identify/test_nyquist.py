@@ -98,19 +98,26 @@ def test_a_locus_that_comes_back_left_of_the_point_is_calm_and_one_that_goes_rou
 
 def test_a_gap_is_neither_crossed_nor_passed_over():
     whole = locus(ROUND)
-    kept = [i for i in range(len(ROUND)) if i not in (2,)]
+    kept = [i for i in range(len(ROUND)) if i not in (2, 3)]
     gap = replace(
         whole, frequency=whole.frequency[kept], response=whole.response[kept], coherence=whole.coherence[kept]
     )
-    assert gap.gaps == ((6.0, 8.0),)
+    assert gap.gaps == ((6.0, 9.0),)
     count = encirclements(gap, 1e-3, 10.0)
     assert count.turns == 0
-    assert count.unseen == (6.0, 8.0)
+    assert count.unseen == (6.0, 9.0)
     assert not count.calm
+    # A single line is seen from both sides: the locus goes on across it.
+    kept = [0, 1, 3, 4, 5, 6, 7]
+    line = replace(
+        whole, frequency=whole.frequency[kept], response=whole.response[kept], coherence=np.ones(7)
+    )
+    assert line.gaps
+    assert (encirclements(line, 1e-3, 10.0).turns, encirclements(line, 1e-3, 10.0).unseen) == (1, ())
     # One that lies where the loop is weak hides nothing.
-    kept = [0, 1, 2, 3, 4, 5, 7]
+    kept = [0, 1, 2, 3, 4, 7]
     weak = replace(
-        whole, frequency=whole.frequency[kept], response=0.05 * whole.response[kept], coherence=np.ones(7)
+        whole, frequency=whole.frequency[kept], response=0.05 * whole.response[kept], coherence=np.ones(6)
     )
     assert weak.gaps
     assert not encirclements(weak, 1e-3, 10.0).unseen

@@ -5,7 +5,7 @@ response, from low to high frequencies, crosses the real axis left of -1 as ofte
 are not seen and are assumed: below the lowest frequency the axis is an inertia or a spring, beyond the highest the loop
 is weaker than 1, and no mode is damped less than `LIGHT` (ratio). A gap between the frequencies seen is passed over
 only where such a mode inside it would leave the loop weaker than 1 (`weak`): what happens in any other gap is not
-known (`Count.unseen`).
+known (`Count.unseen`). A single line that is missing is no gap (`NARROW`).
 """
 
 from __future__ import annotations
@@ -27,6 +27,9 @@ Complex = np.ndarray[Any, np.dtype[np.complex128]]
 
 WEAK, LIGHT = 0.5, 0.02
 """Loop gain at the ends of a gap that is passed over, at most; and the least damping of a mode that may lie in it."""
+
+NARROW = 2.5
+"""Lines apart, up to which neighbours see what is between: a Hann window takes in one line more on either side."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +72,10 @@ def encirclements(found: LoopResponse, inertia: float, bandwidth: float, damping
     below = np.concatenate([[True], locus.imag < 0.0])
     before = np.concatenate([[locus[0].real - 1j], locus])
     size = np.abs(locus)
-    hiding = [(a, b) for a, b in found.gaps if np.max(size[(f == a) | (f == b)]) >= weak(a, b)]
+    gaps = [(a, b) for a, b in found.gaps if b - a > NARROW * float(np.min(np.diff(f)))]
+    hiding = [(a, b) for a, b in gaps if np.max(size[(f == a) | (f == b)]) >= weak(a, b)]
     unseen: tuple[float, ...] = hiding[0] if hiding else ()
-    ends = {b for _, b in found.gaps}
+    ends = {b for _, b in gaps}
     turns, frequency = 0, math.nan
     for i in np.flatnonzero(below[:-1] != below[1:]):
         one, other = before[i], before[i + 1]
