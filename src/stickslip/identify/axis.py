@@ -6,20 +6,27 @@ or for several, among which the error on held-out data chooses (`stickslip.ident
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from stickslip import plugins
 from stickslip.errors import InputError, UnknownName
+from stickslip.identify.axis_choice import (
+    Candidate,
+    chosen_of,
+    compared,
+    foreseen,
+    options_of,
+    sentence_on,
+)  # fmt: skip
 from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics
 from stickslip.identify.axis_output import OutputError, output_error
 from stickslip.identify.axis_prediction import axis_prediction
 from stickslip.identify.axis_problem import Problem
-from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, fitted_axis, require_start
+from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, require_start
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification, silent
 from stickslip.identify.load_check import ADVICE, judged_load
@@ -37,36 +44,6 @@ NO_PREDICTION = "The prediction error cannot be had from these records:"
 INTERVALS = ("prediction", "covariance")
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
-BLOCKS = 20
-COMPARABLE = 1e-2
-"""Relative decrease of the sum of squares at which the fits that are compared end: laws differ by more."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One law in the comparison.
-
-    Attributes
-    ----------
-    law : str
-    parameters : int
-        Free ones.
-    held_out : mapping of str to float
-        Errors on data that were not fitted.
-    score : array
-        Mean squared misfit of each block of held-out data, over weights common to all laws.
-    start : mapping
-        The values fitted: where the output error of all data starts.
-    failure : str
-        Why it could not be fitted; empty otherwise.
-    """
-
-    law: str
-    parameters: int
-    held_out: Mapping[str, float]
-    score: Array
-    start: Mapping[str, Any]
-    failure: str = ""
 
 
 def identify_axis(
@@ -136,7 +113,9 @@ def identify_axis(
     candidates: list[Candidate] = []
     chosen, start = tried[0], values
     if len(tried) > 1:
-        candidates = compared(*held_out(trials, validation), axis, tried, inverse, options, progress)
+        candidates = judged_laws(
+            *held_out(trials, validation), axis, tried, inverse, options, intervals, progress
+        )
         place = chosen_of(candidates)
         chosen, start = tried[place], candidates[place].start
         notes = [*notes, sentence_on(candidates, chosen.name)]
@@ -155,6 +134,19 @@ def identify_axis(
         result, result.estimates, result.fit.correlation, inverse, validation, candidates, notes
     )
     return noted(found, narrow_note(result, ask=not lacking), *filter(None, [lacking]))
+
+
+def judged_laws(
+    fitted: Sequence[Trial], held: Sequence[Trial], axis: ServoAxis, laws: Sequence[Law],
+    inverse: InverseDynamics | None, options: Mapping[str, Any], intervals: str, progress: Callable[[str], None],
+) -> list[Candidate]:  # fmt: skip
+    """The laws judged as the chosen one will be fitted."""
+    if intervals == "prediction" and inverse is not None:
+        try:
+            return foreseen(fitted, held, axis, laws, inverse, options, progress)
+        except InputError:
+            pass  # It is said where the values cannot be had either.
+    return compared(fitted, held, axis, laws, inverse, options, progress)
 
 
 def predicted(
@@ -201,96 +193,6 @@ def first_look(
             f"{100 * found.relative_error:.2f} %."
         )
     return found, notes
-
-
-# ---- the choice among laws ------------------------------------------------------------------------------------
-
-
-def compared(
-    fitted: Sequence[Trial], held: Sequence[Trial], axis: ServoAxis, laws: Sequence[Law],
-    inverse: InverseDynamics | None, options: Mapping[str, Any], progress: Callable[[str], None] = silent,
-) -> list[Candidate]:  # fmt: skip
-    """Fit every law and look at what it says about the held-out data."""
-    out: list[Candidate] = []
-    weights: Mapping[str, float] | None = None
-    for number, law in enumerate(laws, 1):
-        progress(f"{law.name}: law {number} of {len(laws)}")
-        own = options_of(law, options, laws)
-        try:
-            result = fitted_axis(fitted, axis, law, inverse, tolerance=COMPARABLE, **own)
-        except InputError as error:
-            out.append(Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), {}, str(error)))
-            continue
-        weights = weights or result.problem.weights
-        misfits = result.misfits(held)
-        size = np.array([weights[s] for s in result.problem.signals])
-        squares = np.concatenate([np.sum((m / size) ** 2, axis=1) for m in misfits])
-        score = np.array([float(np.mean(part)) for part in np.array_split(squares, BLOCKS)])
-        out.append(
-            Candidate(
-                law.name,
-                result.problem.vector.size,
-                errors_of(held, result.problem.signals, misfits),
-                score,
-                fitted_values(result),
-            )
-        )
-    if all(c.failure for c in out):
-        raise InputError("; ".join(c.failure for c in out))
-    return out
-
-
-def options_of(law: Law, options: Mapping[str, Any], laws: Sequence[Law]) -> dict[str, Any]:
-    """The options without what belongs to another of the laws only: to name that is no mistake."""
-    own = {f.name for f in law.fields}
-    others = {f.name for x in laws for f in x.fields} - own
-
-    def meant(name: str) -> bool:
-        return name.partition("[")[0] not in others
-
-    values = {k: v for k, v in dict[str, Any](options["values"] or {}).items() if meant(k)}
-    return {
-        **options, "free": [*filter(meant, options["free"])], "frozen": [*filter(meant, options["frozen"])],
-        "values": values,
-    }  # fmt: skip
-
-
-def fitted_values(result: FittedAxis) -> dict[str, Any]:
-    """Every value of a fit, those of elements as lists."""
-    plain = {
-        k: v
-        for k, v in result.problem.vector.named(result.u).items()
-        if "[" not in k or k.startswith(("cos", "sin", "friction_"))
-    }
-    law = result.model.as_dict()
-    return plain | {f.name: law[f.name] for f in result.problem.law.fields}
-
-
-def chosen_of(candidates: Sequence[Candidate]) -> int:
-    """The simplest law within one standard error of the best."""
-    means = [float(np.mean(c.score)) for c in candidates]
-    best = int(np.nanargmin(means))
-    near = [best]
-    for i, c in enumerate(candidates):
-        if i == best or c.failure or not np.all(np.isfinite(c.score)):
-            continue
-        difference = c.score - candidates[best].score
-        error = float(np.std(difference, ddof=1)) / math.sqrt(difference.size)
-        if float(np.mean(difference)) <= error:
-            near.append(i)
-    return min(near, key=lambda i: (candidates[i].parameters, means[i]))
-
-
-def sentence_on(candidates: Sequence[Candidate], chosen: str) -> str:
-    """What the comparison showed."""
-    parts = [
-        f"{c.law} {'failed' if c.failure else f'{math.sqrt(float(np.mean(c.score))):.3g}'}"
-        for c in candidates
-    ]
-    return (
-        f"Law {chosen!r} is the simplest within one standard error of the lowest held-out misfit (in standard "
-        f"deviations: {', '.join(parts)})."
-    )
 
 
 # ---- the result ------------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
 
-__all__ = ["axis_prediction", "encoder_resolution"]
+__all__ = ["axis_prediction", "encoder_resolution", "motion_of", "searched", "watched"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -86,22 +86,29 @@ def axis_prediction(
         If a record has no drive signal, moves too little, the axis has backlash, or no simulation from the starting
         values succeeds.
     """
-    for t in trials:
-        if t.drive is None:
-            raise InputError(f"{t.name}: the drive's signal is missing; this method needs it")
-    given = dict(values or {})
-    if given.get("backlash", axis.backlash) > 0.0 or "backlash" in free:
-        raise InputError(
-            "its observer takes the measured velocity for the axis's own, which backlash forbids"
-        )
     start = first or inverse_dynamics(trials, axis)
-    band = min(BAND, *(0.1 / t.period for t in trials))
-    motions = [motion_of(t) for t in trials]
-    criterion, u = searched(trials, axis, law, motions, start, given, free, frozen, extras, band, seed)
+    motions, band = watched(trials, axis, values, free)
+    criterion, u = searched(
+        trials, axis, law, motions, start, dict(values or {}), free, frozen, extras, band, seed
+    )
     return prediction_error(
         motions, law, criterion.vector, criterion.mechanics, inertia=criterion.vector.named(u)["inertia"],
         friction=abs(start.coulomb), start=u, signed_scale=abs(start.coulomb), band=band, seed=seed,
     )  # fmt: skip
+
+
+def watched(
+    trials: Sequence[Trial], axis: ServoAxis, values: Mapping[str, Any] | None, free: Sequence[str]
+) -> tuple[list[Motion], float]:
+    """What the observer follows, and the Hz up to which its corrections count; refuses what it cannot follow."""
+    for t in trials:
+        if t.drive is None:
+            raise InputError(f"{t.name}: the drive's signal is missing; this method needs it")
+    if (values or {}).get("backlash", axis.backlash) > 0.0 or "backlash" in free:
+        raise InputError(
+            "its observer takes the measured velocity for the axis's own, which backlash forbids"
+        )
+    return [motion_of(t) for t in trials], min(BAND, *(0.1 / t.period for t in trials))
 
 
 def searched(
