@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import axis_cases as cases
@@ -278,3 +279,14 @@ def test_friction_that_rises_from_rest_is_no_stribeck_effect() -> None:
     assert "no Stribeck effect" in rising(named(0.9))[0]
     assert rising(named(0.97)) == []  # the intervals overlap
     assert rising(named(1.1)) == []
+
+
+def test_without_its_loop_a_record_still_tells_the_law() -> None:
+    """The output error of an open loop that drifts told no law from another, and the simplest was taken."""
+    trial = replace(cases.trial("stribeck", noise=5e-3, seconds=8.0), reference=None, loop=None)
+    found = identify_axis([trial], AXIS, ["coulomb", "stribeck"])
+    coulomb, stribeck = (float(np.mean(c.score)) for c in found.details["candidates"])
+    assert stribeck < 0.8 * coulomb
+    assert found.model is not None
+    assert found.model.law.name == "stribeck"
+    within(found, {"fs": 0.335, "fc": cases.FC})

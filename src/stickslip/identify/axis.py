@@ -111,15 +111,16 @@ def identify_axis(
     if inverse is None:
         require_start(trials, axis, tried, dict(values or {}), extras)
     candidates: list[Candidate] = []
-    chosen, start = tried[0], values
+    chosen = tried[0]
+    own = options_of(chosen, options, tried)
     if len(tried) > 1:
         candidates = judged_laws(
             *held_out(trials, validation), axis, tried, inverse, options, intervals, progress
         )
         place = chosen_of(candidates)
-        chosen, start = tried[place], candidates[place].start
+        chosen = tried[place]
+        own = dict(options_of(chosen, options, tried), values=candidates[place].start)
         notes = [*notes, sentence_on(candidates, chosen.name)]
-    own = options_of(chosen, options, tried)
     progress(f"{chosen.name}: all of the data")
     lacking = ""
     if intervals == "prediction":
@@ -127,9 +128,7 @@ def identify_axis(
             return predicted(trials, axis, chosen, inverse, own, validation, candidates, notes)
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."
-    result = output_error(
-        trials, axis, chosen, inverse, profiles=profiles, **dict[str, Any](own, values=start)
-    )
+    result = output_error(trials, axis, chosen, inverse, profiles=profiles, **own)
     found = assembled(
         result, result.estimates, result.fit.correlation, inverse, validation, candidates, notes
     )

@@ -73,7 +73,7 @@ def foreseen(
     Raises
     ------
     InputError
-        If a record has no drive signal, or no law could be fitted.
+        If a record has no drive signal, too little is held out, or no law could be fitted.
     """
     failures: dict[str, str] = {}
     found: dict[str, tuple[Criterion, Array]] = {}
@@ -94,6 +94,7 @@ def foreseen(
                 own["extras"],
                 band,
                 0,
+                hops=0,
             )
         except InputError as error:
             failures[law.name] = str(error)
@@ -115,6 +116,8 @@ def foreseen(
             for trial in held
             for record in [prepare(motion_of(trial), law, inertia, abs(inverse.coulomb), min(BAND, 0.1 / trial.period))]
         ])  # fmt: skip
+        if squares.size < BLOCKS:
+            raise InputError("the part held out is too short to judge laws on")
         score = np.array([float(np.mean(part)) for part in np.array_split(squares, BLOCKS)])
         parameters = feasible(law, criterion.vector.law_parameters(u))
         assert parameters is not None

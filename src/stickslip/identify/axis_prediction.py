@@ -86,8 +86,8 @@ def axis_prediction(
         If a record has no drive signal, moves too little, the axis has backlash, or no simulation from the starting
         values succeeds.
     """
-    start = first or inverse_dynamics(trials, axis)
     motions, band = watched(trials, axis, values, free)
+    start = first or inverse_dynamics(trials, axis)
     criterion, u = searched(
         trials, axis, law, motions, start, dict(values or {}), free, frozen, extras, band, seed
     )
@@ -114,6 +114,7 @@ def watched(
 def searched(
     trials: Sequence[Trial], axis: ServoAxis, law: Law, motions: Sequence[Motion], start: InverseDynamics,
     given: Mapping[str, Any], free: Sequence[str], frozen: Sequence[str], extras: Extras, band: float, seed: int,
+    hops: int = HOPS,
 ) -> tuple[Criterion, Array]:  # fmt: skip
     """The criterion of the best minimum met under the firm observer, and its coordinates."""
     tried: dict[float, Criterion] = {}
@@ -144,7 +145,7 @@ def searched(
     adapted = criterion.adapted(search.u)
     best = (*descended(adapted, search.u), adapted)
     rng = np.random.default_rng(seed)
-    for _ in range(HOPS):
+    for _ in range(hops):
         there = hop(adapted.vector, best[1], {f.name for f in law.fields}, rng)
         if math.isfinite(cost_of(adapted.residuals(there))):
             best = min(best, (*descended(adapted, there), adapted), key=lambda entry: entry[0])

@@ -37,6 +37,8 @@ TOLERATED = 3e-3
 """Part of friction that a wrong velocity may make it add."""
 LONGEST = 1e-3
 """Longest step of the simulation, s."""
+FEWEST = 32
+"""Corrections that a motion must leave."""
 EDGE = 0.15
 """s at both ends that filters spoil."""
 
@@ -135,7 +137,12 @@ def prepare(
     )  # fmt: skip
     low_pass = signal.butter(4, band, fs=1.0 / dt, output="sos")
     stride = max(1, int(1.0 / (3.0 * band * dt)))
-    return Prepared(Course(law, drive), low_pass, stride, max(1, int(EDGE / dt)))
+    edge = max(1, int(EDGE / dt))
+    if (motion.time.size - 2 * edge) // stride < FEWEST:
+        raise InputError(
+            f"{motion.time.size * dt:.3g} s are too short for a band of {band:g} Hz; give a longer record"
+        )
+    return Prepared(Course(law, drive), low_pass, stride, edge)
 
 
 def firmness(seen: SeenVelocity, firm: float, least: float, friction: float) -> Array:
