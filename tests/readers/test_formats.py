@@ -332,7 +332,7 @@ def test_files_that_are_none(tmp_path, content, said):
 def test_no_file_and_a_folder(tmp_path):
     with pytest.raises(InputError, match="check the path"):
         read(tmp_path / "none.csv")
-    with pytest.raises(InputError, match="in no format that is known"):
+    with pytest.raises(InputError, match="is a folder, and no ROS bag; give a file in it"):
         read(tmp_path)
 
 

@@ -222,6 +222,15 @@ def test_another_range_is_another_sweep(small, tmp_path):
     assert execute.run(wider, tmp_path)["timings"]["blocks_computed"] == 2
 
 
+def test_blocks_of_a_larger_sweep_are_not_taken_for_its_own(small, tmp_path):
+    few = replace(small, drawn=replace(small.drawn, cases=10))
+    execute.run(few, tmp_path)
+    part = next(tmp_path.rglob("part-000000.parquet"))
+    part.with_name("part-000001.parquet").write_bytes(part.read_bytes())  # of a sweep with more cases
+    with pytest.raises(InputError, match=r"holds 1 blocks .*part-000001.parquet: one with more cases"):
+        execute.run(few, tmp_path)
+
+
 @pytest.mark.slow
 def test_processes_give_the_same_numbers(small, undisturbed, tmp_path):
     execute.run(small, tmp_path, jobs=2, backend="processes")

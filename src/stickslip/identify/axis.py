@@ -42,6 +42,8 @@ AUTOMATIC = ("coulomb", "stribeck", "lugre")
 """Laws among which the held-out error chooses where none is named."""
 NO_PREDICTION = "The prediction error cannot be had from these records:"
 INTERVALS = ("prediction", "covariance")
+LOOP_OFF = 0.3
+"""Relative error of the simulated loop's drive signal from which on its gains are doubted."""
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
 
@@ -229,7 +231,17 @@ def noted(found: Identification, *more: str) -> Identification:
     last = (
         [f"Not identified: {', '.join(missing)}; their values are one choice among many."] if missing else []
     )
-    return replace(found, notes=(*found.notes, *more, *rising(found.estimates), *last))
+    return replace(found, notes=(*found.notes, *more, *strange_loop(found), *rising(found.estimates), *last))
+
+
+def strange_loop(found: Identification) -> list[str]:
+    """That the loop does not make the drive's signal that was recorded; nothing where it does, or there is none."""
+    off = found.misfit.get("drive_relative", 0.0)
+    if off <= LOOP_OFF:
+        return []
+    return [
+        f"The loop simulated makes a drive signal that is {off:.0%} off the recorded one: check its gains and limit."
+    ]
 
 
 def rising(estimates: Sequence[Estimate]) -> list[str]:

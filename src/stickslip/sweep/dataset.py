@@ -91,6 +91,23 @@ def clear_drafts(folder: Path) -> None:
         draft.unlink(missing_ok=True)
 
 
+def refuse_strays(folder: Path, sweep: Sweep) -> None:
+    """Refuse a folder with blocks that this sweep does not have: they would be read as its results.
+
+    Raises
+    ------
+    InputError
+    """
+    own = {block_path(folder, sweep, *b) for b in sweep.blocks}
+    strays = sorted(set((folder / "data").rglob("part-*.parquet")) - own)
+    if strays:
+        raise InputError(
+            f"{folder} holds {len(strays)} blocks that this sweep does not have, such as "
+            f"{strays[0].relative_to(folder)}: one with more cases or other runs was written there; choose another "
+            "place with --out, or delete it"
+        )
+
+
 def room_for(folder: Path, sweep: Sweep) -> None:
     """Refuse a sweep whose data set the disk has no room for.
 

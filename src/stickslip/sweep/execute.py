@@ -73,6 +73,7 @@ def run(
         raise InputError(f"jobs = {jobs} must be at least 1")
     ready(sweep, scheduler)
     folder = claim(Path(out), sweep)
+    dataset.refuse_strays(folder, sweep)
     dataset.room_for(folder, sweep)
     integrators = [integrator_of(sweep, i) for i in range(len(sweep.runs))]
     if say:
