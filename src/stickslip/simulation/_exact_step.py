@@ -81,9 +81,10 @@ from stickslip.simulation._exact_stretch import (
 )
 
 NOT_CONVERGED = 1e9
-UNCHANGED, FINEST_CHANGE, ROUNDING = 0.01, 1e-14, 4e-16
+UNCHANGED, FINEST_CHANGE, ROUNDING, STALLED = 0.01, 1e-14, 4e-16, 1e-13
 """The corrector ends at a change in position below the largest of: parts of the tolerance, 1e-14 rad, parts of the
-particular solution. What it leaves must be less than `stickslip.simulation.accuracy` makes steps wrong by."""
+particular solution. What it leaves must be less than `stickslip.simulation.accuracy` makes steps wrong by; where
+rounding keeps it from that, 1e-13 rad will do."""
 WIDEST = 1.0
 """Change of velocity over half a stretch, in parts of v_s, above which s(v) is not resolved near v = 0."""
 CALM_SHARE = 0.2
@@ -325,6 +326,8 @@ def correct(
             change = max(abs(theta_end - theta_before), 1e-3 * abs(v_end - v_before))
             # A particular solution that is huge leaves rounding errors behind.
             if change < max(UNCHANGED * tol, FINEST_CHANGE, ROUNDING * abs(c[0])):
+                break
+            if rounds == MOST_ROUNDS and change < STALLED:
                 break
             if rounds == MOST_ROUNDS or not change < 1e300:
                 return NOT_CONVERGED
