@@ -199,7 +199,7 @@ def test_intervals_of_the_prediction_error_hold_the_truth() -> None:
         identify_axis([trial], AXIS, ["coulomb"], intervals="guess")
 
 
-def within(found: Identification, truth: dict[str, float]) -> None:
+def assert_recovered(found: Identification, truth: dict[str, float]) -> None:
     """Identified, and the truth inside the 99 % interval (2.58 standard deviations; 1.96 make the 95 % one)."""
     for name, value in truth.items():
         e = found[name]
@@ -214,7 +214,7 @@ def test_torque_and_friction_over_the_position_are_recovered(seed: int) -> None:
     trial = cases.trial("coulomb", seed, noise=5e-3, harmonics=known)
     extras = Extras(harmonics=1, friction_harmonics=1, harmonic_period=0.5)
     found = identify_axis([trial], AXIS, ["coulomb"], extras=extras, intervals="prediction")
-    within(
+    assert_recovered(
         found,
         {"cos[0]": 0.03, "sin[0]": -0.02, "friction_cos[0]": 0.1, "friction_sin[0]": 0.06, "fc": cases.FC},
     )
@@ -230,7 +230,7 @@ def test_friction_that_grows_with_the_load_is_recovered(seed: int) -> None:
         [trial], axis, ["coulomb"], extras=Extras(load=True), frozen=["offset"], values={"offset": 0.0},
         intervals="prediction",
     )  # fmt: skip
-    within(found, {"load_motor": 0.8, "load_external": 1.5, "gravity": 0.25, "fc": cases.FC})
+    assert_recovered(found, {"load_motor": 0.8, "load_external": 1.5, "gravity": 0.25, "fc": cases.FC})
 
 
 def test_under_a_constant_torque_load_is_not_told_from_friction_unless_the_drive_brakes() -> None:
@@ -251,12 +251,14 @@ def test_load_is_told_from_friction_where_the_drive_brakes() -> None:
     trial = braking_trial(load_motor=0.8)
     assert np.mean(trial.signal()[1:] * np.diff(trial.position) < 0.0) > 0.1
     found = identify_axis([trial], AXIS, ["coulomb"], extras=Extras(load=True))
-    within(found, {"load_motor": 0.8, "fc": cases.FC, "inertia": 1.6e-3})
+    assert_recovered(found, {"load_motor": 0.8, "fc": cases.FC, "inertia": 1.6e-3})
     assert not found["load_external"].identified  # there is none
     heavy = identify_axis(
         [braking_trial(load_motor=0.8, load_external=0.8)], AXIS, ["coulomb"], extras=Extras(load=True)
     )
-    within(heavy, {"load_motor": 0.8, "load_external": 0.8, "fc": cases.FC, "inertia": 1.6e-3, "offset": 0.1})
+    assert_recovered(
+        heavy, {"load_motor": 0.8, "load_external": 0.8, "fc": cases.FC, "inertia": 1.6e-3, "offset": 0.1}
+    )
 
 
 def braking_trial(**mechanics: float) -> Trial:
@@ -289,7 +291,7 @@ def test_without_its_loop_a_record_still_tells_the_law() -> None:
     assert stribeck < 0.8 * coulomb
     assert found.model is not None
     assert found.model.law.name == "stribeck"
-    within(found, {"fs": 0.335, "fc": cases.FC})
+    assert_recovered(found, {"fs": 0.335, "fc": cases.FC})
 
 
 def test_gains_that_do_not_make_the_recorded_signal_are_doubted() -> None:

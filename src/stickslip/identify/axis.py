@@ -1,7 +1,9 @@
 """A whole axis from any record: inertia, gravity or offset, and friction jointly.
 
-First the inverse dynamics (`stickslip.identify.axis_inverse`), then the output error of the simulated axis for one law
-or for several, among which the error on held-out data chooses (`stickslip.identify.axis_output`).
+First the inverse dynamics (`stickslip.identify.axis_inverse`). Of several laws the error on held-out data chooses
+(`stickslip.identify.axis_choice`). Values and intervals are the prediction error's
+(`stickslip.identify.axis_prediction`) or, where records lack the drive's signal, the output error's
+(`stickslip.identify.axis_output`).
 """
 
 from __future__ import annotations
@@ -64,7 +66,7 @@ def identify_axis(
     intervals: str = "prediction",
     progress: Callable[[str], None] = silent,
 ) -> Identification:
-    """Identify an axis: by output error, which law; by prediction error, its values and how sure they are.
+    """Identify an axis: which law it has, its values, and how sure they are.
 
     Parameters
     ----------
@@ -80,8 +82,7 @@ def identify_axis(
     free, frozen, values, extras
         As in `stickslip.identify.axis_output.output_error`.
     robust, profiles
-        As there, for the output error alone: the comparison of laws and the covariance's intervals. The prediction
-        error weighs outliers anyway.
+        As there, for the output error alone; the prediction error weighs outliers anyway.
     per_direction : bool
         Whether the inverse dynamics reported beside it has friction of its own for each direction.
     intervals : {"prediction", "covariance"}
@@ -116,13 +117,13 @@ def identify_axis(
     chosen = tried[0]
     own = options_of(chosen, options, tried)
     if len(tried) > 1:
-        candidates = judged_laws(
+        candidates, by = judged_laws(
             *held_out(trials, validation), axis, tried, inverse, options, intervals, progress
         )
         place = chosen_of(candidates)
         chosen = tried[place]
         own = dict(options_of(chosen, options, tried), values=candidates[place].start)
-        notes = [*notes, sentence_on(candidates, chosen.name)]
+        notes = [*notes, sentence_on(candidates, chosen.name), *by]
     progress(f"{chosen.name}: all of the data")
     lacking = ""
     if intervals == "prediction":
@@ -140,14 +141,17 @@ def identify_axis(
 def judged_laws(
     fitted: Sequence[Trial], held: Sequence[Trial], axis: ServoAxis, laws: Sequence[Law],
     inverse: InverseDynamics | None, options: Mapping[str, Any], intervals: str, progress: Callable[[str], None],
-) -> list[Candidate]:  # fmt: skip
-    """The laws judged as the chosen one will be fitted."""
+) -> tuple[list[Candidate], list[str]]:  # fmt: skip
+    """The laws judged as the chosen one will be fitted; and what is to be said where that could not be."""
+    said: list[str] = []
     if intervals == "prediction" and inverse is not None:
         try:
-            return foreseen(fitted, held, axis, laws, inverse, options, progress)
-        except InputError:
-            pass  # It is said where the values cannot be had either.
-    return compared(fitted, held, axis, laws, inverse, options, progress)
+            return foreseen(fitted, held, axis, laws, inverse, options, progress), said
+        except InputError as error:
+            said.append(
+                f"Laws were compared by the output error of the simulation, not the prediction error: {error}."
+            )
+    return compared(fitted, held, axis, laws, inverse, options, progress), said
 
 
 def predicted(

@@ -70,6 +70,19 @@ def foreseen(
 ) -> list[Candidate]:  # fmt: skip
     """Fit every law by the prediction error and look at the torque that it lacks on the held-out data.
 
+    Parameters
+    ----------
+    fitted, held : sequence of Trial
+        With the drive's signal; of those held out only the rows that count are judged.
+    axis : ServoAxis
+    laws : sequence of Law
+    inverse : InverseDynamics
+        Where the searches start.
+    options : mapping
+        ``free``, ``frozen``, ``values`` and ``extras`` of `stickslip.identify.axis_prediction.axis_prediction`.
+    progress : callable
+        Is told which law begins.
+
     Raises
     ------
     InputError
@@ -80,60 +93,54 @@ def foreseen(
     for number, law in enumerate(laws, 1):
         progress(f"{law.name}: law {number} of {len(laws)}")
         own = options_of(law, options, laws)
-        motions, band = watched(fitted, axis, own["values"], own["free"])
+        values, free = own["values"], own["free"]
+        motions, band = watched(fitted, axis, values, free)
         try:
             found[law.name] = searched(
-                fitted,
-                axis,
-                law,
-                motions,
-                inverse,
-                own["values"],
-                own["free"],
-                own["frozen"],
-                own["extras"],
-                band,
-                0,
-                hops=0,
-            )
+                fitted, axis, law, motions, inverse, values, free, own["frozen"], own["extras"], band, seed=0, hops=0
+            )  # fmt: skip
         except InputError as error:
             failures[law.name] = str(error)
     if not found:
         raise InputError("; ".join(failures.values()))
     # Weighed for all as by the law that lacks least where it was fitted.
     criterion, u = min(found.values(), key=lambda f: robust_std(replace(f[0], whitening=FIRST).white(f[1])))
-    scale = criterion.adapted(u)
-    out: list[Candidate] = []
-    for law in laws:
-        if law.name in failures:
-            out.append(Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), {}, failures[law.name]))
-            continue
-        criterion, u = found[law.name]
-        inertia = criterion.vector.named(u)["inertia"]
-        squares = np.concatenate([
-            lacking(replace(scale, records=[record], law=law, vector=criterion.vector, mechanics=criterion.mechanics),
-                    u, trial)
-            for trial in held
-            for record in [prepare(motion_of(trial), law, inertia, abs(inverse.coulomb), min(BAND, 0.1 / trial.period))]
-        ])  # fmt: skip
-        if squares.size < BLOCKS:
-            raise InputError("the part held out is too short to judge laws on")
-        score = np.array([float(np.mean(part)) for part in np.array_split(squares, BLOCKS)])
-        parameters = feasible(law, criterion.vector.law_parameters(u))
-        assert parameters is not None
-        start = values_of(criterion.vector, u, Model(law, **parameters._asdict()))
-        out.append(Candidate(law.name, criterion.vector.size, {}, score, start))
-    return out
+    weights = criterion.adapted(u)
+    return [
+        foreseen_by(law, *found[law.name], weights, held, abs(inverse.coulomb)) if law.name in found
+        else failed(law, failures[law.name])
+        for law in laws
+    ]  # fmt: skip
 
 
-def lacking(criterion: Criterion, u: Array, trial: Trial) -> Array:
-    """Squares of the corrections of one trial in scales, outliers weighed, in its own rows."""
-    record: Prepared = criterion.records[0]
-    time = record.course.drive.time[record.edge : -record.edge : record.stride][
-        criterion.whitening.size - 1 :
-    ]
-    used = np.interp(time, trial.time, trial.rows.astype(np.float64)) > 0.5
-    return criterion.residuals(u)[used] ** 2
+def foreseen_by(
+    law: Law, criterion: Criterion, u: Array, weights: Criterion, held: Sequence[Trial], friction: float
+) -> Candidate:
+    """What one law, fitted, lacks on the held-out data, with the weights common to all."""
+    inertia = criterion.vector.named(u)["inertia"]
+    own = replace(weights, law=law, vector=criterion.vector, mechanics=criterion.mechanics)
+    squares = np.concatenate([
+        lacking(own, prepare(motion_of(t), law, inertia, friction, min(BAND, 0.1 / t.period)), u, t) for t in held
+    ])  # fmt: skip
+    if squares.size < BLOCKS:
+        raise InputError("the part held out is too short to judge laws on")
+    score = np.array([float(np.mean(part)) for part in np.array_split(squares, BLOCKS)])
+    parameters = feasible(law, criterion.vector.law_parameters(u))
+    assert parameters is not None
+    start = values_of(criterion.vector, u, Model(law, **parameters._asdict()))
+    return Candidate(law.name, criterion.vector.size, {}, score, start)
+
+
+def failed(law: Law, why: str) -> Candidate:
+    """A law that could not be fitted."""
+    return Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), {}, why)
+
+
+def lacking(criterion: Criterion, record: Prepared, u: Array, trial: Trial) -> Array:
+    """Squares of the corrections of one trial in scales, outliers weighed, in the rows that count."""
+    time = record.course.drive.time[record.edge : -record.edge : record.stride]
+    used = np.interp(time[criterion.whitening.size - 1 :], trial.time, trial.rows.astype(np.float64)) > 0.5
+    return replace(criterion, records=[record]).residuals(u)[used] ** 2
 
 
 def compared(
@@ -149,7 +156,7 @@ def compared(
         try:
             result = fitted_axis(fitted, axis, law, inverse, tolerance=COMPARABLE, **own)
         except InputError as error:
-            out.append(Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), {}, str(error)))
+            out.append(failed(law, str(error)))
             continue
         weights = weights or result.problem.weights
         misfits = result.misfits(held)
