@@ -186,3 +186,36 @@ def test_a_deadband_takes_single_counts_for_rest() -> None:
 def test_what_cannot_be_is_refused(make, message) -> None:
     with pytest.raises(ParameterError, match=message):
         make(Model("coulomb", fc=0.3, sigma2=0.0))
+
+
+def test_the_linear_controller_alone_is_judged_first_and_its_ringing_is_no_feedforwards(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With 4,096 counts the PD of 20 Hz chatters about every count: any number of axes then gives the same advice."""
+    monkeypatch.setattr(recommending, "GAINS", (1.0,))
+    monkeypatch.setattr(recommending, "LEADS", (0.0,))
+    drive = Drive(20.0, encoder_counts=4096.0, torque_limit=3.0)
+    few, many = (recommend(identified(0.03), drive, axes=n, confirm=6) for n in (0, 3))
+    assert "at rest on 4 of 4 axes: a count of the encoder makes it push 0.15 N·m" in many.rings
+    assert "lower the bandwidth" in many.rings
+    for advice in (few, many):
+        fed = [c for c in advice.candidates if c.setting.kind == "feedforward"]
+        assert not any("limit cycle at rest" in why for c in fed for why in c.unsafe)
+        assert advice.chosen
+        assert advice.chosen.setting.kind == "feedforward"
+        low, high = advice.reduction
+        assert low <= 1.0 - advice.chosen.errors[0] <= high
+    assert max(few.reduction[0], many.reduction[0]) <= min(few.reduction[1], many.reduction[1])
+
+
+@pytest.mark.parametrize(
+    ("bandwidth", "counts", "where"), [(20.0, 65536.0, ""), (2.0, 4096.0, ""), (20.0, 4096.0, "at rest")]
+)
+def test_a_linear_controller_rings_alone_where_a_count_is_too_coarse_for_it(
+    bandwidth: float, counts: float, where: str
+) -> None:
+    drive = Drive(bandwidth, encoder_counts=counts, torque_limit=3.0)
+    gains = place("PD", INERTIA, bandwidth, drive.damping)
+    linear = Controller(gains, None, 3.0, drive.sample_time, counts)
+    bench = recommending.Bench([RigidAxis(INERTIA, Model("stribeck", **TRUE))], linear, drive, {})
+    assert bench.ringing() == ({0: where} if where else {})

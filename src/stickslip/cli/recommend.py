@@ -94,6 +94,8 @@ def show(result: Recommendation, unit: Callable[[str], str]) -> None:
     print()
     print(f"linear controller: kp {result.gains['kp']:.5g}, kd {result.gains['kd']:.5g}; RMS error alone "
           f"{result.linear_error:.3g} {unit('rad')}")  # fmt: skip
+    if result.rings:
+        print(f"it rings alone:    {result.rings}")
     c = result.chosen
     if c and result.model:
         print(

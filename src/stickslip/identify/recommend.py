@@ -3,7 +3,8 @@
 A compensator that gives more than the friction there is pushes the axis: around rest it limit-cycles (thesis 3.2.3).
 The true friction is unknown but for the model's intervals, so every candidate (law, feedforward or feedback, gain,
 deadband) is run on axes drawn from them, sampled, counted, held and limited as in the drive. The best is then run on
-other axes, with a tenth more gain too: what it does there, not where it was picked, is what to expect of it.
+other axes, with a tenth more gain too: what it does there, not where it was picked, is what to expect of it. The linear
+controller alone is judged first: what rings without a compensator is not the compensator's.
 """
 
 from __future__ import annotations
@@ -15,14 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError
 from stickslip.identify.draws import draw_models, sliding_torque
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.setting_trial import Drive, Trial, dangers, run
+from stickslip.identify.setting_bench import Bench, Candidate, Setting, on_both, rings_alone
+from stickslip.identify.setting_trial import Drive
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 
@@ -37,77 +37,12 @@ LEADS = (0.0, 0.5, 1.0, 2.0)
 """In sample times."""
 DEADBAND = 1.5
 """In counts per sample time: a single count, which an axis at rest may give, is then rest."""
-KINDS = {"feedforward": Feedforward, "feedback": Feedback}
 WORTH = 0.95
 """A compensator that leaves more than this part of the error is not worth its risk."""
 NEAR = 1.1
 """Errors within this factor of the best are alike; the lower gain is then taken."""
 ALIKE = 1.02
 """The same for leads: the shorter one is taken."""
-
-
-@dataclass(frozen=True)
-class Setting:
-    """What is switched on: a law with its numbers.
-
-    Attributes
-    ----------
-    law, kind : str
-        ``kind`` is "feedforward" or "feedback".
-    gain : float
-    lead : float
-        s, by which a feedforward looks ahead of the reference.
-    deadband : float
-        rad/s, velocities below which a feedback's law sees rest.
-    """
-
-    law: str
-    kind: str
-    gain: float
-    lead: float = 0.0
-    deadband: float = 0.0
-
-    def on(self, linear: Controller, model: Model) -> Controller:
-        """The linear controller with this compensator."""
-        helper = KINDS[self.kind](model, self.gain, lead=self.lead, deadband=self.deadband)
-        return replace(linear, compensator=helper)
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One setting and what it did on every axis.
-
-    Attributes
-    ----------
-    setting : Setting
-    errors : tuple of float
-        RMS position error along the sinusoid over that of the linear controller alone, one per axis; the best
-        estimate first. The first axis on which it is not safe is the last.
-    unsafe : tuple of str
-        Why it is not safe to switch on; empty where it is.
-    useless : str
-        Why it is not worth it where it is safe; empty where that is not known.
-    """
-
-    setting: Setting
-    errors: tuple[float, ...]
-    unsafe: tuple[str, ...]
-    useless: str = ""
-
-    @property
-    def refused(self) -> tuple[str, ...]:
-        """Why it is not to be switched on; empty where it may be."""
-        return (*self.unsafe, *([self.useless] if self.useless else []))
-
-    @property
-    def worst(self) -> float:
-        """The greatest remaining part of the error."""
-        return max(self.errors)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return {**asdict(self.setting), "errors": list(self.errors), "unsafe": list(self.unsafe),
-                "useless": self.useless}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +65,8 @@ class Recommendation:
     axes : int
         On how many the candidates were simulated, the best estimate among them.
     notes : tuple of str
+    rings : str
+        Where the linear controller rings alone, why, and what to change; empty where it does not.
     """
 
     chosen: Candidate | None
@@ -141,17 +78,19 @@ class Recommendation:
     axes: int
     notes: tuple[str, ...] = ()
     drive: Drive = field(default_factory=Drive)
+    rings: str = ""
 
     @property
     def reduction(self) -> tuple[float, float]:
-        """Least and greatest part of the error that is taken away, over the axes that the setting was not picked on.
+        """Least and greatest part of the error that is taken away, over the axes that the setting was not picked on and
+        the best estimate.
 
-        Of n drawn axes they hold the reduction on another one with a probability of (n - 1)/(n + 1): 95 % for 39.
+        Of n drawn axes they hold the reduction on another one with a probability of (n - 1)/(n + 1), 95 % for 39, or a
+        little more: the best estimate may widen them.
         """
         if self.chosen is None:
             return 0.0, 0.0
-        drawn = self.chosen.errors[1:] or self.chosen.errors
-        return 1.0 - max(drawn), 1.0 - min(drawn)
+        return 1.0 - max(self.chosen.errors), 1.0 - min(self.chosen.errors)
 
     @property
     def confirmed_on(self) -> int:
@@ -172,38 +111,9 @@ class Recommendation:
             "linear_error_rms": self.linear_error, "margin": self.margin,
             "reduction": list(self.reduction) if self.chosen else None, "reduction_confidence": self.confidence,
             "axes": self.axes, "axes_confirmed": self.confirmed_on, "notes": list(self.notes),
-            "drive": asdict(self.drive), "candidates": [c.as_dict() for c in self.candidates],
+            "linear_alone_rings": self.rings, "drive": asdict(self.drive),
+            "candidates": [c.as_dict() for c in self.candidates],
         }  # fmt: skip
-
-
-class Bench:
-    """Axes, each with what the linear controller alone does on it, and the laws that may be switched on."""
-
-    def __init__(
-        self, plants: Sequence[RigidAxis], linear: Controller, drive: Drive, laws: dict[str, Model]
-    ) -> None:
-        self.plants, self.linear, self.drive, self.laws = plants, linear, drive, laws
-        self.alone: list[Trial | str] = []
-
-    def before(self, i: int) -> Trial | str:
-        """The linear controller alone on axis i."""
-        while len(self.alone) <= i:
-            self.alone.append(run(self.plants[len(self.alone)], self.linear, self.drive))
-        return self.alone[i]
-
-    def judged(self, setting: Setting) -> Candidate:
-        """The setting on every axis, up to the first on which it is not safe."""
-        controller = setting.on(self.linear, self.laws[setting.law])
-        errors: list[float] = []
-        for i, plant in enumerate(self.plants):
-            before, after = self.before(i), run(plant, controller, self.drive)
-            if isinstance(after, str) or isinstance(before, str):
-                why = after if isinstance(after, str) else "the linear controller alone fails"
-                return Candidate(setting, (*errors, math.inf), (why,))
-            errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
-            if unsafe := tuple(dangers(before, after, self.drive)):
-                return Candidate(setting, tuple(errors), unsafe)
-        return Candidate(setting, tuple(errors), ())
 
 
 def recommend(
@@ -253,6 +163,7 @@ def recommend(
     others = Bench(list(plants_of(found, float(j), confirm, seed + 1)), linear, drive, laws)
     if isinstance(first := bench.before(0), str):
         raise InputError(f"the linear controller alone: {first}")
+    rung = rings_alone(bench, float(j), found.unit("N·m"))
     settings = list(settings_of(laws, drive))
     total = len(settings) + len(BEYOND) + len(others.plants) // max(1, len(bench.plants))
     candidates: list[Candidate] = []
@@ -264,14 +175,14 @@ def recommend(
     candidates = [rejected.get(c.setting, c) for c in candidates]
     margin = math.inf
     if chosen:
-        beyond = [bench.judged(replace(chosen.setting, gain=gain)) for gain in BEYOND]
+        beyond = [on_both(replace(chosen.setting, gain=gain), bench, others) for gain in BEYOND]
         candidates += beyond
         margin = margin_of(chosen.setting, [*unsafe, *(c.setting for c in beyond if c.unsafe)])
     progress(total, total)
     return Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, dict(linear.gains._asdict()),
         first.moving["position_rms_rad"], margin, tuple(candidates), len(bench.plants),
-        tuple(notes_on(found, chosen, candidates)), drive,
+        tuple(notes_on(found, chosen, candidates)), drive, rung,
     )  # fmt: skip
 
 
@@ -337,19 +248,31 @@ def confirmed(
     rejected: dict[Setting, Candidate] = {}
     unsafe: list[Setting] = []
     while best := best_of([c for c in candidates if c.setting not in rejected]):
-        led = with_lead(best, bench)
-        more = bench.judged(replace(led.setting, gain=GUARD * led.setting.gain))
-        final = others.judged(led.setting) if not more.unsafe else more
-        if not final.unsafe and final.worst <= WORTH:
+        final, where = insisted(with_lead(best, bench).setting, bench, others)
+        if not final.refused:
             return final, rejected, unsafe
-        where = f" with {GUARD:g} times the gain" if more.unsafe else " on an axis drawn later"
         if final.unsafe:
             unsafe.append(final.setting)
-            last = replace(best, unsafe=tuple(w + where for w in final.unsafe))
-        else:
-            last = replace(best, useless=f"hardly less error{where}")
-        rejected[best.setting] = last
+        rejected[best.setting] = replace(
+            best, unsafe=tuple(w + where for w in final.unsafe), useless=final.useless
+        )
     return None, rejected, unsafe
+
+
+def insisted(setting: Setting, bench: Bench, others: Bench) -> tuple[Candidate, str]:
+    """The setting on other axes; or what is not safe, and where: that, or more of its gain here or there."""
+    guarded, later = f" with {GUARD:g} times the gain", " on an axis drawn later"
+    more = replace(setting, gain=GUARD * setting.gain)
+    if (trial := bench.judged(more)).unsafe:
+        return trial, guarded
+    final = others.judged(setting)
+    if final.unsafe:
+        return final, later
+    if final.worst > WORTH:
+        return replace(final, useless=f"hardly less error{later}"), ""
+    if (trial := others.judged(more)).unsafe:
+        return trial, guarded + later
+    return final, ""
 
 
 def with_lead(candidate: Candidate, bench: Bench) -> Candidate:

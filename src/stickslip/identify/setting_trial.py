@@ -1,4 +1,5 @@
-"""One setting of a compensator on one axis: along a slow sinusoid, and to a stop, as a drive runs it."""
+"""One setting of a compensator on one axis: along a slow sinusoid, and to a stop, as a drive runs it; and the linear
+controller alone, which may ring by itself: a count of the encoder looks like kd count / sample time of speed."""
 
 from __future__ import annotations
 
@@ -12,12 +13,18 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.simulation.closed_loop import simulate
 
-__all__ = ["Drive", "Trial", "dangers", "run"]
+__all__ = ["AT_REST", "Drive", "Trial", "dangers", "rings", "run"]
+
+AT_REST = "limit cycle at rest"
 
 BUSY = 1.0
 """Reversals per second beyond those of the linear controller alone from which an axis hunts."""
 LIVELIER, ROUGH = 3.0, 0.1
 """Rough is a velocity above 50 Hz beyond so many times the linear controller's and this part of the reference's RMS."""
+STARTS = (0.45, 1.4)
+"""Counts from which the linear controller goes to rest half way between two counts, where a creeping axis ends up."""
+HELD = 2.0
+"""s, of which the second half is judged."""
 
 
 @dataclass(frozen=True)
@@ -89,10 +96,31 @@ def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
     return Trial(*out)
 
 
+def rings(plant: RigidAxis, linear: Controller, drive: Drive, alone: Trial | str) -> str:
+    """Where the linear controller alone rings on an axis, "at rest" or "in motion"; empty where it is calm.
+
+    `alone` is its trial. Besides, it holds a position between two counts, from near it: whether it happens to stop
+    there after a way is luck, and a compensator that leaves less error brings it there.
+    """
+    if isinstance(alone, str) or alone.stopping["second_half_reversals_per_s"] > BUSY:
+        return "at rest"
+    count = drive.deadband(1.0) * drive.sample_time
+    middle = Reference("step", amplitude=0.5 * count)
+    try:
+        for start in STARTS if count > 0.0 else ():
+            held = simulate(plant, linear, middle, HELD, time_step=min(5e-4, drive.sample_time), output=0.1,
+                            initial=(start * count, 0.0))  # fmt: skip
+            if held.meta["metrics"]["second_half_reversals_per_s"] > BUSY:
+                return "at rest"
+    except SimulationError:
+        return "at rest"
+    return "in motion" if alone.moving["reversals_beyond_reference_per_s"] > BUSY else ""
+
+
 def dangers(before: Trial, after: Trial, drive: Drive) -> Iterator[str]:
     """What a compensator makes worse than the linear controller alone."""
     if after.stopping["second_half_reversals_per_s"] > before.stopping["second_half_reversals_per_s"] + BUSY:
-        yield "limit cycle at rest"
+        yield AT_REST
     name = "reversals_beyond_reference_per_s"
     if after.moving[name] > max(before.moving[name], 0.0) + BUSY:
         yield "oscillates in motion"

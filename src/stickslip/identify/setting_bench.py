@@ -1,0 +1,155 @@
+"""Settings of a compensator on a bench of axes, judged against what the linear controller alone does there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.controller import Controller
+from stickslip.control.linear import place
+from stickslip.identify.setting_trial import AT_REST, Drive, Trial, dangers, rings, run
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model
+
+__all__ = ["Bench", "Candidate", "Setting", "on_both", "rings_alone"]
+
+KINDS = {"feedforward": Feedforward, "feedback": Feedback}
+SLOWER = (0.7, 0.5, 0.35, 0.25, 0.1)
+"""Of the bandwidth: where a linear controller that rings alone is tried for one that is calm."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is switched on: a law with its numbers.
+
+    Attributes
+    ----------
+    law, kind : str
+        ``kind`` is "feedforward" or "feedback".
+    gain : float
+    lead : float
+        s, by which a feedforward looks ahead of the reference.
+    deadband : float
+        rad/s, velocities below which a feedback's law sees rest.
+    """
+
+    law: str
+    kind: str
+    gain: float
+    lead: float = 0.0
+    deadband: float = 0.0
+
+    def on(self, linear: Controller, model: Model) -> Controller:
+        """The linear controller with this compensator."""
+        helper = KINDS[self.kind](model, self.gain, lead=self.lead, deadband=self.deadband)
+        return replace(linear, compensator=helper)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One setting and what it did on every axis.
+
+    Attributes
+    ----------
+    setting : Setting
+    errors : tuple of float
+        RMS position error along the sinusoid over that of the linear controller alone, one per axis; the best
+        estimate first. The first axis on which it is not safe is the last.
+    unsafe : tuple of str
+        Why it is not safe to switch on; empty where it is.
+    useless : str
+        Why it is not worth it where it is safe; empty where that is not known.
+    """
+
+    setting: Setting
+    errors: tuple[float, ...]
+    unsafe: tuple[str, ...]
+    useless: str = ""
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        """Why it is not to be switched on; empty where it may be."""
+        return (*self.unsafe, *([self.useless] if self.useless else []))
+
+    @property
+    def worst(self) -> float:
+        """The greatest remaining part of the error."""
+        return max(self.errors)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {**asdict(self.setting), "errors": list(self.errors), "unsafe": list(self.unsafe),
+                "useless": self.useless}  # fmt: skip
+
+
+class Bench:
+    """Axes, each with what the linear controller alone does on it, and the laws that may be switched on."""
+
+    def __init__(
+        self, plants: Sequence[RigidAxis], linear: Controller, drive: Drive, laws: dict[str, Model]
+    ) -> None:
+        self.plants, self.linear, self.drive, self.laws = plants, linear, drive, laws
+        self.alone: list[Trial | str] = []
+
+    def before(self, i: int) -> Trial | str:
+        """The linear controller alone on axis i."""
+        while len(self.alone) <= i:
+            self.alone.append(run(self.plants[len(self.alone)], self.linear, self.drive))
+        return self.alone[i]
+
+    def ringing(self) -> dict[int, str]:
+        """The axes on which the linear controller alone rings, and where."""
+        found = {i: rings(p, self.linear, self.drive, self.before(i)) for i, p in enumerate(self.plants)}
+        return {i: where for i, where in found.items() if where}
+
+    def judged(self, setting: Setting) -> Candidate:
+        """The setting on every axis, up to the first on which it is not safe.
+
+        At rest a feedforward's torque is constant, so that what rings there is the linear controller alone.
+        """
+        controller = setting.on(self.linear, self.laws[setting.law])
+        errors: list[float] = []
+        for i, plant in enumerate(self.plants):
+            before, after = self.before(i), run(plant, controller, self.drive)
+            if isinstance(after, str) or isinstance(before, str):
+                why = after if isinstance(after, str) else "the linear controller alone fails"
+                return Candidate(setting, (*errors, math.inf), (why,))
+            errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
+            found = dangers(before, after, self.drive)
+            if unsafe := tuple(d for d in found if not (setting.kind == "feedforward" and d == AT_REST)):
+                return Candidate(setting, tuple(errors), unsafe)
+        return Candidate(setting, tuple(errors), ())
+
+
+def on_both(setting: Setting, bench: Bench, others: Bench) -> Candidate:
+    """The setting on the bench; if it is safe there but not on the other axes, that is why it is not safe."""
+    here = bench.judged(setting)
+    there = here if here.unsafe else others.judged(setting)
+    return replace(here, unsafe=there.unsafe)
+
+
+def rings_alone(bench: Bench, inertia: float, torque: str) -> str:
+    """Where the linear controller alone rings, and at which bandwidth it does not; empty where it is calm."""
+    ringing = bench.ringing()
+    if not ringing:
+        return ""
+    drive = bench.drive
+    where = " and ".join(sorted(set(ringing.values())))
+    on = f"on {len(ringing)} of {len(bench.plants)} axes" if len(bench.plants) > 1 else "on the best estimate"
+    kick = bench.linear.gains.kd * drive.deadband(1.0)
+    why = f": a count of the encoder makes it push {kick:.2g} {torque} for a sample" if kick else ""
+    plants = [bench.plants[i] for i in ringing]
+    for share in SLOWER:
+        slower = replace(drive, bandwidth=share * drive.bandwidth)
+        linear = replace(bench.linear, gains=place("PD", inertia, slower.bandwidth, drive.damping))
+        if not Bench(plants, linear, slower, {}).ringing():
+            calm = f"lower the bandwidth ({slower.bandwidth:.3g} Hz is calm)"
+            break
+    else:
+        calm = f"no bandwidth down to {SLOWER[-1] * drive.bandwidth:.3g} Hz is calm"
+    finer = ", or take a finer encoder" if kick else ", or a shorter sample time"
+    return f"{where} {on}{why}; {calm}{finer}"
