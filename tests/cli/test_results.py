@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,11 @@ import tomli_w
 from stickslip import Model
 from stickslip.cli import main
 from stickslip.cli.recommend import parameters, percent
+from stickslip.control.recommended import read_recommended
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.model_file import write_model
+from stickslip.rigs.procedures.track import Track
+from stickslip.rigs.virtual import virtual_rig
 
 STRIBECK = {"k": 50.0, "fs": 0.335, "fc": 0.285, "vs": 0.1, "sigma2": 0.018}
 UNITS = {"k": "N·m·s/rad", "fs": "N·m", "fc": "N·m", "vs": "rad/s", "sigma2": "N·m·s/rad"}
@@ -133,6 +137,39 @@ def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
     line = next(x for x in shown.splitlines() if x.startswith("parameters:"))
     model_parameters = result["model"]
     assert f"fc {model_parameters['fc']:.4g} N·m;" in line
+
+
+def test_what_is_recommended_is_exported_and_run_by_the_commands_that_are_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (0.9,))
+    monkeypatch.setattr("stickslip.identify.recommend.LEADS", (0.5,))
+    monkeypatch.chdir(tmp_path)
+    model, out = written(tmp_path / "m.toml"), tmp_path / "my axis" / "recommended.toml"
+    asked = ["recommend", str(model), "--bandwidth", "20", "--axes", "0", "--confirm", "0", "--out"]
+    assert main([*asked, str(out)]) == 0
+    said = next(x for x in capsys.readouterr().out.splitlines() if x.startswith("next: "))
+    command = shlex.split(said.removeprefix("next: stickslip "))
+    assert main(command) == 0
+    assert "kp" in capsys.readouterr().out
+    found = read_recommended(out)
+    assert (found.compensator, found.gain, found.bandwidth, found.sample_time) == (
+        "feedforward",
+        0.9,
+        20.0,
+        1e-3,
+    )
+    assert (
+        Track(compensator="recommended", model=str(out)).controller(virtual_rig("ideal")).compensator.gain
+        == 0.9
+    )
+    for beside in (["--gain", "1"], ["--sample-time", "0.01"]):
+        assert main([*command, *beside]) == 2
+    assert main(["export", str(model), *command[2:]]) == 2
+    assert "recommends nothing" in capsys.readouterr().err
+    assert main([*asked, str(model)]) == 2
+    assert main(["export", str(model), "--to", "c99", "--compensator", "ff", "--sample-time", "1"]) == 0
+    assert "a reversal up to 1 s late" in capsys.readouterr().out
 
 
 def test_parameters_and_percentages_are_readable() -> None:

@@ -40,7 +40,7 @@ from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.sliding import Sliding
 from stickslip.rigs.procedures.track import RECOMMENDED, Track
 from stickslip.rigs.rig import setpoints
-from stickslip.rigs.virtual import VirtualRig
+from stickslip.rigs.virtual import VirtualRig, virtual_rig
 from stickslip.sweep.numbers import varied
 from stickslip.sweep.plan import load
 
@@ -222,6 +222,12 @@ def test_what_is_recommended_is_run_as_it_was_measured_and_nothing_beside_it_is_
             Track.with_options({**options, name: str(getattr(Track, name))})
     with pytest.raises(InputError, match="bandwidth = 12"):
         Track(**options, bandwidth=12.0).controller(rig)
+    file.write_text(file.read_text() + f"machine = {rig.name!r}\n")
+    Track(**options).controller(VirtualRig(OTHER.without("cogging")))
+    with pytest.raises(
+        InputError, match=r"recommended for 'virtual .*', and this is 'virtual thesis-dry'.*commission"
+    ):
+        Track(**options).controller(virtual_rig("thesis-dry"))
 
 
 def write_model_text(folder):

@@ -4,6 +4,7 @@ stickslip export model.toml --to c99
 stickslip export model.toml --to c99 --single --out firmware --name axis1
 stickslip export run.toml --to c99 --controller      # the whole sampled controller of a `stickslip simulate` file
 stickslip export model.toml --to c99 --compensator fb --filter-hz 10      # the law as a sampled compensator
+stickslip export recommended.toml --to c99 --compensator recommended      # of `stickslip recommend --out`
 stickslip export model.toml --to urdf --nearest      # what a poorer target can hold, with its error
 
 model.toml is what identification writes; by hand it is `law = "lugre"` and a table [parameters]. `stickslip export
@@ -13,15 +14,20 @@ model.toml is what identification writes; by hand it is `law = "lugre"` and a ta
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from stickslip.control.controller import Controller
     from stickslip.export.job import Export, Job
     from stickslip.export.target import Target
     from stickslip.model import Model
 
+SLOW = 0.02
+"""s: sample times above it are told; a tenth of a period of 5 Hz."""
 SUMMARY = "write a model as C, structured text, MATLAB, Python, ..."
 
 
@@ -41,12 +47,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--controller", action="store_true", help="the whole sampled controller of the file's [controller]"
     )
     parser.add_argument(
-        "--compensator", choices=("ff", "fb"),
-        help="the law as a compensator that is called every sample: feedforward of the reference velocity, or "
-        "feedback of the measured one",
+        "--compensator", choices=("ff", "fb", "recommended"),
+        help="the law as a compensator that is called every sample: feedforward of the reference velocity, "
+        "feedback of the measured one, or what the file recommends",
     )  # fmt: skip
     parser.add_argument(
-        "--sample-time", type=float, metavar="TIME", help="of the compensator, s (default: 0.001)"
+        "--sample-time",
+        type=float,
+        metavar="TIME",
+        help="of the compensator, s (default: 0.001, or the recommended one)",
     )
     parser.add_argument(
         "--filter-hz",
@@ -109,16 +118,15 @@ def run(args: argparse.Namespace) -> int:
     export = chosen.write(job)
     folder: Path = args.out or Path(f"{job.name}-{chosen.name}")
     written = store(export, folder)
+    notes = [*export.notes, *notes_on(args, job)]
     result = chosen.check(job, export) if args.check and chosen.check else None
     if args.check and result is None:
         print(f"check: {chosen.name} has no tool to run; its format is checked by our tests")
     if args.json:
         check = {"passed": result.passed, "text": result.text, **result.numbers} if result else None
-        _output.print_json(
-            {"target": chosen.name, "files": written, "notes": list(export.notes), "check": check}
-        )
+        _output.print_json({"target": chosen.name, "files": written, "notes": notes, "check": check})
     else:
-        report(chosen, export, written)
+        report(chosen, notes, written)
         if result:
             print(f"check: {result.text}")
     return 1 if result and result.passed is False else 0
@@ -196,10 +204,65 @@ def compensator_of(args: argparse.Namespace, model: Model) -> Controller | None:
 
     if args.compensator is None:
         return None
+    if args.compensator == "recommended":
+        return recommended_in(args, model)
     kind = {"ff": Feedforward, "fb": Feedback}[args.compensator]
     time = 1e-3 if args.sample_time is None else args.sample_time
     given = {n: getattr(args, n) for n in ("gain", "lead", "deadband") if getattr(args, n) is not None}
     return Controller(Gains(kp=0.0), kind(model, filter_hz=args.filter_hz, **given), sample_time=time)
+
+
+def recommended_in(args: argparse.Namespace, model: Model) -> Controller:
+    """What the file recommends, and nothing beside it that it was not tried with.
+
+    Raises
+    ------
+    InputError
+    """
+    from stickslip.control.controller import Controller
+    from stickslip.control.linear import Gains
+    from stickslip.control.recommended import read_recommended
+    from stickslip.errors import InputError
+
+    found = read_recommended(args.file)
+    for option in ("gain", "lead", "deadband", "filter_hz"):
+        if getattr(args, option) is not None:
+            raise InputError(
+                f"--{option.replace('_', '-')} beside --compensator recommended, which sets it; leave it out, or give "
+                "--compensator ff or fb"
+            )
+    tried, asked = found.sample_time, args.sample_time
+    if tried and asked is not None and not math.isclose(tried, asked):
+        raise InputError(
+            f"--sample-time {asked:g}: {args.file} is recommended for {tried:g} s; leave the option out, or ask "
+            "`stickslip recommend` with that sample time"
+        )
+    return Controller(Gains(kp=0.0), found.on(model), sample_time=tried or asked or 1e-3)
+
+
+def notes_on(args: argparse.Namespace, job: Job) -> Iterator[str]:
+    """What the user must know of a compensator beside what the target says."""
+    from stickslip.config import read_toml
+    from stickslip.control.linear import place
+    from stickslip.control.recommended import read_recommended
+
+    if job.controller is None or args.compensator is None:
+        return
+    time = job.controller.sample_time
+    if time > SLOW:
+        yield (
+            f"a sample time of {time:g} s compensates a reversal up to {time:g} s late, and a loop bears it up to some "
+            f"{0.1 / time:.2g} Hz only; give --sample-time in seconds"
+        )
+    if args.compensator == "recommended":
+        found = read_recommended(args.file)
+        gains = place("PD", found.inertia, found.bandwidth, found.damping)
+        yield (
+            f"it was tried beside a PD of {found.bandwidth:.4g} Hz: kp {gains.kp:.5g}, kd {gains.kd:.5g}; the PD is "
+            "not in the export"
+        )
+        if read_toml(args.file).has("angle"):
+            yield "what the file knows of the angle ([angle]) is not in the export: `stickslip rig run track` runs it"
 
 
 def store(export: Export, folder: Path) -> list[str]:
@@ -219,10 +282,10 @@ def store(export: Export, folder: Path) -> list[str]:
     return written
 
 
-def report(chosen: Target, export: Export, written: list[str]) -> None:
+def report(chosen: Target, notes: list[str], written: list[str]) -> None:
     """Say what was written."""
     print(f"{chosen.title}:")
     for path in written:
         print(f"  {path}")
-    for note in export.notes:
+    for note in notes:
         print(f"note: {note}")

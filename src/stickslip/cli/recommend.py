@@ -1,6 +1,8 @@
 """From an identified model to a setting that is safe to switch on.
 
 stickslip recommend model.toml --bandwidth 15 --sample-time 0.001 --counts-per-rev 65536 --torque-limit 2
+stickslip recommend model.toml --bandwidth 15 --out recommended.toml
+stickslip export recommended.toml --to c99 --compensator recommended
 
 Simulates the linear controller alone (PD by pole placement) and every candidate (law, feedforward or feedback, gain,
 deadband) on the best estimate and on axes drawn from the model's intervals, along a slow sinusoid and to a stop,
@@ -12,12 +14,14 @@ from __future__ import annotations
 
 import argparse
 import math
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from stickslip.identify.identified_file import Identified
     from stickslip.identify.recommend import Candidate, Recommendation
     from stickslip.model import Model
 
@@ -54,6 +58,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="drawn for the recommended one: what it does on them is the interval of the error reduction, which holds "
         "with (N - 1)/(N + 1) (default 39: 95 %%)",
     )  # fmt: skip
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE.toml",
+        help="write what is recommended, as `stickslip export` takes it",
+    )
     parser.add_argument("--json", action="store_true", help="print the result as JSON, all candidates too")
 
 
@@ -64,6 +74,8 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.identify.identified_file import read_identified
     from stickslip.identify.recommend import Drive, recommend
 
+    if args.out:
+        writable(args.out, args.model)
     for option in ("axes", "confirm"):
         if getattr(args, option) < 0:
             raise InputError(f"--{option} {getattr(args, option)} must be 0 or more")
@@ -76,11 +88,46 @@ def run(args: argparse.Namespace) -> int:
         result = recommend(
             found, drive, inertia=args.inertia, axes=args.axes, confirm=args.confirm, progress=progress
         )
+    written = args.out and store(args.out, found, result)
     if args.json:
-        _output.print_json(result.as_dict())
-    else:
-        show(result, found.unit)
+        _output.print_json({**result.as_dict(), "file": str(written) if written else None})
+        return 0
+    show(result, found.unit)
+    if written:
+        print(f"recommended: {written}")
+        print(f"next: stickslip export {shlex.quote(str(written))} --to c99 --compensator recommended")
     return 0
+
+
+def store(out: Path, found: Identified, result: Recommendation) -> Path | None:
+    """Write the recommendation; where there is none, an earlier one must not be taken for it."""
+    from stickslip.config import read_toml
+    from stickslip.identify.setting_file import write_setting
+
+    if result.chosen is not None:
+        return write_setting(out, found, result)
+    if out.is_file() and out.suffix == ".toml" and read_toml(out).has("recommended"):
+        out.unlink()
+    return None
+
+
+def writable(out: Path, model: Path) -> None:
+    """Refuse before the simulations what cannot be written after them.
+
+    Raises
+    ------
+    InputError
+    """
+    from stickslip.errors import InputError
+    from stickslip.study.files import prepared_folder
+
+    if out.resolve() == model.resolve():
+        raise InputError(f"--out {out} is the model itself; give another name, such as recommended.toml")
+    if out.is_dir():
+        raise InputError(
+            f"--out {out} is a folder; give the name of a file, such as {out / 'recommended.toml'}"
+        )
+    prepared_folder(out.parent)
 
 
 def show(result: Recommendation, unit: Callable[[str], str]) -> None:

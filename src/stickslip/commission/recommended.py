@@ -31,6 +31,7 @@ from stickslip.commission.candidates import (
     with_lead,
 )
 from stickslip.control.controller import Controller
+from stickslip.control.recommended import Recommended as Setting
 from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.identify.model_file import write_model
 from stickslip.machines.angle import AngleMap
@@ -80,6 +81,8 @@ class Recommended:
         On the machine itself, from the recommended bandwidth down.
     runs : mapping of str to Record
         Those at the recommended bandwidth: ``alone``, ``mean``, ``helped``.
+    machine, sample_time : str, float
+        On which it was tried, and the rig's sample time, s.
     """
 
     known: Known
@@ -89,6 +92,8 @@ class Recommended:
     alone: float
     tracked: tuple[Tracked, ...] = ()
     runs: Mapping[str, Record] = field(default_factory=dict[str, Record])
+    machine: str = ""
+    sample_time: float = 0.0
 
     def controllers(self, rig: Rig, bandwidth: float) -> dict[str, tuple[Controller, AngleMap]]:
         """Controller and map by name: the PD alone, with the law's mean, with all that was found."""
@@ -128,10 +133,10 @@ class Recommended:
     def table(self) -> dict[str, Any]:
         """``[recommended]`` of a recommended.toml."""
         assert self.chosen is not None
-        return {
-            "compensator": self.chosen.kind, "gain": self.chosen.gain, "lead": self.chosen.lead,
-            "bandwidth": self.known.bandwidth, "damping": DAMPING, "inertia": self.known.inertia,
-        }  # fmt: skip
+        return Setting(
+            self.chosen.kind, self.chosen.gain, self.known.bandwidth, DAMPING, self.known.inertia, self.chosen.lead,
+            sample_time=self.sample_time, machine=self.machine,
+        ).table()  # fmt: skip
 
 
 def write_recommended(path: Path, found: Recommended) -> Path:
@@ -167,7 +172,9 @@ def recommend_on(
     if chosen is None:
         return Recommended(known, tuple(tried), None, None, alone)
     chosen = with_lead(known, rig, laws[chosen.law], chosen)
-    found = Recommended(known, tuple(tried), chosen, laws[chosen.law], alone)
+    found = Recommended(
+        known, tuple(tried), chosen, laws[chosen.law], alone, machine=rig.name, sample_time=rig.sample_time
+    )
     tracked: list[Tracked] = []
     runs: dict[str, Record] = {}
     for share in (1.0, *SLOWER):

@@ -67,6 +67,8 @@ class Recommendation:
     notes : tuple of str
     rings : str
         Where the linear controller rings alone, why, and what to change; empty where it does not.
+    inertia : float
+        kg·m², that the PD is placed with.
     """
 
     chosen: Candidate | None
@@ -79,6 +81,7 @@ class Recommendation:
     notes: tuple[str, ...] = ()
     drive: Drive = field(default_factory=Drive)
     rings: str = ""
+    inertia: float = math.nan
 
     @property
     def reduction(self) -> tuple[float, float]:
@@ -182,7 +185,7 @@ def recommend(
     return Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, dict(linear.gains._asdict()),
         first.moving["position_rms_rad"], margin, tuple(candidates), len(bench.plants),
-        tuple(notes_on(found, chosen, candidates)), drive, rung,
+        tuple(notes_on(found, chosen, candidates)), drive, rung, float(j),
     )  # fmt: skip
 
 

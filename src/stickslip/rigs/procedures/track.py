@@ -12,10 +12,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from stickslip.config import read_toml
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import LINEAR, Gains, place
+from stickslip.control.recommended import KINDS, read_recommended
 from stickslip.errors import InputError, UnknownName
 from stickslip.machines.angle import AngleMap
 from stickslip.model import Model, Reference
@@ -32,8 +31,7 @@ REFERENCES = {
     "step": (Reference("step", amplitude=0.01, tau=0.02), 3.0),
 }
 """Thesis eqs. 3.23 and 3.24, and figure 3.17's step; with their durations, s."""
-COMPENSATORS = {"feedforward": Feedforward, "feedback": Feedback}
-RECOMMENDED = ("linear", "bandwidth", "damping", "inertia", "gain", "filter", "lead")
+RECOMMENDED = ("linear", "bandwidth", "damping", "inertia", "gain", "filter", "lead", "deadband")
 """Options that a recommendation sets: it was simulated and measured with these, and with no others."""
 
 
@@ -43,10 +41,10 @@ class Track(Procedure):
 
     ``reference`` is low, high or step; ``linear`` PD, PID or PR with ``bandwidth`` (Hz), ``damping`` and ``inertia``
     (kg·m²) of its placement; ``compensator`` none, feedforward or feedback with ``model``, a model.toml or the name of
-    one of the machine's, its ``gain``, ``filter`` (Hz, 0: the machine's) and ``lead`` (s, of feedforward); or
-    recommended: all of that from the ``model``, a recommended.toml of `stickslip rig commission`, and none of it given
-    beside it. What a file knows of the angle (``[angle]``) is compensated as well. ``duration`` in s (0: the
-    reference's own).
+    one of the machine's, its ``gain``, ``filter`` (Hz, 0: the machine's), ``lead`` (s, of feedforward) and ``deadband``
+    (rad/s); or recommended: all of that from the ``model``, a recommended.toml of `stickslip rig commission` (of this
+    machine) or `stickslip recommend`, and none of it given beside it. What a file knows of the angle
+    (``[angle]``) is compensated as well. ``duration`` in s (0: the reference's own).
     """
 
     name: ClassVar[str] = "track"
@@ -63,6 +61,7 @@ class Track(Procedure):
     gain: float = 1.0
     filter: float = 0.0
     lead: float = 0.0
+    deadband: float = 0.0
     duration: float = 0.0
     wait: float = 1.0
 
@@ -91,46 +90,50 @@ class Track(Procedure):
             If a name is unknown or the model is missing.
         """
         if self.compensator == "recommended":
-            return self.recommended().controller(rig)
+            return self.recommended(rig.name).controller(rig)
         if self.linear not in LINEAR:
             raise UnknownName("linear controller", self.linear, LINEAR)
         gains: Gains = place(self.linear, self.inertia, self.bandwidth, self.damping)
         limit = ROOM * rig.limits.torque - self.angle().largest
         if self.compensator == "none":
             return Controller(gains, None, limit, rig.sample_time)
-        if self.compensator not in COMPENSATORS:
-            raise UnknownName("compensator", self.compensator, ("none", *COMPENSATORS, "recommended"))
+        if self.compensator not in KINDS:
+            raise UnknownName("compensator", self.compensator, ("none", *KINDS, "recommended"))
         machine: Any = getattr(rig, "machine", None)
         corner = self.filter or (machine.filter if machine is not None else 0.0)
         corner = corner if math.isfinite(corner) else 0.0
         law = self.angle().on(self.law(rig))
-        helper = COMPENSATORS[self.compensator](law, self.gain, corner or None, lead=self.lead)
+        helper = KINDS[self.compensator](law, self.gain, corner or None, self.lead, self.deadband)
         return Controller(gains, helper, limit, rig.sample_time)
 
-    def recommended(self) -> Track:
+    def recommended(self, machine: str) -> Track:
         """This with what the file of the model recommends; without a filter where the file names none.
 
         Raises
         ------
         InputError
-            If the file recommends nothing, or an option that it sets was given too.
+            If the file recommends nothing, or for another machine, or an option that it sets was given too.
         """
         usual = {f.name: f.default for f in dataclasses.fields(Track)}
         for name in RECOMMENDED:
             if getattr(self, name) != usual[name]:
                 raise InputError(beside_recommended(name, getattr(self, name)))
-        table = read_toml(Path(self.model)) if self.model.endswith(".toml") else None
-        if table is None or not table.has("recommended"):
+        if not self.model.endswith(".toml"):
             raise InputError(
                 f"model = {self.model!r} recommends nothing; give the recommended.toml of `stickslip rig commission`"
             )
-        with table.table("recommended") as given:
-            return dataclasses.replace(
-                self, linear="PD", compensator=given.choice("compensator", COMPENSATORS, "feedforward"),
-                bandwidth=given.positive("bandwidth", "Hz"), damping=given.positive("damping", ""),
-                inertia=given.positive("inertia", "kg·m²"), gain=given.positive("gain", ""),
-                filter=given.number("filter", "Hz", 0.0, 0.0) or math.inf, lead=given.number("lead", "s", 0.0, 0.0),
-            )  # fmt: skip
+        found = read_recommended(self.model)
+        if found.machine and machine_in(found.machine) != machine_in(machine):
+            raise InputError(
+                f"{self.model} is recommended for {found.machine!r}, and this is {machine!r}: it may shake here; "
+                f"commission this machine, or give the settings themselves (compensator={found.compensator}, "
+                f"gain={found.gain:g}, ...)"
+            )
+        return dataclasses.replace(
+            self, linear="PD", compensator=found.compensator, bandwidth=found.bandwidth, damping=found.damping,
+            inertia=found.inertia, gain=found.gain, filter=found.filter or math.inf, lead=found.lead,
+            deadband=found.deadband,
+        )  # fmt: skip
 
     def angle(self) -> AngleMap:
         """What the file of the model knows of the angle; nothing without a compensator."""
@@ -197,6 +200,11 @@ class Track(Procedure):
                 f"error {rms:.4g} rad RMS, {worst:.4g} at most; torque at its limit {100 * cut:.3g} %",
             ),
         )  # fmt: skip
+
+
+def machine_in(rig: str) -> str:
+    """The machine of a rig's name, whatever imperfections were switched off."""
+    return rig.partition(" without ")[0]
 
 
 def beside_recommended(name: str, value: object) -> str:
