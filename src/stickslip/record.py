@@ -16,7 +16,7 @@ from stickslip.errors import InputError, suggestion
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["Record"]
+__all__ = ["Record", "encoder_step"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -112,3 +112,19 @@ class Record:
         frame = pandas.DataFrame(dict(self.channels), index=pandas.Index(self.time, name="time"))
         frame.attrs.update(units=dict(self.units), meta=dict(self.meta))
         return frame
+
+
+def encoder_step(position: Array) -> float:
+    """The step of which the position's changes from row to row are whole multiples, in its unit; 0 where there is none.
+
+    Changes of up to 50 steps are looked at: those of a faster motion are known no better than the noise of one step.
+    """
+    changes = np.abs(np.diff(position))
+    changes = changes[changes > 1e-12 * float(np.max(np.abs(position), initial=1e-300))]
+    if changes.size < 20:
+        return 0.0
+    step = float(np.min(changes))
+    # The mean over the changes by one step is sharper than the smallest of them.
+    step = float(np.mean(changes[changes < 1.5 * step]))
+    multiples = changes[changes < 50.0 * step] / step
+    return step if float(np.mean(np.abs(multiples - np.round(multiples)) < 0.02)) > 0.95 else 0.0

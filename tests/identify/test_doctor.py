@@ -607,6 +607,55 @@ def test_spoiled(base, tmp_path, capsys, monkeypatch, what, spoil, names, code, 
     assert "\n" not in found["message"]
 
 
+@pytest.mark.parametrize("counts", [1024, 4096, 65536])
+def test_a_coarse_encoder_is_no_delay_of_the_torque(counts):
+    """A turning point is known to the time in which the axis moves by a count, no better."""
+    slow = run("lugre", 0.5, 0.5, 4.0, sigma0=3.5e4, sigma1=0.1, sigma2=0.018, fs=0.335, fc=0.285, vs=0.01)
+    for lag in (0, 2):
+        channels = {
+            "position": steps(slow["position"], 2 * np.pi / counts),
+            "motor_torque": delayed(slow["torque"], lag or 1),
+        }
+        record = Record(slow["time"], channels, UNITS)
+        assert "time-skew" not in {f.code for f in examine(record).findings}
+
+
+def test_a_delay_is_told_with_a_coarse_encoder_too():
+    fast = run("coulomb", 0.3, 2.0, 3.0, fc=0.2, sigma2=0.01)
+    channels = {
+        "position": steps(fast["position"], 2 * np.pi / 4096),
+        "motor_torque": delayed(fast["torque"], 10),
+    }
+    found = {f.code: f.message for f in examine(Record(fast["time"], channels, UNITS)).findings}
+    assert re.search(r"shifted by (9|10|11) ms: torque comes after", found["time-skew"])
+
+
+@pytest.mark.parametrize("counts", [2**16, 4000])
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_degrees_under_a_header_that_says_rad_are_doubted(tmp_path, counts, unit):
+    table = made("turned")
+    table = with_(table, position=steps(table["position"], 2 * np.pi / counts))
+    if unit == "deg":
+        table = {k: v * DEG if k in ("position", "velocity") else v for k, v in table.items()}
+    found = examine(read(write(tmp_path / "a.csv", table, HEADER)))
+    doubted = [f for f in found.warnings if f.code == "position-unit"]
+    assert len(doubted) == (unit == "deg")
+    assert found.errors == ()
+    assert all("position=position [rad]:deg" in f.remedy.replace("'", "") for f in doubted)
+
+
+@pytest.mark.parametrize(
+    ("way", "doubted"), [(90.0, True), (2.0 * np.pi, False), (40.0, False), (45.01, False)]
+)
+def test_a_reference_over_eighths_of_a_turn_in_degrees_is_no_reference_in_rad(way, doubted):
+    table = made("lugre")
+    shape = table["position"] / np.ptp(table["position"])
+    channels = {"position": way * shape, "position_reference": way * shape, "motor_torque": table["torque"]}
+    units = {**UNITS, "position_reference": "rad"}
+    codes = {f.code for f in examine(Record(table["time"], channels, units)).warnings}
+    assert ("position-unit" in codes) == doubted
+
+
 # ---- real data ----------------------------------------------------------------------------------------------
 
 REAL: list[tuple[str, list[str], set[str]]] = [

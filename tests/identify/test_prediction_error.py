@@ -14,7 +14,7 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.identify.axis_inverse import inverse_dynamics
-from stickslip.identify.axis_prediction import axis_prediction, encoder_resolution, held_torque, motion_of
+from stickslip.identify.axis_prediction import axis_prediction, held_torque, motion_of
 from stickslip.identify.axis_trial import trial_of
 from stickslip.identify.contact import contact_frequency, unseen_refused
 from stickslip.identify.estimate import Estimate
@@ -22,6 +22,7 @@ from stickslip.identify.jackknife import leave_blocks_out
 from stickslip.identify.observer import GRASP, prepare
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
+from stickslip.record import encoder_step
 from stickslip.simulation.driven import Mechanics
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -61,8 +62,8 @@ def test_same_seed_same_numbers(generator: Any) -> None:
 @pytest.mark.parametrize("count", [2.0 * np.pi / 16384, 6.28e-6])
 def test_resolution_of_a_counted_position(count: float) -> None:
     q = np.sin(np.linspace(0.0, 20.0, 5000))
-    assert encoder_resolution(count * np.round(q / count)) == pytest.approx(count, rel=1e-3)
-    assert encoder_resolution(q) == 0.0
+    assert encoder_step(count * np.round(q / count)) == pytest.approx(count, rel=1e-3)
+    assert encoder_step(q) == 0.0
 
 
 def test_a_record_without_drive_is_refused(generator: Any) -> None:

@@ -32,9 +32,8 @@ from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.record import Record, encoder_step
 from stickslip.rigs.procedures._moves import ROOM
-from stickslip.rigs.procedures._resting import resolution_in
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
@@ -187,7 +186,7 @@ class Candidate:
 
 def resolution_of(record: Record) -> float:
     """The least step of the position, rad; 0 where it is continuous."""
-    return resolution_in(record["position"][:20000])
+    return encoder_step(record["position"][:20000])
 
 
 def controller_of(known: Known, rig: Rig, bandwidth: float, helper: Helper | None = None) -> Controller:

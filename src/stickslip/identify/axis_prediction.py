@@ -23,9 +23,10 @@ from stickslip.identify.secant import Secants
 from stickslip.identify.vector import Vector
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
+from stickslip.record import encoder_step
 from stickslip.spec import Law
 
-__all__ = ["axis_prediction", "encoder_resolution", "motion_of", "searched", "watched"]
+__all__ = ["axis_prediction", "motion_of", "searched", "watched"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -185,19 +186,7 @@ def motion_of(trial: Trial) -> Motion:
     """The trial on a regular grid, its drive's signal as it acts."""
     t, q, u, _ = uniform(trial)
     supply = 1.0 if trial.supply is None else np.interp(t, trial.time, trial.supply)
-    return Motion(t, q, supply * u, encoder_resolution(q))
-
-
-def encoder_resolution(position: Array) -> float:
-    """The step of which the position's changes are whole multiples, rad (m); 0 where there is none."""
-    changes = np.abs(np.diff(position))
-    changes = changes[changes > 1e-12 * float(np.max(np.abs(position), initial=1e-300))]
-    if changes.size < 20:
-        return 0.0
-    step = float(np.min(changes))
-    step = float(np.mean(changes[changes < 1.5 * step]))
-    multiples = changes[changes < 50.0 * step] / step
-    return step if float(np.mean(np.abs(multiples - np.round(multiples)) < 0.02)) > 0.95 else 0.0
+    return Motion(t, q, supply * u, encoder_step(q))
 
 
 def starting_points(

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.record import Record
+from stickslip.record import Record, encoder_step
 
-__all__ = ["Array", "Column", "Smooth", "View", "is_number", "row", "step_of"]
+__all__ = ["Array", "Column", "Smooth", "View", "is_number", "row"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
@@ -135,6 +135,11 @@ class View:
         return float(np.median(np.diff(self.time))) if self.time.size > 1 else math.nan
 
     @cached_property
+    def step(self) -> float:
+        """The step of the position's encoder, in the position's unit; 0 where there is none."""
+        return encoder_step(self.values("position")) if self.has("position") else 0.0
+
+    @cached_property
     def smooth(self) -> Smooth | None:
         """Filtered signals; None where there is too little to filter."""
         if self.time.size < 30 or not (self.has("position") or self.has("velocity")):
@@ -168,21 +173,6 @@ class View:
             out = Smooth(period, position, velocity, np.gradient(velocity, period), torque)
         every = (out.position, out.velocity, out.acceleration, out.torque)
         return out if all(np.isfinite(values).all() for values in every) else None
-
-
-def step_of(values: Array) -> float:
-    """The quantum of a signal: the step of which its changes are multiples; 0 where there is none."""
-    steps = np.abs(np.diff(values))
-    size = float(np.max(np.abs(values), initial=0.0))
-    real = steps[steps > 1e-9 * size]
-    if real.size < 10:
-        return 0.0
-    smallest = float(np.min(real))
-    # The mean over the steps of one quantum is sharper than the smallest step.
-    quantum = float(np.mean(real[real < 1.5 * smallest]))
-    off = np.abs(real / quantum - np.round(real / quantum))
-    few = float(np.median(real)) < 200.0 * quantum
-    return quantum if few and float(np.mean(off < 0.05)) > 0.98 else 0.0
 
 
 def row(index: int, view: View | None = None) -> str:

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import View, step_of
+from stickslip.identify.doctor._view import View
+from stickslip.record import encoder_step
 
 __all__ = ["channels", "moved", "reversed_and_slow"]
 
@@ -71,7 +72,7 @@ def _standing(view: View, channel: str) -> Finding | None:
             f"{channel} stays within {span:.3g} {unit}: the axis never moved",
             remedy=remedy,
         )
-    if float(np.var(np.diff(values))) > 1.2 * float(np.var(values)) and step_of(values) < 0.1 * span:
+    if float(np.var(np.diff(values))) > 1.2 * float(np.var(values)) and encoder_step(values) < 0.1 * span:
         message = (
             f"{channel} is noise of {float(np.std(values)):.3g} {unit} about a fixed value: the axis never"
             " moved"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import Array, View, is_number, row, step_of
+from stickslip.identify.doctor._view import Array, View, is_number, row
 
 __all__ = ["missing", "quantised", "saturated", "wrapped"]
 
@@ -91,7 +91,7 @@ def quantised(view: View) -> Iterator[Finding]:
     """The step of the position and the lowest speed it supports."""
     if not view.has("position") or view.smooth is None:
         return
-    step = step_of(view.values("position"))
+    step = view.step
     if step <= 0.0:
         return
     lowest = step / (WINDOW * SLOW_ERROR)

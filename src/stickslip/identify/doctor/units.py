@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import Array, View, step_of
+from stickslip.identify.doctor._view import Array, View
 
 __all__ = ["assumed", "counted", "degrees", "too_fast", "torque_scale", "velocity_scale"]
 
@@ -58,16 +58,23 @@ def counted(view: View) -> Iterator[Finding]:
 
 
 def degrees(view: View) -> Iterator[Finding]:
-    """A resolution that divides 360 as an encoder does, and not a whole turn of 2 pi."""
-    if not view.has("position") or view.stated("position") or view.record.units["position"] != "rad":
+    """A resolution that divides 360 as an encoder does, and not a whole turn of 2 pi; or a reference of so many eighths
+    of 360. Where the file itself says rad, a warning."""
+    if not view.has("position") or view.record.units["position"] != "rad":
         return
-    step = step_of(view.values("position"))
+    level, step = "warning" if view.stated("position") else "error", view.step
+    remedy = f"say {view.mapped('position', 'deg')}, if it is so"
     if step > 0.0 and _counts_of_encoder(360.0 / step) and not _counts_of_encoder(2.0 * math.pi / step):
         message = (
             f"the position's step of {step:.6g} is a turn of 360 over {360.0 / step:.0f} counts: degrees"
             " rather than rad"
         )
-        yield Finding("error", "position-unit", message, remedy=f"say {view.mapped('position', 'deg')}")
+        yield Finding(level, "position-unit", message, remedy=remedy)
+        return
+    way = float(np.ptp(view.values("position_reference"))) if view.has("position_reference") else 0.0
+    if way > 0.0 and view.record.units["position_reference"] == "rad" and _eighths(way):
+        message = f"the reference goes over {way:.6g}, whole eighths of a turn in degrees: degrees, not rad?"
+        yield Finding("warning", "position-unit", message, remedy=remedy)
 
 
 def velocity_scale(view: View) -> Iterator[Finding]:
@@ -205,6 +212,11 @@ def _counts_of_encoder(count: float) -> bool:
     if near < 100 or abs(count - near) > 2e-4 * near:
         return False
     return near & (near - 1) == 0 or (near % 400 == 0 and near <= 40000 and not _decimal(360.0 / near))
+
+
+def _eighths(way: float) -> bool:
+    """Whether a way is 45, 90, ... and nothing that a person would ask for in rad."""
+    return round(way / 45.0) >= 1 and abs(way / 45.0 - round(way / 45.0)) < 1e-5
 
 
 def _decimal(step: float) -> bool:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["RESTING", "resolution_in", "resting"]
+__all__ = ["RESTING", "resting"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -15,17 +15,6 @@ SLOW, RESTING = 0.2, 0.02
 """Of the mean speed, below which the axis all but stands; share of the time from which it sticks and slips."""
 COUNTS = 3.0
 """Of the encoder, over which a speed is taken at least: a count more or less at both ends is then no rest."""
-
-
-def resolution_in(position: Array) -> float:
-    """The least step of a position, rad; 0 where it is continuous."""
-    steps = np.abs(np.diff(np.unique(position)))
-    steps = steps[steps > 1e-12]
-    if steps.size < 10:
-        return 0.0
-    least = float(np.min(steps))
-    whole = steps / least
-    return least if np.mean(np.abs(whole - np.round(whole)) < 0.01 * np.round(whole)) > 0.9 else 0.0
 
 
 def resting(time: Array, position: Array, velocity: float, resolution: float) -> float:

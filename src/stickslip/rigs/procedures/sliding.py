@@ -12,9 +12,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from stickslip.record import Record
+from stickslip.record import Record, encoder_step
 from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, uniform
-from stickslip.rigs.procedures._resting import RESTING, resolution_in, resting
+from stickslip.rigs.procedures._resting import RESTING, resting
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
@@ -116,7 +116,7 @@ class Sliding(Procedure):
         mean = float((x[-1] - x[0]) / (t[-1] - t[0]))
         speed = np.diff(x) / np.diff(t)
         # A row is the mean of some samples: its least step is a count over their number.
-        count = round(float(np.median(np.diff(t))) / sample_time) * resolution_in(position)
+        count = round(float(np.median(np.diff(t))) / sample_time) * encoder_step(position)
         ripple, still = float(np.std(speed)), resting(t, x, v, count)
         words = (
             f"; it sticks and slips, {100.0 * still:.2g} % of the time all but at rest"
