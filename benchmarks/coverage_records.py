@@ -99,10 +99,11 @@ def law_of(rng: np.random.Generator, family: str, inertia: float, sliding: Mappi
     return Model(family, fc=fc, sigma2=sigma2, sigma0=fc / log_uniform(rng, 1e-4, 1e-3))
 
 
-def make(seed: int, family: str = "", *, repeat: int = 0, coulomb: float = 1.0) -> Case:
+def make(seed: int, family: str = "", *, repeat: int = 0, coulomb: float = 1.0, rows: int = 0) -> Case:
     """The record of a seed; its family goes round with the seed unless it is given.
 
     Another `repeat` is the same motion of the same axis with other noise; `coulomb` is a factor on its Coulomb torque.
+    With `rows` the programme of velocities is gone through again until the record has so many.
     """
     rng = np.random.default_rng([2026, seed])
     family = family or FAMILIES[seed % len(FAMILIES)]
@@ -123,6 +124,8 @@ def make(seed: int, family: str = "", *, repeat: int = 0, coulomb: float = 1.0) 
         rng.permutation(levels), rng.uniform(0.4, 0.9, levels.size), fc * rng.uniform(0.5, 2.0) / inertia,
         int(rng.integers(3, 6)), top,
     )  # fmt: skip
+    if rows:
+        velocity = np.tile(velocity, math.ceil(rows / velocity.size))[:rows]
     position = np.concatenate([[0.0], np.cumsum(0.5 * PERIOD * (velocity[1:] + velocity[:-1]))])
     time = PERIOD * np.arange(position.size)
     gains = place(("PD", "PID")[int(rng.integers(2))], inertia, rng.uniform(10.0, 25.0), 1.0)

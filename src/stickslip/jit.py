@@ -335,14 +335,8 @@ two_to: Any = intrinsic(_two_to)
 
 
 @compile_inlined
-def exponential(x: float) -> float:
-    """exp(x) to 1e-15 of its value, without a branch; beyond +-700 that of +-700.
-
-    x = k ln 2 + r with |r| <= ln(2) / 2, and the series of exp(r) to the twelfth power.
-    """
-    x = select(x > -700.0, x, -700.0)
-    x = select(x < 700.0, x, 700.0)
-    shifted = x * 1.4426950408889634 + 6755399441055744.0
+def less_one(x: float, shifted: float) -> float:
+    """exp(r) - 1, where x = k ln 2 + r and `shifted` holds k: the series to the twelfth power."""
     k = shifted - 6755399441055744.0
     r = x - k * 6.93147180369123816490e-01
     r = r - k * 1.90821492927058770002e-10
@@ -357,8 +351,29 @@ def exponential(x: float) -> float:
     y = 1.0 / 24.0 + r * y
     y = 1.0 / 6.0 + r * y
     y = 0.5 + r * y
-    y = 1.0 + r * (1.0 + r * y)
-    return y * two_to(shifted)
+    return r * (1.0 + r * y)
+
+
+@compile_inlined
+def exponential(x: float) -> float:
+    """exp(x) to 1e-15 of its value, without a branch; beyond +-700 that of +-700.
+
+    x = k ln 2 + r with |r| <= ln(2) / 2, and the series of exp(r) to the twelfth power.
+    """
+    x = select(x > -700.0, x, -700.0)
+    x = select(x < 700.0, x, 700.0)
+    shifted = x * 1.4426950408889634 + 6755399441055744.0
+    return (1.0 + less_one(x, shifted)) * two_to(shifted)
+
+
+@compile_inlined
+def exponential_less_one(x: float) -> float:
+    """exp(x) - 1 to 1e-15 of its value, also near 0, as `exponential`."""
+    x = select(x > -700.0, x, -700.0)
+    x = select(x < 700.0, x, 700.0)
+    shifted = x * 1.4426950408889634 + 6755399441055744.0
+    power = two_to(shifted)
+    return power * less_one(x, shifted) + (power - 1.0)
 
 
 def compile_inner(function: Any) -> Any:

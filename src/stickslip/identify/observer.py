@@ -19,6 +19,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.edges import SeenVelocity, seen_velocity
 from stickslip.simulation.driven import Course, Drive, Mechanics
+from stickslip.simulation.driven_lanes import Stretches, cut
 from stickslip.spec import Law
 
 __all__ = ["Motion", "Prepared", "prepare"]
@@ -36,7 +37,10 @@ RETURNS = 0.5
 TOLERATED = 3e-3
 """Part of friction that a wrong velocity may make it add."""
 LONGEST = 1e-3
-"""Longest step of the simulation, s."""
+"""Longest step of the simulation, s, but for what equally spaced samples may differ by."""
+FORGOTTEN = (8.0, 4.0)
+"""Periods of the observer's natural frequency after which little is left of how it began, where the axis slides; the
+second where a record leaves no room for the first. Within an encoder's count nothing pulls, so that it takes many."""
 FEWEST = 32
 """Corrections that a motion must leave."""
 EDGE = 0.15
@@ -77,6 +81,7 @@ class Prepared:
     """A motion with its observer and the filter of its corrections."""
 
     course: Course
+    stretches: Stretches
     low_pass: Any
     stride: int
     edge: int
@@ -85,14 +90,20 @@ class Prepared:
         """Torque that the model lacks, N·m, in the band, shape (m,)."""
         signal: Any = importlib.import_module("scipy.signal")  # it carries no types
 
-        raw = self.course.run(mechanics, parameters)[:, 3]
+        raw = self.raw(mechanics, parameters)
         if not np.all(np.isfinite(raw)):
             return self.nothing()
         return signal.sosfiltfilt(self.low_pass, raw)[self.edge : -self.edge : self.stride]
 
+    def raw(self, mechanics: Mechanics, parameters: Any) -> Array:
+        """Torque that the observer adds at every sample, N·m, shape (n,)."""
+        found = self.stretches.corrections(mechanics, parameters)
+        return self.course.run(mechanics, parameters)[:, 3] if found is None else found
+
     def shaken(self, torque: Array) -> Prepared:
         """The same with this torque on the axis, N·m, shape (n,)."""
-        return replace(self, course=Course(self.course.law, replace(self.course.drive, disturbance=torque)))
+        course = Course(self.course.law, replace(self.course.drive, disturbance=torque))
+        return replace(self, course=course, stretches=self.stretches.shaken(torque))
 
     def nothing(self) -> Array:
         """Not a number, as many as there are corrections."""
@@ -133,7 +144,7 @@ def prepare(
         spring=inertia * omega**2, damping=np.where(firm > 0.0, firm, 2.0 * inertia * omega),
         goal=np.where(firm > 0.0, seen.velocity, np.append(np.diff(motion.position) / dt, 0.0)), firm=firm > 0.0,
         forgets=-math.expm1(-LAG * omega * dt), returns=RETURNS * omega, slack=0.5 * motion.count,
-        max_step=min(dt, LONGEST),
+        max_step=1.001 * min(dt, LONGEST),
     )  # fmt: skip
     low_pass = signal.butter(4, band, fs=1.0 / dt, output="sos")
     stride = max(1, int(1.0 / (3.0 * band * dt)))
@@ -142,15 +153,42 @@ def prepare(
         raise InputError(
             f"{motion.time.size * dt:.3g} s are too short for a band of {band:g} Hz; give a longer record"
         )
-    return Prepared(Course(law, drive), low_pass, stride, edge)
+    return Prepared(
+        Course(law, drive), in_stretches(law, drive, seen, 1.0 / (speed * band * dt)), low_pass, stride, edge
+    )
+
+
+def in_stretches(law: Law, drive: Drive, seen: SeenVelocity, period: float) -> Stretches:
+    """The same followed in stretches; `period` is that of the observer's natural frequency, in rows."""
+    stretches = None
+    for periods in FORGOTTEN:
+        warm = math.ceil(periods * period)
+        stretches = Stretches(law, drive, cut(forgotten(seen, warm), warm), warm)
+        if stretches.worth:
+            break
+    assert stretches is not None
+    return stretches
 
 
 def firmness(seen: SeenVelocity, firm: float, least: float, friction: float) -> Array:
     """Damping of the firm damper, N·m·s/rad; 0 where the axis is fast, or its velocity too unsure for one."""
     allowed = TOLERATED * friction / np.maximum(seen.doubt, 1e-300)
     damping = np.where(seen.doubt > 0.0, np.minimum(allowed, firm), firm)
-    slow = np.abs(seen.velocity) < SLOW * float(np.sqrt(np.mean(seen.velocity**2)))
-    return np.where(slow & (damping > least), damping, 0.0)
+    return np.where(slow(seen) & (damping > least), damping, 0.0)
+
+
+def slow(seen: SeenVelocity) -> Any:
+    """Where the axis is slower than `SLOW` of its usual speed, shape (n,)."""
+    return np.abs(seen.velocity) < SLOW * float(np.sqrt(np.mean(seen.velocity**2)))
+
+
+def forgotten(seen: SeenVelocity, warm: int) -> Any:
+    """Rows before which the axis has slid one way, not slowly, for so many rows, shape (n,)."""
+    way = np.where(slow(seen), 0.0, np.sign(seen.velocity))
+    slid = np.concatenate([[0.0], np.cumsum(way)])
+    out = np.zeros(way.size, dtype=np.bool_)
+    out[warm:] = np.abs(slid[warm:-1] - slid[: -warm - 1]) == warm
+    return out
 
 
 def checked(motion: Motion, band: float) -> None:

@@ -222,7 +222,7 @@ def shaken_steps(criterion: Criterion, optimum: Optimum, rng: np.random.Generato
     r, jacobian = weighted(criterion, optimum)
     newton = -np.linalg.solve(jacobian.T @ jacobian + ridge_of(r, u.size), jacobian.T)
     parameters, axis = feasible(criterion.law, vector.law_parameters(u)), criterion.mechanics(vector.named(u))
-    lacking = [x.course.run(axis, parameters)[:, 3] for x in criterion.records]
+    lacking = [x.raw(axis, parameters) for x in criterion.records]
     steps: list[Array] = []
     for _ in range(DRAWS):
         records = [

@@ -19,7 +19,7 @@ import numpy as np
 from stickslip.spec import Law
 from stickslip.subset import law_layouts, lower
 
-__all__ = ["Numbers", "Refused", "source"]
+__all__ = ["Numbers", "Refused", "body", "source"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 INLINED = frozenset(
@@ -108,7 +108,7 @@ def source(
         "from stickslip.jit import compile_inlined, compile_lanes, exponential, pointer, select",
     ]
     lines += [f"{name} = {value!r}" for name, value in sizes.items()]
-    constants, functions = body()
+    constants, functions = body(("_lanes_step", "_lanes_run"), INLINED)
     lines += constants
     for name, expression in scalars.items():
         lines += function(name, "", [f"    return {expression}"])
@@ -122,17 +122,15 @@ def source(
 
 
 @functools.cache
-def body() -> tuple[list[str], list[str]]:
-    """The constants and the functions of `_lanes_step` and `_lanes_run`."""
-    texts = [
-        Path(__file__).with_name(f"_lanes_{name}.py").read_text(encoding="utf-8") for name in ("step", "run")
-    ]
+def body(files: tuple[str, ...], inlined: frozenset[str]) -> tuple[list[str], list[str]]:
+    """The constants and the functions of files of this folder; those `inlined` run for all lanes at once."""
+    texts = [Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8") for name in files]
     tree = ast.parse("\n".join(text.partition("from __future__ import annotations")[2] for text in texts))
     constants = [ast.unparse(node) for node in tree.body if isinstance(node, ast.Assign)]
     functions: list[str] = []
     for node in tree.body:
         if isinstance(node, ast.FunctionDef):
-            functions.append("@compile_inlined" if node.name in INLINED else "@compile_lanes")
+            functions.append("@compile_inlined" if node.name in inlined else "@compile_lanes")
             functions.append(ast.unparse(bare(node)))
     return constants, functions
 

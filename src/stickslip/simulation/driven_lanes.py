@@ -1,0 +1,214 @@
+"""A record followed in stretches side by side: the observer's corrections of `driven.Course`, ten times as fast.
+
+Where an axis slides at speed, an observer and a contact forget within a fraction of a second how they began. There a
+record is cut, each stretch begins a while before its cut, and `LANES` of them run in vectors of the machine
+(`_driven_lanes`). The law's own ``step`` takes part as straight lines (`straight_line`); laws that cannot be written
+so, and axes with backlash, a pendulum or harmonics, are left to `driven.Course`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.jit import compiled_lanes, flat
+from stickslip.simulation import _driven_lanes as lanes
+from stickslip.simulation._lanes_source import body
+from stickslip.simulation.driven import Drive, Mechanics, reads_load
+from stickslip.simulation.straight_line import Assumption, Name, NotStraight, Trace, traced
+from stickslip.spec import Law, Surroundings
+from stickslip.subset import law_layouts, lower
+
+__all__ = ["LANES", "Stretches", "cut"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Mask = np.ndarray[Any, np.dtype[np.bool_]]
+
+LANES = 8
+LONGEST = 0.5
+"""Part of a record beyond which its longest stretch is too long for lanes to be worth it."""
+INLINED = frozenset(
+    {
+        "start", "improve", "first_stage", "second_stage", "take_other_rise", "accept", "beyond", "pull", "look_back",
+    }
+)  # fmt: skip
+"""Functions that run for all lanes at once."""
+
+
+# ---- the program -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Program:
+    """A law's compiled text, or None where it has none, and the parameters that it holds for."""
+
+    assumptions: frozenset[Assumption]
+    follow: Any
+
+    def fits(self, parameters: Sequence[float]) -> bool:
+        """Whether it holds for these."""
+        return all(a.fits(parameters) for a in self.assumptions)
+
+
+_programs: dict[int, tuple[Law, list[Program]]] = {}
+
+
+def program_for(law: Law, parameters: Sequence[float]) -> Program:
+    """The program of a law with such parameters, compiled on first use."""
+    _, programs = _programs.setdefault(id(law), (law, []))
+    for program in programs:
+        if program.fits(parameters):
+            return program
+    trace = Trace(parameters)
+    try:
+        follow = compiled_lanes(source(law, trace)).follow_lanes
+    except NotStraight:
+        follow = None
+    programs.append(Program(frozenset(trace.assumptions), follow))
+    return programs[-1]
+
+
+def source(law: Law, trace: Trace) -> str:
+    """The specialised text.
+
+    Raises
+    ------
+    NotStraight
+        If the law's functions cannot be written as straight lines.
+    """
+    count = len(law.pack_state(law.state(law.parameters(dict(law.example)))))
+    text = [
+        "import math",
+        "import numpy as np",
+        "from stickslip.jit import compile_inlined, compile_lanes, exponential, exponential_less_one, pointer, select",
+        f"LANES, STATES, HOLDS = {LANES}, {count}, {law.holding is not None}",
+    ]
+    constants, functions = body(("_driven_lanes",), INLINED)
+    text += constants
+    text += written(law, "step", {"v0": Name("v"), "v1": Name("v"), "dt": Name("h")}, "law", "v, h", trace)
+    if law.holding is not None:
+        text += written(law, "holding", {"direction": Name("direction")}, "withstood", "direction", trace)
+    return "\n".join([*text, *functions]) + "\n"
+
+
+def written(
+    law: Law, entry: str, arguments: dict[str, Name], name: str, signature: str, trace: Trace
+) -> list[str]:
+    """The lines of one of the law's functions; it reads the states in BASE and leaves them in TRIAL."""
+    functions = lower({f"_{entry}_": getattr(law, entry)}, law_layouts(law))
+    count = len(law.pack_state(law.state(law.parameters(dict(law.example)))))
+    arrays: dict[Any, Any] = {("p", i): Name(f"p[{i}]") for i in range(len(trace.parameters))}
+    arrays |= {("z", i): Name(f"z{i}") for i in range(count)}
+    arrays |= {("u", i): x for i, x in enumerate(Surroundings())}
+    arrays["u", Surroundings._fields.index("load")] = Name("load")
+    del arrays["u", Surroundings._fields.index("position")]
+    own = Trace(trace.parameters, assumptions=trace.assumptions)
+    given = {**arguments, "z": "z", "p": "p", "u": "u"}
+    result = traced(functions, f"_{entry}_", given, arrays, own)
+    lines = [f"z{i} = w[(BASE + {i}) * LANES + lane]" for i in range(count)]
+    lines += ["load = w[LOAD * LANES + lane]", *own.lines]
+    if entry == "step":
+        lines += [f"w[(TRIAL + {i}) * LANES + lane] = {arrays['z', i]}" for i in range(count)]
+    lines.append(f"return {result}")
+    return ["@compile_inlined", f"def {name}(w, lane, {signature}, p):", *(f"    {line}" for line in lines)]
+
+
+# ---- a record ----------------------------------------------------------------------------------------------------
+
+
+def cut(forgotten: Mask, warm: int) -> list[int]:
+    """Rows at which a record may be cut into stretches about as long as one another, the first 0.
+
+    Parameters
+    ----------
+    forgotten : array of bool, shape (n,)
+        Where nothing is left of what was `warm` rows before.
+    warm : int
+        Rows that a stretch begins before its cut.
+    """
+    allowed = np.flatnonzero(forgotten)
+    cuts = [0]
+    for i in range(1, LANES):
+        # The first stretch has nothing before it, so that it may be longer.
+        goal = warm + i * (forgotten.size - warm) / LANES
+        if allowed.size and (place := int(allowed[np.argmin(np.abs(allowed - goal))])) > cuts[-1] + warm:
+            cuts.append(place)
+    return cuts
+
+
+class Stretches:
+    """A held drive with an observer, laid out in stretches."""
+
+    def __init__(self, law: Law, drive: Drive, cuts: Sequence[int], warm: int) -> None:
+        self.law, self.drive, self.cuts, self.warm = law, drive, list(cuts), warm
+        n = drive.time.size
+        ends = [*self.cuts[1:], n]
+        self.begins = [max(0, c - warm) for c in self.cuts]
+        rows = max(end - begin for begin, end in zip(self.begins, ends, strict=True))
+        first = np.array(self.begins + [0] * (LANES - len(self.begins)))
+        self.rows: Any = np.minimum(np.arange(rows)[:, None] + first, n - 1)
+        self.ends, self.worth = ends, rows <= LONGEST * n
+        self.speeds = np.zeros(LANES)
+        assert drive.goal is not None
+        self.speeds[1 : len(first)] = drive.goal[first[1:]]
+        self.signals = self.laid_out()
+        self.substeps = max(1, math.ceil(float(np.max(np.diff(drive.time))) / drive.max_step - 1e-9))
+        self.scaled = not reads_load(law)
+
+    def laid_out(self) -> Array:
+        """The signals of all lanes, shape (rows, SIGNALS, LANES)."""
+        drive, at = self.drive, self.rows
+        last = at == drive.time.size - 1
+        out = np.zeros((len(at), lanes.SIGNALS, LANES))
+        columns = {
+            lanes.SIGNAL: drive.gain * drive.signal, lanes.SEEN: drive.position, lanes.DAMPING: drive.damping,
+            lanes.GOAL: drive.goal, lanes.FIRM: drive.firm, lanes.DISTURBANCE: drive.disturbance,
+        }  # fmt: skip
+        for place, values in columns.items():
+            if values is not None:
+                out[:, place] = values[at]
+        assert drive.position is not None
+        out[:, lanes.NEXT] = np.append(drive.position[1:], drive.position[-1])[at]
+        out[:, lanes.GOES_ON] = ~last
+        out[:, lanes.PERIOD] = np.diff(drive.time, append=2.0 * drive.time[-1] - drive.time[-2])[at]
+        return out
+
+    def shaken(self, torque: Array) -> Stretches:
+        """The same with another torque from outside, N·m, shape (n,)."""
+        other = object.__new__(Stretches)
+        other.__dict__ |= self.__dict__
+        other.signals = self.signals.copy()
+        other.signals[:, lanes.DISTURBANCE] = torque[self.rows]
+        return other
+
+    def numbers(self, mechanics: Mechanics) -> tuple[float, ...]:
+        """What the kernel reads of axis and observer."""
+        drive = self.drive
+        n = np.zeros(lanes.NUMBERS)
+        n[lanes.INERTIA], n[lanes.OFFSET] = mechanics.inertia, mechanics.offset
+        n[lanes.DRIVE_GAIN], n[lanes.BACK_EMF] = mechanics.drive_gain, mechanics.back_emf
+        n[lanes.LOAD_MOTOR], n[lanes.LOAD_EXTERNAL] = mechanics.load_motor, mechanics.load_external
+        n[lanes.SCALED], n[lanes.SPRING], n[lanes.FORGETS] = self.scaled, drive.spring, drive.forgets
+        n[lanes.RETURNS], n[lanes.SLACK] = drive.returns, drive.slack
+        return tuple(n.tolist())
+
+    def corrections(self, mechanics: Mechanics, parameters: Any) -> Array | None:
+        """The observer's corrections, shape (n,), as `driven.Course.run` says; None where lanes cannot run this."""
+        harmonics = mechanics.harmonics
+        more = harmonics.torque or harmonics.friction or mechanics.gravity or mechanics.backlash
+        packed = tuple(float(x) for x in self.law.pack(parameters))
+        if not self.worth or more or (program := program_for(self.law, packed)).follow is None:
+            return None
+        states = flat(self.law.pack_state(self.law.state(parameters)))
+        found = np.empty((len(self.rows), LANES))
+        program.follow(
+            self.numbers(mechanics), packed, states, self.speeds, self.signals, self.substeps, LANES, found
+        )
+        out = np.empty(self.drive.time.size)
+        for lane, (begin, first, end) in enumerate(zip(self.begins, self.cuts, self.ends, strict=True)):
+            out[first:end] = found[first - begin : end - begin, lane]
+        return out
