@@ -288,6 +288,9 @@ def test_a_saved_profile_is_never_used_in_silence(
         comments="",
     )
     calls = ["identify", "log.csv", "--inverse", "--out", "."]
+    assert main([*calls, "--map", "position=q:deg", "--map", "torque=tau [N·m]:-N·m"]) == 2
+    assert "friction would drive the axis" in capsys.readouterr().err
+    assert not list((tmp_path / "config").rglob("*.toml"))  # what reads it wrongly is not kept
     assert main([*calls, "--map", "position=q:deg"]) == 0
     kept = next((tmp_path / "config" / "profiles").glob("*.toml"))
     first = capsys.readouterr()

@@ -96,7 +96,9 @@ def test_models_of_different_laws_are_compared_by_their_curves(
     assert result["parameters"] == []
     assert result["changed"]  # Coulomb's law has no Stribeck effect
     assert main(["compare", str(first), str(second)]) == 0
-    assert "only the curves" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "only the curves" in shown
+    assert "p (Holm)" not in shown
 
 
 def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(

@@ -247,6 +247,30 @@ def test_under_a_constant_torque_load_is_not_told_from_friction_unless_the_drive
     )  # at this record's load
 
 
+def test_the_outer_torques_share_of_the_load_alone_is_judged_too() -> None:
+    """With load_motor held, a constant torque loads a drive that never brakes as more friction would."""
+    how = {"extras": Extras(load=True), "frozen": ["load_motor"], "free": ["load_external"]}
+    flat = identify_axis(
+        [cases.trial("coulomb", offset=0.1, load_motor=0.8)],
+        AXIS,
+        ["coulomb"],
+        values={"load_motor": 0.8},
+        **how,
+    )
+    assert not flat["load_external"].identified
+    assert "looks like more friction" in flat["load_external"].verdict
+    assert not flat["fc"].identified
+    assert flat["inertia"].identified
+    known = {"gravity": 0.25, "gravity_angle": 0.1, "load_motor": 0.8, "load_external": 1.5}
+    trial = cases.trial("coulomb", 0, offset=0.0, noise=5e-3, **known)
+    how["frozen"].append("offset")
+    swung = identify_axis(
+        [trial], ServoAxis(drive_side="load", gravity="pendulum"), ["coulomb"],
+        values={"load_motor": 0.8, "offset": 0.0}, **how,
+    )  # fmt: skip
+    assert_recovered(swung, {"load_external": 1.5, "fc": cases.FC})
+
+
 def test_load_is_told_from_friction_where_the_drive_brakes() -> None:
     trial = braking_trial(load_motor=0.8)
     assert np.mean(trial.signal()[1:] * np.diff(trial.position) < 0.0) > 0.1

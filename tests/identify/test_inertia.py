@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from stickslip import Model
+from stickslip.cli.identify import interval
 from stickslip.errors import InputError
 from stickslip.identify.axis_trial import Trial
-from stickslip.identify.inertia import frequency_response, inertia
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.inertia import frequency_response, inertia, verdict_on
 from stickslip.machines.servo import ServoAxis
 from stickslip.simulation.driven import Drive, Mechanics, drive_axis
 
@@ -92,3 +94,11 @@ def test_what_cannot_be_fitted_is_said() -> None:
         inertia([trial], AXIS, band=(5.0, 1.0))
     with pytest.raises(InputError, match="no record"):
         inertia([], AXIS)
+
+
+def test_a_value_below_zero_and_an_interval_of_many_decades_are_called_what_they_are():
+    assert "below 0" in verdict_on(-2.0, -1.0)
+    assert verdict_on(-2.0, 1.0) == "the data do not tell it from 0"
+    wide = Estimate("k", "N·m/rad", "k", 1.0, 1.0, 3e-12, 3e16, False, "")
+    assert interval(wide) == "[not determined]"
+    assert interval(replace(wide, lower=1e-3, upper=9.0)) == "[0.001, 9]"

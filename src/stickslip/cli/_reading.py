@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from stickslip.finding import Finding
     from stickslip.readers import Drive
     from stickslip.readers.profiles import Profile
@@ -63,7 +65,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def read_record(path: Path, args: argparse.Namespace) -> Record:
+def read_record(
+    path: Path, args: argparse.Namespace, accept: Callable[[Record], None] = lambda _: None
+) -> Record:
     """As `open_record`, for verbs that show no columns: stderr says where a saved profile had a part in it.
 
     Raises
@@ -72,14 +76,17 @@ def read_record(path: Path, args: argparse.Namespace) -> Record:
     """
     import sys
 
-    opened = open_record(path, args)
+    opened = open_record(path, args, accept)
     for finding in opened.notes:
         print(f"stickslip: {path}: {finding.line()}", file=sys.stderr)
     return opened.record
 
 
-def open_record(path: Path, args: argparse.Namespace) -> Opened:
-    """Read a file as the options say, with the profile of its layout; keep what `--map` and the others say.
+def open_record(
+    path: Path, args: argparse.Namespace, accept: Callable[[Record], None] = lambda _: None
+) -> Opened:
+    """Read a file as the options say, with the profile of its layout; keep what `--map` and the others say, unless
+    `accept` raises on the record: what reads it wrongly is not for the next file.
 
     What a profile has done that the options do not say is among the record's findings.
 
@@ -97,6 +104,7 @@ def open_record(path: Path, args: argparse.Namespace) -> Opened:
     kept = profiles.load(used) if used else None
     drive = _drive(args)
     record = record_of(table, args.map, drive=drive, profile=kept, sample_time=args.sample_time)
+    accept(record)
     written = None
     if (
         args.map

@@ -42,13 +42,15 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         _output.print_json({**result.as_dict(), "plot": str(args.plot) if args.plot else None})
         return 0
-    print(f"{'parameter':<14}{'first':>11}{'second':>11}  {'difference, 95 %':<26} {'unit':<11} p (Holm)")
+    if result.changes:
+        print(f"{'parameter':<14}{'first':>11}{'second':>11}  {'difference, 95 %':<26} {'unit':<11} p (Holm)")
     for c in result.changes:
         span = f"[{c.lower:.4g}, {c.upper:.4g}]"
         mark = "changed" if c.changed else ""
         p = "-" if math.isnan(c.p) else f"{c.p:.2g}"
         print(f"{c.name:<14}{c.first:>11.5g}{c.second:>11.5g}  {span:<26} {c.unit:<11} {p:<9}{mark}".rstrip())
-    print()
+    if result.changes:
+        print()
     if not math.isnan(result.p):
         print(f"friction parameters together: p = {result.p:.2g}")
     print(f"sliding curve: largest difference is {result.largest:.2g} times what the intervals explain")

@@ -230,10 +230,11 @@ def checked(path: Path, args: argparse.Namespace, held_out: bool = False) -> Sou
     from stickslip.identify.doctor import examine
     from stickslip.report.identified import Source
 
-    record = _reading.read_record(path, args)
-    diagnosis = examine(record)
-    if diagnosis.errors:
-        raise InputError(f"{path}: {diagnosis.errors[0].line()}; see `stickslip doctor {path}`")
+    def accept(record: Record) -> None:
+        if errors := examine(record).errors:
+            raise InputError(f"{path}: {errors[0].line()}; see `stickslip doctor {path}`")
+
+    diagnosis = examine(_reading.read_record(path, args, accept))
     for finding in diagnosis.warnings:
         print(f"stickslip: {path}: {finding.line()}", file=sys.stderr)
     return Source(path.name, diagnosis.record, diagnosis.findings, source_of(diagnosis.record), held_out)
@@ -317,6 +318,8 @@ def interval(e: Estimate) -> str:
 
     if math.isnan(e.lower) or math.isnan(e.upper):
         return "[unknown]"
+    if e.undetermined:
+        return "[not determined]"
     return f"[{e.lower:.5g}, {e.upper:.5g}]"
 
 

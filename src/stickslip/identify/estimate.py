@@ -21,6 +21,10 @@ def silent(_what: str) -> None:
     """Tell nobody how far an identification is."""
 
 
+DECADES = 4.0
+"""That an interval spans at most where its ends are worth printing."""
+
+
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """One identified number.
@@ -47,6 +51,11 @@ class Estimate:
     upper: float
     identified: bool
     verdict: str = ""
+
+    @property
+    def undetermined(self) -> bool:
+        """Whether the interval of a positive number spans more than `DECADES`: its ends then tell nothing."""
+        return self.lower > 0.0 and self.upper > 10.0**DECADES * self.lower
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data; what is not finite becomes None, since JSON has no such numbers."""

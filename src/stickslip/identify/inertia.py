@@ -181,7 +181,7 @@ def _result(
     for (name, unit, symbol), value, s in zip(names, solution, std, strict=True):
         low, high = float(value - 1.96 * s), float(value + 1.96 * s)
         good = low > 0.0 and high <= 2.0 * low
-        why = "" if good else "the data do not tell it from 0" if low <= 0.0 else "its interval is too wide"
+        why = "" if good else verdict_on(low, high)
         estimates.append(Estimate(name, unit, symbol, float(value), float(s), low, high, good, why))
     notes = [f"Rigid axis fitted from {band[0]:g} to {band[1]:g} Hz with {estimator.upper()}."]
     if resonances:
@@ -194,6 +194,13 @@ def _result(
         pictures=(_picture(responses, solution, axis),),
         details={"responses": tuple(responses), "resonances": tuple(resonances), "axis": axis, "band": band},
     )  # fmt: skip
+
+
+def verdict_on(low: float, high: float) -> str:
+    """Why a value that must be above 0 is not identified."""
+    if high < 0.0:
+        return "it lies below 0, which no axis has: torque and motion are not of one time, or one has the wrong sign"
+    return "the data do not tell it from 0" if low <= 0.0 else "its interval is too wide"
 
 
 def modes_of(trials: Sequence[Trial], axis: ServoAxis, inertia: float, above: float) -> list[float]:

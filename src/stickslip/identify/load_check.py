@@ -72,16 +72,53 @@ def tells_external(inverse: InverseDynamics) -> bool:
     return bool(there) and own_part(inverse, Mechanics(1.0, load_motor=1.0, load_external=1.0)) >= LEAST
 
 
+def own_part_external(inverse: InverseDynamics, mechanics: Mechanics) -> float:
+    """As `own_part`, of the load that torques from outside make, with load_motor held: a constant one loads a drive
+    that never brakes as more friction would."""
+    speed = inverse.velocity
+    moving = np.abs(speed) > MOVING * float(np.sqrt(np.mean(speed**2)))
+    outside = [i for i, n in enumerate(inverse.names) if n.startswith(OUTER)]
+    outer: Array = inverse.matrix[:, outside] @ inverse.values[outside]
+    carried = mechanics.load_motor * inverse.torque + (mechanics.load_external or 1e-9) * outer
+    effect = (np.sign(speed) * np.where(carried < 0.0, -1.0, 1.0) * outer)[moving]
+    known = inverse.matrix[moving]
+    left: Array = effect - known @ np.linalg.lstsq(known, effect, rcond=None)[0]
+    whole = float(np.linalg.norm(effect))
+    return float(np.linalg.norm(left)) / whole if whole > 0.0 else 0.0
+
+
+def judged_external(
+    estimates: Sequence[Estimate], inverse: InverseDynamics | None, mechanics: Mechanics
+) -> tuple[Estimate, ...]:
+    """The estimates; where the records do not tell load_external, neither it nor the torques of friction are."""
+    own = own_part_external(inverse, mechanics) if inverse is not None else 0.0
+    if own >= LEAST:
+        return tuple(estimates)
+    torque = next(e.unit for e in estimates if e.name == "load_external").removeprefix("1/").strip("()")
+    why = {
+        e.name: "it goes with load_external, which is not identified"
+        for e in estimates if e.identified and e.unit == torque and not e.name.startswith(OUTER)
+    }  # fmt: skip
+    why["load_external"] = (
+        f"all but {100.0 * own:.2g} % of its effect looks like more friction; identified means at least "
+        f"{100.0 * LEAST:g} %"
+    )
+    return tuple(replace(e, identified=False, verdict=why[e.name]) if e.name in why else e for e in estimates)
+
+
 def judged_load(
     estimates: Sequence[Estimate], inverse: InverseDynamics | None, mechanics: Mechanics
 ) -> tuple[Estimate, ...]:
     """The estimates; where the records do not tell load_motor, neither it nor what goes with it is identified.
 
-    All torques and inertias go with it: they scale alike.
+    All torques and inertias go with it: they scale alike. With load_motor held, load_external alone goes with the level
+    of friction.
     """
     names = {e.name for e in estimates}
     if "load_motor" not in names:
-        return tuple(estimates)
+        return (
+            judged_external(estimates, inverse, mechanics) if "load_external" in names else tuple(estimates)
+        )
     own = own_part(inverse, mechanics) if inverse is not None else 0.0
     why: dict[str, str] = {}
     if own < LEAST:

@@ -153,7 +153,7 @@ def interval(e: Estimate) -> str:
     """The 95 % interval in words."""
     if math.isnan(e.lower) or math.isnan(e.upper):
         return "unknown"
-    return f"{number(e.lower)} to {number(e.upper)}"
+    return "not determined" if e.undetermined else f"{number(e.lower)} to {number(e.upper)}"
 
 
 def shown(e: Estimate) -> dict[str, Any]:
