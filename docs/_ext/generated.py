@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -35,8 +37,11 @@ def generate(app: Sphinx, config: Any) -> None:
         start = time.perf_counter()
         make()
         log.info("%s.%s: %.1f s", make.__module__, make.__name__, time.perf_counter() - start)
-    for page in sorted(page for pattern in RUN for page in DOCS.glob(pattern)):
-        run(page)
+    pages = sorted(page for pattern in RUN for page in DOCS.glob(pattern))
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # each in a process of its own
+        for wrong in pool.map(run, pages):
+            if wrong:
+                log.warning("%s", wrong)
 
 
 def work_precision() -> None:
@@ -51,26 +56,26 @@ def work_precision() -> None:
     stamp.write_text(now)
 
 
-def run(page: Path) -> None:
-    """Run a page, unless page and package are as they were; what goes wrong is a warning, which fails the build."""
+def run(page: Path) -> str:
+    """Run a page, unless page and package are as they were; says what went wrong, which fails the build."""
     if not any(sessions.blocks(page.read_text(encoding="utf-8"))):
-        return
+        return ""
     folder = GENERATED / "sessions" / page.stem
     stamp = folder / ".stamp"
     now = hashlib.sha256(page.read_bytes() + package_hash().encode()).hexdigest()
     if stamp.exists() and stamp.read_text() == now:
-        return
+        return ""
     shutil.rmtree(folder, ignore_errors=True)  # what an earlier build left there is not on the page
     start = time.perf_counter()
     done = subprocess.run(
         [sys.executable, str(DOCS / "_ext" / "sessions.py"), str(page), str(folder)],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
-    if done.returncode:
-        log.warning("%s", done.stderr.strip())
-    else:
-        stamp.write_text(now)
     log.info("%s: %.1f s", page.name, time.perf_counter() - start)
+    if done.returncode:
+        return done.stderr.strip() or f"{page.name}: exit code {done.returncode}"
+    stamp.write_text(now)
+    return ""
 
 
 def package_hash() -> str:
