@@ -29,6 +29,8 @@ PERIOD = 1e-3
 COUNTS = (4096 * 4, 4096 * 16, 1_000_000)
 FINE = 1e-4
 """Longest step of the simulation, s."""
+STUCK, SELDOM = 0.1, 0.05
+"""Part of a level below which the axis sticks there; part of the time that it may do so and still keep the level."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +47,9 @@ class Case:
     record : Record
         Position (counted) and torque.
     slow_levels : int
-        Velocity levels below twice the Stribeck velocity.
+        Velocity levels below twice the Stribeck velocity that the reference asks for.
+    slow_held : int
+        Those of them that the axis kept, in both directions: where it sticks and slips it has no such speed.
     """
 
     family: str
@@ -53,6 +57,7 @@ class Case:
     truth: Mapping[str, float]
     record: Record
     slow_levels: int
+    slow_held: int
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
@@ -151,6 +156,15 @@ def make(seed: int, family: str = "", *, repeat: int = 0, coulomb: float = 1.0, 
         {"inertia": inertia, "offset": offset, **numbers(friction)},
         record,
         int(np.sum(levels < 2.0 * vs)),
+        sum(kept(velocity, out[:, 1], x) for x in levels[levels < 2.0 * vs]),
+    )
+
+
+def kept(wanted: Any, actual: Any, level: float) -> bool:
+    """Whether the axis kept a level in both directions instead of sticking."""
+    return all(
+        float(np.mean(sign * actual[wanted == sign * level] < STUCK * level)) <= SELDOM
+        for sign in (1.0, -1.0)
     )
 
 

@@ -7,14 +7,16 @@ and counted. Parallel over records.
 
 Every bar is printed with PASS or FAIL: J, Fc, sigma2 identified in at least 95 % of the records; Fs and vs in every
 record with at least 3 levels below 2 vs; 95 % intervals that contain the truth 90 to 99 % of the time, for each
-parameter with at least 100 verdicts; upper/lower at most 2 (positive), half-width at most 5 % of Fc (signed). The
-coverage without the verdict is printed beside it.
+parameter with at least 100 verdicts; upper/lower at most 2 (positive), half-width at most 5 % of Fc (signed). Beside
+it are printed the coverage without the verdict, and how often Fs and vs are identified where the axis *kept* so many
+slow levels: where it sticks and slips it has no such speed (--kept 3 draws only such records).
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import itertools
 import os
 import sys
 import time
@@ -46,6 +48,7 @@ class Row:
     seed: int
     family: str
     slow_levels: int
+    slow_held: int
     name: str
     truth: float
     value: float
@@ -72,7 +75,7 @@ def study(seed: int) -> list[Row]:
         return []
     seconds = time.process_time() - begin
     return [
-        Row(seed, case.family, case.slow_levels, e.name, case.truth[e.name], e.value, e.lower, e.upper,
+        Row(seed, case.family, case.slow_levels, case.slow_held, e.name, case.truth[e.name], e.value, e.lower, e.upper,
             e.identified, seconds)
         for e in found.estimates if e.name in case.truth and "[" not in e.name
     ]  # fmt: skip
@@ -85,7 +88,8 @@ def kept(path: Path | None) -> list[Row]:
     with path.open(newline="", encoding="utf-8") as file:
         return [
             Row(
-                int(r["seed"]), r["family"], int(r["slow_levels"]), r["name"], float(r["truth"]), float(r["value"]),
+                int(r["seed"]), r["family"], int(r["slow_levels"]), int(r["slow_held"]), r["name"],
+                float(r["truth"]), float(r["value"]),
                 float(r["lower"]), float(r["upper"]), r["identified"] == "True", float(r["seconds"]),
             )
             for r in csv.DictReader(file)
@@ -124,12 +128,30 @@ def report(rows: Sequence[Row], records: int) -> bool:
             called == len(mine),
             f"{called} of {len(mine)}",
         )
+        for least in range(1, SLOW_LEVELS + 1):
+            held = [r for r in rows if r.name == name and r.slow_held >= least]
+            print(f"        {name} identified where the axis kept at least {least} of them: "
+                  f"{sum(r.identified for r in held)} of {len(held)}")  # fmt: skip
     for name in names:
         called = [r for r in rows if r.name == name and r.identified]
         if len(called) >= ENOUGH:
             within = sum(r.inside for r in called) / len(called)
             good &= verdict(f"{name} covered", 0.90 <= within <= 0.99, f"{within:.1%} of {len(called)}")
     return good
+
+
+def seeds_from(first: int, count: int, kept: int) -> Sequence[int]:
+    """So many seeds from the first, those whose axis kept enough slow levels."""
+    if not kept:
+        return range(first, first + count)
+    found: list[int] = []
+    for seed in itertools.count(first):
+        if len(found) == count:
+            return found
+        case = make(seed)
+        if "vs" in case.truth and case.slow_held >= kept:
+            found.append(seed)
+    return found
 
 
 def main() -> int:
@@ -142,11 +164,17 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--short", action="store_true", help="20 records")
     parser.add_argument(
+        "--kept",
+        type=int,
+        default=0,
+        help="only records of a Stribeck effect whose axis kept so many slow levels",
+    )
+    parser.add_argument(
         "--rows", type=Path, help="write every row to this CSV file; seeds that it holds are not run again"
     )
     options = parser.parse_args()
     count = 20 if options.short else options.records
-    wanted = range(options.first, options.first + count)
+    wanted = seeds_from(options.first, count, options.kept)
     rows = [r for r in kept(options.rows) if r.seed in wanted]
     done = {r.seed for r in rows}
     with ProcessPoolExecutor(options.jobs) as pool:
