@@ -13,8 +13,9 @@ import tomli_w
 from stickslip.analyse.tracking import tracking_metrics
 from stickslip.commission import commission as commissioning
 from stickslip.commission.candidates import Following
-from stickslip.commission.commission import commission, tried
+from stickslip.commission.commission import commission, planned, tried
 from stickslip.commission.curve import moving
+from stickslip.commission.kept import claimed
 from stickslip.commission.recommended import write_recommended
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
@@ -27,6 +28,7 @@ from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
 from stickslip.identify.recommend import notes_on, plants_of
 from stickslip.identify.segments import constant_velocity_segments
+from stickslip.machines.angle import AngleMap
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine, machine
@@ -34,9 +36,10 @@ from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.report.identified import Source, write_identification
+from stickslip.rigs.limited import limited
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.procedures._moves import holder, move
-from stickslip.rigs.procedures.base import perform
+from stickslip.rigs.procedures.base import Check, CheckFailed, perform
 from stickslip.rigs.procedures.sliding import Sliding
 from stickslip.rigs.procedures.track import RECOMMENDED, Track
 from stickslip.rigs.rig import setpoints
@@ -309,6 +312,70 @@ def test_a_coarse_count_is_no_rest(counts):
     slid = moving(done.record, 0.22, 2.0 * math.pi / counts)
     assert slid.points.velocity == pytest.approx([0.1, 0.3, 0.5, 1.0])
     assert len(slid.notes) == 1
+
+
+def test_an_interrupted_commissioning_goes_on_from_its_records(monkeypatch, tmp_path):
+    """What has the same settings is not measured again; other settings, another rig or a failed check are."""
+    short, said = Track(duration=0.2, bandwidth=8.0), []
+
+    def course(rig, resume=True):
+        return commissioning._Course(rig, tmp_path, said.append, False, resume)
+
+    first = course(VirtualRig(OTHER)).run(short)
+    with monkeypatch.context() as patch:
+        patch.setattr(commissioning, "perform", None)
+        again = course(VirtualRig(OTHER)).run(short)
+    assert "as recorded" in said[-1]
+    assert again.passed
+    assert again.segments == first.segments
+    np.testing.assert_array_equal(again.part("low")["position"], first.part("low")["position"])
+    for other, rig, resume in (
+        (replace(short, bandwidth=9.0), VirtualRig(OTHER), True),
+        (short, limited(VirtualRig(OTHER), {"torque": 0.5}), True),
+        (short, VirtualRig(replace(OTHER, seed=77)), True),
+        (short, VirtualRig(OTHER), False),
+    ):
+        course(rig, resume).run(other)
+        assert "follow low" in said[-1]
+    bad = Check("tracking", False, "no")
+    monkeypatch.setattr(Track, "checks", lambda *_: (bad,))
+    for _ in range(2):
+        with pytest.raises(CheckFailed):
+            course(VirtualRig(OTHER), True).run(replace(short, bandwidth=7.0))
+        assert "follow low" in said[-1]
+
+
+def test_a_folder_with_results_or_another_rigs_records_is_refused(tmp_path):
+    rig = VirtualRig(OTHER)
+    claimed(tmp_path, rig, anew=False)
+    commissioning._Course(rig, tmp_path, lambda _: None, False).run(Track(duration=0.2, bandwidth=8.0))
+    claimed(tmp_path, rig, anew=False)
+    with pytest.raises(InputError, match=r"track\.npz is a record of 'virtual other'.*thesis-dry.*--force"):
+        claimed(tmp_path, virtual_rig("thesis-dry"), anew=False)
+    (tmp_path / "model.toml").write_text("")
+    with pytest.raises(InputError, match=r"holds model\.toml already; give another folder with --out"):
+        claimed(tmp_path, rig, anew=False)
+    claimed(tmp_path, rig, anew=True)
+    assert not (tmp_path / "model.toml").exists()
+
+
+def test_the_tracking_runs_are_said_once():
+    plans = planned(VirtualRig(OTHER))
+    lines = [line for plan in plans for line in plan.text if "follow" in line]
+    assert len(lines) == 1
+    assert "9 times" in lines[0]
+    assert plans[-1].duration == pytest.approx(9 * Track().plan(VirtualRig(OTHER)).duration)
+
+
+def test_a_limit_crossed_while_looking_for_the_lag_leaves_the_rest(monkeypatch):
+    def crosses(self, procedure, **_):
+        raise LimitCrossed("speed: 41 rad/s beyond 40")
+
+    monkeypatch.setattr(commissioning._Course, "run", crosses)
+    course = commissioning._Course(VirtualRig(OTHER), None, print, False)
+    found, said = commissioning._attraction(course, 1e-3, AngleMap(), OTHER.clutch)
+    assert found is None
+    assert "41 rad/s beyond 40" in said[0]
 
 
 def test_a_stick_slip_stage_that_is_left_out_is_said(monkeypatch):

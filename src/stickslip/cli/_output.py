@@ -37,6 +37,11 @@ def say(what: str) -> None:
         print(what, file=sys.stderr)
 
 
+def tell(what: str) -> None:
+    """Say on stderr what goes on, in a file too: a line per step is what a log of a long run wants."""
+    print(what, file=sys.stderr, flush=True)
+
+
 def warn(what: str) -> None:
     """Say on stderr what a reader of the results must know, above a bar if there is one."""
     from tqdm import tqdm

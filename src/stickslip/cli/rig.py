@@ -6,7 +6,7 @@ stickslip rig run sliding --rig thesis-grease --set velocities=5,1,0.2 --without
 stickslip rig run track --rig thesis-dry --set compensator=feedforward --set model=lugre
 stickslip rig run inertia --rig my_machine.toml --dry-run
 stickslip rig run breakaway --rig drive.toml --limit torque=0.5 --stream breakaway.stream
-stickslip rig commission --rig thesis-dry --out commissioned
+stickslip rig commission --rig thesis-dry --out commissioned      # the same again goes on where it was interrupted
 
 A rig is the name of a machine of the library, the TOML file of a machine, or a TOML file with a table [rig] (`kind`,
 and what that kind of rig needs). --dry-run says how far, how fast, how strong and how long, and moves nothing. The
@@ -46,6 +46,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     whole = actions.add_parser("commission", help="every procedure in turn, to a model.toml and a report")
     whole.add_argument(
         "--out", type=Path, default=Path("commission"), metavar="DIR", help="folder (commission)"
+    )
+    whole.add_argument(
+        "--force",
+        action="store_true",
+        help="measure all of it again, over the results that lie in the folder",
     )
     actions.add_parser("list", help="list machines, procedures and imperfections")
     for action in (run_one, whole):
@@ -196,6 +201,7 @@ def commissioned(args: argparse.Namespace) -> int:
     """`stickslip rig commission`."""
     from stickslip.cli import _output
     from stickslip.commission.commission import commission, planned
+    from stickslip.commission.kept import claimed
     from stickslip.commission.recommended import write_recommended
     from stickslip.errors import InputError
     from stickslip.identify.model_file import versions, write_model
@@ -213,14 +219,25 @@ def commissioned(args: argparse.Namespace) -> int:
     if args.out.is_file():
         raise InputError(f"--out {args.out} is a file; give a folder")
     folder: Path = prepared_folder(args.out)
-    found = commission(rig, folder=folder, progress=_output.say, without_watchdog=args.no_watchdog)
+    claimed(folder, rig, anew=args.force)
+    try:
+        found = commission(
+            rig,
+            folder=folder,
+            progress=_output.tell,
+            without_watchdog=args.no_watchdog,
+            resume=not args.force,
+        )
+    except KeyboardInterrupt:
+        _output.tell(
+            f"the records are kept in {folder}: the same command (without --force) goes on from them"
+        )
+        raise
     stages = [s for s in found.stages if s.name != "angle"]  # another look at the sliding record
     records = {s.name: s.performed.record for s in stages}
     data = [described(folder / f"{name}.npz", len(record)) for name, record in records.items()]
     model = write_model(folder / "model.toml", found.result, data=data)
     advice = found.recommended
-    # One of an earlier commissioning must not be run when nothing is recommended now.
-    (folder / "recommended.toml").unlink(missing_ok=True)
     if advice and advice.chosen:
         write_recommended(folder / "recommended.toml", advice)
     sources = [Source(s.name, s.performed.record, findings_of(s.performed)) for s in stages]

@@ -34,7 +34,7 @@ from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
 from stickslip.record import Record, encoder_step
 from stickslip.rigs.procedures._moves import ROOM
-from stickslip.rigs.procedures.base import perform
+from stickslip.rigs.procedures.base import Plan, perform
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
 from stickslip.rigs.virtual import VirtualRig
@@ -86,6 +86,13 @@ class Following(Track):
     def angle(self) -> AngleMap:
         """The one that was given."""
         return self.over
+
+    def plan(self, rig: Rig) -> Plan:
+        """As `Track`, with what the controller has."""
+        assert self.using is not None
+        helper, whole = self.using.compensator, super().plan(rig)
+        what = f"{helper.name} of law {helper.model.law.name!r}" if helper else "the PD alone"
+        return dataclasses.replace(whole, text=(f"follow {self.reference}, {what}",))
 
     def options(self) -> dict[str, Any]:
         """Plain data."""

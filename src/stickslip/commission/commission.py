@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from stickslip.commission.candidates import Following, Known, resolution_of
 from stickslip.commission.curve import fitted_curve, moving
+from stickslip.commission.kept import kept, stamped
 from stickslip.commission.lag import lag_of
 from stickslip.commission.recommended import (
     SLOWER,
@@ -118,14 +119,19 @@ class _Course:
     folder: Path | None
     progress: Callable[[str], None]
     without_watchdog: bool
+    resume: bool = False
     stages: list[Stage] = field(default_factory=list[Stage])
 
     def run(self, procedure: Procedure, *, insist: bool = True, name: str = "") -> Performed:
-        """Perform, save under a name (the procedure's), and insist on the checks."""
-        self.progress(f"{procedure.name}: {'; '.join(procedure.plan(self.rig).text)}")
+        """Perform, save under a name (the procedure's) and insist on the checks; or take the record that lies there."""
+        file = self.folder / f"{name or procedure.name}.npz" if self.folder is not None else None
+        if file and self.resume and (done := kept(file, procedure, self.rig, insist=insist)):
+            self.progress(f"{name or procedure.name}: as recorded with the same settings in {file}")
+            return done
+        self.progress(f"{name or procedure.name}: {'; '.join(procedure.plan(self.rig).text)}")
         done = perform(procedure, self.rig, without_watchdog=self.without_watchdog)
-        if self.folder is not None:
-            done.record.save(self.folder / f"{name or procedure.name}.npz")
+        if file is not None:
+            stamped(done.record, procedure, self.rig).save(file)
         return done.insist() if insist else done
 
     def add(self, name: str, done: Performed, found: Identification | None, note: str = "") -> None:
@@ -144,9 +150,15 @@ def planned(rig: Rig, velocities: tuple[float, ...] = VELOCITIES, duration: floa
     stages: tuple[Procedure, ...] = (
         Inertia(duration=duration), Breakaway(), Sliding(velocities=speeds), Presliding(), Stickslip(),
         *(Attraction(mean=m, swing=s * m, frequency=LIVELY) for m, s in SWUNG), Resonance(),
-        *[Track()] * 2 * (1 + len(SLOWER)),
     )  # fmt: skip
-    return tuple(s.plan(rig) for s in stages)
+    track, shares = Track().plan(rig), (1.0, *SLOWER)
+    runs = 3 * len(shares)
+    said = (
+        f"follow low {runs} times for {track.duration:.2g} s: the PD alone, with the compensator and without what that "
+        f"knows of the angle, at {', '.join(f'{100.0 * s:g}' for s in shares)} % of the bandwidth that is found",
+    )
+    whole = replace(track, duration=runs * track.duration, pauses=runs * track.pauses, text=said)
+    return (*(s.plan(rig) for s in stages), whole)
 
 
 def commission(
@@ -160,6 +172,7 @@ def commission(
     lugre_too: bool = True,
     track_too: bool = True,
     without_watchdog: bool = False,
+    resume: bool = False,
 ) -> Commissioned:
     """Commission a rig.
 
@@ -182,20 +195,24 @@ def commission(
         Whether a compensator is recommended and tried.
     without_watchdog : bool
         Arm a rig that declares no watchdog.
+    resume : bool
+        Whether a record in `folder` that was made with the same settings is taken instead of measured again.
 
     Raises
     ------
     InputError, RigError
         If a stage that the others rest on cannot be performed or identified.
     """
-    course = _Course(rig, folder, progress or (lambda _: None), without_watchdog)
+    course = _Course(rig, folder, progress or (lambda _: None), without_watchdog, resume)
     j, top, level = _inertia(course, duration)
     fs, fs_std, resolution = _breakaway(course, j, level, interval)
     able = tuple(v for v in velocities if v <= 1.05 * top)
     sliding, curve, angle = _sliding(course, j, (fs, fs_std), able, resolution)
     stuck = _presliding(course, j, fs, sliding, resolution)
     model, stiffness, said = joined_model(curve, stuck)
-    model, said = with_lag(model, _attraction(course, j, angle, model), said)
+    lag, unknown = _attraction(course, j, angle, model)
+    model, said = with_lag(model, lag, said)
+    said = (*said, *unknown)
     lugre, missed = _stickslip(course, j, fs, sliding) if lugre_too else (None, ())
     said = (*said, *missed)
     recommended = None
@@ -260,11 +277,16 @@ def _presliding(
     """Elements of GMS from a loop below break-away; a loop that breaks away is made smaller."""
     share = BELOW
     while True:
-        done = course.run(Presliding(amplitude=share * fs), insist=False)
-        if done.passed or share < 0.2:
-            break
+        last = share < 0.2
+        try:
+            done = course.run(Presliding(amplitude=share * fs), insist=last)
+        except LimitCrossed:
+            if last:
+                raise
+        else:
+            if done.passed:
+                break
         share *= 0.75
-    done.insist()
     level = {**sliding, "fs": fs, "fc": fs, "sigma2": 0.0}
     loop = Hysteresis.of(done.record, "motor_torque")
     found = identify_presliding(loop, level, elements=3, offset=True, inertia=j)
@@ -273,22 +295,25 @@ def _presliding(
     return found
 
 
-def _attraction(course: _Course, j: float, angle: AngleMap, model: Model) -> Identification | None:
-    """What the lag of friction tells of C: nothing where the axis does not run in one direction."""
+def _attraction(
+    course: _Course, j: float, angle: AngleMap, model: Model
+) -> tuple[Identification | None, tuple[str, ...]]:
+    """What the lag of friction tells of C: nothing where the axis does not run in one direction, and why."""
     done, why = None, ""
     for mean, swing in SWUNG:
         procedure = Attraction(inertia=j, mean=mean, swing=swing * mean, frequency=LIVELY)
-        done = course.run(procedure, insist=False)
         try:
+            done = course.run(procedure, insist=False)
             found = lag_of(done.record, j, angle, model, course.rig.sample_time)
-        except InputError as error:
+        except (InputError, LimitCrossed) as error:
             why = str(error).rstrip(".")
             continue
         course.add("attraction", done, found)
-        return found
-    assert done is not None
+        return found, ()
+    if done is None:
+        return None, (f"attraction: {why}.",)
     course.add("attraction", done, None, why)
-    return None
+    return None, ()
 
 
 def _stickslip(

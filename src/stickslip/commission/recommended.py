@@ -8,6 +8,7 @@ follows the slow sinusoid with the PD alone and with the compensator, at this ba
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -125,10 +126,18 @@ class Recommended:
         )
         for t in self.tracked:
             yield (
-                f"Measured on the slow sinusoid, PD of {t.bandwidth:.3g} Hz: {1e3 * t.alone:.3g} mrad RMS alone, "
-                f"{1e3 * t.helped:.3g} with the compensator: {t.ratio:.3g} times smaller "
+                f"Measured on the slow sinusoid{self.place}, PD of {t.bandwidth:.3g} Hz: {1e3 * t.alone:.3g} mrad RMS "
+                f"alone, {1e3 * t.helped:.3g} with the compensator: {t.ratio:.3g} times smaller "
                 f"({t.alone / t.mean:.3g} times without what it knows of the angle)."
             )
+
+    @property
+    def place(self) -> str:
+        """Where the runs began, in words."""
+        if not self.runs:
+            return ""
+        start = math.degrees(float(self.runs["alone"]["position"][0])) % 360.0
+        return f" from one start angle ({start:.0f} degrees; elsewhere it may be more or less)"
 
     def table(self) -> dict[str, Any]:
         """``[recommended]`` of a recommended.toml."""
