@@ -1,5 +1,6 @@
 """Sweeps: what varies, which cases, the data set after any interruption, and bad ones told before anything runs."""
 
+import gc
 import json
 import os
 import re
@@ -247,6 +248,17 @@ def test_a_cluster_gives_the_same_numbers(small, undisturbed, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("address", ["nonsense", "tcp://host", "http//host:1", "host:port"])
+def test_an_address_that_is_none_is_refused_at_once(small, tmp_path, address):
+    begun = time.monotonic()
+    with pytest.raises(
+        InputError, match=r"is no address of a Dask scheduler; give one such as tcp://host:8786"
+    ):
+        execute.run(small, tmp_path / "out", scheduler=address)
+    assert time.monotonic() - begun < 5.0
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_scheduler_that_is_not_there(small, tmp_path):
     pytest.importorskip("distributed")
     with pytest.raises(InputError, match="no Dask scheduler at"):
@@ -291,6 +303,7 @@ def test_percentiles_and_shares(small, tmp_path):
 def test_a_sweep_is_run_again_from_its_manifest(tmp_path, capsys):
     assert main(["sweep", str(SMALL), "--out", str(tmp_path), "--cases", "30", "--no-report"]) == 0
     assert main(["rerun", str(tmp_path)]) == 0
+    assert main(["rerun", str(tmp_path / "manifest.json")]) == 0
     assert "60 cases, " in capsys.readouterr().out
     part = next((tmp_path / "data").rglob("*controller=PD/*.parquet"))
     table = pyarrow.parquet.read_table(part)
@@ -345,7 +358,18 @@ def test_more_cases_than_the_disk_has_room_for(small, tmp_path):
         dataset.room_for(tmp_path, huge)
 
 
+def test_an_interrupted_sweep_gives_none_of_joblibs_advice(small, recwarn):
+    blocks = execute.computed(small, small.blocks, jobs=2)
+    next(blocks)
+    blocks.close()
+    gc.collect()
+    assert [str(w.message) for w in recwarn if "tasks" in str(w.message)] == []
+
+
 def test_the_command_prints_and_draws(tmp_path, capsys):
+    (tmp_path / "figures").mkdir()
+    for name in ("tornado-of-a-run-that-was.png", "my-own.png"):
+        (tmp_path / "figures" / name).write_bytes(b"")
     assert main(["sweep", str(SMALL), "--out", str(tmp_path), "--cases", "60", "--jobs", "2"]) == 0
     out = capsys.readouterr().out
     assert "signed/sine/nominal/FF-lugre" in out
@@ -355,6 +379,8 @@ def test_the_command_prints_and_draws(tmp_path, capsys):
         .read_text()
         .startswith("slip_rule,reference,friction,controller,cases,flagged")
     )
+    assert not (tmp_path / "figures" / "tornado-of-a-run-that-was.png").exists()
+    assert (tmp_path / "figures" / "my-own.png").exists()
     assert main(["sweep", "no-such-sweep"]) == 2
 
 

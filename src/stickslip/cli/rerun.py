@@ -11,13 +11,18 @@ SUMMARY = "run a finished study or sweep again from its manifest and compare the
 def arguments(parser: argparse.ArgumentParser) -> None:
     """The folder."""
     parser.add_argument(
-        "folder", type=Path, metavar="DIR", help="a folder that `stickslip study` or `stickslip sweep` wrote"
+        "folder",
+        type=Path,
+        metavar="DIR",
+        help="a folder that `stickslip study` or `stickslip sweep` wrote, or its manifest.json",
     )
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at a time (default 1)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print what differs; 1 if anything does."""
+    if args.folder.name == "manifest.json" and args.folder.is_file():
+        args.folder = args.folder.parent
     from stickslip.cli import _output
     from stickslip.study.rerun import rerun as rerun_study
     from stickslip.sweep.rerun import is_sweep

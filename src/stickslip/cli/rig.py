@@ -229,10 +229,9 @@ def commissioned(args: argparse.Namespace) -> int:
             resume=not args.force,
         )
     except KeyboardInterrupt:
-        _output.tell(
-            f"the records are kept in {folder}: the same command (without --force) goes on from them"
-        )
-        raise
+        raise KeyboardInterrupt(
+            f"the records are kept in {folder}; run the same command again, without --force, to go on"
+        ) from None
     stages = [s for s in found.stages if s.name != "angle"]  # another look at the sliding record
     records = {s.name: s.performed.record for s in stages}
     data = [described(folder / f"{name}.npz", len(record)) for name, record in records.items()]

@@ -24,6 +24,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 LEVELS = 13
 HIGH = 95.0
 """The percentile that a design is judged by."""
+KINDS = ("percentiles", "gain", "uncertainty", "tornado")
+"""What the names of the figures begin with."""
 BAND = Style("#0072B2", "-", 4.0)
 MEDIAN = Style("#000000", "-", 1.0)
 LOWER, HIGHER = Style("#0072B2", "-", 4.0), Style("#E69F00", "-", 4.0)
@@ -36,7 +38,11 @@ UNITS = {"rad_s": "rad/s", "rad": "rad", "Nm": "N·m", "J": "J", "s": "s"}
 
 
 def draw(folder: Path, sweep: Sweep) -> list[Path]:
-    """Draw what the sweep's cases allow into ``figures/`` of its folder. Returns the PNG files."""
+    """Draw what the sweep's cases allow into ``figures/`` of its folder; those of an earlier run give way. Returns the
+    PNG files."""
+    for kind in KINDS:
+        for old in (folder / "figures").glob(f"{kind}-*"):
+            old.unlink()
     made: list[Path] = []
     groups: dict[tuple[str, str, str], list[PlannedRun]] = {}
     for run in sweep.runs:

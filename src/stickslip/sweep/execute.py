@@ -6,8 +6,10 @@ import functools
 import importlib
 import json
 import os
+import re
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -26,6 +28,8 @@ from stickslip.sweep.plan import BLOCK, Sweep, load
 
 __all__ = ["BACKENDS", "computed", "run"]
 
+ADDRESS = re.compile(r"(?:[a-z]+://)?(?:[^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):\d{1,5}/?|inproc://\S+")
+"""Of a Dask scheduler: its client looks for another kind of text in vain, and for long."""
 BACKENDS = ("threads", "processes")
 MOST_TRIES = 5
 """So often workers may be killed before the command gives up; what is done is kept."""
@@ -103,8 +107,12 @@ def ready(sweep: Sweep, scheduler: str = "") -> None:
     Raises
     ------
     InputError
-        If a run is bad, or it needs a GPU and this machine, which runs it, has none.
+        If a run is bad, the scheduler's address is none, or a GPU is needed and this machine, which runs it, has none.
     """
+    if scheduler and not ADDRESS.fullmatch(scheduler):
+        raise InputError(
+            f"--scheduler {scheduler!r} is no address of a Dask scheduler; give one such as tcp://host:8786"
+        )
     if sweep.device == "gpu" and not scheduler:
         lanes.check_gpu()
     for planned in sweep.runs:
@@ -179,6 +187,8 @@ def _once(
     if not blocks:
         return
     joblib: Any = importlib.import_module("joblib")
+    # What an interruption leaves undone is said by the verb; joblib's advice is for those who iterate themselves.
+    warnings.filterwarnings("ignore", r"\d+ tasks (which were still|have been)", UserWarning)
     if not scheduler and (jobs == 1 or backend == "threads"):
         tasks = (joblib.delayed(compute)(sweep, *block) for block in blocks)
         yield from joblib.Parallel(jobs, backend="threading", return_as="generator_unordered")(tasks)
