@@ -1,8 +1,9 @@
 """What a record can say of a contact that is stiff: it rings with the mass, and samples must show that.
 
-A contact at rest is a spring. A bristle whose inner loops do not close (LuGre) slips a little with every oscillation;
-where it rings faster than the samples show, unseen vibration lowers the torque at which it breaks away, as a dither
-does (``armstrong1994``), and shifts all that slow motion tells of the law. Sliding at speed is not touched.
+A contact at rest is a spring. A bristle whose inner loops do not close (LuGre; elasto-plastic friction near break-away,
+above its z_ba) slips a little with every oscillation; where it rings faster than the samples show, unseen vibration
+lowers the torque at which it breaks away, as a dither does (``armstrong1994``), and shifts all that slow motion tells
+of the law. Sliding at speed is not touched.
 """
 
 from __future__ import annotations
