@@ -36,7 +36,6 @@ from stickslip.simulation._exact_state import (
     S_MID,
     SCALE,
     SIDE_SIZE,
-    SIDES,
     SIGMA,
     SLIPPING,
     SPRING,
@@ -48,6 +47,7 @@ from stickslip.simulation._exact_state import (
     Q,
     S,
     curve_slope,
+    sides_of,
     sliding,
 )
 
@@ -69,7 +69,7 @@ def bend(parameters: Any, plan: Any, sides: Any, loop: Any, h: float) -> Linear:
     loop[BASE] = loop[EVEN_BASE]
     bristles = False
     least = max(STIFF * parameters[INERTIA] / (h * h), loop[FLOOR])
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         w = sides[side * SIDE_SIZE + WEIGHT]
         if sides[side * SIDE_SIZE + KIND] == BENDS and sides[side * SIDE_SIZE + SLIPPING] > 0.0:
             g = bend_bristle(parameters, plan, sides, loop, side, h, total, least)

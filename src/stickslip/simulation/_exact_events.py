@@ -34,16 +34,17 @@ from stickslip.simulation._exact_state import (
     S_START,
     SHARE,
     SIDE_SIZE,
-    SIDES,
     SIGMA,
     SLIPPING,
     SLIPS,
     STIFFNESS,
+    TOP_NEXT,
     VELOCITY,
     WATCHED,
     Q,
     S,
     first_of,
+    sides_of,
     sliding,
 )
 from stickslip.simulation._exact_stretch import (
@@ -57,7 +58,19 @@ from stickslip.simulation._exact_stretch import (
     cubic_of,
     state_at,
 )
-from stickslip.simulation._exact_trigger import BARELY, NOISE, load_of, looks, passes_turn, trigger
+from stickslip.simulation._exact_trigger import (
+    BARELY,
+    NOISE,
+    STILL,
+    load_of,
+    looks,
+    pass_on,
+    passes_turn,
+    stays,
+    trigger,
+    trigger_at_node,
+    weigh,
+)
 
 NEAR = 1e-3
 """N·m: a guess of how far the event function is below zero."""
@@ -103,9 +116,9 @@ def grazing(
 @kernel(exact=False, inline=True)
 def between(
     lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, stretch: Any, left: float,
-    theta: float, v: float, g_left: float, width: float, parts: int, tol: float,
+    theta: float, v: float, g_left: float, width: float, parts: int, slows: bool, tol: float,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """Look for an event at the ends of `parts` parts of [left, left + width], but for the last.
+    """Look for an event at the ends of `parts` parts of [left, left + width], but for the last; the end is weighed.
 
     Returns its time or NONE, the last time looked at, and the event function there.
     """
@@ -126,6 +139,8 @@ def between(
             return event, left, g_left
         left = x
         g_left = g
+        if slows and stays(parameters, plan, sides, v):
+            break
     return NONE, left, g_left
 
 
@@ -139,14 +154,20 @@ def find(
     left = 0.0
     theta = loop[POSITION]
     v = loop[VELOCITY]
-    a = acceleration(lin, c, 0.0, theta, v)
+    watched = loop[WATCHED] > 0.0
     g_left = -NEAR
     for node in range(1, 3):
         right = half * node
         theta_right = stretch[POSITION_MID] if node == 1 else stretch[POSITION_END]
         v_right = stretch[VELOCITY_MID] if node == 1 else stretch[VELOCITY_END]
-        a_right = acceleration(lin, c, right, theta_right, v_right)
-        if loop[WATCHED] > 0.0:
+        near = weigh(plan, elements, sides, theta_right, v_right, TOP_NEXT)
+        turns = v * v_right < 0.0 and abs(v_right - v) > STILL
+        if watched or near or turns:
+            a = acceleration(lin, c, right - half, theta, v)
+            a_right = acceleration(lin, c, right, theta_right, v_right)
+        else:
+            a = a_right = 0.0
+        if watched:
             dip = grazing(lin, loop, stretch, left, right, v_right, a, a_right)
             if dip > 0.0:
                 theta, v = state_at(lin, stretch, dip)
@@ -154,35 +175,23 @@ def find(
                 return locate(
                     lin, parameters, plan, elements, sides, loop, stretch, left, g_left, dip, g, theta, v, tol
                 )
-        elif v * v_right < 0.0 and passes_turn(
-            parameters, plan, elements, sides, half, theta, v, theta_right, v_right
-        ):
+        elif turns and passes_turn(parameters, plan, elements, sides, half, theta, v, theta_right, v_right):
             event = at_turn(
                 lin, parameters, plan, elements, sides, loop, stretch, left, right, v, g_left, tol
             )
             if event >= 0.0:
                 return event
-        parts = looks(parameters, plan, elements, sides, half, theta, v, a, theta_right, v_right, a_right)
-        if parts > 1:
-            event, left, g_left = between(
-                lin,
-                parameters,
-                plan,
-                elements,
-                sides,
-                loop,
-                stretch,
-                left,
-                theta,
-                v,
-                g_left,
-                half,
-                parts,
-                tol,
-            )
-            if event >= 0.0:
-                return event
-        g = trigger(parameters, plan, elements, sides, loop, theta_right, v_right)
+        if near or turns:
+            parts = looks(parameters, plan, elements, sides, half, theta, v, a, theta_right, v_right, a_right)
+            if parts > 1:
+                slows = v * v_right >= 0.0 and a * v < 0.0 and a_right * v_right < 0.0
+                event, left, g_left = between(
+                    lin, parameters, plan, elements, sides, loop, stretch, left, theta, v, g_left, half, parts,
+                    slows, tol,
+                )  # fmt: skip
+                if event >= 0.0:
+                    return event
+        g = trigger_at_node(parameters, plan, sides, loop, v_right)
         if g >= 0.0:
             if left == 0.0:
                 g_left = trigger(parameters, plan, elements, sides, loop, theta, v)
@@ -190,7 +199,8 @@ def find(
                 lin, parameters, plan, elements, sides, loop, stretch, left, g_left, right, g, theta_right,
                 v_right, tol,
             )  # fmt: skip
-        left, theta, v, a, g_left = right, theta_right, v_right, a_right, g
+        pass_on(plan, sides)
+        left, theta, v, g_left = right, theta_right, v_right, g
     return NONE
 
 
@@ -272,7 +282,7 @@ def at_turn(
 def add_exponents(plan: Any, sides: Any, h: float, x: float) -> None:
     """Add the decay C int 1/s dt of slipping elements over the first x of a stretch of length h."""
     f = x / h
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and sides[side * SIDE_SIZE + KIND] == RELAXES:
             attraction = sides[side * SIDE_SIZE + ATTRACTION]
             q0 = sides[side * SIDE_SIZE + Q]
@@ -284,7 +294,7 @@ def add_exponents(plan: Any, sides: Any, h: float, x: float) -> None:
 @kernel(exact=False, inline=True)
 def settle_forces(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> None:
     """Write every element's force where the loop stands, before modes change."""
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         if sides[side * SIDE_SIZE + KIND] == BENDS:
             sides[side * SIDE_SIZE + S] = sides[side * SIDE_SIZE + S_NOW]
             continue
@@ -312,7 +322,7 @@ def switch(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> 
     """Change the modes that end here: stick at a reversal, slip where the limit is reached."""
     v = loop[VELOCITY]
     settle_forces(parameters, plan, elements, sides, loop)
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         enter_or_leave(sides, loop, side, v)
     if loop[WATCHED] > 0.0 and loop[SIGMA] * v <= 1e-9 * abs(v):
         for i in range(int(plan[ELEMENTS])):
@@ -334,7 +344,7 @@ def break_away(
     parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, v: float, direction: float
 ) -> None:
     """Let the sticking elements slip whose load in `direction` is at its limit."""
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         first = first_of(plan, side)
         last = first_of(plan, side + 1)
         if first == last:

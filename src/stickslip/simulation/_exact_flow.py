@@ -8,7 +8,7 @@ complex, real, and growing ones of negative stiffness (feedback of a model stiff
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
 
@@ -31,6 +31,10 @@ class Linear(NamedTuple):
     """K/J - (D/2J)²: positive where the pair is complex"""
     frequency: float
     """square root of its magnitude, rad/s"""
+    compliance: float
+    """1 / K"""
+    mobility: float
+    """1 / sqrt(J |K|)"""
 
 
 @kernel(exact=False)
@@ -39,7 +43,10 @@ def linear(inertia: float, damping: float, stiffness: float) -> Linear:
     decay = 0.5 * damping / inertia
     square = stiffness / inertia
     discriminant = square - decay * decay
-    return Linear(inertia, damping, stiffness, decay, square, discriminant, math.sqrt(abs(discriminant)))
+    return Linear(
+        inertia, damping, stiffness, decay, square, discriminant, math.sqrt(abs(discriminant)), 1.0 / stiffness,
+        1.0 / math.sqrt(inertia * abs(stiffness)),
+    )  # fmt: skip
 
 
 @kernel(exact=False, inline=True)
@@ -58,6 +65,23 @@ def flow(lin: Linear, x: float) -> Matrix:
     return e * (c + lin.decay * s), e * s, -e * lin.square * s, e * (c - lin.decay * s)
 
 
+FLOW = 5
+"""Entries of a kept flow: a matrix, and the generation of modes that it belongs to."""
+
+
+@kernel(exact=False, inline=True)
+def kept_flow(lin: Linear, kept: Any, generation: int, x: float) -> Matrix:
+    """The flow over x, computed once for every set of modes: ``kept`` belongs to one x."""
+    if kept[4] != generation:
+        m = flow(lin, x)
+        kept[0] = m[0]
+        kept[1] = m[1]
+        kept[2] = m[2]
+        kept[3] = m[3]
+        kept[4] = generation
+    return kept[0], kept[1], kept[2], kept[3]
+
+
 @kernel(exact=False)
 def twice(m: Matrix) -> Matrix:
     """The square of a flow: twice the time."""
@@ -72,7 +96,7 @@ def twice(m: Matrix) -> Matrix:
 @kernel(exact=False)
 def particular(lin: Linear, p0: float, p1: float, p2: float, p3: float) -> Cubic:
     """The cubic c(x) with J c'' + D c' + K c = p(x)."""
-    inverse = 1.0 / lin.stiffness
+    inverse = lin.compliance
     c3 = p3 * inverse
     c2 = (p2 - 3.0 * lin.damping * c3) * inverse
     c1 = (p1 - 2.0 * lin.damping * c2 - 6.0 * lin.inertia * c3) * inverse

@@ -24,7 +24,7 @@ from stickslip.simulation._case import (
 )
 from stickslip.simulation._exact_bend import bend
 from stickslip.simulation._exact_events import find
-from stickslip.simulation._exact_flow import Linear, Matrix, flow
+from stickslip.simulation._exact_flow import FLOW, Linear, kept_flow
 from stickslip.simulation._exact_kick import kick
 from stickslip.simulation._exact_output import measure, row_after, write_grid, write_rows
 from stickslip.simulation._exact_rest import rest
@@ -45,18 +45,19 @@ from stickslip.simulation._exact_state import (
     STORM_COUNT,
     STORM_SINCE,
     TIME,
+    TOP,
     VELOCITY,
     arrange,
 )
 from stickslip.simulation._exact_step import NOT_CONVERGED, correct, look_ahead
 from stickslip.simulation._exact_stretch import (
-    AMPLITUDE,
     ERROR,
     LENGTH,
     ROUNDS,
     STRETCH_SIZE,
-    free_amplitude,
+    shows,
 )
+from stickslip.simulation._exact_trigger import weigh
 
 SAFETY = 0.0015
 """Share of the tolerance that one step may be wrong by."""
@@ -72,28 +73,17 @@ MOST_GROWTH = 8.0
 """Unstable motion grows by no more than exp of this in one step."""
 
 
-FLOW = 6
-"""Entries per level in the cache of flows: a matrix, the generation of modes it belongs to, and the step."""
+LEVEL = FLOW + 1
+"""Entries per level in the cache of flows: the flow over half its step, and the step. After the levels follow the
+flow over the grid's spacing, and that of a step that is cut short."""
+SPACED = LEVEL * (DEEPEST + 1)
+CUT = SPACED + FLOW
 AT_LOOP = COUNTS
 AT_STRETCH = AT_LOOP + LOOP_SIZE
 AT_CACHE = AT_STRETCH + STRETCH_SIZE
-AT_SIDES = AT_CACHE + FLOW * (DEEPEST + 1)
+AT_SIDES = AT_CACHE + CUT + FLOW
 AT_ELEMENTS = AT_SIDES + 2 * SIDE_SIZE
 """Places in `work`; the elements end it."""
-
-
-@kernel(exact=False, inline=True)
-def flow_of_level(lin: Linear, cache: Any, generation: int, level: int, x: float) -> Matrix:
-    """The flow over half a step x of a level, computed once for every set of modes."""
-    kept = pointer(cache, level * FLOW)
-    if kept[4] != generation:
-        m = flow(lin, x)
-        kept[0] = m[0]
-        kept[1] = m[1]
-        kept[2] = m[2]
-        kept[3] = m[3]
-        kept[4] = generation
-    return kept[0], kept[1], kept[2], kept[3]
 
 
 @kernel(exact=False)
@@ -111,27 +101,27 @@ def move(
     growth = growth_of(lin)
     while True:
         count[STEPS] += 1.0
-        while level < DEEPEST and growth * min(left, cache[level * FLOW + 5]) > MOST_GROWTH:
+        while level < DEEPEST and growth * min(left, cache[level * LEVEL + FLOW]) > MOST_GROWTH:
             level += 1
-        h = cache[level * FLOW + 5]
+        h = cache[level * LEVEL + FLOW]
+        kept = pointer(cache, level * LEVEL)
         if h > left - 1e-9:
             h = left
-            half = flow(lin, 0.5 * h)
-        else:
-            half = flow_of_level(lin, cache, generation, level, 0.5 * h)
+            kept = pointer(cache, CUT)
+            kept[FLOW - 1] = 0.0
+        # The one call: a flow over `left` of its own would be taken out of the loop, and computed at every step.
+        half = kept_flow(lin, kept, generation, 0.5 * h)
         look_ahead(parameters, plan, cells, loop, stretch, h, tol)
         error = correct(lin, parameters, plan, sides, loop, stretch, half, h, tol)
         stretch[ERROR] = error
-        amplitude = free_amplitude(lin, stretch)
-        stretch[AMPLITUDE] = amplitude
-        rings = amplitude > 2.0 * tol and lin.frequency * h > QUARTER_PERIODS and h > 2e-6
+        rings = lin.frequency * h > QUARTER_PERIODS and h > 2e-6 and shows(lin, stretch, 2.0 * tol)
         if error <= tol and not rings:
             return level
         if level >= DEEPEST:
             return -1 if error >= NOT_CONVERGED else level
         count[REJECTED] += 1.0
         level += 1
-        while level < DEEPEST and cache[level * FLOW + 5] >= h:
+        while level < DEEPEST and cache[level * LEVEL + FLOW] >= h:
             level += 1
 
 
@@ -139,14 +129,14 @@ def move(
 def next_level(lin: Linear, loop: Any, stretch: Any, cache: Any, level: int, tol: float) -> int:
     """A longer step after an accurate one that was not cut short."""
     h = stretch[LENGTH]
-    if h < 0.999 * cache[level * FLOW + 5]:
+    if h < 0.999 * cache[level * LEVEL + FLOW]:
         return level
     error = stretch[ERROR]
     shortest = max(0, level - 3)
     rounds = 3.0 if loop[BENT] > 0.0 else 2.0
     while level > shortest and error < 0.03 * tol and stretch[ROUNDS] <= rounds:
         h *= 2.0
-        if stretch[AMPLITUDE] > 2.0 * tol and lin.frequency * h > QUARTER_PERIODS:
+        if lin.frequency * h > QUARTER_PERIODS and shows(lin, stretch, 2.0 * tol):
             break
         error *= 32.0
         level -= 1
@@ -204,6 +194,7 @@ def solve(
     loop = pointer(work, AT_LOOP)
     stretch = pointer(work, AT_STRETCH)
     cache = pointer(work, AT_CACHE)
+    spaced = pointer(cache, SPACED)
     sides = pointer(work, AT_SIDES)
     elements = pointer(work, AT_ELEMENTS)
     tol = max(SAFETY * parameters[TOLERANCE], FINEST)
@@ -212,10 +203,13 @@ def solve(
     level = after_event
     generation = 1
     next_break = 0
+    h = longest
     for i in range(DEEPEST + 1):
-        cache[i * FLOW + 5] = math.ldexp(longest, -i)
+        cache[i * LEVEL + FLOW] = h
+        h *= 0.5
     start(parameters, plan, cells, elements, sides, loop, breaks)
     lin = arrange(parameters, plan, elements, sides, loop)
+    weigh(plan, elements, sides, loop[POSITION], loop[VELOCITY], TOP)
     while loop[TIME] < parameters[DURATION] - EDGE:
         left = breaks[next_break] - loop[TIME]
         held = loop[HELD] > 0.0
@@ -223,7 +217,7 @@ def solve(
             event = rest(parameters, plan, cells, elements, sides, loop, stretch, left)
         else:
             if loop[BENT] > 0.0:
-                lin = bend(parameters, plan, sides, loop, min(left, cache[level * FLOW + 5]))
+                lin = bend(parameters, plan, sides, loop, min(left, cache[level * LEVEL + FLOW]))
                 generation += 1
             level = move(
                 lin, parameters, plan, cells, elements, sides, loop, stretch, cache, generation, count, level, left,
@@ -235,7 +229,7 @@ def solve(
         happens = event >= 0.0
         h = event if happens else stretch[LENGTH]
         if light and awaits(plan, grid, count, loop[TIME] + h):
-            write_grid(lin, plan, loop, stretch, grid, count, out, h, 0.1 * tol)
+            write_grid(lin, plan, loop, stretch, grid, count, out, h, 0.1 * tol, spaced, generation)
         if full:
             write_rows(lin, parameters, plan, cells, sides, loop, stretch, grid, count, rows, h)
         if metered:
@@ -244,12 +238,14 @@ def solve(
             cross(parameters, plan, cells, elements, sides, loop, stretch, count, rows, h, tol, held, full)
             slow_again = growth_of(lin) * FIRST_STEP > MOST_GROWTH
             lin = arrange(parameters, plan, elements, sides, loop)
+            weigh(plan, elements, sides, loop[POSITION], loop[VELOCITY], TOP)
             generation += 1
             level = after_event if slow_again else max(level, after_event)
         else:
             finish_step(plan, sides, loop, stretch, loop[TIME] + h, parameters[KI])
             if parameters[KICK] != 0.0:
                 kick(parameters, plan, elements, loop, h, tol, False)
+                weigh(plan, elements, sides, loop[POSITION], loop[VELOCITY], TOP)
             if not held:
                 level = next_level(lin, loop, stretch, cache, level, tol)
         jumps = happens

@@ -7,7 +7,7 @@ from typing import Any
 
 from stickslip.jit import kernel, pointer
 from stickslip.simulation._case import COLUMNS
-from stickslip.simulation._exact_flow import UNMOVED, Linear, flow, free_motion, moved
+from stickslip.simulation._exact_flow import UNMOVED, Linear, flow, free_motion, kept_flow, moved
 from stickslip.simulation._exact_state import (
     DS,
     EDGE,
@@ -35,8 +35,8 @@ from stickslip.simulation._exact_stretch import (
     FREE_POSITION,
     FREE_VELOCITY,
     cubic_of,
-    free_amplitude,
     integral_at,
+    shows,
     slip_torque_at,
     state_at,
 )
@@ -55,41 +55,53 @@ UNSEEN_COARSE = 1e-4
 """The same where only coarse metrics are wanted: 1e-8 rad of the ringing in pre-sliding."""
 
 
+@kernel(exact=False, inline=True)
+def rows_until(plan: Any, grid: Any, row: int, end: float) -> int:
+    """The first row after `row` whose time is after `end`; loops over a known number of rows are vectorised."""
+    rows = int(plan[GRID_ROWS])
+    last = row
+    if plan[SPACING] > 0.0:
+        # A guess that rounding may put one row off.
+        last = min(max(int((end - grid[0]) / plan[SPACING]), row), rows)
+        if last > row and grid[last - 1] > end:
+            last -= 1
+    while last < rows and grid[last] <= end:
+        last += 1
+    return last
+
+
 @kernel(exact=False)
 def write_grid(
-    lin: Linear, plan: Any, loop: Any, stretch: Any, grid: Any, count: Any, out: Any, h: float, visible: float
+    lin: Linear, plan: Any, loop: Any, stretch: Any, grid: Any, count: Any, out: Any, h: float, visible: float,
+    spaced: Any, generation: int,
 ) -> None:  # fmt: skip
     """Write position and velocity at the grid's times inside the first h of the stretch; the next one is inside.
 
     On an even grid the free motion is carried from one time to the next by one matrix. A free motion that has
     died out (less than `visible` rad) is left out.
     """
-    end = min(loop[TIME] + h + EDGE, grid[int(plan[GRID_ROWS]) - 1])
     row = int(count[GRID_WRITTEN])
-    c = cubic_of(stretch)
-    if lin.discriminant > 0.0 and free_amplitude(lin, stretch) <= visible:
-        while row < plan[GRID_ROWS] and grid[row] <= end:
-            x = grid[row] - loop[TIME]
-            out[2 * row] = c[0] + x * (c[1] + x * (c[2] + x * c[3]))
-            out[2 * row + 1] = c[1] + x * (2.0 * c[2] + x * 3.0 * c[3])
-            row += 1
-        count[GRID_WRITTEN] = row
+    last = rows_until(plan, grid, row, loop[TIME] + h + EDGE)
+    count[GRID_WRITTEN] = last
+    time = loop[TIME]
+    c0, c1, c2, c3 = cubic_of(stretch)
+    if lin.discriminant > 0.0 and not shows(lin, stretch, visible):
+        for i in range(row, last):
+            x = grid[i] - time
+            out[2 * i] = c0 + x * (c1 + x * (c2 + x * c3))
+            out[2 * i + 1] = c1 + x * (2.0 * c2 + x * 3.0 * c3)
         return
-    x = grid[row] - loop[TIME]
+    x = grid[row] - time
     p, q = free_motion(flow(lin, x), stretch[FREE_POSITION], stretch[FREE_VELOCITY])
-    even = plan[SPACING] > 0.0 and grid[row] + plan[SPACING] <= end
-    between = flow(lin, plan[SPACING]) if even else UNMOVED
-    while True:
-        out[2 * row], out[2 * row + 1] = moved(c, UNMOVED, x, p, q)
-        row += 1
-        if row >= plan[GRID_ROWS] or grid[row] > end:
-            break
-        x = grid[row] - loop[TIME]
-        if even:
-            p, q = free_motion(between, p, q)
-        else:
+    even = plan[SPACING] > 0.0
+    between = kept_flow(lin, spaced, generation, plan[SPACING]) if even and row + 1 < last else UNMOVED
+    for i in range(row, last):
+        x = grid[i] - time
+        if not even:
             p, q = free_motion(flow(lin, x), stretch[FREE_POSITION], stretch[FREE_VELOCITY])
-    count[GRID_WRITTEN] = row
+        out[2 * i] = c0 + x * (c1 + x * (c2 + x * c3)) + p
+        out[2 * i + 1] = c1 + x * (2.0 * c2 + x * 3.0 * c3) + q
+        p, q = free_motion(between, p, q)
 
 
 @kernel(exact=False)

@@ -30,6 +30,7 @@ from stickslip.simulation._exact_state import (
     S,
     command,
     first_of,
+    sides_of,
 )
 from stickslip.simulation._exact_step import look_ahead
 from stickslip.simulation._exact_stretch import (
@@ -98,7 +99,7 @@ def excess(
 def stiction(plan: Any, sides: Any) -> float:
     """Half the net interval of torque that rigid elements hold at rest, N·m; negative where they repel."""
     total = 0.0
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         total += (
             sides[side * SIDE_SIZE + WEIGHT]
             * sides[side * SIDE_SIZE + RIGID]
@@ -111,7 +112,7 @@ def stiction(plan: Any, sides: Any) -> float:
 def applied(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> float:
     """Torque on the resting axis without its rigid elements, N·m."""
     torque = loop[R] + parameters[KI] * loop[INTEGRAL] - parameters[KP] * loop[POSITION]
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         if sides[side * SIDE_SIZE + KIND] == BENDS:
             force = (
                 sides[side * SIDE_SIZE + SPRING] * loop[POSITION] + sides[side * SIDE_SIZE + SPRING_OFFSET]

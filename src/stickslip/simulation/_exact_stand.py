@@ -33,7 +33,6 @@ from stickslip.simulation._exact_state import (
     S_END,
     S_NOW,
     SIDE_SIZE,
-    SIDES,
     SIGMA,
     SLIPPING,
     TIME,
@@ -44,6 +43,7 @@ from stickslip.simulation._exact_state import (
     R,
     S,
     command,
+    sides_of,
 )
 from stickslip.simulation._exact_stretch import (
     DR_END,
@@ -68,7 +68,7 @@ SOON = 1e-9
 def finish_step(plan: Any, sides: Any, loop: Any, stretch: Any, t: float, ki: float) -> None:
     """Stand at the end of the stretch; modes stay."""
     add_exponents(plan, sides, stretch[LENGTH], stretch[LENGTH])
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and sides[side * SIDE_SIZE + VARIES] > 0.0:
             sides[side * SIDE_SIZE + S] = sides[side * SIDE_SIZE + S_END]
             sides[side * SIDE_SIZE + S_NOW] = sides[side * SIDE_SIZE + S_END]
@@ -91,7 +91,7 @@ def finish_event(
 ) -> None:  # fmt: skip
     """Stand at the event x; modes are about to change."""
     add_exponents(plan, sides, stretch[LENGTH], x)
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         sides[side * SIDE_SIZE + S_NOW] = slip_force_at(sides, stretch, side, x)
     loop[INTEGRAL] = integral_at(parameters, loop, stretch, x)
     loop[TIME] += x
@@ -141,7 +141,7 @@ def start(parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, loo
     if loop[VELOCITY] != 0.0:
         loop[SIGMA] = 1.0 if loop[VELOCITY] > 0.0 else -1.0
     stand(parameters, plan, cells, loop)
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         sides[side * SIDE_SIZE + INSIDE] = (
             1.0 if abs(loop[VELOCITY]) < sides[side * SIDE_SIZE + LAYER] else 0.0
         )

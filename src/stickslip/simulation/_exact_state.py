@@ -24,10 +24,11 @@ STIFFNESS, SHARE, FORCE, OFFSET, SLIPS, LOAD_AT_0, LOAD_SLOPE, ELEMENT_SIZE = ra
 (
     WEIGHT, ATTRACTION, BREAKAWAY, LOWEST, SCALE, VISCOUS, RIGID, SLIPPING, STICKING, SPRING, SPRING_OFFSET,
     VARIES, S, DS, Q, S_START, EXPONENT, S_MID, S_END, DS_END, Q_MID, Q_END, S_NOW, LIFT,
-    KIND, BRISTLE, LAG, STEEP, STEEPNESS, LAYER, INSIDE, DAMPING, KEPT,
-) = range(33)  # fmt: skip
+    KIND, BRISTLE, LAG, STEEP, STEEPNESS, LAYER, INSIDE, DAMPING, TOP, TOP_NEXT, KEPT,
+) = range(35)  # fmt: skip
 """BRISTLE: stiffness of a bristle, LAG: its damping over its stiffness. STEEP: share that rises with the slope
-STEEPNESS through the layer |v| < LAYER; INSIDE is 1 there. DAMPING: torque over velocity in the flow."""
+STEEPNESS through the layer |v| < LAYER; INSIDE is 1 there. DAMPING: torque over velocity in the flow. TOP: largest
+load per share of a sticking element where the loop stands, TOP_NEXT: at the next node of the stretch."""
 
 RELAXES, FOLLOWS, BENDS = 0.0, 1.0, 2.0
 """What KIND says of the force of what slips: it relaxes towards the curve, is on the curve at once, or is that of a
@@ -63,6 +64,12 @@ IN_LAYER = 1e-4
 """Stiffness added in a steep layer, over slope²/J."""
 EDGE = 1e-12
 """One-sided limits at a break are taken this far from it, s."""
+
+
+@kernel(exact=False, inline=True)
+def sides_of(plan: Any) -> int:
+    """Number of sides, told to the compiler as one or two: it would gather and scatter them as vectors of many."""
+    return 2 if plan[SIDES] > 1.0 else 1
 
 
 @kernel(exact=False, inline=True)
@@ -131,7 +138,7 @@ def arrange(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) ->
     slips = False
     sticks = False
     loop[NONLINEAR] = 1.0 if parameters[KI] != 0.0 else 0.0
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         w = sides[side * SIDE_SIZE + WEIGHT]
         sides[side * SIDE_SIZE + DAMPING] = sides[side * SIDE_SIZE + VISCOUS]
         if sides[side * SIDE_SIZE + KIND] == BENDS:

@@ -6,7 +6,6 @@ and corrected until the motion no longer changes; what a cubic cannot follow is 
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from stickslip.jit import kernel
@@ -48,7 +47,6 @@ from stickslip.simulation._exact_state import (
     SCALE,
     SEEN_LENGTH,
     SIDE_SIZE,
-    SIDES,
     SIGMA,
     SLIPPING,
     TIME,
@@ -59,6 +57,7 @@ from stickslip.simulation._exact_state import (
     R,
     S,
     command,
+    sides_of,
     sliding,
 )
 from stickslip.simulation._exact_stretch import (
@@ -160,7 +159,7 @@ def hides_curve(plan: Any, sides: Any, v0: float, v1: float, v2: float) -> bool:
     jump = max(abs(v1 - v0), abs(v2 - v1))
     turns = v0 * v1 < 0.0 or v1 * v2 < 0.0
     slowest = 0.0 if turns else min(abs(v0), abs(v1), abs(v2))
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         scale = sides[side * SIDE_SIZE + SCALE]
         if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and jump > WIDEST * scale > 0.0 and slowest < 3.0 * scale:
             return True
@@ -182,7 +181,7 @@ def slip_error(
     v = 0.5 * (loop[VELOCITY] + stretch[VELOCITY_MID]) + 0.0625 * h * (a0 - a1)
     total = 0.0
     between = 0.0
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         kind = sides[side * SIDE_SIZE + KIND]
         if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and kind == FOLLOWS:
             if sides[side * SIDE_SIZE + VARIES] > 0.0:
@@ -243,7 +242,7 @@ def loop_terms(
     added = loop[ADDED]
     travelled = (
         impulse - lin.damping * (theta_end - loop[POSITION]) - lin.inertia * (v_end - loop[VELOCITY])
-    ) / lin.stiffness
+    ) * lin.compliance
     wanted = h / 30.0 * (7.0 * (loop[GOAL] + stretch[GOAL_END]) + 16.0 * stretch[GOAL_MID])
     wanted += h * h / 60.0 * (loop[GOAL_RATE] - stretch[RATE_END])
     stretch[INTEGRAL_END] = loop[INTEGRAL] + wanted - travelled
@@ -270,7 +269,7 @@ def commanded(lin: Linear, loop: Any, stretch: Any, h: float) -> tuple[float, fl
     r1 = loop[DR]
     r2, r3 = upper_terms(loop[R], r1, stretch[R_END], stretch[DR_END], inverse)
     misfit = stretch[R_MID] - 0.5 * (loop[R] + stretch[R_END]) - 0.125 * h * (r1 - stretch[DR_END])
-    lag = lin.damping / lin.stiffness
+    lag = lin.damping * lin.compliance
     if h < SHORT or abs(r3 * lag * lag * lag) > STEEPEST * abs(lin.stiffness):
         return (stretch[R_END] - loop[R]) * inverse, 0.0, 0.0, misfit, 0.0
     return r1, r2, r3, misfit, 1.0
@@ -281,7 +280,7 @@ def tangents(parameters: Any, plan: Any, sides: Any, loop: Any) -> tuple[float, 
     """Torque at the start without the command, and its slope: slipping forces, integral and added spring."""
     p0 = -loop[BASE]
     p1 = 0.0
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         lagging = sides[side * SIDE_SIZE + LAG] * sides[side * SIDE_SIZE + DS]
         p0 -= sides[side * SIDE_SIZE + WEIGHT] * (sides[side * SIDE_SIZE + S] + lagging)
         p1 -= sides[side * SIDE_SIZE + WEIGHT] * sides[side * SIDE_SIZE + DS]
@@ -337,7 +336,7 @@ def correct(
         p2 = r2
         p3 = r3
         misfit = abs(command_misfit)
-        for side in range(int(plan[SIDES])):
+        for side in range(sides_of(plan)):
             if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and sides[side * SIDE_SIZE + VARIES] > 0.0:
                 u2, u3 = slip_terms(
                     parameters, plan, sides, loop, side, h, theta_mid, v_mid, theta_end, v_end
@@ -368,13 +367,14 @@ def error_of(
     # A torque wrong by m in the middle moves a free axis by about m h²/20J, a spring by less than m/2K; of its
     # impulse little is left.
     h = stretch[LENGTH]
-    k = abs(lin.stiffness)
-    moves = min(h * (0.05 * h / lin.inertia + 0.02 / math.sqrt(lin.inertia * k)), 0.5 / k)
+    soft = abs(lin.compliance)
+    light = h * abs(lin.square) * soft
+    moves = min(h * (0.05 * light + 0.02 * lin.mobility), 0.5 * soft)
     error = misfit * moves
     if loop[NONLINEAR] > 0.0:
         bump, between = slip_error(lin, parameters, plan, sides, loop, stretch)
-        error += between * min(h * (0.1 * h / lin.inertia + 0.25 / math.sqrt(lin.inertia * k)), 0.5 / k)
+        error += between * min(h * (0.1 * light + 0.25 * lin.mobility), 0.5 * soft)
         # What a slipping force is wrong by at the end stays for as long as it relaxes.
-        slip = bump * (moves + 0.5 * min(LASTING * LASTING / lin.inertia, 1.0 / k))
+        slip = bump * (moves + 0.5 * min(LASTING * LASTING / lin.inertia, soft))
         error += CALM_SHARE * slip if loop[CALM] > 0.0 else slip
     return error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from stickslip.jit import kernel
@@ -26,9 +25,9 @@ from stickslip.simulation._exact_state import (
 # ---- entries of `stretch`: the motion over one accepted step -------------------------------------------------
 (
     LENGTH, C0, C1, C2, C3, FREE_POSITION, FREE_VELOCITY, POSITION_MID, VELOCITY_MID, POSITION_END, VELOCITY_END,
-    R_MID, R_END, DR_END, GOAL_MID, RATE_MID, GOAL_END, RATE_END, INTEGRAL_END, AMPLITUDE, ERROR, ROUNDS,
+    R_MID, R_END, DR_END, GOAL_MID, RATE_MID, GOAL_END, RATE_END, INTEGRAL_END, ERROR, ROUNDS,
     POSITION_EVENT, VELOCITY_EVENT, STRETCH_SIZE,
-) = range(25)  # fmt: skip
+) = range(24)  # fmt: skip
 
 
 @kernel(exact=False, inline=True)
@@ -52,12 +51,11 @@ def remember(
 
 
 @kernel(exact=False)
-def free_amplitude(lin: Linear, stretch: Any) -> float:
-    """Amplitude of the ringing in this stretch, rad; 0 where nothing rings."""
-    if lin.discriminant <= 0.0:
-        return 0.0
-    u = stretch[FREE_VELOCITY] / lin.frequency
-    return math.sqrt(stretch[FREE_POSITION] * stretch[FREE_POSITION] + u * u)
+def shows(lin: Linear, stretch: Any, least: float) -> bool:
+    """Whether something rings in this stretch with an amplitude of more than `least`, rad."""
+    p = stretch[FREE_POSITION]
+    q = stretch[FREE_VELOCITY]
+    return lin.discriminant > 0.0 and lin.discriminant * (p * p - least * least) + q * q > 0.0
 
 
 @kernel(exact=False)

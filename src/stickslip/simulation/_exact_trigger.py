@@ -22,11 +22,13 @@ from stickslip.simulation._exact_state import (
     NARROW,
     SCALE,
     SIDE_SIZE,
-    SIDES,
     SIGMA,
     STICKING,
+    TOP,
+    TOP_NEXT,
     WATCHED,
     first_of,
+    sides_of,
     sliding,
 )
 
@@ -34,6 +36,8 @@ NOISE = 1e-12
 """Velocities this small (rad/s) may be rounding errors of one that creeps to zero: no reversal yet."""
 BARELY = 1e-12
 """Velocity that stands for a side of zero, rad/s."""
+STILL = 1e-9
+"""An axis whose velocity changes by less than this between two nodes (rad/s) rests, whatever sign rounding gives it."""
 LOOK, MOST_LOOKS, LOOKS_AT_TURN = 0.1, 16.0, 8
 """Where an event may hide between two nodes, it is looked for at every such change of velocity, in parts of v_s,
 so often at most, and so often where the velocity turns."""
@@ -63,24 +67,80 @@ def heaviest(plan: Any, elements: Any, sides: Any, side: int, theta: float, v: f
 
 
 @kernel(exact=False, inline=True)
+def mode_ends(sides: Any, loop: Any, side: int, v: float) -> float:
+    """How far the velocity is beyond where it ends a mode: at a reversal, or at the edge of a steep layer."""
+    g = -1e9
+    if side == 0 and loop[WATCHED] > 0.0:
+        g = -VELOCITY_WEIGHT * (loop[SIGMA] * v - loop[NARROW] + NOISE)
+    if sides[side * SIDE_SIZE + INSIDE] > 0.0:
+        g = max(g, VELOCITY_WEIGHT * (abs(v) - sides[side * SIDE_SIZE + LAYER]))
+    return g
+
+
+@kernel(exact=False, inline=True)
+def beyond_limit(parameters: Any, plan: Any, sides: Any, side: int, top: float, v: float) -> float:
+    """How far a side's largest load is beyond the limit; the curve is asked for where its least level is in reach."""
+    limit = sides[side * SIDE_SIZE + LOWEST]
+    if top > limit:
+        # At rest, rounding would ask for the curve at ever other velocities.
+        limit = sliding(parameters, plan, sides, side, v if abs(v) > BARELY else math.copysign(BARELY, v))
+    return top - limit
+
+
+@kernel(exact=False, inline=True)
 def trigger(
     parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, theta: float, v: float
 ) -> float:
     """The largest event function at a state: not negative where a mode ends."""
     g = -1e9
-    if loop[WATCHED] > 0.0:
-        g = -VELOCITY_WEIGHT * (loop[SIGMA] * v - loop[NARROW] + NOISE)
-    for side in range(int(plan[SIDES])):
-        if sides[side * SIDE_SIZE + INSIDE] > 0.0:
-            g = max(g, VELOCITY_WEIGHT * (abs(v) - sides[side * SIDE_SIZE + LAYER]))
+    for side in range(sides_of(plan)):
+        g = max(g, mode_ends(sides, loop, side, v))
         if sides[side * SIDE_SIZE + STICKING] > 0.0:
             top = heaviest(plan, elements, sides, side, theta, v)
-            # The curve is only asked for where its lowest level is in reach.
-            limit = sides[side * SIDE_SIZE + LOWEST]
-            if top > limit:
-                limit = sliding(parameters, plan, sides, side, v)
-            g = max(g, top - limit)
+            g = max(g, beyond_limit(parameters, plan, sides, side, top, v))
     return g
+
+
+@kernel(exact=False, inline=True)
+def trigger_at_node(parameters: Any, plan: Any, sides: Any, loop: Any, v: float) -> float:
+    """`trigger` at the next node, which is weighed."""
+    g = -1e9
+    for side in range(sides_of(plan)):
+        g = max(g, mode_ends(sides, loop, side, v))
+        if sides[side * SIDE_SIZE + STICKING] > 0.0:
+            g = max(g, beyond_limit(parameters, plan, sides, side, sides[side * SIDE_SIZE + TOP_NEXT], v))
+    return g
+
+
+@kernel(exact=False, inline=True)
+def stays(parameters: Any, plan: Any, sides: Any, v: float) -> bool:
+    """Whether the loads at the next node are within the limit at v: up to there, while the motion slows down."""
+    for side in range(sides_of(plan)):
+        if (
+            sides[side * SIDE_SIZE + STICKING] > 0.0
+            and beyond_limit(parameters, plan, sides, side, sides[side * SIDE_SIZE + TOP_NEXT], v) >= 0.0
+        ):
+            return False
+    return True
+
+
+@kernel(exact=False, inline=True)
+def weigh(plan: Any, elements: Any, sides: Any, theta: float, v: float, column: int) -> bool:
+    """Write each side's largest load at a state to `column`; returns whether one is near its limit there or at TOP."""
+    near = False
+    for side in range(sides_of(plan)):
+        if sides[side * SIDE_SIZE + STICKING] > 0.0:
+            top = heaviest(plan, elements, sides, side, theta, v)
+            sides[side * SIDE_SIZE + column] = top
+            near = near or max(top, sides[side * SIDE_SIZE + TOP]) > sides[side * SIDE_SIZE + LOWEST]
+    return near
+
+
+@kernel(exact=False, inline=True)
+def pass_on(plan: Any, sides: Any) -> None:
+    """Stand at the next node."""
+    for side in range(sides_of(plan)):
+        sides[side * SIDE_SIZE + TOP] = sides[side * SIDE_SIZE + TOP_NEXT]
 
 
 @kernel(exact=False, inline=True)
@@ -97,7 +157,7 @@ def passes_turn(
 ) -> bool:  # fmt: skip
     """Whether a sticking element may be loaded beyond its limit where the velocity passes zero; ends are given."""
     peak = farthest(width, theta0, v0, theta1, v1)
-    for side in range(int(plan[SIDES])):
+    for side in range(sides_of(plan)):
         if sides[side * SIDE_SIZE + STICKING] > 0.0:
             before = heaviest(plan, elements, sides, side, peak, v0)
             after = heaviest(plan, elements, sides, side, theta1, v1)
@@ -114,29 +174,31 @@ def looks(
     parameters: Any, plan: Any, elements: Any, sides: Any, width: float, theta0: float, v0: float, a0: float,
     theta1: float, v1: float, a1: float,
 ) -> int:  # fmt: skip
-    """Number of parts of a stretch at whose ends events are looked for; the stretch's ends are given.
+    """Number of parts of a stretch at whose ends events are looked for; the stretch's ends are given, and weighed.
 
     The load of a sticking element near its limit can cross it up and down between two nodes, since s(v) varies
     over v_s. Not where the motion speeds up all along: there the event function rises with the load.
     """
     jump = abs(v1 - v0)
-    fastest = max(abs(v0), abs(v1)) + jump
+    # A smooth velocity leaves its chord by less than this, and the range of its ends by even less.
+    mean = (v1 - v0) / width
+    bulge = 0.5 * width * (abs(a0 - mean) + abs(a1 - mean))
+    fastest = max(abs(v0), abs(v1)) + min(jump, bulge)
     rises = v0 * v1 >= 0.0 and a0 * v1 > 0.0 and a1 * v1 > 0.0
     parts = 1
     peak = farthest(width, theta0, v0, theta1, v1)
-    for side in range(int(plan[SIDES])):
-        if (
-            v0 * v1 < 0.0
-            and sides[side * SIDE_SIZE + STICKING] > 0.0
-            and heaviest(plan, elements, sides, side, peak, v0) > sides[side * SIDE_SIZE + LOWEST]
-        ):
+    for side in range(sides_of(plan)):
+        if sides[side * SIDE_SIZE + STICKING] == 0.0:
+            continue
+        lowest = sides[side * SIDE_SIZE + LOWEST]
+        if jump > STILL and v0 * v1 < 0.0 and heaviest(plan, elements, sides, side, peak, v0) > lowest:
             parts = LOOKS_AT_TURN
         seen = LOOK * sides[side * SIDE_SIZE + SCALE]
-        if sides[side * SIDE_SIZE + STICKING] > 0.0 and jump > seen > 0.0:
-            top0 = heaviest(plan, elements, sides, side, theta0, v0)
-            top1 = heaviest(plan, elements, sides, side, theta1, v1)
+        if jump > seen > 0.0:
+            top0 = sides[side * SIDE_SIZE + TOP]
+            top1 = sides[side * SIDE_SIZE + TOP_NEXT]
             top = max(top0, top1)
-            if top > sides[side * SIDE_SIZE + LOWEST] and not (rises and top0 <= top1):
+            if top > lowest and not (rises and top0 <= top1):
                 lowest = sliding(parameters, plan, sides, side, fastest)
                 lowest = min(lowest, sliding(parameters, plan, sides, side, -fastest))
                 if top > lowest:
