@@ -1,281 +1,186 @@
 /* The exact integrator in C: what the compiled Python kernel is measured against.
  *
- * J v' = T_m - T_f on a sinusoid from rest, PD control, a GMS contact (thesis eqs. 2.16 to 2.18), and one of no
- * compensation, LuGre feedforward, GMS feedback. Between events the motion is a cubic (forced) plus a 2x2 matrix
- * exponential (free); the slipping elements of a contact collapse to one scalar, advanced by Lobatto's rule of
+ * J v' = T_m - T_f on a sinusoid from rest or a filtered step, PD or PID control, a GMS contact (thesis eqs. 2.16 to
+ * 2.18), and one of no compensation, a feedforward torque from a table, feedback of Coulomb, Stribeck, LuGre or GMS
+ * friction: compiled for each (MODEL, INTEGRAL, TABLE), as one would write a program for one loop. Between events the
+ * motion is a cubic (forced) plus a 2x2 matrix exponential (free); slipping forces are advanced by Lobatto's rule of
  * fourth order and coupled by a corrector; break-aways and reversals are located on the exact flow. Steps are the
- * longest one halved some times, as long as the corrector converges quickly; there is no other control of errors.
+ * longest one halved some times: by an estimate of their error (CONTROL), or only as long as the corrector converges
+ * quickly, which is cheaper where the longest step is given with the answer in sight.
  *
  * SPDX-License-Identifier: BSD-3-Clause
  */
-#include <math.h>
-
-#define MOST 16
-#define DEEPEST 24
-enum { NONE = 0, LUGRE_FEEDFORWARD = 1, GMS_FEEDBACK = 2 };
-
-typedef struct {
-  double count, stiffness[8], share[8], attraction, fs, fc, vs, viscous;
-} Contact;
-
-typedef struct {
-  double inertia, kp, kd, amplitude, omega, compensation;
-  Contact plant, model;
-  double sigma0, sigma1;
-} Loop;
-
-typedef struct { double a, b, c, d; } Matrix;            /* flow of (position, velocity) */
-typedef struct { double c0, c1, c2, c3; } Cubic;
-typedef struct { double inertia, damping, stiffness, decay, square, discriminant, frequency; } Linear;
-typedef struct { double r, dr, z; } Command;             /* torque by time alone, slope, bristle */
-typedef struct { double weight, share, s, ds, start, exponent, q, q_mid, q_end, s_end, ds_end, per_vs; } Slip;
-typedef struct { double h, theta_mid, v_mid, theta_end, v_end, free_position, free_velocity; Cubic c; } Stretch;
-
-typedef struct {
-  const Loop *loop;
-  int sides, first[3], slips[MOST], any;
-  double force[MOST], offset[MOST], load[MOST], slope[MOST], t, theta, v, sigma, base;
-  Slip slip[2];
-  Linear lin;
-  Matrix halves[DEEPEST];    /* flows over half a step of every level, */
-  unsigned known;            /* where its bit is set */
-  Command command;
-} State;
-
-static const Contact *contact(const State *s, int side) { return side ? &s->loop->model : &s->loop->plant; }
-
-static double curve(const State *s, int side, double v) {
-  const Contact *p = contact(s, side);
-  double x = v * s->slip[side].per_vs;
-  return p->fc + (p->fs - p->fc) * exp(-x * x);
-}
-
-static Matrix flow(const Linear *l, double x) {
-  double e = 1.0, c, s;
-  if (l->discriminant > 0.0) {
-    double si;
-    e = exp(-l->decay * x);
-    sincos(l->frequency * x, &si, &c);
-    s = si / l->frequency;
-  } else {
-    double slow = exp((l->frequency - l->decay) * x), fast = exp(-(l->frequency + l->decay) * x);
-    c = 0.5 * (slow + fast);
-    s = l->frequency > 1e-9 ? 0.5 * (slow - fast) / l->frequency : x * slow;
-  }
-  return (Matrix){e * (c + l->decay * s), e * s, -e * l->square * s, e * (c - l->decay * s)};
-}
-
-static Matrix twice(Matrix m) {
-  double trace = m.a + m.d;
-  return (Matrix){m.a * m.a + m.b * m.c, m.b * trace, m.c * trace, m.d * m.d + m.b * m.c};
-}
-
-static Cubic particular(const Linear *l, double p0, double p1, double p2, double p3) {
-  double inverse = 1.0 / l->stiffness;
-  Cubic c;
-  c.c3 = p3 * inverse;
-  c.c2 = (p2 - 3.0 * l->damping * c.c3) * inverse;
-  c.c1 = (p1 - 2.0 * l->damping * c.c2 - 6.0 * l->inertia * c.c3) * inverse;
-  c.c0 = (p0 - l->damping * c.c1 - 2.0 * l->inertia * c.c2) * inverse;
-  return c;
-}
-
-static void move(const Stretch *p, Matrix m, double x, double *theta, double *v) {
-  const Cubic *c = &p->c;
-  *theta = c->c0 + x * (c->c1 + x * (c->c2 + x * c->c3)) + m.a * p->free_position + m.b * p->free_velocity;
-  *v = c->c1 + x * (2.0 * c->c2 + x * 3.0 * c->c3) + m.c * p->free_position + m.d * p->free_velocity;
-}
-
-static double acceleration(const Linear *l, const Stretch *p, double x, double theta, double v) {
-  const Cubic *c = &p->c;
-  double free_theta = theta - (c->c0 + x * (c->c1 + x * (c->c2 + x * c->c3)));
-  double free_v = v - (c->c1 + x * (2.0 * c->c2 + x * 3.0 * c->c3));
-  return 2.0 * c->c2 + 6.0 * c->c3 * x - l->square * free_theta - 2.0 * l->decay * free_v;
-}
-
-static double hermite(double y0, double d0, double y1, double d1, double h, double x) {
-  double s = x / h, r = 1.0 - s;
-  return r * r * (1.0 + 2.0 * s) * y0 + s * s * (3.0 - 2.0 * s) * y1 + s * r * h * (r * d0 - s * d1);
-}
-
-/* ---- the command: PD on the sinusoid, and the bristle of the feedforward, relaxed exponentially ---- */
-
-static void bristle(const Loop *p, double t, double *v, double *rate, double *steady, double *slope) {
-  double si, co;
-  sincos(p->omega * t, &si, &co);
-  *v = p->amplitude * p->omega * si;
-  double x = *v / p->model.vs, peak = (p->model.fs - p->model.fc) * exp(-x * x), s = p->model.fc + peak;
-  *rate = p->sigma0 * fabs(*v) / s;
-  *steady = s / p->sigma0;
-  *slope = -peak * 2.0 * x / p->model.vs * p->amplitude * p->omega * p->omega * co / p->sigma0;
-}
-
-static Command command_after(const Loop *p, double t, double z, double h) {
-  double si, co, t1 = t + h, w = p->omega;
-  sincos(w * t1, &si, &co);
-  double goal = p->amplitude * (1.0 - co), v = p->amplitude * w * si, a = p->amplitude * w * w * co;
-  Command out = {p->kp * goal + p->kd * v, p->kp * v + p->kd * a, z};
-  if (p->compensation == LUGRE_FEEDFORWARD) {
-    double v0, r0, s0, d0, vm, rm, sm, dm, v1, r1, s1, d1;
-    bristle(p, t, &v0, &r0, &s0, &d0);
-    bristle(p, t + 0.5 * h, &vm, &rm, &sm, &dm);
-    bristle(p, t1, &v1, &r1, &s1, &d1);
-    double sign = vm >= 0.0 ? 1.0 : -1.0, exponent = h / 6.0 * (r0 + 4.0 * rm + r1), decay = exp(-exponent);
-    double lag = exponent > 1e-4 ? (1.0 - decay) / exponent : 1.0 - 0.5 * exponent;
-    out.z = sign * s1 + (z - sign * s0) * decay - sign * dm * h * lag;
-    double dz = v1 - r1 * out.z;
-    out.r += p->sigma0 * out.z + p->sigma1 * dz + p->model.viscous * v1;
-    out.dr += p->sigma0 * dz + p->model.viscous * a;
-    if (h > 0.0) out.dr += p->sigma1 * (dz - (v0 - r0 * z)) / h;
-  }
-  return out;
-}
+#include "baseline_step.h"
 
 /* ---- modes ---- */
 
-static void arrange(State *s) {
-  const Loop *p = s->loop;
-  double stiffness = p->kp, damping = p->kd;
-  s->base = 0.0;
-  s->any = 0;
-  s->known = 0;
-  for (int side = 0; side < s->sides; side++) {
-    const Contact *law = contact(s, side);
-    Slip *slip = &s->slip[side];
-    slip->share = slip->s = slip->exponent = slip->ds = 0.0;
-    damping += slip->weight * law->viscous;
-    for (int i = s->first[side]; i < s->first[side + 1]; i++) {
-      double k = law->stiffness[i - s->first[side]];
-      if (s->slips[i]) {
-        slip->share += law->share[i - s->first[side]];
-        slip->s += s->force[i];
-      } else {
-        s->offset[i] = s->force[i] - k * s->theta;
-        s->load[i] = s->offset[i] / law->share[i - s->first[side]];
-        s->slope[i] = k / law->share[i - s->first[side]];
-        stiffness += slip->weight * k;
-        s->base += slip->weight * s->offset[i];
-      }
-    }
-    slip->start = slip->s;
-    if (slip->share > 0.0) {
-      s->any = 1;
-      slip->q = 1.0 / curve(s, side, s->v);
-      slip->ds = law->attraction * (slip->share * s->sigma - slip->s * slip->q);
+static void gather(State *s, int side, int first) {
+  const Law *law = &s->loop->law[side];
+  Slip *slip = &s->slip[side];
+  slip->share = slip->s = slip->exponent = slip->ds = slip->spring = slip->offset = 0.0;
+  for (int j = 0; j < s->count[side]; j++) {
+    int i = first + j;
+    if (s->slips[i]) {
+      slip->share += law->share[j];
+      slip->s += s->force[i];
+    } else {
+      s->offset[i] = s->force[i] - law->stiffness[j] * s->theta;
+      s->load[i] = s->offset[i] / law->share[j];
+      s->slope[i] = law->stiffness[j] / law->share[j];
+      slip->spring += law->stiffness[j];
+      slip->offset += s->offset[i];
     }
   }
-  Linear *l = &s->lin;
-  *l = (Linear){p->inertia, damping, stiffness, 0.5 * damping / p->inertia, stiffness / p->inertia, 0.0, 0.0};
-  l->discriminant = l->square - l->decay * l->decay;
-  l->frequency = sqrt(fabs(l->discriminant));
+  slip->start = slip->s;
 }
 
-static double trigger(const State *s, double theta, double v) {
-  double g = s->any ? -10.0 * s->sigma * v : -1e9, direction = v >= 0.0 ? 1.0 : -1.0;
-  for (int side = 0; side < s->sides; side++) {
-    const Contact *law = contact(s, side);
+static void arrange(State *s) {
+  const Loop *p = s->loop;
+  double level[2];
+  s->even_stiffness = p->kp, s->even_damping = p->kd, s->even_base = s->added = s->narrow = 0.0;
+  s->watched = MODEL == COULOMB || MODEL == LUGRE || (MODEL == STRIBECK && !s->inside);
+  s->corrected = INTEGRAL || MODEL == LUGRE || (MODEL == STRIBECK && !s->inside);
+  s->known = 0;
+  if (MODEL == LUGRE) {
+    Slip *q = &s->slip[1];
+    q->s += q->spring * s->theta + q->offset;
+    q->spring = q->offset = 0.0;
+  }
+  for (int side = 0; side < SIDES; side++) {
+    Slip *slip = &s->slip[side];
+    s->even_damping += WEIGHT[side] * p->law[side].viscous;
+    if (side >= GMS_SIDES) break;
+    gather(s, side, side ? s->count[0] : 0);
+    s->even_stiffness += WEIGHT[side] * slip->spring;
+    s->even_base += WEIGHT[side] * slip->offset;
+    if (slip->share > 0.0) s->watched = s->corrected = 1;
+  }
+  if (s->watched && s->corrected) {
+    curves(s, s->v, level);
+    for (int side = 0; side < GMS_SIDES; side++) {
+      Slip *slip = &s->slip[side];
+      slip->q = 1.0 / level[side];
+      if (slip->share > 0.0) slip->ds = p->law[side].attraction * (slip->share * s->sigma - slip->s * slip->q);
+    }
+  }
+  if (MODEL == COULOMB) s->slip[1].s = s->sigma * p->law[1].fc;
+  if (MODEL == STRIBECK) {
+    s->slip[1].s = s->slip[1].damping = 0.0;
+    if (s->inside) {
+      /* Over the moment that a crossing takes, the added spring moves nothing. */
+      s->even_damping += WEIGHT[1] * (p->law[1].steepness - p->law[1].viscous);
+      s->added = 2e-4 * p->law[1].steepness * p->law[1].steepness / p->inertia;
+      s->corrected = 1;
+    } else {
+      s->narrow = p->law[1].layer;
+    }
+  }
+  int sticks = 0;
+  for (int i = 0; i < s->count[0] + s->count[1]; i++) sticks |= !s->slips[i];
+  s->calm = !sticks && !INTEGRAL && !BENT && s->even_stiffness > 0.0 && s->even_damping > 0.0;
+  s->base = s->even_base;
+  s->lin = linear(p->inertia, s->even_damping, s->even_stiffness + s->added);
+}
+
+/* Takes the flow anew for a step of about h. */
+static void bend(State *s, double h) {
+  double stiffness = s->even_stiffness, damping = s->even_damping;
+  if (MODEL == LUGRE) {
+    double g = bend_lugre(s, h, stiffness);
+    stiffness -= g;
+    damping -= s->loop->law[1].lag * g;
+    s->base = s->even_base + g * s->theta;
+  }
+  if (MODEL == STRIBECK) {
+    damping -= bend_stribeck(s);
+    double floor = 0.01 * fabs(damping) / h;
+    s->added = fabs(stiffness) < floor ? 2.0 * floor : 0.0;
+    stiffness += s->added;
+  }
+  s->lin = linear(s->loop->inertia, damping, stiffness);
+  s->known = 0;
+}
+
+static double trigger(const State *s, Motion y) {
+  double v = y.velocity, direction = v >= 0.0 ? 1.0 : -1.0, level[2] = {0.0, 0.0}, g = -1e9;
+  if (s->watched) g = -10.0 * (s->sigma * v - s->narrow + 1e-12);
+  if (MODEL == STRIBECK && s->inside) g = fmax(g, 10.0 * (fabs(v) - s->loop->law[1].layer));
+  for (int side = 0, i = 0; side < GMS_SIDES; side++) {
+    const Law *law = &s->loop->law[side];
     double top = -1e9;
-    for (int i = s->first[side]; i < s->first[side + 1]; i++)
+    for (int last = i + s->count[side]; i < last; i++)
       if (!s->slips[i]) {
-        double load = direction * (s->load[i] + s->slope[i] * theta);
+        double load = direction * (s->load[i] + s->slope[i] * y.position);
         if (load > top) top = load;
       }
-    double limit = top > law->fc ? curve(s, side, v) : law->fc;
+    double limit = law->fc;
+    if (top > limit) {
+      if (level[side] == 0.0) curves(s, v, level);
+      limit = level[side];
+    }
     if (top - limit > g) g = top - limit;
   }
   return g;
 }
 
-static void change_modes(State *s) {
-  for (int side = 0; side < s->sides; side++) {
-    const Contact *law = contact(s, side);
-    double decay = exp(-s->slip[side].exponent);
-    for (int i = s->first[side]; i < s->first[side + 1]; i++) {
-      int j = i - s->first[side];
-      if (s->slips[i])
-        s->force[i] = decay * s->force[i]
-                      + law->share[j] / s->slip[side].share * (s->slip[side].s_end - decay * s->slip[side].start);
-      else
-        s->force[i] = s->offset[i] + law->stiffness[j] * s->theta;
-    }
+static void break_away(State *s, double v, double direction) {
+  double level[2];
+  curves(s, v, level);
+  for (int side = 0, i = 0; side < GMS_SIDES; side++)
+    for (int j = 0; j < s->count[side]; j++, i++)
+      if (!s->slips[i] && direction * s->force[i] >= s->loop->law[side].share[j] * level[side] - 1e-10) {
+        s->slips[i] = 1;
+        s->sigma = direction;
+      }
+}
+
+static void settle_forces(State *s) {
+  for (int side = 0, i = 0; side < GMS_SIDES; side++) {
+    const Law *law = &s->loop->law[side];
+    const Slip *p = &s->slip[side];
+    double decay = p->share > 0.0 ? exp(-p->exponent) : 1.0;
+    for (int j = 0; j < s->count[side]; j++, i++)
+      s->force[i] = s->slips[i] ? decay * s->force[i] + law->share[j] / p->share * (p->s - decay * p->start)
+                                : s->offset[i] + law->stiffness[j] * s->theta;
   }
-  if (s->any && s->sigma * s->v <= 1e-9 * fabs(s->v)) {
-    for (int i = 0; i < s->first[2]; i++) s->slips[i] = 0;
-  } else {
-    double direction = s->v >= 0.0 ? 1.0 : -1.0;
-    for (int side = 0; side < s->sides; side++) {
-      const Contact *law = contact(s, side);
-      double level = curve(s, side, s->v);
-      for (int i = s->first[side]; i < s->first[side + 1]; i++)
-        if (!s->slips[i] && direction * s->force[i] >= law->share[i - s->first[side]] * level - 1e-10) {
-          s->slips[i] = 1;
-          s->sigma = direction;
-        }
+}
+
+static void change_modes(State *s) {
+  settle_forces(s);
+  double edge = s->loop->law[1].layer;
+  if (MODEL == STRIBECK && s->inside && fabs(s->v) >= (1.0 - 1e-6) * edge) {
+    s->inside = 0;
+    s->sigma = s->v > 0.0 ? 1.0 : -1.0;
+  } else if (MODEL == STRIBECK && !s->inside && s->sigma * s->v <= (1.0 + 1e-6) * edge) {
+    s->inside = 1;
+  }
+  if (s->watched && s->sigma * s->v <= 1e-9 * fabs(s->v)) {
+    for (int i = 0; i < s->count[0] + s->count[1]; i++) s->slips[i] = 0;
+    if (s->sigma * s->v > 0.0) s->v = 0.0;
+    if (MODEL == COULOMB) {
+      /* Feedback of sign(v) repels from rest: the applied torque says where to. */
+      double torque = s->command.r + s->loop->ki * s->integral - s->loop->kp * s->theta;
+      for (int i = 0; i < s->count[0]; i++) torque -= s->force[i];
+      s->sigma = torque > 0.0 ? 1.0 : -1.0;
+      if (s->sigma * s->v < 0.0) s->v = 0.0;
+    } else {
+      s->sigma = -s->sigma;
     }
+    break_away(s, s->sigma * fmax(s->sigma * s->v, 1e-12), s->sigma);
+  } else {
+    break_away(s, s->v, s->v >= 0.0 ? 1.0 : -1.0);
   }
   arrange(s);
 }
 
-/* ---- one stretch ---- */
-
-enum { MOST_ROUNDS = 3, FEW_ROUNDS = 2 };
-
-static void advance_slip(State *s, int side, double h, double v_mid, double v_end) {
-  Slip *p = &s->slip[side];
-  double c = contact(s, side)->attraction, goal = c * p->share * s->sigma;
-  p->q_mid = 1.0 / curve(s, side, v_mid);
-  p->q_end = 1.0 / curve(s, side, v_end);
-  double right_mid = p->s + h * (5.0 / 24.0 * p->ds + 7.0 / 24.0 * goal);
-  double right_end = p->s + h / 6.0 * (p->ds + 5.0 * goal);
-  double m11 = 1.0 + h * c * p->q_mid / 3.0, m12 = -h * c * p->q_end / 24.0;
-  double m21 = 2.0 * h * c * p->q_mid / 3.0, m22 = 1.0 + h * c * p->q_end / 6.0;
-  p->s_end = (m11 * right_end - m21 * right_mid) / (m11 * m22 - m12 * m21);
-  p->ds_end = goal - c * p->q_end * p->s_end;
-}
-
-/* Moves over h; returns how many rounds the corrector took, or more than MOST_ROUNDS. */
-static int correct(State *s, Stretch *p, Command next, Matrix half, double h, double tol) {
-  Matrix full = twice(half);
-  double per_h = 1.0 / h, slope = (next.r - s->command.r) * per_h;
-  double r2 = (3.0 * slope - 2.0 * s->command.dr - next.dr) * per_h;
-  double r3 = (s->command.dr + next.dr - 2.0 * slope) * per_h * per_h;
-  double p0 = s->command.r - s->base, p1 = s->command.dr, p2 = r2, p3 = r3;
-  for (int side = 0; side < s->sides; side++) {
-    p0 -= s->slip[side].weight * s->slip[side].s;
-    p1 -= s->slip[side].weight * s->slip[side].ds;
-  }
-  p->h = h;
-  for (int round = 0;; round++) {
-    double theta = p->theta_end, v = p->v_end;
-    p->c = particular(&s->lin, p0, p1, p2, p3);
-    p->free_position = s->theta - p->c.c0;
-    p->free_velocity = s->v - p->c.c1;
-    move(p, half, 0.5 * h, &p->theta_mid, &p->v_mid);
-    move(p, full, h, &p->theta_end, &p->v_end);
-    if (!s->any) return 0;
-    if (round && fabs(p->theta_end - theta) < 0.1 * tol && 1e-3 * fabs(p->v_end - v) < 0.1 * tol) return round;
-    if (round == MOST_ROUNDS) return MOST_ROUNDS + 1;
-    p2 = r2;
-    p3 = r3;
-    for (int side = 0; side < s->sides; side++) {
-      Slip *q = &s->slip[side];
-      if (q->share > 0.0) {
-        advance_slip(s, side, h, p->v_mid, p->v_end);
-        double m = (q->s_end - q->s) * per_h;
-        p2 -= q->weight * (3.0 * m - 2.0 * q->ds - q->ds_end) * per_h;
-        p3 -= q->weight * (q->ds + q->ds_end - 2.0 * m) * per_h * per_h;
-      }
-    }
-  }
-}
+/* ---- events ---- */
 
 static double locate(const State *s, const Stretch *p, double low, double high, double g_low, double g_high, double tol) {
   int last = 0;
   for (int turn = 0; turn < 60; turn++) {
-    double x = (low * g_high - high * g_low) / (g_high - g_low), theta, v;
+    double x = (low * g_high - high * g_low) / (g_high - g_low);
     if (turn > 10 || !(x > low && x < high)) x = 0.5 * (low + high);
-    move(p, flow(&s->lin, x), x, &theta, &v);
-    double g = trigger(s, theta, v);
+    double g = trigger(s, moved(&p->c, flow(&s->lin, x), x, p->released));
     if (g >= 0.0) {
       high = x, g_high = g;
       if (last == 1) g_low *= 0.5;
@@ -292,22 +197,23 @@ static double locate(const State *s, const Stretch *p, double low, double high, 
 
 /* Time of the first event in the stretch, or -1. */
 static double find(const State *s, const Stretch *p, double tol) {
-  double left = 0.0, theta = s->theta, v = s->v, g_left = -1e-3;
+  Motion y = {s->theta, s->v};
+  double left = 0.0, g_left = -1e-3;
   for (int node = 1; node <= 2; node++) {
-    double right = 0.5 * node * p->h, theta1 = node == 1 ? p->theta_mid : p->theta_end;
-    double v1 = node == 1 ? p->v_mid : p->v_end, g = trigger(s, theta1, v1);
-    if (s->any) { /* a reversal that dips through zero and back */
-      double a0 = s->sigma * acceleration(&s->lin, p, left, theta, v);
-      double a1 = s->sigma * acceleration(&s->lin, p, right, theta1, v1);
-      if (a0 < 0.0 && a1 > 0.0 && s->sigma * v1 > 0.0 && s->sigma * v1 < -a0 * p->h) {
-        double x = left + (right - left) * a0 / (a0 - a1), theta_x, v_x;
-        move(p, flow(&s->lin, x), x, &theta_x, &v_x);
-        if (s->sigma * v_x <= 0.0)
-          return locate(s, p, left, x, fmin(g_left, -1e-15), fmax(trigger(s, theta_x, v_x), 1e-15), tol);
+    double right = 0.5 * node * p->h;
+    Motion z = node == 1 ? p->mid : p->end;
+    if (s->watched && s->sigma * z.velocity > s->narrow) { /* a reversal that dips through zero and back */
+      double a0 = s->sigma * acceleration(&s->lin, &p->c, left, y), a1 = s->sigma * acceleration(&s->lin, &p->c, right, z);
+      if (a0 < 0.0 && a1 > 0.0 && s->sigma * z.velocity - s->narrow < -a0 * p->h) {
+        double x = left + (right - left) * a0 / (a0 - a1);
+        Motion dip = moved(&p->c, flow(&s->lin, x), x, p->released);
+        if (s->sigma * dip.velocity <= s->narrow)
+          return locate(s, p, left, x, fmin(g_left, -1e-15), fmax(trigger(s, dip), 1e-15), tol);
       }
     }
+    double g = trigger(s, z);
     if (g >= 0.0) return locate(s, p, left, right, fmin(g_left, -1e-15), fmax(g, 1e-15), tol);
-    left = right, theta = theta1, v = v1, g_left = g;
+    left = right, y = z, g_left = g;
   }
   return -1.0;
 }
@@ -315,8 +221,8 @@ static double find(const State *s, const Stretch *p, double tol) {
 /* ---- the loop ---- */
 
 static double amplitude_of(const State *s, const Stretch *p) {
-  double u = p->free_velocity / s->lin.frequency;
-  return s->lin.discriminant > 0.0 ? sqrt(p->free_position * p->free_position + u * u) : 0.0;
+  double u = p->released.velocity / s->lin.frequency;
+  return s->lin.discriminant > 0.0 ? sqrt(p->released.position * p->released.position + u * u) : 0.0;
 }
 
 static Matrix half_of(State *s, int level, double h) {
@@ -327,81 +233,151 @@ static Matrix half_of(State *s, int level, double h) {
   return s->halves[level];
 }
 
-/* Takes one step of at most `left`; returns the rounds it took. */
+/* The command in the middle of the next h; where it has lain on the cubic, the next few are taken from it. */
+static Command middle_of(State *s, Command next, double h, double tol) {
+  Command c = s->command;
+  double middle = 0.5 * (c.r + next.r) + 0.125 * h * (c.dr - next.dr);
+  if (!CONTROL && !INTEGRAL) return next;
+  if (s->unseen > 0 && h <= s->seen) {
+    s->unseen--;
+    return (Command){.r = middle};
+  }
+  Command out = command_at(s, s->t + 0.5 * h);
+  int smooth = !INTEGRAL && !TABLE && fabs(out.r - middle) * h * h < 0.1 * tol * s->loop->inertia;
+  s->unseen = smooth ? 4 : 0;
+  s->seen = h;
+  return out;
+}
+
+static int rings(const State *s, const Stretch *p, double h, double tol) {
+  return s->lin.frequency * h > 3.2 && amplitude_of(s, p) > 2.0 * tol;
+}
+
+/* Takes one step of at most `left`; returns 0 where none converges. */
 static int step(State *s, Stretch *p, Command *next, double longest, double left, double tol, int *level) {
+  double unstable = growth(&s->lin);
   for (;; ++*level) {
     double h = ldexp(longest, -*level);
+    while (unstable * fmin(h, left) > 8.0 && *level < DEEPEST - 1) h = ldexp(longest, -++*level);
     int cut = h > left - 1e-9;
     if (cut) h = left;
-    *next = command_after(s->loop, s->t, s->command.z, h);
-    int rounds = correct(s, p, *next, cut ? flow(&s->lin, 0.5 * h) : half_of(s, *level, h), h, tol);
-    int rings = amplitude_of(s, p) > 2.0 * tol && s->lin.frequency * h > 3.2;
-    if ((rounds <= MOST_ROUNDS && !rings) || h < 1e-6 || *level == DEEPEST - 1) return rounds;
+    *next = command_at(s, s->t + h);
+    Command middle = middle_of(s, *next, h, tol);
+    correct(s, p, middle, *next, cut ? flow(&s->lin, 0.5 * h) : half_of(s, *level, h), h, tol);
+    if (p->error <= tol && !rings(s, p, h, tol)) return 1;
+    if (*level == DEEPEST - 1) return p->error < NOT_CONVERGED;
   }
 }
 
-/* Position at x: on the exact flow where the free motion shows, else on the cubics through the nodes. */
-static double position_at(const State *s, const Stretch *p, int shows, double x) {
-  if (shows) {
-    double theta, v;
-    move(p, flow(&s->lin, x), x, &theta, &v);
-    return theta;
+/* The level of the next step after one that was not cut short. */
+static int next_level(const State *s, const Stretch *p, int level, double tol) {
+  double h = p->h, error = p->error;
+  for (int turn = 0; turn < (CONTROL ? 3 : 1); turn++, level--) {
+    h *= 2.0;
+    if (level == 0 || error >= 0.03 * tol || p->rounds > FEW_ROUNDS || rings(s, p, h, tol)) return level;
+    error *= 32.0;
   }
-  double half = 0.5 * p->h;
-  if (x > half) return hermite(p->theta_mid, p->v_mid, p->theta_end, p->v_end, half, x - half);
-  return hermite(s->theta, s->v, p->theta_mid, p->v_mid, half, x);
+  return level;
+}
+
+/* Writes position and velocity of the rows up to x in the stretch. */
+static int write_rows(State *s, const Stretch *p, double spacing, int row, int n, double x, double tol, double *out) {
+  int last = (int)((s->t + x + 1e-12) / spacing) + 1;
+  if (last > n) last = n;
+  if (row >= last) return row;
+  const Cubic c = p->c;
+  const double t = s->t;
+  if (s->lin.discriminant > 0.0 && amplitude_of(s, p) <= 0.01 * tol) {
+    for (int i = row; i < last; i++) {
+      Motion y = on_cubic(&c, i * spacing - t);
+      out[2 * i] = y.position, out[2 * i + 1] = y.velocity;
+    }
+    return last;
+  }
+  Motion released = times(flow(&s->lin, row * spacing - t), p->released);
+  if (!(s->known >> BETWEEN & 1) && row + 1 < last) {
+    s->between = flow(&s->lin, spacing);
+    s->known |= 1u << BETWEEN;
+  }
+  for (int i = row; i < last; i++) {
+    Motion y = on_cubic(&c, i * spacing - t);
+    out[2 * i] = y.position + released.position, out[2 * i + 1] = y.velocity + released.velocity;
+    released = times(s->between, released);
+  }
+  return last;
 }
 
 /* Stands at x in the stretch, or at its end. */
 static void advance(State *s, const Stretch *p, Command next, double x, int event) {
-  for (int side = 0; side < s->sides; side++) {
+  for (int side = 0; side < GMS_SIDES; side++) {
     Slip *q = &s->slip[side];
     if (q->share > 0.0) {
       double f = x / p->h, bend = 2.0 * (q->q + q->q_end) - 4.0 * q->q_mid, slope = q->q_end - q->q - bend;
-      q->exponent += contact(s, side)->attraction * x * (q->q + f * (0.5 * slope + f * bend / 3.0));
-      if (event) q->s_end = hermite(q->s, q->ds, q->s_end, q->ds_end, p->h, x);
+      q->exponent += s->loop->law[side].attraction * x * (q->q + f * (0.5 * slope + f * bend / 3.0));
+      if (event) q->s = hermite(q->s, q->ds, q->s_end, q->ds_end, p->h, x);
       else q->s = q->s_end, q->ds = q->ds_end, q->q = q->q_end;
     }
   }
-  s->theta = p->theta_end;
-  s->v = p->v_end;
-  if (event) move(p, flow(&s->lin, x), x, &s->theta, &s->v);
-  s->command = event ? command_after(s->loop, s->t, s->command.z, x) : next;
+  if (MODEL == LUGRE) {
+    Slip *q = &s->slip[1];
+    q->s = event ? hermite(q->s, q->ds, q->s_end, q->ds_end, p->h, x) : q->s_end;
+  }
+  if (INTEGRAL) {
+    double e0 = s->command.goal - s->theta, e1 = next.goal - p->end.position;
+    s->integral = event ? hermite(s->integral, e0, p->integral_end, e1, p->h, x) : p->integral_end;
+  }
+  Motion y = event ? moved(&p->c, flow(&s->lin, x), x, p->released) : p->end;
+  s->theta = y.position, s->v = y.velocity;
   s->t += x;
+  s->command = event ? command_at(s, s->t) : next;
 }
 
-/* Writes the position at 0, spacing, 2 spacing, ... (n values); returns the number of events. */
-int baseline(const Loop *p, double duration, double tol, double longest, double spacing, int n, double *out) {
-  State s = {.loop = p, .sides = p->compensation == GMS_FEEDBACK ? 2 : 1, .sigma = 1.0};
+/* Writes position and velocity at 0, spacing, 2 spacing, ... (n of them) up to the last of the breaks, onto which it
+ * steps; returns the number of events, or -1 where no step converges. */
+static int run(const Loop *p, const double *cells, int count, const double *breaks, double tol, double longest,
+               double spacing, int n, double *out) {
+  State s = {.loop = p, .cells = cells, .last_cell = count - 1, .high = breaks[0] - 1e-12, .low = 1e-12};
   Stretch stretch = {0};
-  s.first[1] = (int)p->plant.count;
-  s.first[2] = s.first[1] + (s.sides == 2 ? (int)p->model.count : 0);
-  s.slip[0] = (Slip){.weight = 1.0, .per_vs = 1.0 / p->plant.vs};
-  s.slip[1] = (Slip){.weight = -1.0, .per_vs = 1.0 / p->model.vs};
-  s.command = command_after(p, 0.0, 0.0, 0.0);
+  const Law *one = &p->law[0], *other = &p->law[1];
+  s.alike = one->fs == other->fs && one->fc == other->fc && one->vs == other->vs;
+  s.count[0] = (int)one->count, s.count[1] = MODEL == GMS ? (int)other->count : 0;
+  s.command = command_at(&s, 0.0);
+  s.sigma = command_at(&s, 1e-9).r >= 0.0 ? 1.0 : -1.0;
+  s.inside = MODEL == STRIBECK;
   arrange(&s);
-  int row = 0, events = 0, after_event = (int)ceil(log2(longest / 2.5e-4)), level = after_event;
-  double half_period = M_PI / p->omega, edge = half_period;
+  int row = 0, events = 0, after_event = (int)fmax(0.0, ceil(log2(longest / 2.5e-4))), level = after_event;
+  const double duration = (n - 1) * spacing;
   while (s.t < duration - 1e-12) {
-    double end = p->compensation == LUGRE_FEEDFORWARD && edge < duration ? edge : duration;
+    double left = *breaks - s.t;
     Command next;
-    int rounds = step(&s, &stretch, &next, longest, end - s.t, tol, &level);
-    double x = find(&s, &stretch, tol), h = x >= 0.0 ? x : stretch.h, amplitude = amplitude_of(&s, &stretch);
-    int rings = s.lin.discriminant > 0.0 && amplitude > 0.2 * tol && s.lin.frequency * stretch.h > 1.0;
-    int shows = rings || (s.lin.discriminant < 0.0 && s.lin.frequency * stretch.h > 0.15);
-    for (; row < n && row * spacing <= s.t + h + 1e-12; row++)
-      out[row] = position_at(&s, &stretch, shows, row * spacing - s.t);
+    if (BENT && !(MODEL == STRIBECK && s.inside)) bend(&s, fmin(left, ldexp(longest, -level)));
+    if (!step(&s, &stretch, &next, longest, left, tol, &level)) return -1;
+    double x = find(&s, &stretch, tol), h = x >= 0.0 ? x : stretch.h;
+    row = write_rows(&s, &stretch, spacing, row, n, h, tol, out);
     advance(&s, &stretch, next, h, x >= 0.0);
-    if (s.t >= edge - 1e-12) edge += half_period;
     if (x >= 0.0) {
+      int fast = growth(&s.lin) * 2.5e-4 > 8.0;
       events++;
       change_modes(&s);
-      if (level < after_event) level = after_event;
-    } else if (rounds <= FEW_ROUNDS && level > 0 && h >= 0.999 * ldexp(longest, -level)
-               && !(amplitude > 2.0 * tol && 2.0 * s.lin.frequency * h > 3.2)) {
-      level--;
+      if (level < after_event || fast) level = after_event;
+    } else if (h >= 0.999 * ldexp(longest, -level)) {
+      level = next_level(&s, &stretch, level, tol);
+    }
+    if (h >= left - 1e-12) {
+      s.t = *breaks++;
+      if (s.t >= duration - 1e-12) break;
+      s.low = s.t + 1e-12, s.high = *breaks - 1e-12, s.unseen = 0;
+      s.command = command_at(&s, s.t);
     }
   }
-  for (; row < n; row++) out[row] = s.theta;
+  for (; row < n; row++) out[2 * row] = s.theta, out[2 * row + 1] = s.v;
+  return events;
+}
+
+/* The same so many times: what a call costs from Python does not count. */
+int baseline(int times, const Loop *p, const double *cells, int count, const double *breaks, double tol, double longest,
+             double spacing, int n, double *out) {
+  int events = 0;
+  for (int i = 0; i < times; i++) events = run(p, cells, count, breaks, tol, longest, spacing, n, out);
   return events;
 }

@@ -28,9 +28,9 @@ import numpy as np
 
 import closed_loop
 import jax_step
-from baseline import compiled_baseline
+from baseline import FC, FS, Baseline, compiled_baseline
 from stickslip.control.controller import Controller
-from stickslip.simulation import batch, lanes
+from stickslip.simulation import batch, exact, lanes
 from stickslip.simulation._case import Case
 from stickslip.simulation.closed_loop import prepare
 
@@ -82,16 +82,15 @@ def built(compiler: str, source: Path, folder: str) -> Any | None:
     return ctypes.CDLL(str(library))
 
 
-def same_method(function: Any, name: str, fs: Column, fc: Column, tolerance: float) -> Callable[[], Column]:
+def same_method(c: Baseline, name: str, fs: Column, fc: Column, tolerance: float) -> Callable[[], Column]:
     """baseline.c over the loops."""
-    p, out, ends = closed_loop.numbers(name), np.zeros(2), np.zeros(fs.size)
-    plant = 6 + 18
+    loop, ends = c.loop(exact.prepare(the_case(name, 1e-6)), control=False), np.zeros(fs.size)
+    one = loop.run(tolerance)
 
     def run() -> Column:
         for i in range(fs.size):
-            p[plant], p[plant + 1] = fs[i], fc[i]
-            function(pointer(p), DURATION, tolerance, 64e-3, DURATION, 2, pointer(out))
-            ends[i] = out[1]
+            loop.values[FS], loop.values[FC] = fs[i], fc[i]
+            ends[i] = one()[1]
         return ends.copy()
 
     return run
