@@ -24,14 +24,14 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from stickslip.identify.axis_start import feasible
-from stickslip.identify.contact import unseen_refused
+from stickslip.identify.contact import of_slow_motion, unseen_refused
 from stickslip.identify.corrections import BAND, Criterion, MakeMechanics, student_weight
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.jackknife import BlockCovariance, leave_blocks_out
@@ -58,6 +58,9 @@ DRAWS = 16
 """Times that the corrections are shaken."""
 MEMORY = 0.15
 """s over which they are shaken alike."""
+CAUTION = 1.35
+"""Factor on the spread of what only slow motion tells: what an observer does to a contact that sticks is in none of the
+parts. Without it the intervals of vs, sigma0 and C held in 84, 89 and 82 % (coverage study, seeds 16000 to 16199)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,10 +181,11 @@ def prediction_error(
     ]
     moved = [c.adapted(u).descend(u, 6, 1e-3).u - u for c in others]
     beside = sum((np.outer(d, d) for d in moved), np.zeros_like(shaken))
-    estimates = estimates_of(vector, u, spread, shaken, beside, signed_scale)
     accepted, named = feasible(law, vector.law_parameters(u)), vector.named(u)
     assert accepted is not None
     highest = max(float(np.max(np.abs(m.seen.velocity))) for m in motions)
+    slow = {p.name for p in vector.free if of_slow_motion(law, accepted, p.name, highest)}
+    estimates = estimates_of(vector, u, spread, shaken, beside, signed_scale, slow)
     estimates = unseen_refused(
         estimates, law, accepted, named["inertia"], highest, max(m.period for m in motions)
     )
@@ -265,8 +269,12 @@ def estimates_of(
     shaken: Array,
     beside: Array,
     signed_scale: float | Mapping[str, float],
+    slow: Container[str],
 ) -> tuple[Estimate, ...]:
-    """Estimates with 95 % intervals from Student's quantile, in coordinates, and verdicts."""
+    """Estimates with 95 % intervals from Student's quantile, in coordinates, and verdicts.
+
+    `slow` names what only slow motion tells.
+    """
     from scipy import special
 
     values = vector.values(u)
@@ -276,6 +284,7 @@ def estimates_of(
         within = max(float(change[k] @ c @ change[k]) for c in (spread.covariance, shaken))
         variance = within + float(change[k] @ beside @ change[k])
         std = math.sqrt(variance) if variance >= 0.0 else math.inf
+        std *= CAUTION if p.name in slow else 1.0
         dof = max(spread.freedom(change[k]) - 1.0, 1.0)
         width = float(special.stdtrit(dof, 0.975))
         low, high = interval_of(p, float(values[k]), width * std, None)
