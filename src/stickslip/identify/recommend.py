@@ -166,7 +166,8 @@ def recommend(
     others = Bench(list(plants_of(found, float(j), confirm, seed + 1)), linear, drive, laws)
     if isinstance(first := bench.before(0), str):
         raise InputError(f"the linear controller alone: {first}")
-    rung = rings_alone(bench, float(j), found.unit("N·m"))
+    # By the axes of the confirmation, if there are more of them: what is said is then the same for any `axes`.
+    rung = rings_alone(max(others, bench, key=lambda b: len(b.plants)), float(j), found.unit("N·m"))
     settings = list(settings_of(laws, drive))
     total = len(settings) + len(BEYOND) + len(others.plants) // max(1, len(bench.plants))
     candidates: list[Candidate] = []

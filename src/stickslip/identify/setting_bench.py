@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -17,6 +17,8 @@ from stickslip.model import Model
 
 __all__ = ["Bench", "Candidate", "Setting", "on_both", "rings_alone"]
 
+LOOKED_AT = 16
+"""Axes on which the linear controller alone is judged: the best estimate and some drawn ones."""
 KINDS = {"feedforward": Feedforward, "feedback": Feedback}
 SLOWER = (0.7, 0.5, 0.35, 0.25, 0.1)
 """Of the bandwidth: where a linear controller that rings alone is tried for one that is calm."""
@@ -101,10 +103,11 @@ class Bench:
             self.alone.append(run(self.plants[len(self.alone)], self.linear, self.drive))
         return self.alone[i]
 
-    def ringing(self) -> dict[int, str]:
-        """The axes on which the linear controller alone rings, and where."""
-        found = {i: rings(p, self.linear, self.drive, self.before(i)) for i, p in enumerate(self.plants)}
-        return {i: where for i, where in found.items() if where}
+    def ringing(self) -> Iterator[tuple[RigidAxis, str]]:
+        """The axes, of the first `LOOKED_AT`, on which the linear controller alone rings, and where."""
+        for i, plant in enumerate(self.plants[:LOOKED_AT]):
+            if where := rings(plant, self.linear, self.drive, self.before(i)):
+                yield plant, where
 
     def judged(self, setting: Setting) -> Candidate:
         """The setting on every axis, up to the first on which it is not safe.
@@ -134,19 +137,19 @@ def on_both(setting: Setting, bench: Bench, others: Bench) -> Candidate:
 
 def rings_alone(bench: Bench, inertia: float, torque: str) -> str:
     """Where the linear controller alone rings, and at which bandwidth it does not; empty where it is calm."""
-    ringing = bench.ringing()
+    ringing = list(bench.ringing())
     if not ringing:
         return ""
-    drive = bench.drive
-    where = " and ".join(sorted(set(ringing.values())))
-    on = f"on {len(ringing)} of {len(bench.plants)} axes" if len(bench.plants) > 1 else "on the best estimate"
+    drive, count = bench.drive, len(bench.plants[:LOOKED_AT])
+    where = " and ".join(sorted({where for _, where in ringing}))
+    on = f"on {len(ringing)} of {count} axes" if count > 1 else "on the best estimate"
     kick = bench.linear.gains.kd * drive.deadband(1.0)
     why = f": a count of the encoder makes it push {kick:.2g} {torque} for a sample" if kick else ""
-    plants = [bench.plants[i] for i in ringing]
+    plants = [plant for plant, _ in ringing]
     for share in SLOWER:
         slower = replace(drive, bandwidth=share * drive.bandwidth)
         linear = replace(bench.linear, gains=place("PD", inertia, slower.bandwidth, drive.damping))
-        if not Bench(plants, linear, slower, {}).ringing():
+        if not any(Bench(plants, linear, slower, {}).ringing()):
             calm = f"lower the bandwidth ({slower.bandwidth:.3g} Hz is calm)"
             break
     else:
