@@ -656,6 +656,23 @@ def test_a_reference_over_eighths_of_a_turn_in_degrees_is_no_reference_in_rad(wa
     assert ("position-unit" in codes) == doubted
 
 
+@pytest.mark.parametrize(
+    ("unit", "twist"), [("deg", "gravity"), ("rad", "gravity"), ("deg", "spring"), ("rad", "warm")]
+)
+def test_a_pendulum_in_degrees_under_rad_is_known_by_its_gravity(unit, twist):
+    """Without an encoder's step; a spring, or friction that falls while the axis warms up, is none."""
+    t = np.arange(0.0, 8.0, 1e-3)
+    q = (1.4 if unit == "deg" else 80.0) * np.sin(2.0 * np.pi * 0.5 * t)
+    v, a = np.gradient(q, t), np.gradient(np.gradient(q, t), t)
+    torque = 1e-3 * a + 0.1 * np.sign(v) * (1.0 - 0.05 * t * (twist == "warm"))
+    torque += {"gravity": 0.4 * np.sin(q), "spring": 0.1 * q, "warm": 0.0}[twist]
+    size = DEG if unit == "deg" else 1.0
+    noise = 1e-3 * rng().standard_normal((2, t.size))
+    record = Record(t, {"position": size * (q + 1e-3 * noise[0]), "motor_torque": torque + noise[1]}, UNITS)
+    codes = {f.code for f in examine(record).warnings}
+    assert ("position-unit" in codes) == (unit == "deg" and twist == "gravity")
+
+
 # ---- real data ----------------------------------------------------------------------------------------------
 
 REAL: list[tuple[str, list[str], set[str]]] = [

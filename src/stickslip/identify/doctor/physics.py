@@ -21,6 +21,8 @@ __all__ = ["gravity", "sign", "skew"]
 
 ROWS = 20_000
 """Rows of a regression: more tell no more."""
+QUARTER = 90.0
+"""Of a turn, in degrees, that a pendulum must swing over to be told from a spring."""
 HARM = 5e-6
 """Of the torque's variance, that a delay must leave unexplained to be told: less spoils nothing."""
 
@@ -113,6 +115,12 @@ def gravity(view: View) -> Iterator[Finding]:
                 "warning", "gravity", message, remedy="identify with gravity, or turn the axis upright"
             )
             return
+        if _hangs_in_degrees(smooth, min(plain.rest, full.rest)):
+            message = (
+                "the mean torque comes back with 360, as gravity does with a turn: degrees rather than rad"
+            )
+            yield Finding("warning", "position-unit", message, remedy=f"say {view.mapped('position', 'deg')}")
+            return
     offset, coulomb = plain.values[3], abs(plain.values[1])
     if coulomb > 0.0 and abs(offset) > 0.3 * coulomb and plain.explained > 0.5:
         unit = view.record.units["motor_torque"]
@@ -137,6 +145,16 @@ def _usable(view: View) -> Smooth | None:
     return smooth if enough else None
 
 
+def _hangs_in_degrees(smooth: Smooth, rest: float) -> bool:
+    """Whether the torque is that of a pendulum whose angle is in degrees: on the way forth and on the way back."""
+    forth = float(np.mean(smooth.velocity[smooth.moving] > 0.0))
+    if np.ptp(smooth.position) < QUARTER or not 0.2 < forth < 0.8:
+        return False
+    fit = _fit(smooth, 0, periodic=True, turn=360.0)
+    amplitude, size = math.hypot(fit.values[4], fit.values[5]), float(np.std(smooth.torque))
+    return fit.rest < 0.2 * rest and fit.explained > 0.9 and 0.1 * size < amplitude < 20.0 * size
+
+
 def _edge(smooth: Smooth, step: float) -> float:
     """The time within which the axis turns round inside one step of its encoder, s: no edge is known better."""
     slow = smooth.moving & (np.abs(smooth.velocity) < 0.5 * smooth.fast)
@@ -144,8 +162,11 @@ def _edge(smooth: Smooth, step: float) -> float:
     return math.sqrt(step / turning) if turning > 0.0 else 0.0
 
 
-def _fit(smooth: Smooth, shift: int, *, periodic: bool = False, measured: bool = False) -> Fit:
-    """Least squares over the rows that move, with the torque taken `shift` samples later."""
+def _fit(
+    smooth: Smooth, shift: int, *, periodic: bool = False, measured: bool = False, turn: float = 2.0 * math.pi
+) -> Fit:
+    """Least squares over the rows that move, with the torque taken `shift` samples later; `turn` is one of the position
+    in its unit."""
     count = smooth.velocity.size
     edge = min(60, count // 8)
     rows = np.flatnonzero(smooth.moving[edge : count - edge]) + edge
@@ -154,7 +175,8 @@ def _fit(smooth: Smooth, shift: int, *, periodic: bool = False, measured: bool =
     inertia = np.zeros_like(v) if measured else smooth.acceleration[rows]
     parts = [inertia, np.sign(v), v, np.ones_like(v)]
     if periodic:
-        parts += [np.sin(smooth.position[rows]), np.cos(smooth.position[rows])]
+        angle = 2.0 * math.pi / turn * smooth.position[rows]
+        parts += [np.sin(angle), np.cos(angle)]
     matrix: Array = np.stack(parts, axis=1)
     size: Array = np.sqrt(np.mean(matrix**2, axis=0))
     size[size == 0.0] = 1.0
