@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,14 +13,15 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics, uniform
 from stickslip.identify.axis_output import Extras, laid_out, starting_models
-from stickslip.identify.axis_problem import Problem
+from stickslip.identify.axis_problem import mechanics_of
 from stickslip.identify.axis_start import steady_fit
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.corrections import BAND, DIFFERENCE, Criterion
-from stickslip.identify.observer import Motion, prepare
+from stickslip.identify.observer import Motion, Prepared, prepare
 from stickslip.identify.optimum import cost_of
 from stickslip.identify.prediction_error import PredictionError, prediction_error
 from stickslip.identify.secant import Secants
+from stickslip.identify.side_by_side import mapped
 from stickslip.identify.vector import Vector
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
@@ -118,16 +120,17 @@ def searched(
     hops: int = HOPS,
 ) -> tuple[Criterion, Array]:  # fmt: skip
     """The criterion of the best minimum met under the firm observer, and its coordinates."""
-    tried: dict[float, Criterion] = {}
+    records: list[Prepared] = []
+    criteria: list[Criterion] = []
+    mechanics = functools.partial(mechanics_of, harmonic_period=extras.harmonic_period)
     for model in starting_points(trials, axis, law, start, given):
         vector, inertia = laid_out(trials, axis, law, start, model, given, free, frozen, extras)
-        problem = Problem.of(
-            trials, axis, law, vector, inertia=inertia, harmonic_period=extras.harmonic_period
-        )
-        records = [prepare(m, law, inertia, abs(start.coulomb), band) for m in motions]
-        criterion = Criterion.first(records, law, vector, problem.mechanics)
-        # Several ways lead to one start: it counts once.
-        tried[float(f"{cost_of(criterion.residuals(vector.start)):.6g}")] = criterion
+        # All start from one inertia.
+        records = records or [prepare(m, law, inertia, abs(start.coulomb), band) for m in motions]
+        criteria.append(Criterion.first(records, law, vector, mechanics))
+    costs = mapped(lambda c: cost_of(c.residuals(c.vector.start)), criteria)
+    # Several ways lead to one start: it counts once.
+    tried = {float(f"{cost:.6g}"): criterion for cost, criterion in zip(costs, criteria, strict=True)}
     tried.pop(math.inf, None)
     if not tried:
         raise InputError(
@@ -136,10 +139,10 @@ def searched(
     ranked = [tried[cost] for cost in sorted(tried)]
     others = ranked[BEST:]
     ranked = ranked[:BEST] + [others[i] for i in spread(len(others), SPREAD)]
-    running = [(c, search_from(c, c.vector.start)) for c in ranked]
+    running = mapped(lambda c: (c, search_from(c, c.vector.start)), ranked)
     for count, evaluations in ROUNDS:
-        for _, search in running[:count]:
-            search.run(evaluations, SETTLED)
+        going = [search for _, search in running[:count]]
+        mapped(lambda search: search.run(evaluations, SETTLED), going)  # noqa: B023 (done at once)
         running = sorted(running[:count], key=lambda entry: entry[1].cost)
     criterion, search = running[0]
     # Outliers would choose among hops by plain squares: from here on the likelihood that weighs them decides.

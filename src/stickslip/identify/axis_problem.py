@@ -72,6 +72,25 @@ def mechanics_parameters(
     return [Parameter(name, par, float(values.get(name, neutral))) for name, par, neutral in described]
 
 
+def mechanics_of(named: Mapping[str, float], harmonic_period: float) -> Mechanics:
+    """The axis at named values."""
+    torque = tuple(
+        (named[f"cos[{i}]"], named[f"sin[{i}]"]) for i in range(len(named)) if f"cos[{i}]" in named
+    )
+    share = tuple(
+        (named[f"friction_cos[{i}]"], named[f"friction_sin[{i}]"])
+        for i in range(len(named)) if f"friction_cos[{i}]" in named
+    )  # fmt: skip
+    plain = {
+        k: named[k]
+        for k in (
+            "inertia", "offset", "gravity", "gravity_angle", "drive_gain", "back_emf", "load_motor",
+            "load_external", "backlash",
+        )
+    }  # fmt: skip
+    return Mechanics(**plain, harmonics=Harmonics(harmonic_period, torque, share))
+
+
 UNITS = {"torque": "N·m", "current": "A", "rated_torque": "%", "voltage": "V"}
 
 
@@ -162,21 +181,7 @@ class Problem:
 
     def mechanics(self, named: Mapping[str, float]) -> Mechanics:
         """The axis at named values."""
-        torque = tuple(
-            (named[f"cos[{i}]"], named[f"sin[{i}]"]) for i in range(len(named)) if f"cos[{i}]" in named
-        )
-        share = tuple(
-            (named[f"friction_cos[{i}]"], named[f"friction_sin[{i}]"])
-            for i in range(len(named)) if f"friction_cos[{i}]" in named
-        )  # fmt: skip
-        plain = {
-            k: named[k]
-            for k in (
-                "inertia", "offset", "gravity", "gravity_angle", "drive_gain", "back_emf", "load_motor",
-                "load_external", "backlash",
-            )
-        }  # fmt: skip
-        return Mechanics(**plain, harmonics=Harmonics(self.harmonic_period, torque, share))
+        return mechanics_of(named, self.harmonic_period)
 
     def simulated(self, u: Array) -> list[Array] | None:
         """Every record simulated (`Course.run`); None where the law refuses the parameters."""

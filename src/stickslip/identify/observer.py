@@ -8,7 +8,6 @@ There a damper takes over that is part of the implicit step, as firm as the enco
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,6 +17,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.edges import SeenVelocity, seen_velocity
+from stickslip.identify.filters import ZeroPhase
 from stickslip.simulation.driven import Course, Drive, Mechanics
 from stickslip.simulation.driven_lanes import Stretches, cut
 from stickslip.spec import Law
@@ -82,18 +82,16 @@ class Prepared:
 
     course: Course
     stretches: Stretches
-    low_pass: Any
+    low_pass: ZeroPhase
     stride: int
     edge: int
 
     def correction(self, mechanics: Mechanics, parameters: Any) -> Array:
         """Torque that the model lacks, N·m, in the band, shape (m,)."""
-        signal: Any = importlib.import_module("scipy.signal")  # it carries no types
-
         raw = self.raw(mechanics, parameters)
         if not np.all(np.isfinite(raw)):
             return self.nothing()
-        return signal.sosfiltfilt(self.low_pass, raw)[self.edge : -self.edge : self.stride]
+        return self.low_pass(raw)[self.edge : -self.edge : self.stride]
 
     def raw(self, mechanics: Mechanics, parameters: Any) -> Array:
         """Torque that the observer adds at every sample, N·m, shape (n,)."""
@@ -133,8 +131,6 @@ def prepare(
     InputError
         If the record is too short, or its samples too few or not equally spaced.
     """
-    signal: Any = importlib.import_module("scipy.signal")  # it carries no types
-
     checked(motion, band)
     dt, seen = motion.period, motion.seen
     omega = 2.0 * math.pi * speed * band
@@ -146,7 +142,7 @@ def prepare(
         forgets=-math.expm1(-LAG * omega * dt), returns=RETURNS * omega, slack=0.5 * motion.count,
         max_step=1.001 * min(dt, LONGEST),
     )  # fmt: skip
-    low_pass = signal.butter(4, band, fs=1.0 / dt, output="sos")
+    low_pass = ZeroPhase(4, band, 1.0 / dt)
     stride = max(1, int(1.0 / (3.0 * band * dt)))
     edge = max(1, int(EDGE / dt))
     if (motion.time.size - 2 * edge) // stride < FEWEST:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.side_by_side import mapped
 
 __all__ = [
     "STEP",
@@ -71,15 +72,16 @@ def central_differences(
 
     Residuals that are exact to fewer digits need a larger `difference`: relative above 1.
     """
-    columns: list[Array] = []
-    for i in free:
+
+    def column(i: int) -> Array:
         h = difference * max(1.0, abs(float(u[i])))
         ahead, behind = u.copy(), u.copy()
         ahead[i] = min(u[i] + h, upper[i])
         behind[i] = max(u[i] - h, lower[i])
         width = ahead[i] - behind[i]
-        columns.append((residuals(ahead) - residuals(behind)) / width if width > 0.0 else 0.0 * residuals(u))
-    return np.stack(columns, axis=1)
+        return (residuals(ahead) - residuals(behind)) / width if width > 0.0 else 0.0 * residuals(u)
+
+    return np.stack(mapped(column, free), axis=1)
 
 
 def descend(

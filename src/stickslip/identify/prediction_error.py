@@ -38,6 +38,7 @@ from stickslip.identify.jackknife import BlockCovariance, leave_blocks_out
 from stickslip.identify.noise import Noise
 from stickslip.identify.observer import GRASP, Motion, Prepared, prepare
 from stickslip.identify.optimum import Optimum
+from stickslip.identify.side_by_side import mapped
 from stickslip.identify.uncertainty import interval_of, verdict_on
 from stickslip.identify.vector import Vector
 from stickslip.model import Model
@@ -227,15 +228,13 @@ def shaken_steps(criterion: Criterion, optimum: Optimum, rng: np.random.Generato
     newton = -np.linalg.solve(jacobian.T @ jacobian + ridge_of(r, u.size), jacobian.T)
     parameters, axis = feasible(criterion.law, vector.law_parameters(u)), criterion.mechanics(vector.named(u))
     lacking = [x.raw(axis, parameters) for x in criterion.records]
-    steps: list[Array] = []
-    for _ in range(DRAWS):
-        records = [
-            x.shaken(e * random_signs(rng, x.course.drive.time))
-            for x, e in zip(criterion.records, lacking, strict=True)
-        ]
-        step = newton @ replace(criterion, records=records).weighed(u)
-        if np.all(np.isfinite(step)):
-            steps.append(step - newton @ r)
+    signs = [[random_signs(rng, x.course.drive.time) for x in criterion.records] for _ in range(DRAWS)]
+
+    def step(draw: list[Array]) -> Array:
+        records = [x.shaken(e * s) for x, e, s in zip(criterion.records, lacking, draw, strict=True)]
+        return newton @ (replace(criterion, records=records).weighed(u) - r)
+
+    steps = [s for s in mapped(step, signs) if np.all(np.isfinite(s))]
     found = np.array(steps).reshape(-1, u.size)
     return found.T @ found / max(len(steps), 1)
 

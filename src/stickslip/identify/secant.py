@@ -14,6 +14,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.optimum import MOST_TRIES, STEP, Quadratic, Residuals, cost_of, downhill
+from stickslip.identify.side_by_side import mapped
 
 __all__ = ["Secants", "descend_by_secants", "forward_differences"]
 
@@ -33,13 +34,14 @@ def forward_differences(
     residuals: Residuals, u: Array, r: Array, lower: Array, upper: Array, widths: Array
 ) -> Array:
     """Jacobian at u, where the residuals are r, by one-sided differences inside the bounds, shape (n, p)."""
-    jacobian = np.zeros((r.size, u.size))
-    for i in range(u.size):
+
+    def column(i: int) -> Array:
         there = u.copy()
         there[i] = u[i] + widths[i] if u[i] + widths[i] <= upper[i] else max(u[i] - widths[i], lower[i])
         width = float(there[i] - u[i])
-        if width != 0.0:
-            jacobian[:, i] = (residuals(there) - r) / width
+        return (residuals(there) - r) / width if width != 0.0 else np.zeros(r.size)
+
+    jacobian = np.stack(mapped(column, range(u.size)), axis=1) if u.size else np.zeros((r.size, 0))
     return np.where(np.isfinite(jacobian), jacobian, 0.0)
 
 

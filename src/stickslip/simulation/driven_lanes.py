@@ -121,7 +121,7 @@ def written(
 
 
 def cut(forgotten: Mask, warm: int) -> list[int]:
-    """Rows at which a record may be cut into stretches about as long as one another, the first 0.
+    """Rows at which a record is cut into at most `LANES` stretches, the longest as short as can be; the first is 0.
 
     Parameters
     ----------
@@ -130,13 +130,22 @@ def cut(forgotten: Mask, warm: int) -> list[int]:
     warm : int
         Rows that a stretch begins before its cut.
     """
-    allowed = np.flatnonzero(forgotten)
+    allowed, n = np.flatnonzero(forgotten), forgotten.size
+    short, long = n // LANES, n
+    while long - short > max(1, n // 1000):
+        middle = (short + long) // 2
+        short, long = (short, middle) if cuts_within(middle, allowed, warm, n) else (middle, long)
+    return cuts_within(long, allowed, warm, n) or [0]
+
+
+def cuts_within(rows: int, allowed: Any, warm: int, n: int) -> list[int]:
+    """Cuts so that no stretch has more rows, what is before its cut included; none where there are no such."""
     cuts = [0]
-    for i in range(1, LANES):
-        # The first stretch has nothing before it, so that it may be longer.
-        goal = warm + i * (forgotten.size - warm) / LANES
-        if allowed.size and (place := int(allowed[np.argmin(np.abs(allowed - goal))])) > cuts[-1] + warm:
-            cuts.append(place)
+    while (end := max(0, cuts[-1] - warm) + rows) < n:
+        place = int(np.searchsorted(allowed, end, side="right")) - 1
+        if place < 0 or allowed[place] <= cuts[-1] or len(cuts) == LANES:
+            return []
+        cuts.append(int(allowed[place]))
     return cuts
 
 
