@@ -16,11 +16,10 @@ from stickslip.identify.axis_output import Extras, laid_out, starting_models
 from stickslip.identify.axis_problem import mechanics_of
 from stickslip.identify.axis_start import steady_fit
 from stickslip.identify.axis_trial import Trial
-from stickslip.identify.corrections import BAND, DIFFERENCE, Criterion
+from stickslip.identify.corrections import BAND, Criterion
 from stickslip.identify.observer import Motion, Prepared, prepare
 from stickslip.identify.optimum import cost_of
 from stickslip.identify.prediction_error import PredictionError, prediction_error
-from stickslip.identify.secant import Secants
 from stickslip.identify.side_by_side import mapped
 from stickslip.identify.vector import Vector
 from stickslip.machines.servo import ServoAxis
@@ -139,7 +138,7 @@ def searched(
     ranked = [tried[cost] for cost in sorted(tried)]
     others = ranked[BEST:]
     ranked = ranked[:BEST] + [others[i] for i in spread(len(others), SPREAD)]
-    running = mapped(lambda c: (c, search_from(c, c.vector.start)), ranked)
+    running = mapped(lambda c: (c, c.search(c.vector.start)), ranked)
     for count, evaluations in ROUNDS:
         going = [search for _, search in running[:count]]
         mapped(lambda search: search.run(evaluations, SETTLED), going)  # noqa: B023 (done at once)
@@ -162,15 +161,9 @@ def spread(count: int, most: int) -> list[int]:
     return [(i + 1) * count // taken - 1 for i in range(taken)]
 
 
-def search_from(criterion: Criterion, start: Array) -> Secants:
-    """A descent that stands at the start."""
-    vector = criterion.vector
-    return Secants(criterion.residuals, start, vector.lower, vector.upper, difference=DIFFERENCE)
-
-
 def descended(criterion: Criterion, start: Array) -> tuple[float, Array]:
     """Sum of squares and coordinates that a few steps from a start reach."""
-    search = search_from(criterion, start)
+    search = criterion.search(start)
     search.run(EVALUATIONS, SETTLED)
     return search.cost, search.u
 

@@ -16,6 +16,8 @@ import numpy as np
 from stickslip.identify.axis_start import feasible
 from stickslip.identify.observer import Prepared
 from stickslip.identify.optimum import Optimum, descend
+from stickslip.identify.secant import Secants
+from stickslip.identify.side_by_side import mapped
 from stickslip.identify.vector import Vector
 from stickslip.simulation.driven import Mechanics
 from stickslip.spec import Law
@@ -138,11 +140,15 @@ class Criterion:
         n = self.freedom
         return np.copysign(np.sqrt((n + 1.0) * np.log1p((r / self.scale) ** 2 / n)), r)
 
+    def search(self, u: Array) -> Secants:
+        """A descent that stands at u."""
+        return Secants(self.residuals, u, self.vector.lower, self.vector.upper, difference=DIFFERENCE)
+
     def descend(self, u: Array, iterations: int, tolerance: float) -> Optimum:
         """The minimum reached from u."""
         return descend(
             self.residuals, u, self.vector.lower, self.vector.upper, iterations=iterations, tolerance=tolerance,
-            difference=DIFFERENCE,
+            difference=DIFFERENCE, each=mapped,
         )  # fmt: skip
 
     def adapted(self, u: Array) -> Criterion:

@@ -7,14 +7,13 @@ normal equations, which would square its condition, are never formed. Bounds are
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.side_by_side import mapped
 
 __all__ = [
     "STEP",
@@ -30,6 +29,9 @@ __all__ = [
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Residuals = Callable[[Array], Array]
 """Model minus data at the coordinates, shape (n,); what is not finite counts as infinitely bad."""
+
+Each = Callable[[Callable[[int], Array], Sequence[int]], Iterable[Array]]
+"""Computes the columns of a Jacobian: one after another, or, where they are dear, side by side."""
 
 MOST_TRIES = 60
 """Damped steps that may fail."""
@@ -66,8 +68,9 @@ def cost_of(r: Array) -> float:
 
 
 def central_differences(
-    residuals: Residuals, u: Array, free: Sequence[int], lower: Array, upper: Array, difference: float = STEP
-) -> Array:
+    residuals: Residuals, u: Array, free: Sequence[int], lower: Array, upper: Array, difference: float = STEP,
+    each: Each = map,
+) -> Array:  # fmt: skip
     """Jacobian by central differences inside the bounds, shape (n, p); error about 1e-10 of its scale.
 
     Residuals that are exact to fewer digits need a larger `difference`: relative above 1.
@@ -81,7 +84,7 @@ def central_differences(
         width = ahead[i] - behind[i]
         return (residuals(ahead) - residuals(behind)) / width if width > 0.0 else 0.0 * residuals(u)
 
-    return np.stack(mapped(column, free), axis=1)
+    return np.stack(list(each(column, free)), axis=1)
 
 
 def descend(
@@ -94,6 +97,7 @@ def descend(
     iterations: int = 300,
     tolerance: float = 1e-15,
     difference: float = STEP,
+    each: Each = map,
 ) -> Optimum:
     """The minimum that is reached from `start`.
 
@@ -110,6 +114,8 @@ def descend(
         Relative decrease of the sum of squares below which it ends.
     difference : float
         Of coordinates, for the Jacobian; relative above 1.
+    each : callable
+        Computes the columns of a Jacobian; `map`, or `stickslip.identify.side_by_side.mapped`.
 
     Returns
     -------
@@ -129,7 +135,7 @@ def descend(
     jacobian = np.zeros((r.size, u.size))
     damping, scale, known = 1e-3, np.zeros(len(free)), False
     for _ in range(iterations if free else 0):
-        jacobian[:, free] = central_differences(residuals, u, free, lower, upper, difference)
+        jacobian[:, free] = central_differences(residuals, u, free, lower, upper, difference, each)
         evaluations, known = evaluations + 2 * len(free), True
         part = np.where(np.isfinite(jacobian[:, free]), jacobian[:, free], 0.0)
         scale = np.maximum(scale, np.linalg.norm(part, axis=0))
@@ -151,7 +157,7 @@ def descend(
         if gain <= tolerance * cost or cost == 0.0:
             break
     if free and not known:
-        jacobian[:, free] = central_differences(residuals, u, free, lower, upper, difference)
+        jacobian[:, free] = central_differences(residuals, u, free, lower, upper, difference, each)
         evaluations += 2 * len(free)
     return Optimum(u, cost, r, jacobian, evaluations)
 

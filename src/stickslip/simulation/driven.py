@@ -219,12 +219,13 @@ class Course:
     def __init__(self, law: Law, drive: Drive) -> None:
         self.law = law
         self.drive = drive
-        pointers = compiled_law(law)
-        self._step, self._holding = pointers.step, pointers.holding
-        self._signals = drive.signals()
         self._numbers = drive.numbers()
         self._disturbance = np.zeros(drive.time.size) if drive.disturbance is None else drive.disturbance
         self.scaled_by_load = not reads_load(law)
+
+    @functools.cached_property
+    def _signals(self) -> Array:
+        return self.drive.signals()
 
     def run(
         self, mechanics: Mechanics, parameters: Any, *, gain: float | None = None,
@@ -244,8 +245,9 @@ class Course:
         if start is not None:
             c[loop.START_POSITION], c[loop.START_VELOCITY] = start
         out = np.full((self.drive.time.size, loop.OUTS), np.nan)
+        pointers = compiled_law(self.law)
         loop.follow(
-            mechanics.numbers(self.scaled_by_load), self._step, self._holding, flat(self.law.pack(parameters)),
+            mechanics.numbers(self.scaled_by_load), pointers.step, pointers.holding, flat(self.law.pack(parameters)),
             np.array(Surroundings()), flat(self.law.pack_state(self.law.state(parameters))), c, self._signals,
             self._disturbance, out,
         )  # fmt: skip

@@ -12,15 +12,17 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.record import Record
-from stickslip.study.plan import PlannedRun, Study
 from stickslip.study.provenance import engine_hash, file_hash, versions
 from stickslip.study.result import Run
+
+if TYPE_CHECKING:
+    from stickslip.study.plan import PlannedRun, Study
 
 __all__ = [
     "KEYS",
