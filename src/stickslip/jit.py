@@ -20,6 +20,7 @@ import os
 import platform
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -203,6 +204,7 @@ class LawPointers(NamedTuple):
 
 
 _laws: dict[int, tuple[Law, LawPointers]] = {}
+_lock = threading.Lock()
 
 
 def compiled_law(law: Law) -> LawPointers:
@@ -213,6 +215,11 @@ def compiled_law(law: Law) -> LawPointers:
     LawError
         If a function of the law is outside the scalar subset.
     """
+    with _lock:
+        return _compiled_law(law)
+
+
+def _compiled_law(law: Law) -> LawPointers:
     if id(law) not in _laws:
         entries: dict[str, Callable[..., Any]] = {
             name: function
@@ -271,8 +278,8 @@ def loaded(name: str, text: str) -> Any:
     """Import a generated module, written to a file so that its compiled code can be cached."""
     path = cache_folder() / f"{name}.py"
     if not path.exists():
-        # Written aside and renamed, so that a second process never reads half a file.
-        draft = path.with_suffix(f".{os.getpid()}.tmp")
+        # Written aside and renamed, so that no other process or thread reads half a file.
+        draft = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.tmp")
         draft.write_text(text)
         os.replace(draft, path)
     spec = importlib.util.spec_from_file_location(f"stickslip._compiled.{name}", path)

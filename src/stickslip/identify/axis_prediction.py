@@ -20,6 +20,7 @@ from stickslip.identify.corrections import BAND, Criterion
 from stickslip.identify.observer import Motion, Prepared, prepare
 from stickslip.identify.optimum import cost_of
 from stickslip.identify.prediction_error import PredictionError, prediction_error
+from stickslip.identify.secant import Secants
 from stickslip.identify.side_by_side import mapped
 from stickslip.identify.vector import Vector
 from stickslip.machines.servo import ServoAxis
@@ -43,6 +44,8 @@ HOPS, EVALUATIONS = 3, 60
 """Hops from the best of them; simulations that each may take."""
 SETTLED = 1e-3
 """Relative decrease of the sum of squares below which a descent ends."""
+ALIKE = 0.03
+"""Coordinates by which two descents differ at least."""
 HOP = 0.4
 """Standard deviation of a hop in the law's coordinates; a tenth of it in the others."""
 RESTING, SLOWEST = 0.02, 1e-3
@@ -142,7 +145,7 @@ def searched(
     for count, evaluations in ROUNDS:
         going = [search for _, search in running[:count]]
         mapped(lambda search: search.run(evaluations, SETTLED), going)  # noqa: B023 (done at once)
-        running = sorted(running[:count], key=lambda entry: entry[1].cost)
+        running = apart(sorted(running[:count], key=lambda entry: entry[1].cost))
     criterion, search = running[0]
     # Outliers would choose among hops by plain squares: from here on the likelihood that weighs them decides.
     adapted = criterion.adapted(search.u)
@@ -159,6 +162,15 @@ def spread(count: int, most: int) -> list[int]:
     """At most so many places, evenly among that many, the last among them."""
     taken = min(most, count)
     return [(i + 1) * count // taken - 1 for i in range(taken)]
+
+
+def apart(running: Sequence[tuple[Criterion, Secants]]) -> list[tuple[Criterion, Secants]]:
+    """Those that reached another place than every better one: several starts may lead to one minimum."""
+    kept: list[tuple[Criterion, Secants]] = []
+    for criterion, search in running:
+        if all(float(np.max(np.abs(search.u - k.u))) > ALIKE for _, k in kept):
+            kept.append((criterion, search))
+    return kept
 
 
 def descended(criterion: Criterion, start: Array) -> tuple[float, Array]:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from scipy import signal
 
+from stickslip.simulation._biquads import zero_phase
+
 __all__ = ["ZeroPhase", "cross_spectrum", "decimated", "low_pass", "spectrum"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -36,9 +38,8 @@ class ZeroPhase:
         reach = self.reach
         ends = 2.0 * x[0] - x[reach:0:-1], 2.0 * x[-1] - x[-2 : -reach - 2 : -1]
         y = np.concatenate([ends[0], x, ends[1]])
-        for _ in range(2):
-            y = signal.sosfilt(self.sections, y, zi=self.start * y[0])[0][::-1]
-        return np.asarray(y[reach:-reach], dtype=np.float64)
+        zero_phase(self.sections, self.start, y)
+        return y[reach:-reach]
 
 
 def decimated(x: Array, factor: int) -> Array:

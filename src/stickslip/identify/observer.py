@@ -30,6 +30,8 @@ LAG = 4.0
 """Corner of the low-pass behind which the slow damper damps, in natural frequencies of the observer."""
 SLOW = 0.15
 """Part of the usual (RMS) speed below which the firm damper takes over."""
+CREEP = 0.01
+"""Part of it below which a contact may not slide far enough to forget how it was before."""
 GRASP = 0.6
 """Samples within which it takes the measured velocity."""
 RETURNS = 0.5
@@ -40,7 +42,9 @@ LONGEST = 1e-3
 """Longest step of the simulation, s, but for what equally spaced samples may differ by."""
 FORGOTTEN = (8.0, 4.0)
 """Periods of the observer's natural frequency after which little is left of how it began, where the axis slides; the
-second where a record leaves no room for the first. Within an encoder's count nothing pulls, so that it takes many."""
+second where the first leaves a stretch longer than `SHORT`. Within an encoder's count nothing pulls: it takes many."""
+SHORT = 0.25
+"""Part of a record."""
 FEWEST = 32
 """Corrections that a motion must leave."""
 EDGE = 0.15
@@ -150,20 +154,20 @@ def prepare(
             f"{motion.time.size * dt:.3g} s are too short for a band of {band:g} Hz; give a longer record"
         )
     return Prepared(
-        Course(law, drive), in_stretches(law, drive, seen, 1.0 / (speed * band * dt)), low_pass, stride, edge
+        Course(law, drive),
+        in_stretches(law, drive, sliding(seen, firm), 1.0 / (speed * band * dt)),
+        low_pass,
+        stride,
+        edge,
     )
 
 
-def in_stretches(law: Law, drive: Drive, seen: SeenVelocity, period: float) -> Stretches:
+def in_stretches(law: Law, drive: Drive, way: Array, period: float) -> Stretches:
     """The same followed in stretches; `period` is that of the observer's natural frequency, in rows."""
-    stretches = None
-    for periods in FORGOTTEN:
-        warm = math.ceil(periods * period)
-        stretches = Stretches(law, drive, cut(forgotten(seen, warm), warm), warm)
-        if stretches.worth:
-            break
-    assert stretches is not None
-    return stretches
+    rows = [math.ceil(periods * period) for periods in FORGOTTEN]
+    cuts = [cut(forgotten(way, warm), warm) for warm in rows]
+    tried = [Stretches(law, drive, c, warm) for c, warm in zip(cuts, rows, strict=True)]
+    return tried[0] if tried[0].longest <= SHORT else min(tried, key=lambda s: s.longest)
 
 
 def firmness(seen: SeenVelocity, firm: float, least: float, friction: float) -> Array:
@@ -178,9 +182,17 @@ def slow(seen: SeenVelocity) -> Any:
     return np.abs(seen.velocity) < SLOW * float(np.sqrt(np.mean(seen.velocity**2)))
 
 
-def forgotten(seen: SeenVelocity, warm: int) -> Any:
-    """Rows before which the axis has slid one way, not slowly, for so many rows, shape (n,)."""
-    way = np.where(slow(seen), 0.0, np.sign(seen.velocity))
+def sliding(seen: SeenVelocity, firm: Array) -> Array:
+    """Which way the contact slides and forgets, +1 or -1, shape (n,); 0 where it may stick.
+
+    A soft observer may part from the motion where the axis is slow, a firm one holds it to all but a creep.
+    """
+    creeps = np.abs(seen.velocity) < CREEP * float(np.sqrt(np.mean(seen.velocity**2)))
+    return np.where(creeps | (slow(seen) & (firm == 0.0)), 0.0, np.sign(seen.velocity))
+
+
+def forgotten(way: Array, warm: int) -> Any:
+    """Rows before which the axis has slid one way for so many rows, shape (n,)."""
     slid = np.concatenate([[0.0], np.cumsum(way)])
     out = np.zeros(way.size, dtype=np.bool_)
     out[warm:] = np.abs(slid[warm:-1] - slid[: -warm - 1]) == warm

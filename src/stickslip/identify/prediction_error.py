@@ -168,9 +168,9 @@ def prediction_error(
     criterion = Criterion.first(observed(), law, vector, mechanics)
     u = vector.start if start is None else start
     optimum = None
-    for _ in range(rounds):
+    for left in reversed(range(rounds)):
         criterion = criterion.adapted(u)
-        optimum = criterion.descend(u, 12, 1e-4)
+        optimum = criterion.descend(u, 12, 1e-3 if left else 1e-4)
         u = optimum.u
     assert optimum is not None
     spread = spread_of(criterion, optimum)

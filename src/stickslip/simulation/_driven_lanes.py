@@ -84,18 +84,18 @@ def improve(w: Any, lane: int, n: Any, p: Any) -> bool:
     close = (abs(x - other) <= ROUNDING * size) & (phase > GUESSED) & (crossed | (phase == NARROWS))
     open_ = phase < SOLVED
     done = fine | close
-    # ---- where the line through the last two leads ----
-    slope = (f - f_last) / (x - last)
-    slope = select(first, w[RISE * LANES + lane], slope)
-    secant = x - f / slope
+    # ---- where the line through the last two leads; its slope is kept as its inverse: divisions take long ----
+    run = x - last
+    inverse = run / (f - f_last)
+    inverse = select(first, w[RISE * LANES + lane], inverse)
+    step = -f * inverse
+    secant = x + step
     low = select(x < other, x, other)
     high = select(x < other, other, x)
     helps = (low < secant) & (secant < high) & (abs(f) <= 0.5 * abs(f_last))
     narrower = select(helps, secant, 0.5 * (x + other))
-    stride = x - last
-    ratio = (secant - x) / stride
-    ratio = select(ratio > 0.0, select(ratio * 1.1 < 10.0, ratio * 1.1, 10.0), 10.0)
-    farther = select(first, secant, x + stride * ratio)
+    onwards = (step * run > 0.0) & (1.1 * abs(step) < 10.0 * abs(run))
+    farther = select(first, secant, x + select(onwards, 1.1 * step, 10.0 * run))
     narrows = crossed | (phase == NARROWS)
     # ---- what stays of it ----
     goes_on = open_ & (done == False)  # noqa: E712 (`not` would be a branch)
@@ -104,8 +104,8 @@ def improve(w: Any, lane: int, n: Any, p: Any) -> bool:
     w[F_LAST * LANES + lane] = select(goes_on, f, f_last)
     w[OTHER * LANES + lane] = other
     w[PHASE * LANES + lane] = select(goes_on, select(narrows, NARROWS, LEADS_ON), SOLVED)
-    kept = open_ & done & (slope > 0.0) & (slope < 1e300)
-    w[RISE * LANES + lane] = select(kept, slope, w[RISE * LANES + lane])
+    kept = open_ & done & (inverse > 0.0) & (inverse < 1e300)
+    w[RISE * LANES + lane] = select(kept, inverse, w[RISE * LANES + lane])
     return goes_on
 
 
@@ -220,8 +220,8 @@ def follow_lanes(
     for lane in range(count):
         w[POSITION * LANES + lane] = signals[0, SEEN, lane]
         w[VELOCITY * LANES + lane] = speeds[lane]
-        w[RISE * LANES + lane] = n[INERTIA]
-        w[OTHER_RISE * LANES + lane] = n[INERTIA]
+        w[RISE * LANES + lane] = 1.0 / n[INERTIA]
+        w[OTHER_RISE * LANES + lane] = 1.0 / n[INERTIA]
         for i in range(STATES):
             w[(STATE + i) * LANES + lane] = states[i]
     for t in range(signals.shape[0]):

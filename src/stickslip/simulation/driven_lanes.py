@@ -9,6 +9,7 @@ so, and axes with backlash, a pendulum or harmonics, are left to `driven.Course`
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -30,7 +31,7 @@ Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 LANES = 8
 LONGEST = 0.5
-"""Part of a record beyond which its longest stretch is too long for lanes to be worth it."""
+"""Part of a record beyond which its longest stretch, `Stretches.longest`, is too long for lanes to be worth it."""
 INLINED = frozenset(
     {
         "start", "improve", "first_stage", "second_stage", "take_other_rise", "accept", "beyond", "pull", "look_back",
@@ -55,21 +56,23 @@ class Program:
 
 
 _programs: dict[int, tuple[Law, list[Program]]] = {}
+_lock = threading.Lock()
 
 
 def program_for(law: Law, parameters: Sequence[float]) -> Program:
     """The program of a law with such parameters, compiled on first use."""
-    _, programs = _programs.setdefault(id(law), (law, []))
-    for program in programs:
-        if program.fits(parameters):
-            return program
-    trace = Trace(parameters)
-    try:
-        follow = compiled_lanes(source(law, trace)).follow_lanes
-    except NotStraight:
-        follow = None
-    programs.append(Program(frozenset(trace.assumptions), follow))
-    return programs[-1]
+    with _lock:
+        _, programs = _programs.setdefault(id(law), (law, []))
+        for program in programs:
+            if program.fits(parameters):
+                return program
+        trace = Trace(parameters)
+        try:
+            follow = compiled_lanes(source(law, trace)).follow_lanes
+        except NotStraight:
+            follow = None
+        programs.append(Program(frozenset(trace.assumptions), follow))
+        return programs[-1]
 
 
 def source(law: Law, trace: Trace) -> str:
@@ -160,7 +163,7 @@ class Stretches:
         rows = max(end - begin for begin, end in zip(self.begins, ends, strict=True))
         first = np.array(self.begins + [0] * (LANES - len(self.begins)))
         self.rows: Any = np.minimum(np.arange(rows)[:, None] + first, n - 1)
-        self.ends, self.worth = ends, rows <= LONGEST * n
+        self.ends, self.longest = ends, rows / n
         self.speeds = np.zeros(LANES)
         assert drive.goal is not None
         self.speeds[1 : len(first)] = drive.goal[first[1:]]
@@ -210,7 +213,7 @@ class Stretches:
         harmonics = mechanics.harmonics
         more = harmonics.torque or harmonics.friction or mechanics.gravity or mechanics.backlash
         packed = tuple(float(x) for x in self.law.pack(parameters))
-        if not self.worth or more or (program := program_for(self.law, packed)).follow is None:
+        if self.longest > LONGEST or more or (program := program_for(self.law, packed)).follow is None:
             return None
         states = flat(self.law.pack_state(self.law.state(parameters)))
         found = np.empty((len(self.rows), LANES))
