@@ -100,14 +100,18 @@ def cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="stickslip-"))
 
 
+_decorating = threading.RLock()
+
+
 def _cached(make: Callable[[], Any]) -> Any:
     """Run `make` with numba's cache in our folder; numba reads the folder when a function is decorated."""
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_folder())
-    try:
-        return make()
-    finally:
-        config.CACHE_DIR = before
+    with _decorating:
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(cache_folder())
+        try:
+            return make()
+        finally:
+            config.CACHE_DIR = before
 
 
 def kernel(*, exact: bool = True, inline: bool = False) -> Callable[[Any], Any]:
@@ -204,7 +208,6 @@ class LawPointers(NamedTuple):
 
 
 _laws: dict[int, tuple[Law, LawPointers]] = {}
-_lock = threading.Lock()
 
 
 def compiled_law(law: Law) -> LawPointers:
@@ -215,24 +218,19 @@ def compiled_law(law: Law) -> LawPointers:
     LawError
         If a function of the law is outside the scalar subset.
     """
-    with _lock:
-        return _compiled_law(law)
+    with _decorating:
+        if id(law) not in _laws:
+            addresses = _compile(law.name, entries_of(law), law_layouts(law))
+            _laws[id(law)] = (law, LawPointers(*(addresses.get(name, 0) for name in LawPointers._fields)))
+        return _laws[id(law)][1]
 
 
-def _compiled_law(law: Law) -> LawPointers:
-    if id(law) not in _laws:
-        entries: dict[str, Callable[..., Any]] = {
-            name: function
-            for name in ("step", "rate", "guards", "switch", "steady", "holding")
-            if (function := getattr(law, name)) is not None
-        }
-        for choice in law.choices:
-            curve = law.option(choice).function
-            if choice.replaces == "sliding" and curve is not None:
-                entries["sliding"] = curve
-        addresses = _compile(law.name, entries, law_layouts(law))
-        _laws[id(law)] = (law, LawPointers(*(addresses.get(name, 0) for name in LawPointers._fields)))
-    return _laws[id(law)][1]
+def entries_of(law: Law) -> dict[str, Callable[..., Any]]:
+    """The functions of a law that kernels may call."""
+    names = ("step", "rate", "guards", "switch", "steady", "holding")
+    entries = {name: function for name in names if (function := getattr(law, name)) is not None}
+    curves = (law.option(choice).function for choice in law.choices if choice.replaces == "sliding")
+    return entries | {"sliding": curve for curve in curves if curve is not None}
 
 
 @functools.cache

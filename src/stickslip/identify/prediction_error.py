@@ -51,6 +51,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SLOWER, STRICTER = 0.5, 3.0
 """Other choices that would do as well: an observer this much slower, degrees of freedom this few."""
+TOLERANCE = 1e-4
+"""Relative decrease of the sum of squares at which the last descent ends."""
 BLOCK = 0.25
 """s of a stretch that is left out: some correlation times of the disturbance."""
 REACH = 3.0
@@ -148,7 +150,7 @@ def prediction_error(
     band : float
         Hz up to which corrections count.
     rounds : int
-        Times that weights and parameters are found in turn.
+        Times that weights and parameters are found in turn, the last to a tenth of the others' tolerance.
     seed : int
         Of the noise with which the corrections are shaken.
 
@@ -170,7 +172,7 @@ def prediction_error(
     optimum = None
     for left in reversed(range(rounds)):
         criterion = criterion.adapted(u)
-        optimum = criterion.descend(u, 12, 1e-3 if left else 1e-4)
+        optimum = criterion.descend(u, 12, TOLERANCE if left == 0 else 10.0 * TOLERANCE)
         u = optimum.u
     assert optimum is not None
     spread = spread_of(criterion, optimum)
@@ -180,7 +182,7 @@ def prediction_error(
         replace(criterion, records=observed(grasp=GRASP)),
         replace(criterion, freedom=STRICTER),
     ]
-    moved = [c.adapted(u).descend(u, 6, 1e-3).u - u for c in others]
+    moved = [c.adapted(u).descend(u, 6, 10.0 * TOLERANCE).u - u for c in others]
     beside = sum((np.outer(d, d) for d in moved), np.zeros_like(shaken))
     accepted, named = feasible(law, vector.law_parameters(u)), vector.named(u)
     assert accepted is not None
