@@ -228,9 +228,13 @@ def compiled_law(law: Law) -> LawPointers:
 def entries_of(law: Law) -> dict[str, Callable[..., Any]]:
     """The functions of a law that kernels may call."""
     names = ("step", "rate", "guards", "switch", "steady", "holding")
-    entries = {name: function for name in names if (function := getattr(law, name)) is not None}
-    curves = (law.option(choice).function for choice in law.choices if choice.replaces == "sliding")
-    return entries | {"sliding": curve for curve in curves if curve is not None}
+    entries: dict[str, Callable[..., Any]] = {
+        name: function for name in names if (function := getattr(law, name)) is not None
+    }
+    for choice in law.choices:
+        if choice.replaces == "sliding" and (curve := law.option(choice).function) is not None:
+            entries["sliding"] = curve
+    return entries
 
 
 @functools.cache
