@@ -194,3 +194,12 @@ def test_a_controller_in_continuous_time_is_refused():
 def test_a_name_that_is_no_identifier_is_refused():
     with pytest.raises(InputError, match="--name"):
         Job(example(LAWS[0]), "my law")
+
+
+@pytest.mark.parametrize(
+    ("single", "said"), [(False, "every bit is the same"), (True, f"at most {c99.SINGLE_BOUND} of")]
+)
+def test_the_readme_says_what_the_check_allows(single, said):
+    readme = c99.write(Job(Model("coulomb", fc=0.3), "axis", single=single)).files["README.md"]
+    assert said in readme
+    assert "within 0.0" not in readme
