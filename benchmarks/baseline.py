@@ -164,17 +164,20 @@ def loosest(
 
 @dataclass(frozen=True)
 class Found:
-    """A setting of the C program that is accurate enough: its run, CPU time (s), error (rad) and longest step (s)."""
+    """A setting of the C program that is accurate enough: its run, CPU time (s), error (rad), and which it is."""
 
     run: Run
     spent: float
     error: float
-    longest: float
+    setting: str
 
 
-def measured(found: tuple[float, Run, float] | None, longest: float) -> list[Found]:
+def measured(found: tuple[float, Run, float] | None, longest: float | None = None) -> list[Found]:
     """The time of what `loosest` has found."""
-    return [Found(found[1], min(time_of(found[1]) for _ in range(5)), found[2], longest)] if found else []
+    if found is None:
+        return []
+    setting = f"{found[0]:.0e}" if longest is None else f"{1e3 * longest:g} ms"
+    return [Found(found[1], min(time_of(found[1]) for _ in range(5)), found[2], setting)]
 
 
 def fastest_by_hand(
@@ -196,7 +199,7 @@ def fastest(baseline: Baseline, ready: exact.Prepared, truth: Positions, wanted:
         If none is accurate enough.
     """
     loop = baseline.loop(ready, control=True)
-    found = measured(loosest(((t, loop.run(t)) for t in TOLERANCES), truth, wanted), LONGEST_STEP)
+    found = measured(loosest(((t, loop.run(t)) for t in TOLERANCES), truth, wanted))
     by_hand = fastest_by_hand(baseline, ready, truth, wanted)
     if by_hand:
         found.append(by_hand)

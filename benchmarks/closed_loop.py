@@ -4,9 +4,10 @@ The closed loop of Table 6 (PD on the low reference, 5 s) without compensation, 
 feedforward; position on a 1 ms grid. Each program runs at its fastest setting whose largest error in position
 stays below `--error` (1e-6 rad), measured against a tight run of our own: ours and SciPy's BDF (compiled
 right-hand side, restarted at every located event) by tolerance, `baseline.c` (compiled here by gcc -O3
--march=native) by tolerance and longest step. Times are medians of runs taken in turns in one process: ours on the
-prepared kernel (a feedforward torque is tabulated when it is prepared; that time is printed too). What
-`simulate()` adds to its kernel is measured apart.
+-march=native) by tolerance, or by its longest step. Times are medians of runs taken in turns in one process: ours on
+the prepared kernel (a feedforward torque is tabulated when it is prepared, for C too; that time is printed). What
+`simulate()` adds to its kernel is measured apart. PID and LuGre feedback are compared with C alone;
+`study_speed.py` has every kind of loop.
 
     python benchmarks/closed_loop.py [--short [--record]]
 
@@ -49,8 +50,18 @@ GMS = Model("gms", k=[12896.0, 8141.0, 4273.0], alpha=[1 / 3] * 3, c=23.8782, **
 LUGRE = Model("lugre", sigma0=3.5e4, sigma1=0.1, **CURVE)
 AMPLITUDE, FREQUENCY = 0.01, 0.4
 GAINS = place("PD", INERTIA, 36.0, 1.0)
-COMPENSATORS = {"none": None, "GMS feedback": Feedback(GMS), "LuGre feedforward": Feedforward(LUGRE)}
+COMPENSATORS: dict[str, Feedback | Feedforward | None] = {
+    "none": None,
+    "GMS feedback": Feedback(GMS),
+    "LuGre feedforward": Feedforward(LUGRE),
+}
 CODES = {"none": 0.0, "LuGre feedforward": 1.0, "GMS feedback": 2.0}
+CONTROLLERS = {name: Controller(GAINS, helper) for name, helper in COMPENSATORS.items()}
+AGAINST_C = {
+    "PID": Controller(place("PID", INERTIA, 36.0, 1.0)),
+    "LuGre feedback": Controller(GAINS, Feedback(LUGRE)),
+}
+"""Compared with C alone."""
 TIMES_BDF = {"none": 2000.0, "GMS feedback": 1500.0, "LuGre feedforward": 500.0}
 TIMES_C = 1.5
 RISE = 1.5
@@ -71,7 +82,7 @@ AXIS = RigidAxis(INERTIA, PLANT)
 
 def prepared(name: str, tolerance: float, grid: Positions) -> exact.Prepared:
     """The case on our prepared kernel."""
-    controller = Controller(GAINS, COMPENSATORS[name])
+    controller = (CONTROLLERS | AGAINST_C)[name]
     return exact.prepare(
         lay_out(AXIS, controller, REFERENCE, float(grid[-1]), tolerance=tolerance, grid=grid, metered=False)
     )
@@ -84,7 +95,7 @@ def positions(name: str, tolerance: float, grid: Positions) -> Positions:
 
 def overhead(name: str, tolerance: float, grid: Positions, repeats: int) -> float:
     """What `simulate()` adds to the kernel that writes its rows, s."""
-    controller = Controller(GAINS, COMPENSATORS[name])
+    controller = CONTROLLERS[name]
 
     def whole() -> Any:
         return simulate(
@@ -308,6 +319,21 @@ def compare(name: str, grid: Positions, wanted: float, repeats: int, rounds: int
     return min(every["ours"]) / min(every["C"]) if baseline is not None else math.nan
 
 
+def against_c(name: str, grid: Positions, wanted: float, repeats: int, baseline: Baseline) -> float:
+    """Measure one kind of loop against C alone, print its row; returns the ratio of the least times."""
+    truth = positions(name, 1e-10, grid)
+    tolerance, error = loosest(lambda tol: positions(name, tol, grid), truth, wanted, TOLERANCES)
+    mine = ours(prepared(name, tolerance, grid))
+    theirs, c_error = fastest_c(baseline, name, truth, wanted, grid)
+    every = in_turns({"ours": mine, "C": theirs}, {}, repeats)
+    ours_s, c_s = (float(np.median(every[label])) for label in ("ours", "C"))
+    print(
+        f"{name:18} {1e6 * ours_s:8.0f} us {error:8.1e}   {1e6 * c_s:8.0f} us {c_error:8.1e}   {ours_s / c_s:31.2f}",
+        flush=True,
+    )
+    return min(every["ours"]) / min(every["C"])
+
+
 def risen(ratios: dict[str, float], kept: dict[str, float]) -> list[str]:
     """Which ratios to C have risen by half over those kept, in words."""
     return [
@@ -321,7 +347,8 @@ def gate(measure: Callable[[str], float], record: bool) -> None:
     """Compare the ratios to C with those kept, or keep them; exits with 1 where one has risen."""
     kept = json.loads(RATIOS.read_text()) if RATIOS.exists() else {}
     ratios: dict[str, float] = {}
-    for name in COMPENSATORS:
+    names = [*CONTROLLERS, *AGAINST_C]
+    for name in names:
         for _ in range(TRIES):
             ratios[name] = min(measure(name), ratios.get(name, math.inf))
             if not record and not risen({name: ratios[name]}, {name: kept.get(name, math.inf)}):
@@ -332,7 +359,7 @@ def gate(measure: Callable[[str], float], record: bool) -> None:
         )
         print(f"{RATIOS} keeps {ratios}")
         return
-    if missing := [name for name in COMPENSATORS if name not in kept]:
+    if missing := [name for name in names if name not in kept]:
         sys.exit(f"{RATIOS.name} has no ratio for {', '.join(missing)}; --short --record writes it")
     if complaints := risen(ratios, kept):
         sys.exit("\n".join(complaints))
@@ -362,12 +389,14 @@ def main() -> None:
         print(f"{'':18} {'ours':>20}   {'C':>20}   {'BDF':>20}   ours/C   BDF/ours")
 
         def measure(name: str) -> float:
+            if baseline is not None and name in AGAINST_C:
+                return against_c(name, grid, options.error, repeats, baseline)
             return compare(name, grid, options.error, repeats, rounds, baseline)
 
         if options.short and baseline is not None:
             gate(measure, options.record)
         else:
-            for name in COMPENSATORS:
+            for name in [*CONTROLLERS, *(AGAINST_C if baseline is not None else ())]:
                 measure(name)
     print(f"tabulating the feedforward torque: {1e6 * tabulation('LuGre feedforward', grid):.0f} us")
 

@@ -37,8 +37,8 @@ def test_a_ratio_that_rose_by_half_fails(benchmark):
 def test_one_slow_measurement_does_not_fail(benchmark, capsys):
     benchmark.gate(measured([1.2]), record=True)
     benchmark.gate(measured([5.0, 1.3]), record=False)
-    # The first compensation is measured again; the others give what is left.
-    assert capsys.readouterr().out.splitlines()[-1].endswith("1.30, 1.30, 1.30")
+    # The first kind of loop is measured again; the others give what is left.
+    assert capsys.readouterr().out.splitlines()[-1].endswith(": 1.30, 1.30, 1.30, 1.30, 1.30")
     with pytest.raises(SystemExit, match=r"none: 4\.00 times"):
         benchmark.gate(measured([5.0, 4.5, 4.0]), record=False)
 
@@ -48,7 +48,7 @@ def test_a_missing_record_is_told(benchmark):
         benchmark.gate(measured([1.0]), record=False)
 
 
-def test_every_compensation_has_a_record():
+def test_every_kind_of_loop_has_a_record():
     kept = json.loads((BENCHMARKS / "c_ratios.json").read_text())
-    assert set(kept) == {"none", "GMS feedback", "LuGre feedforward"}
+    assert set(kept) == {"none", "GMS feedback", "LuGre feedforward", "PID", "LuGre feedback"}
     assert all(0.2 < ratio < 2.0 for ratio in kept.values())
