@@ -16,7 +16,9 @@ model's file with the report beside it; `law = {model = "model.toml"}` names the
 from __future__ import annotations
 
 import argparse
+import importlib
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -96,7 +98,7 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
     )
     parser.add_argument(
         "--intervals", choices=("prediction", "covariance"), default="prediction",
-        help="covariance: in half the time, but too narrow under coloured noise",
+        help="covariance: that of the output error, too narrow under coloured noise",
     )  # fmt: skip
     parser.add_argument(
         "--robust",
@@ -118,6 +120,9 @@ def run(args: argparse.Namespace) -> int:
         tried, left_out = all_laws()
         args.law = [*tried, *(x for x in args.law if x != "all" and x not in tried)]
     _output.say(f"method {args.method}, {sum(len(s.record) for s in sources)} samples")
+    if not args.no_report:
+        # The library that draws loads while compiled code runs.
+        threading.Thread(target=importlib.import_module, args=("matplotlib.figure",)).start()
     found = identified(sources, args)
     if left_out:
         names = ", ".join(left_out)

@@ -87,7 +87,7 @@ def identify_axis(
         Whether the inverse dynamics reported beside it has friction of its own for each direction.
     intervals : {"prediction", "covariance"}
         Values and intervals from the prediction error (`stickslip.identify.axis_prediction`), where the records allow
-        it; or from the covariance of the output error: in half the time, and too narrow where noise is coloured.
+        it; or from the covariance of the output error, which is too narrow where noise is coloured.
     progress : callable
         Is told what begins, in a few words.
 

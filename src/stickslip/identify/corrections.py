@@ -66,9 +66,7 @@ def autoregression(e: Sequence[Array], order: int) -> Array:
 
 def whitened(filter_: Array, e: Array) -> Array:
     """The series behind the filter, without the values that its start spoils."""
-    signal: Any = importlib.import_module("scipy.signal")  # it carries no types
-
-    return signal.lfilter(filter_, [1.0], e)[filter_.size - 1 :]
+    return np.convolve(e, filter_, "valid")
 
 
 def robust_std(r: Array) -> float:
