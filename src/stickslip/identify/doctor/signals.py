@@ -16,6 +16,8 @@ __all__ = ["missing", "quantised", "saturated", "wrapped"]
 WINDOW = 0.1
 """s: the window over which a slow speed is told from the counts it gives."""
 SLOW_ERROR = 0.05
+WORTH_A_WORD = 1e-4
+"""Part of the fast speed below which that speed is of no interest: the step is the file's rounding, no encoder's."""
 
 
 def missing(view: View) -> Iterator[Finding]:
@@ -108,7 +110,7 @@ def quantised(view: View) -> Iterator[Finding]:
             f"{message}; most of the record is slower than {max(fast, lowest):.3g} {unit}/s",
             remedy="use a finer encoder, or leave the slow part of the curve to faster motion",
         )
-    else:
+    elif lowest > WORTH_A_WORD * fast:
         yield Finding("note", "quantisation", message)
 
 
