@@ -14,7 +14,7 @@ from stickslip.errors import InputError
 from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics, uniform
 from stickslip.identify.axis_output import Extras, laid_out, starting_models
 from stickslip.identify.axis_problem import mechanics_of
-from stickslip.identify.axis_start import steady_fit
+from stickslip.identify.axis_start import steady_fits
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.corrections import BAND, Criterion
 from stickslip.identify.observer import Motion, Prepared, prepare
@@ -208,13 +208,16 @@ def starting_points(
     held = [f.name for f in law.fields if f.name in given]
     slower = [replace(first, velocity=part * first.velocity) for part in SLOWER]
     examples = [m for f in slower for m in starting_models(trials, law, f, given)]
-    fitted = [fitted_to_levels(m, first, held) for m in examples]
-    least = min(misfit for _, misfit in fitted)
+    speed, torque = levels_of(first)
+    fitted = steady_fits(examples, speed, torque, held)
+    misfits = [misfit_of(m, speed, torque) for m in fitted]
+    near = [m for m, misfit in zip(fitted, misfits, strict=True) if misfit <= WORSE * min(misfits)]
     held_at = held_torque(trials, axis, first)
-    sticking = (
-        [fitted_to_levels(m, first, held, held_at)[0] for m in examples] if held_at > first.coulomb else []
-    )
-    return examples + [m for m, misfit in fitted if misfit <= WORSE * least] + sticking
+    if held_at <= first.coulomb:
+        return examples + near
+    slow = max(1, LEVELS // 8)
+    speed[:slow], torque[:slow] = SLOWEST * first.usual_speed, held_at
+    return examples + near + steady_fits(examples, speed, torque, held)
 
 
 def held_torque(trials: Sequence[Trial], axis: ServoAxis, first: InverseDynamics) -> float:
@@ -232,25 +235,18 @@ def held_torque(trials: Sequence[Trial], axis: ServoAxis, first: InverseDynamics
     return level
 
 
-def fitted_to_levels(
-    model: Model, first: InverseDynamics, held: Sequence[str], held_torque: float = 0.0
-) -> tuple[Model, float]:
-    """The model with its steady torque fitted to the friction that the inverse dynamics leaves at every speed.
-
-    A `held_torque` counts as that of a creeping motion, instead of the slowest levels. Returns the model with the sum
-    of absolute differences, N·m.
-    """
+def levels_of(first: InverseDynamics) -> tuple[Array, Array]:
+    """Speeds, from slow to fast, and the friction that the inverse dynamics leaves there, N·m."""
     v = first.velocity
     friction = first.residual + np.sign(v) * first.coulomb + first.viscous * v
-    order = np.argsort(np.abs(v))
-    groups = [g for g in np.array_split(order, LEVELS) if g.size]
+    groups = [g for g in np.array_split(np.argsort(np.abs(v)), LEVELS) if g.size]
     speed = np.array([float(np.median(np.abs(v[g]))) for g in groups])
-    torque = np.array([float(np.median(np.sign(v[g]) * friction[g])) for g in groups])
-    if held_torque > 0.0:
-        slow = max(1, LEVELS // 8)
-        speed[:slow], torque[:slow] = SLOWEST * first.usual_speed, held_torque
-    out = steady_fit(model, speed, torque, held)
+    return speed, np.array([float(np.median(np.sign(v[g]) * friction[g])) for g in groups])
+
+
+def misfit_of(model: Model, speed: Array, torque: Array) -> float:
+    """Sum of absolute differences of the steady torque from that at the levels, N·m; 1 for a law without one."""
     steady = model.law.steady
     if steady is None:
-        return out, 1.0
-    return out, sum(abs(steady(float(x), out.parameters) - y) for x, y in zip(speed, torque, strict=True))
+        return 1.0
+    return sum(abs(steady(float(x), model.parameters) - y) for x, y in zip(speed, torque, strict=True))

@@ -194,17 +194,47 @@ def length_of(law: Law, p: Any, torque: float) -> float:
 
 
 def steady_fit(model: Model, v: Array, curve: Array, held: Sequence[str]) -> Model:
-    """The model with its steady torque fitted to a curve; what the curve does not tell stays near where it was."""
+    """The model with its steady torque fitted to a curve; what the curve does not tell stays as it was."""
+    return steady_fits([model], v, curve, held)[0]
+
+
+def steady_fits(models: Sequence[Model], v: Array, curve: Array, held: Sequence[str]) -> list[Model]:
+    """`steady_fit` of models of one law; those that differ in what the curve does not tell share a fit."""
+    fits: dict[Any, dict[str, float]] = {}
+    out: list[Model] = []
+    for model in models:
+        names = told_by(model, v, held)
+        start = tuple(getattr(model.parameters, name) for name in names)
+        if (names, start) not in fits:
+            fits[names, start] = steady_values(model, v, curve, names) if names else {}
+        p = feasible(model.law, model.parameters._replace(**fits[names, start]))
+        out.append(model if p is None else Model(model.law, **p._asdict()))
+    return out
+
+
+def told_by(model: Model, v: Array, held: Sequence[str]) -> tuple[str, ...]:
+    """The parameters that the steady torque at these velocities depends on, but for those that are held."""
+    law, p = model.law, model.parameters
+    if law.steady is None:
+        return ()
+    torque = [law.steady(x, p) for x in v]
+    told: list[str] = []
+    for f in law.fields:
+        if f.per_element or f.name in (*held, *frozen_by_default(law)) or dimensions_of(f.par.unit) is None:
+            continue
+        value = float(getattr(p, f.name))
+        more = p._replace(**{f.name: value + 1e-3 * max(abs(value), 1e-3)})
+        if any(law.steady(x, more) != y for x, y in zip(v, torque, strict=True)):
+            told.append(f.name)
+    return tuple(told)
+
+
+def steady_values(model: Model, v: Array, curve: Array, names: Sequence[str]) -> dict[str, float]:
+    """These parameters, fitted so that the steady torque follows the curve."""
     law = model.law
-    names = [f.name for f in law.fields if not f.per_element and dimensions_of(f.par.unit) is not None]
-    if law.steady is None or not names:
-        return model
-    frozen = [f.name for f in law.fields if f.name not in names or f.name in (*held, *frozen_by_default(law))]
-    vector = Vector(model, frozen=frozen)
-    if not vector.size:
-        return model
-    first, size = vector.start, float(np.max(np.abs(curve)))
-    steady = law.steady
+    assert law.steady is not None
+    vector = Vector(model, frozen=[f.name for f in law.fields if f.name not in names])
+    first, size, steady = vector.start, float(np.max(np.abs(curve))), law.steady
 
     def residuals(u: Array) -> Array:
         p = feasible(law, vector.law_parameters(u))
@@ -215,7 +245,7 @@ def steady_fit(model: Model, v: Array, curve: Array, held: Sequence[str]) -> Mod
 
     best = descend(residuals, first, vector.lower, vector.upper, iterations=30, tolerance=1e-8)
     p = feasible(law, vector.law_parameters(best.u))
-    return model if p is None else Model(law, **p._asdict())
+    return {} if p is None else {name: getattr(p, name) for name in names}
 
 
 def dimensions_of(unit: str) -> tuple[int, int, int] | None:
