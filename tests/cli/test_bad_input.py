@@ -370,6 +370,7 @@ SIBLINGS = [
     (["doctor", "good.csv", "--torque-constant", "nan"], "--torque-constant nan must be a number"),
     (["identify", "good.csv", *IDENTIFY, "--loop", "kp=1"], "--loop needs the reference position"),
     (["identify", "closed.csv", *IDENTIFY, "--loop", "kp=nan"], "--loop: kp = nan must be a finite number"),
+    (["identify", "closed.csv", *IDENTIFY, "--loop", "kp=-7,kd=0.1"], "kp = -7 must be a finite number of 0 or more"),
     (["identify", "closed.csv", *IDENTIFY, "--loop", "kp=1,span=0"], "span = 0 must be 1 or 2"),
     (["identify", "closed.csv", *IDENTIFY, "--loop", "kp=1,limit=-1"], "limit = -1 must be greater than 0"),
     (["compare", "heavy.toml", "model.toml"], "axis.inertia = 'heavy' must be a number"),

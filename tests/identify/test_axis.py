@@ -14,6 +14,7 @@ import pytest
 from stickslip import law_names
 from stickslip.errors import InputError, ParameterError, UnknownName
 from stickslip.identify.axis import identify_axis, rising
+from stickslip.identify.axis_choice import Candidate, sentence_on
 from stickslip.identify.axis_inverse import correlation_lags, inverse_dynamics
 from stickslip.identify.axis_output import Extras, output_error
 from stickslip.identify.axis_start import dimensions, starts
@@ -113,6 +114,26 @@ def test_held_out_rows_are_simulated_but_not_fitted() -> None:
     found = output_error([early], AXIS, law("coulomb"), inverse_dynamics([early], AXIS))
     held_out = found.held_out([late])
     assert held_out["drive_relative"] == pytest.approx(found.errors["drive_relative"], rel=0.5)
+
+
+def test_laws_are_judged_at_speeds_that_they_were_fitted_to() -> None:
+    time = 1e-3 * np.arange(10_000)
+    rising = Trial("rising", time, 0.05 * time**3, np.zeros(time.size))
+    fitted, judged = rising.split(0.3)
+    assert fitted.time[-1] == time[-1]
+    assert judged.time[judged.rows][-1] < fitted.time[0]
+    assert fitted.rows.sum() + judged.rows.sum() == time.size
+    # What an integrating controller holds in the middle of a record is not known: there the end is held out.
+    looped = replace(rising, reference=rising.position, loop=Loop(kp=5.0, ki=1.0, kd=0.1))
+    assert looped.split(0.3)[0].time[0] == 0.0
+
+
+def test_a_choice_that_foretells_nothing_says_so() -> None:
+    def sentence(misfit: float) -> str:
+        return sentence_on([Candidate("coulomb", 4, {}, np.full(20, misfit**2), {})], "coulomb")
+
+    assert "unsure" in sentence(3.7)
+    assert "unsure" not in sentence(1.2)
 
 
 def test_a_law_of_ones_own_is_identified(tmp_path: Path) -> None:

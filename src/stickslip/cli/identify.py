@@ -38,7 +38,8 @@ if TYPE_CHECKING:
 
 SUMMARY = "identify inertia and a friction law from records; writes model.toml and report.html"
 LOOP_NAMES = ("kp", "ki", "kd", "kr", "limit", "period", "count", "span")
-RANGES = {"limit": "greater than 0", "period": "0 or more", "count": "0 or more"}
+NOT_NEGATIVE = ("kp", "ki", "kd", "kr", "period", "count")
+RANGES = {"limit": "greater than 0", **dict.fromkeys(NOT_NEGATIVE, "a finite number of 0 or more")}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -91,7 +92,12 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
     parser.add_argument(
         "--resistance", type=float, metavar="OHM", help="of the motor, where a voltage drives it"
     )
-    parser.add_argument("--loop", metavar="kp=..,kd=..", help=f"sampled controller: {', '.join(LOOP_NAMES)}")
+    parser.add_argument(
+        "--loop", metavar="kp=..,kd=..",
+        help="sampled controller kp e + ki (integral of e) + kr v_ref - kd v, its output the recorded drive's signal (a torque: "
+        "kp in N·m/rad, kd and kr in N·m·s/rad), what is left out 0; limit: of that output; period: s between its samples "
+        "(0: the rows); count: rad of its encoder; span: samples that its velocity spans, 1 or 2",
+    )  # fmt: skip
     parser.add_argument("--harmonics", type=int, default=0, metavar="N", help="of a torque over the position")
     parser.add_argument(
         "--load", action="store_true", help="friction that grows with the load of the gearing"
@@ -283,11 +289,7 @@ def loop_of(text: str) -> Loop:
             raise UnknownName("number of --loop", name, LOOP_NAMES)
     for name, value in given.items():
         above = math.isfinite(value) or name == "limit"
-        if (
-            not above
-            or (name in ("period", "count") and value < 0.0)
-            or (name == "limit" and not value > 0.0)
-        ):
+        if not above or (name in NOT_NEGATIVE and value < 0.0) or (name == "limit" and not value > 0.0):
             raise InputError(f"--loop: {name} = {value:g} must be {RANGES.get(name, 'a finite number')}")
     span = given.pop("span", 1.0)
     if span not in (1.0, 2.0):

@@ -77,8 +77,8 @@ def identify_axis(
         Names, paths of law files, or laws. Of several, the one with the fewest parameters is taken whose held-out
         error lies within one standard error of the best (Hastie, Tibshirani and Friedman 2009, 7.10).
     validation : sequence of Trial
-        Held out. Without any, and with several laws, the last 30 % of every record are held out for the choice,
-        and the chosen law is then fitted to all.
+        Held out. Without any, and with several laws, the last 30 % of every record are held out for the choice
+        (the first, where the end is half as fast again as all before), and the chosen law is then fitted to all.
     free, frozen, values, extras
         As in `stickslip.identify.axis_output.output_error`.
     robust, profiles

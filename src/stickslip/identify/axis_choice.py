@@ -33,6 +33,8 @@ __all__ = ["Candidate", "chosen_of", "compared", "foreseen", "options_of", "sent
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BLOCKS = 20
+FORETOLD = 2.0
+"""Standard deviations of the lowest held-out misfit above which no law is said to foretell what was held out."""
 COMPARABLE = 1e-2
 """Relative decrease of the sum of squares at which the fits that are compared end: laws differ by more."""
 
@@ -222,7 +224,13 @@ def sentence_on(candidates: Sequence[Candidate], chosen: str) -> str:
         f"{c.law} {'failed' if c.failure else f'{math.sqrt(float(np.mean(c.score))):.3g}'}"
         for c in candidates
     ]
-    return (
+    said = (
         f"Law {chosen!r} is the simplest within one standard error of the lowest held-out misfit (in standard "
         f"deviations: {', '.join(parts)})."
     )
+    if min(math.sqrt(float(np.mean(c.score))) for c in candidates) > FORETOLD:
+        said += (
+            " None of them foretells what was held out, which may be unlike the rest (speeds, load): the choice is "
+            "unsure; name a law (--law), or give a record to judge them by (--validation)."
+        )
+    return said

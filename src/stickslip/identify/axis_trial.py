@@ -24,6 +24,8 @@ DRIVES = {
 }  # fmt: skip
 """Channels that may hold the drive's signal, in the order in which they are looked for, and what they are."""
 REFERENCES = ("position_reference", "reference")
+FASTER, WINDOW = 1.5, 0.1
+"""Times as fast that the end of a trial must be to be fitted instead of its begin; s over which a speed is averaged."""
 FEWEST = 50
 
 
@@ -134,10 +136,37 @@ class Trial:
         return float(line[0]), float(line[1])
 
     def split(self, share: float) -> tuple[Trial, Trial]:
-        """The first part of this trial, and the whole of it looked at in the last `share` of its time."""
-        border = self.time[0] + (1.0 - share) * (self.time[-1] - self.time[0])
-        early = self.time < border
-        return self.until(int(np.sum(early))), replace(self, used=self.rows & ~early)
+        """Most of this trial, and the whole of it looked at in the rest: the last `share` of its time.
+
+        Where the end is faster than all before, the first `share` is looked at instead: laws are judged at speeds that
+        they were fitted to.
+        """
+        first, last = self.time[0], self.time[-1]
+        late = self.time >= last - share * (last - first)
+        if self.can_begin_later and self.top_speed(late) > FASTER * self.top_speed(~late):
+            early = self.time < first + share * (last - first)
+            return self.since(int(np.sum(early))), replace(self, used=self.rows & early)
+        return self.until(int(np.sum(~late))), replace(self, used=self.rows & late)
+
+    @property
+    def can_begin_later(self) -> bool:
+        """Whether it can be simulated from any row: what a controller has integrated is not recorded."""
+        return not self.closed_loop or (self.loop is not None and self.loop.ki == 0.0)
+
+    def top_speed(self, rows: Mask) -> float:
+        """The highest mean speed over `WINDOW` seconds in these rows, rad/s (m/s)."""
+        step = max(1, round(WINDOW / self.period))
+        q, t = self.position[rows], self.time[rows]
+        if q.size <= step:
+            return 0.0
+        return float(np.max(np.abs(q[step:] - q[:-step]) / (t[step:] - t[:-step])))
+
+    def since(self, row: int) -> Trial:
+        """Its rows from this one on, at least as many as a trial needs."""
+        begin = min(row, self.time.size - FEWEST)
+        arrays = ("time", "position", "drive", "reference", "supply", "used")
+        cut = {n: None if (a := getattr(self, n)) is None else a[begin:] for n in arrays}
+        return replace(self, **cut)
 
     def until(self, rows: int) -> Trial:
         """Its first rows, at least as many as a trial needs."""
