@@ -94,9 +94,9 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
     )
     parser.add_argument(
         "--loop", metavar="kp=..,kd=..",
-        help="sampled controller kp e + ki (integral of e) + kr v_ref - kd v, its output the recorded drive's signal (a torque: "
-        "kp in N·m/rad, kd and kr in N·m·s/rad), what is left out 0; limit: of that output; period: s between its samples "
-        "(0: the rows); count: rad of its encoder; span: samples that its velocity spans, 1 or 2",
+        help="sampled controller kp e + ki (integral of e) + kr v_ref - kd v, its output the recorded drive's signal "
+        "(a torque: kp in N·m/rad, kd and kr in N·m·s/rad), what is left out 0; limit: of that output; period: s from "
+        "sample to sample (0: the rows); count: rad of its encoder; span: samples that its velocity spans, 1 or 2",
     )  # fmt: skip
     parser.add_argument("--harmonics", type=int, default=0, metavar="N", help="of a torque over the position")
     parser.add_argument(
