@@ -215,12 +215,31 @@ def test_what_is_missing_or_damaged_is_run_again(small, undisturbed, tmp_path):
     assert table(tmp_path).equals(undisturbed)
 
 
-def test_another_range_is_another_sweep(small, tmp_path):
+def test_finished_blocks_of_another_sweep_are_not_lost(small, tmp_path):
     few = replace(small, drawn=replace(small.drawn, cases=10))
     assert execute.run(few, tmp_path)["timings"]["blocks_computed"] == 2
     assert execute.run(few, tmp_path)["timings"]["blocks_computed"] == 0
-    wider = replace(few, drawn=replace(few.drawn, seed=4))
-    assert execute.run(wider, tmp_path)["timings"]["blocks_computed"] == 2
+    before = table(tmp_path)
+    for other in (
+        replace(few, drawn=replace(few.drawn, seed=4)),
+        replace(few, drawn=replace(few.drawn, cases=9)),
+        replace(few, metrics=few.metrics[:1]),
+        replace(few, runs=few.runs[::-1][:1], check=False),
+    ):
+        with pytest.raises(
+            InputError, match=r"holds finished blocks of another sweep .*; .*--out, or delete"
+        ):
+            execute.run(other, tmp_path)
+    assert table(tmp_path).equals(before)
+
+
+def test_fewer_cases_do_not_overwrite_an_interrupted_sweep(tmp_path, capsys):
+    command = ["sweep", str(SMALL), "--out", str(tmp_path), "--no-report", "--cases"]
+    assert main([*command, "9"]) == 0
+    (tmp_path / "manifest.json").unlink()  # as an interruption leaves it
+    assert main([*command, "8"]) == 2
+    assert "finished blocks of another sweep (2, such as data/" in capsys.readouterr().err
+    assert table(tmp_path).num_rows == 2 * 9
 
 
 def test_blocks_of_a_larger_sweep_are_not_taken_for_its_own(small, tmp_path):
@@ -228,7 +247,7 @@ def test_blocks_of_a_larger_sweep_are_not_taken_for_its_own(small, tmp_path):
     execute.run(few, tmp_path)
     part = next(tmp_path.rglob("part-000000.parquet"))
     part.with_name("part-000001.parquet").write_bytes(part.read_bytes())  # of a sweep with more cases
-    with pytest.raises(InputError, match=r"holds 1 blocks .*part-000001.parquet: one with more cases"):
+    with pytest.raises(InputError, match=r"another sweep \(1, such as .*part-000001.parquet\)"):
         execute.run(few, tmp_path)
 
 

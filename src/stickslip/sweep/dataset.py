@@ -39,12 +39,16 @@ def block_path(folder: Path, sweep: Sweep, run: int, start: int) -> Path:
 
 def has_block(folder: Path, sweep: Sweep, run: int, start: int) -> bool:
     """Whether the block lies there, whole, with these numbers."""
+    return fingerprint_of(block_path(folder, sweep, run, start)) == sweep.fingerprint(run)
+
+
+def fingerprint_of(path: Path) -> str | None:
+    """What a block was made of; None where it is missing, cut off or something else, and is to be run again."""
     parquet: Any = importlib.import_module("pyarrow.parquet")
     try:
-        found = parquet.read_schema(block_path(folder, sweep, run, start)).metadata[KEY]
-        return json.loads(found)["fingerprint"] == sweep.fingerprint(run)
+        return json.loads(parquet.read_schema(path).metadata[KEY])["fingerprint"]
     except (OSError, ValueError, KeyError, TypeError):
-        return False  # Missing, cut off or written by something else: it is run again.
+        return None
 
 
 def keep_block(folder: Path, sweep: Sweep, block: Block) -> None:
@@ -92,19 +96,22 @@ def clear_drafts(folder: Path) -> None:
 
 
 def refuse_strays(folder: Path, sweep: Sweep) -> None:
-    """Refuse a folder with blocks that this sweep does not have: they would be read as its results.
+    """Refuse a folder with blocks of another sweep: they would be read as this one's results, or lost to them.
 
     Raises
     ------
     InputError
     """
-    own = {block_path(folder, sweep, *b) for b in sweep.blocks}
-    strays = sorted(set((folder / "data").rglob("part-*.parquet")) - own)
+    own = {block_path(folder, sweep, *b): sweep.fingerprint(b[0]) for b in sweep.blocks}
+    strays = [
+        path for path in sorted((folder / "data").rglob("part-*.parquet"))
+        if path not in own or fingerprint_of(path) not in (own[path], None)
+    ]  # fmt: skip
     if strays:
         raise InputError(
-            f"{folder} holds {len(strays)} blocks that this sweep does not have, such as "
-            f"{strays[0].relative_to(folder)}: one with more cases or other runs was written there; choose another "
-            "place with --out, or delete it"
+            f"{folder} holds finished blocks of another sweep ({len(strays)}, such as "
+            f"{strays[0].relative_to(folder)}): its cases, ranges, metrics, runs or numerics were others, or another "
+            "version of stickslip wrote them; run that one to go on, choose another place with --out, or delete it"
         )
 
 
