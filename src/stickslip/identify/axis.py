@@ -32,6 +32,7 @@ from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, requir
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification, silent
 from stickslip.identify.load_check import ADVICE, judged_load
+from stickslip.identify.loop_check import doubted_loops
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
@@ -240,6 +241,10 @@ def noted(found: Identification, *more: str) -> Identification:
 
 def strange_loop(found: Identification) -> list[str]:
     """That the loop does not make the drive's signal that was recorded; nothing where it does, or there is none."""
+    fitted: FittedAxis = found.details["output"]
+    named = fitted.problem.vector.named(fitted.u)
+    if others := doubted_loops(fitted.problem.trials, named["controller_gain"]):
+        return others
     off = found.misfit.get("drive_relative", 0.0)
     if off <= LOOP_OFF:
         return []

@@ -1,0 +1,100 @@
+"""Gains that a record shows, against those that somebody gives."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import axis_cases as cases
+import numpy as np
+import pytest
+
+from stickslip.identify.axis import identify_axis
+from stickslip.identify.axis_trial import Trial
+from stickslip.identify.loop_check import GAINS, doubted_loops, shown_gains
+from stickslip.machines.servo import ServoAxis
+from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
+
+WRONG: dict[str, dict[str, Any]] = {
+    "kp": {"kp": 1.41 * cases.LOOP.kp},
+    "kd": {"kd": 2.0 * cases.LOOP.kd},
+    "kr": {"kr": 0.0},
+    "ki": {"ki": 40.0},
+}
+
+
+def recorded(counts: float, seen: float, seed: int = 0, late: int = 0) -> Trial:
+    """A record of so many counts a turn, made by a controller that saw the position in `seen` of them."""
+    time = 1e-3 * np.arange(6000)
+    rng = np.random.default_rng(seed)
+    reference = cases.wanted(time, seed)
+    loop = replace(cases.LOOP, count=2.0 * math.pi / seen if seen else 0.0)
+    push = 0.01 * np.repeat(rng.standard_normal(time.size // 10), 10)
+    drive = Drive(time, reference, "feedback", loop, disturbance=push, max_step=2e-4)
+    out = drive_axis(Mechanics(cases.INERTIA, offset=0.03), cases.model("stribeck"), drive)
+    count = 2.0 * math.pi / counts
+    signal = np.roll(out[:, 2] + 2e-3 * rng.standard_normal(time.size), late)
+    return Trial(
+        "log.csv", time, count * np.round(out[:, 0] / count), signal, "torque", reference, cases.LOOP
+    )
+
+
+@pytest.mark.parametrize("counts", [2000, 16384, 1_000_000])
+@pytest.mark.parametrize("seen", ["the same", "the exact position", "two rows before"])
+def test_right_gains_are_not_doubted(counts: int, seen: str) -> None:
+    for seed in range(3):
+        made = recorded(
+            counts, 0 if seen == "the exact position" else counts, seed, 2 * (seen == "two rows before")
+        )
+        assert doubted_loops([made]) == []
+
+
+@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize("counts", [16384, 1_000_000])
+def test_wrong_gains_are_told_with_those_that_the_record_shows(name: str, counts: int) -> None:
+    made = recorded(counts, counts)
+    claimed = replace(made, loop=replace(cases.LOOP, **WRONG[name]))
+    shown = shown_gains(claimed)
+    assert shown is not None
+    truth = np.array([getattr(cases.LOOP, g) for g in GAINS])
+    assert np.all(np.abs(shown.values - truth) < np.maximum(2.0 * shown.half_widths, 0.03 * truth))
+    (said,) = doubted_loops([claimed])
+    assert said.startswith("log.csv")
+    assert f"{name} {WRONG[name][name]:.4g} given" in said
+    assert not any(f"{g} " in said for g in GAINS if g != name)
+
+
+def test_a_factor_on_the_output_belongs_to_the_gains() -> None:
+    made = recorded(16384, 16384)
+    halved = replace(made, loop=replace(cases.LOOP, kp=4.0, kd=0.04, kr=0.04))
+    assert doubted_loops([halved])
+    assert doubted_loops([halved], 2.0) == []
+    assert doubted_loops([replace(halved, gain=2.0)]) == []
+
+
+def test_rows_at_the_limit_say_nothing_of_the_gains() -> None:
+    made = recorded(16384, 16384)
+    assert made.drive is not None
+    limit = 0.3
+    assert np.mean(np.abs(made.drive) > limit) > 0.1
+    cut = replace(made, drive=np.clip(made.drive, -limit, limit))
+    assert doubted_loops([cut]) == []
+    assert doubted_loops([replace(cut, loop=replace(cases.LOOP, limit=limit))]) == []
+
+
+def test_nothing_is_said_without_signal_or_rows() -> None:
+    made = recorded(16384, 16384)
+    assert shown_gains(replace(made, drive=None)) is None
+    assert shown_gains(replace(made, loop=None)) is None
+    assert shown_gains(made.until(90)) is None
+    idle = replace(made, drive=0.0 * made.time, reference=0.0 * made.time, position=0.0 * made.time)
+    assert doubted_loops([idle]) == []
+
+
+def test_identification_doubts_a_loop_that_did_not_make_the_record() -> None:
+    axis = ServoAxis(drive_side="load")
+    made = recorded(16384, 16384).until(3000)
+    wrong = replace(made, loop=Loop(kp=8.0, kd=0.16, kr=0.08, limit=3.0))
+    found = identify_axis([wrong], axis, ["coulomb"], intervals="covariance")
+    assert any("kd 0.16 given, 0.0799" in note for note in found.notes)
