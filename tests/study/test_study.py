@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import math
+import os
 import shutil
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -240,6 +242,34 @@ def test_rerun_is_identical_and_sees_a_change(small: studies.Study, tmp_path: Pa
     (out / "inputs" / "small_study.toml").write_text("")
     with pytest.raises(InputError, match="was changed"):
         rerun(out)
+
+
+def test_ctrl_c_is_acknowledged_at_once_and_held_back_until_what_is_in_hand_is_kept(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with studies.interrupts_between_runs("stopping") as check:
+        check()
+        signal.raise_signal(signal.SIGINT)
+        assert capfd.readouterr().err.splitlines() == ["stickslip: stopping"]
+        with pytest.raises(KeyboardInterrupt):
+            check()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    with studies.interrupts_between_runs():
+        signal.raise_signal(signal.SIGINT)
+    assert "Ctrl-C again drops it" in capfd.readouterr().err
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_the_line_of_an_interruption_does_not_run_into_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[bytes] = []
+    monkeypatch.setattr(studies.os, "isatty", lambda fd: True)
+    monkeypatch.setattr(studies.os, "write", lambda fd, text: written.append(text))
+    with studies.interrupts_between_runs("stopping"):
+        signal.raise_signal(signal.SIGINT)
+    newline = os.linesep.encode()
+    assert written == [newline + b"stickslip: stopping" + newline]
 
 
 # ---- runs that end early -------------------------------------------------------------------------------------------

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 SUMMARY = "choose a controller's settings for an uncertain machine"
+STOPPING = "stopping after the setting in hand; Ctrl-C again drops it"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     out: Path = prepared_folder(args.out or Path(f"tune-{sweep.name}"))
     found: list[dict[str, Any]] = []
     for planned in sweep.runs:
-        with _output.progress_bar(planned.key) as progress, interrupts_between_runs() as check:
+        with _output.progress_bar(planned.key) as progress, interrupts_between_runs(STOPPING) as check:
             tuned = tune(sweep, planned, _stopped_by(progress, check))
         written = write(out, sweep, tuned)
         if not args.no_report and len(sweep.metrics) > 1:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -114,12 +115,15 @@ def run(
     return StudyResult(folder, runs, manifest, study.config, more)
 
 
+STOPPING = "stopping: what is in hand is finished and kept; Ctrl-C again drops it"
+
+
 @contextmanager
-def interrupts_between_runs() -> Generator[Callable[[], None]]:
+def interrupts_between_runs(said: str = STOPPING) -> Generator[Callable[[], None]]:
     """Hold Ctrl-C back until the run in hand is finished and kept; a second one stops at once.
 
     Yields what raises KeyboardInterrupt if one was asked for. Raised inside a compilation it would tear the
-    compiler down with it.
+    compiler down with it. `said` is a line for stderr, at once.
     """
     asked: list[int] = []
 
@@ -127,6 +131,9 @@ def interrupts_between_runs() -> Generator[Callable[[], None]]:
         if asked:
             raise KeyboardInterrupt
         asked.append(number)
+        # Not by sys.stderr: the signal may come while it is being written to. A terminal has a bar in this line.
+        with suppress(OSError):
+            os.write(2, f"{os.linesep if os.isatty(2) else ''}stickslip: {said}{os.linesep}".encode())
 
     def check() -> None:
         if asked:
