@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
 import shlex
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ import pytest
 import tomli_w
 
 from stickslip import Model
-from stickslip.cli import main
+from stickslip.cli import _output, main
 from stickslip.cli.recommend import parameters, percent
 from stickslip.control.recommended import read_recommended
 from stickslip.identify.estimate import Estimate, Identification
@@ -43,6 +45,27 @@ def written(path: Path, relative: float = 0.01, law: str = "stribeck", **values:
 def compared(first: Path, second: Path, capsys: pytest.CaptureFixture[str], *options: str) -> dict[str, Any]:
     assert main(["compare", str(first), str(second), "--json", *options]) == 0
     return json.loads(capsys.readouterr().out)
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_bar_shows_at_once_how_much_there_is_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", shown := Terminal())
+    with _output.progress_bar("it") as progress:
+        progress(0, 1200)
+        assert "0/1200" in shown.getvalue()
+        progress(0, 1300)
+        assert "0/1300" in shown.getvalue()
+
+
+def test_what_was_found_is_not_counted_for_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", shown := Terminal())
+    with _output.progress_bar("it") as progress:
+        progress(900, 1200)
+    assert "900/1200 [00:00<?, ?run/s]" in shown.getvalue()
 
 
 def test_friction_that_changed_is_told_from_one_that_did_not(

@@ -129,6 +129,18 @@ def test_a_law_without_intervals_is_simulated_once_and_promises_nothing(
     assert any("no intervals" in note for note in advice.notes)
 
 
+def test_progress_goes_on_while_the_best_is_confirmed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recommending, "GAINS", (0.5,))
+    told: list[tuple[int, int]] = []
+    recommend(identified(0.02), Drive(20.0), axes=0, confirm=2, progress=lambda *now: told.append(now))
+    done, of = (list(each) for each in zip(*told))
+    assert done[0] == 0
+    assert done[-1] == of[0]
+    assert done == sorted(done)
+    assert len(set(of)) == 1
+    assert np.max(np.diff(done[:-1])) == 1
+
+
 def test_axes_are_drawn_about_the_inertia_that_is_given() -> None:
     found = identified(0.02)
     own = Estimate("inertia", "kg·m²", "J", INERTIA, 0.01 * INERTIA, 0.98 * INERTIA, 1.02 * INERTIA, True)

@@ -233,6 +233,20 @@ def test_finished_blocks_of_another_sweep_are_not_lost(small, tmp_path):
     assert table(tmp_path).equals(before)
 
 
+def test_progress_begins_with_what_was_found_and_that_is_said(small, tmp_path):
+    few = replace(small, drawn=replace(small.drawn, cases=10))
+    told, said = [], []
+    execute.run(few, tmp_path, progress=lambda *now: told.append(now), say=said.append)
+    assert told == [(0, 20), (10, 20), (20, 20)]
+    assert said == []
+    next(tmp_path.rglob("part-000000.parquet")).unlink()
+    told.clear()
+    execute.run(few, tmp_path, progress=lambda *now: told.append(now), say=said.append)
+    assert told == [(10, 20), (20, 20)]
+    execute.run(few, tmp_path, say=said.append)
+    assert said == ["1 of 2 blocks were already done; going on", "2 of 2 blocks were already done"]
+
+
 def test_fewer_cases_do_not_overwrite_an_interrupted_sweep(tmp_path, capsys):
     command = ["sweep", str(SMALL), "--out", str(tmp_path), "--no-report", "--cases"]
     assert main([*command, "9"]) == 0

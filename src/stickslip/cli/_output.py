@@ -25,8 +25,16 @@ def progress_bar(title: str) -> Generator[Callable[[int, int], None]]:
     with tqdm(desc=title, unit="run", file=sys.stderr, disable=None, leave=False) as bar:
 
         def progress(finished: int, total: int) -> None:
-            bar.total = total
-            bar.update(finished - bar.n)
+            if bar.total is None:
+                # The time left is told from what is finished from now on, not from what was found.
+                bar.reset(total)
+                bar.initial = bar.n = finished
+                bar.refresh()
+            elif total != bar.total:
+                bar.total, bar.n = total, finished
+                bar.refresh()
+            else:
+                bar.update(finished - bar.n)
 
         yield progress
 

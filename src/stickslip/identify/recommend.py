@@ -138,7 +138,7 @@ def recommend(
     seed : int
         Of the draws.
     progress : callable
-        Called with the runs that are done and all of them.
+        Called with the axes that are simulated, and all of them that may be.
 
     Returns
     -------
@@ -162,18 +162,18 @@ def recommend(
     if not found.law_estimates[0]:
         axes = confirm = 0  # Nothing of the friction would be drawn: all axes would be the same one.
     laws = laws_of(found.model)
-    bench = Bench(list(plants_of(found, float(j), axes, seed)), linear, drive, laws)
-    others = Bench(list(plants_of(found, float(j), confirm, seed + 1)), linear, drive, laws)
+    settings = list(settings_of(laws, drive))
+    account = Account(progress, len(settings), axes + 1, confirm + 1)
+    bench = Bench(list(plants_of(found, float(j), axes, seed)), linear, drive, laws, account.one)
+    others = Bench(list(plants_of(found, float(j), confirm, seed + 1)), linear, drive, laws, account.one)
     if isinstance(first := bench.before(0), str):
         raise InputError(f"the linear controller alone: {first}")
     # By the axes of the confirmation, if there are more of them: what is said is then the same for any `axes`.
     rung = rings_alone(max(others, bench, key=lambda b: len(b.plants)), float(j), found.unit("N·m"))
-    settings = list(settings_of(laws, drive))
-    total = len(settings) + len(BEYOND) + len(others.plants) // max(1, len(bench.plants))
     candidates: list[Candidate] = []
     for setting in settings:
         candidates.append(bench.judged(setting))
-        progress(len(candidates), total)
+        account.tried(len(candidates))
     chosen, rejected, unsafe = confirmed(candidates, bench, others)
     unsafe += [c.setting for c in candidates if c.unsafe]
     candidates = [rejected.get(c.setting, c) for c in candidates]
@@ -182,12 +182,38 @@ def recommend(
         beyond = [on_both(replace(chosen.setting, gain=gain), bench, others) for gain in BEYOND]
         candidates += beyond
         margin = margin_of(chosen.setting, [*unsafe, *(c.setting for c in beyond if c.unsafe)])
-    progress(total, total)
+    account.end()
     return Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, dict(linear.gains._asdict()),
         first.moving["position_rms_rad"], margin, tuple(candidates), len(bench.plants),
         tuple(notes_on(found, chosen, candidates)), drive, rung, float(j),
     )  # fmt: skip
+
+
+class Account:
+    """How many axes are simulated, of how many at most; what is unsafe is left early, and the rest of it counted."""
+
+    def __init__(self, progress: Callable[[int, int], None], settings: int, axes: int, others: int) -> None:
+        self.progress, self.axes, self.done = progress, axes, 0
+        # Each with the linear controller alone; then leads, the guard and the gains beyond.
+        self.total = axes * (settings + len(LEADS) + 1 + len(BEYOND)) + others * (3 + len(BEYOND))
+        progress(0, self.total)
+
+    def one(self) -> None:
+        """Another axis is simulated."""
+        self._reach(self.done + 1)
+
+    def tried(self, settings: int) -> None:
+        """So many settings have been judged on the first axes."""
+        self._reach(max(self.done, self.axes * settings))
+
+    def end(self) -> None:
+        """Nothing is left."""
+        self._reach(self.total)
+
+    def _reach(self, done: int) -> None:
+        self.done = min(done, self.total)
+        self.progress(self.done, self.total)
 
 
 def plants_of(found: Identified, inertia: float, count: int, seed: int) -> Iterator[RigidAxis]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -89,18 +89,23 @@ class Candidate:
 
 
 class Bench:
-    """Axes, each with what the linear controller alone does on it, and the laws that may be switched on."""
+    """Axes, each with what the linear controller alone does on it, and the laws that may be switched on.
+
+    `ran` is called after every axis that was simulated.
+    """
 
     def __init__(
-        self, plants: Sequence[RigidAxis], linear: Controller, drive: Drive, laws: dict[str, Model]
-    ) -> None:
-        self.plants, self.linear, self.drive, self.laws = plants, linear, drive, laws
+        self, plants: Sequence[RigidAxis], linear: Controller, drive: Drive, laws: dict[str, Model],
+        ran: Callable[[], None] = lambda: None,
+    ) -> None:  # fmt: skip
+        self.plants, self.linear, self.drive, self.laws, self.ran = plants, linear, drive, laws, ran
         self.alone: list[Trial | str] = []
 
     def before(self, i: int) -> Trial | str:
         """The linear controller alone on axis i."""
         while len(self.alone) <= i:
             self.alone.append(run(self.plants[len(self.alone)], self.linear, self.drive))
+            self.ran()
         return self.alone[i]
 
     def ringing(self) -> Iterator[tuple[RigidAxis, str]]:
@@ -118,6 +123,7 @@ class Bench:
         errors: list[float] = []
         for i, plant in enumerate(self.plants):
             before, after = self.before(i), run(plant, controller, self.drive)
+            self.ran()
             if isinstance(after, str) or isinstance(before, str):
                 why = after if isinstance(after, str) else "the linear controller alone fails"
                 return Candidate(setting, (*errors, math.inf), (why,))

@@ -58,9 +58,10 @@ def run(
     scheduler : str
         Address of a Dask scheduler (tcp://host:8786), whose workers run the blocks instead.
     progress : callable, optional
-        ``progress(finished, all)`` in closed loops.
+        ``progress(finished, all)`` in closed loops, first of what was found.
     say : callable, optional
-        ``say(line)`` is told before anything runs which runs the first integrator cannot run, and why.
+        ``say(line)`` is told before anything runs which runs the first integrator cannot run, and why, and how many
+        blocks were found.
 
     Returns
     -------
@@ -87,6 +88,10 @@ def run(
     clock, cpu = time.perf_counter(), time.process_time()
     missing = [b for b in sweep.blocks if not dataset.has_block(folder, sweep, *b)]
     done, found = sweep.cases - sum(_size(sweep, b) for b in missing), len(sweep.blocks) - len(missing)
+    if say and found:
+        say(f"{found} of {len(sweep.blocks)} blocks were already done{'; going on' if missing else ''}")
+    if progress:
+        progress(done, sweep.cases)
     with interrupts_between_runs() as check:
         for block in computed(sweep, missing, jobs or os.cpu_count() or 1, backend, scheduler):
             dataset.keep_block(folder, sweep, block)
