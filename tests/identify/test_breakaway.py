@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from stickslip import Record
+from stickslip import Model, Record
 from stickslip.errors import InputError
 from stickslip.identify.breakaway import find_breaks, identify_breakaway
+from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
 
 
 def ramps(rates: list[float], rng: np.random.Generator, per_decade: float = 0.0) -> Record:
@@ -53,6 +54,26 @@ def test_dependence_on_the_ramp_rate_is_found() -> None:
     assert result["rate_effect"].lower < -0.06 < result["rate_effect"].upper < 0.0
     flat = identify_breakaway(ramps(rates, np.random.default_rng(2)))
     assert not any("depends on the ramp rate" in note for note in flat.notes)
+
+
+def test_a_tracking_record_is_no_break_away_record() -> None:
+    # Slow motion that sticks and slips: it moves off often, from torques that hardly rose.
+    time = 1e-3 * np.arange(20_000)
+    drive = Drive(time, 0.05 * time, "feedback", Loop(kp=6.0, kd=0.05), max_step=2e-4)
+    friction = Model("stribeck", fs=0.3, fc=0.2, vs=0.05, sigma2=0.01, k=500.0)
+    out = drive_axis(Mechanics(5e-3), friction, drive)
+    channels = {"position": out[:, 0], "motor_torque": out[:, 2]}
+    record = Record(time, channels, {"position": "rad", "motor_torque": "N·m"})
+    assert len(find_breaks(record)) > 5
+    with pytest.raises(
+        InputError, match=r"no break-away record: \d+ times .* [01] of them after a torque ramp"
+    ):
+        identify_breakaway(record)
+    # Ramps beside it: what is no ramp is said.
+    few = Record(time[:4000], {k: v[:4000] for k, v in channels.items()}, record.units)
+    found = identify_breakaway([ramps([0.1] * 36, np.random.default_rng(0)), few])
+    assert any("followed no torque ramp" in note for note in found.notes)
+    assert all(b.ramped for b in find_breaks(ramps([0.1] * 36, np.random.default_rng(0))))
 
 
 def test_an_axis_that_never_moves_is_one_clear_error() -> None:

@@ -657,6 +657,34 @@ def test_a_reference_over_eighths_of_a_turn_in_degrees_is_no_reference_in_rad(wa
 
 
 @pytest.mark.parametrize(
+    ("position", "reference", "unit", "found"),
+    [
+        (DEG, 1.0, "rad", ("position-unit", "position in deg")),
+        (1.0, DEG, "rad", ("position-reference-unit", "position_reference in deg")),
+        (1e3, 1.0, "m", ("position-unit", "position in mm")),
+        (1.0, 1e3, "m", ("position-reference-unit", "position_reference in mm")),
+        (10.0, 1.0, "rad", ("reference-scale", "10 times as far")),
+        (1.0, 1.0, "rad", None),
+        (1.4, 1.0, "rad", None),
+        (0.0, 1.0, "rad", None),
+    ],
+)
+def test_a_reference_of_another_size_than_the_position_is_told(position, reference, unit, found):
+    table = made("turned")
+    late = np.roll(table["position"], 20)
+    channels = {"position": position * late + 0.1, "position_reference": reference * table["position"]}
+    record = Record(
+        table["time"], {**channels, "motor_torque": table["torque"]},
+        {"position": unit, "position_reference": unit, "motor_torque": "N·m" if unit == "rad" else "N"},
+    )  # fmt: skip
+    told = [f for f in examine(record).findings if "follows its reference" in f.message]
+    assert len(told) == (found is not None)
+    for finding in told:
+        assert (finding.level, finding.code) == ("warning", found[0])
+        assert found[1] in finding.message
+
+
+@pytest.mark.parametrize(
     ("unit", "twist"), [("deg", "gravity"), ("rad", "gravity"), ("deg", "spring"), ("rad", "warm")]
 )
 def test_a_pendulum_in_degrees_under_rad_is_known_by_its_gravity(unit, twist):

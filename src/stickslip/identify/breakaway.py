@@ -23,19 +23,29 @@ __all__ = ["Break", "find_breaks", "identify_breakaway"]
 
 WINDOW = 0.02
 """s, over which a velocity is taken where the record has none."""
+RAMP = 0.7
+"""Part of its torque by which the torque must have risen at rest before a break-away that a ramp brought about. Where
+an axis that follows a reference sticks and slips, it rises by a fifth or so."""
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 @dataclass(frozen=True, slots=True)
 class Break:
-    """One break-away: time (s), angle (rad), direction (+1, -1), torque (N·m, its size), ramp rate (N·m/s)."""
+    """One break-away: time (s), angle (rad), direction (+1, -1), torque (N·m, its size), ramp rate (N·m/s), and by
+    which part of it the torque had risen in its direction since the axis came to rest."""
 
     time: float
     angle: float
     direction: int
     torque: float
     rate: float
+    risen: float = math.inf
+
+    @property
+    def ramped(self) -> bool:
+        """Whether a torque ramp from rest brought it about."""
+        return self.risen >= RAMP
 
 
 def find_breaks(
@@ -58,9 +68,11 @@ def find_breaks(
     v = record["velocity"] if "velocity" in record.channels else slope_of(time, position, WINDOW)
     found: list[Break] = []
     quiet_since, ready = math.nan, False
+    first = 0  # row at which the rest began
     for k in range(time.size):
         i = k
         if abs(v[i]) < 0.2 * threshold:
+            first = first if ready or not math.isnan(quiet_since) else i
             quiet_since = float(time[i]) if math.isnan(quiet_since) else quiet_since
             ready = ready or float(time[i]) - quiet_since >= rest
         elif abs(v[i]) > threshold:
@@ -70,15 +82,20 @@ def find_breaks(
                 rows = np.flatnonzero((time <= time[i]) & (time >= time[i] - rest))
                 width = float(time[rows[-1]] - time[rows[0]])
                 rate = float(load[rows[-1]] - load[rows[0]]) / width if width > 0.0 else math.nan
-                found.append(
-                    Break(
-                        float(time[i]), float(position[i]), int(np.sign(v[i])), abs(float(load[i])), abs(rate)
-                    )
-                )
+                found.append(broken(time, position, load, first, i, int(np.sign(v[i])), abs(rate)))
             quiet_since, ready = math.nan, False
         else:
             quiet_since = math.nan
     return tuple(found)
+
+
+def broken(
+    time: Array, position: Array, load: Array, first: int, at: int, direction: int, rate: float
+) -> Break:
+    """The break-away at a row, after a rest that began at `first`."""
+    size, since = abs(float(load[at])), direction * load[min(first, at) : at + 1]
+    risen = float(since[-1] - np.min(since)) / size if size > 0.0 else math.inf
+    return Break(float(time[at]), float(position[at]), direction, size, rate, risen)
 
 
 def departure(time: Array, position: Array, seen: int, threshold: float) -> int:
@@ -109,7 +126,7 @@ def identify_breakaway(
     Raises
     ------
     InputError
-        If the axis never breaks away.
+        If the axis never breaks away, or most times without a torque ramp from rest: that is no break-away record.
     """
     several = [records] if isinstance(records, Record) else list(records)
     breaks = [b for r in several for b in find_breaks(r, torque=torque, threshold=threshold, rest=rest)]
@@ -117,6 +134,13 @@ def identify_breakaway(
         raise InputError(
             f"the axis never breaks away: its velocity does not pass {threshold:g} rad/s from rest; ramp the "
             "torque higher or lower the threshold"
+        )
+    ramps = sum(b.ramped for b in breaks)
+    if 2 * ramps < len(breaks):
+        raise InputError(
+            f"no break-away record: {len(breaks)} times the axis moved off, {ramps} of them after a torque ramp. In "
+            "one the torque rises slowly from about 0 while the axis rests until it moves, then goes back to 0 until it "
+            "rests again (`stickslip rig run breakaway`); for the record of a motion take --method axis"
         )
     estimates: list[Estimate] = []
     misfit: dict[str, float] = {}
@@ -131,6 +155,10 @@ def identify_breakaway(
     notes = [f"{len(breaks)} break-aways from channel {torque!r}, velocity threshold {threshold:g} rad/s."]
     if rate is not None and (rate.lower > 0.0 or rate.upper < 0.0):
         notes.append(f"Break-away depends on the ramp rate: {rate.value:.3g} N·m per tenfold rate.")
+    if ramps < len(breaks):
+        notes.append(
+            f"{len(breaks) - ramps} of them followed no torque ramp from rest, and may lie elsewhere."
+        )
     few = tuple(["Repeat the ramp at other angles; one break-away has no spread."] if len(breaks) < 3 else [])
     return Identification(
         "breakaway", None, tuple(estimates), np.eye(len(estimates)), misfit, tuple(notes), few,

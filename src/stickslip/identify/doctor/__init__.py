@@ -22,8 +22,8 @@ __all__ = ["CHECKS", "Diagnosis", "examine"]
 
 CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
     excitation.channels, signals.missing, timing.ascending, timing.sampling, timing.scale, units.assumed, units.counted,
-    units.degrees, units.velocity_scale, units.too_fast, units.torque_scale, signals.wrapped, signals.saturated,
-    signals.quantised, physics.sign, physics.skew, physics.gravity, excitation.moved,
+    units.degrees, units.reference_scale, units.velocity_scale, units.too_fast, units.torque_scale, signals.wrapped,
+    signals.saturated, signals.quantised, physics.sign, physics.skew, physics.gravity, excitation.moved,
 )  # fmt: skip
 
 

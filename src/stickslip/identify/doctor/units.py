@@ -11,13 +11,16 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.identify.doctor._view import Array, View
 
-__all__ = ["assumed", "counted", "degrees", "too_fast", "torque_scale", "velocity_scale"]
+__all__ = ["assumed", "counted", "degrees", "reference_scale", "too_fast", "torque_scale", "velocity_scale"]
 
 DEG, REV, RPM = math.pi / 180.0, 2.0 * math.pi, 2.0 * math.pi / 60.0
 POSITION = {"deg": DEG, "rev": REV, "mm": 1e-3, "um": 1e-6}
 VELOCITY = {"deg/s": DEG, "rpm": RPM, "rev/s": REV, "mm/s": 1e-3, "mm/min": 1e-3 / 60}
 TIME = {"ms": 1e-3, "us": 1e-6}
 LINEAR_ONLY = ("mm", "um", "mm/s", "mm/min")
+FOLLOWS, MOVES_ALIKE = 0.95, 5.0
+"""Correlation with its reference from which on a position follows it; and how many times as far, or as little, it may
+then go: a weak loop that holds a weight goes a third of the way."""
 
 
 def assumed(view: View) -> Iterator[Finding]:
@@ -75,6 +78,42 @@ def degrees(view: View) -> Iterator[Finding]:
     if way > 0.0 and view.record.units["position_reference"] == "rad" and _eighths(way):
         message = f"the reference goes over {way:.6g}, whole eighths of a turn in degrees: degrees, not rad?"
         yield Finding("warning", "position-unit", message, remedy=remedy)
+
+
+def reference_scale(view: View) -> Iterator[Finding]:
+    """A position that follows its reference, but many times as far: one of the two is in another unit."""
+    unit = view.record.units.get("position")
+    if not unit or not view.has("position_reference") or view.record.units["position_reference"] != unit:
+        return
+    both: Array = np.stack([view.values("position"), view.values("position_reference")])
+    both = both[:, np.isfinite(both).all(axis=0)]
+    spread = np.std(both, axis=1) if both.shape[1] else np.zeros(2)
+    if not np.min(spread) > 0.0:
+        return
+    # Sizes first: absurd numbers overflow where they are squared.
+    away: Array = (both - np.mean(both, axis=1, keepdims=True)) / spread[:, None]
+    times, alike = float(spread[0] / spread[1]), float(np.mean(away[0] * away[1]))
+    if not alike > FOLLOWS or 1.0 / MOVES_ALIKE < times < MOVES_ALIKE:
+        return
+    farther = times if times > 1.0 else 1.0 / times
+    message = (
+        f"the position follows its reference, {farther:.4g} times as {'far' if times > 1.0 else 'little'}"
+    )
+    linear = unit == "m"
+    for name, size in POSITION.items():
+        if (name in LINEAR_ONLY) != linear:
+            continue
+        for channel, expected in (("position", 1.0 / size), ("position_reference", size)):
+            if abs(math.log(times / expected)) < 0.05:
+                level = "warning" if view.stated(channel) else "error"
+                said = f"{message}: {channel} in {name} rather than {unit}"
+                remedy = f"say {view.mapped(channel, name)}, if it is so"
+                yield Finding(level, f"{channel.replace('_', '-')}-unit", said, remedy=remedy)
+                return
+    yield Finding(
+        "warning", "reference-scale", f"{message}, where both are taken in {unit}",
+        remedy="check both units and whether one is on the other side of a gear",
+    )  # fmt: skip
 
 
 def velocity_scale(view: View) -> Iterator[Finding]:
