@@ -139,8 +139,8 @@ def identify_breakaway(
     if 2 * ramps < len(breaks):
         raise InputError(
             f"no break-away record: {len(breaks)} times the axis moved off, {ramps} of them after a torque ramp. In "
-            "one the torque rises slowly from about 0 while the axis rests until it moves, then goes back to 0 until it "
-            "rests again (`stickslip rig run breakaway`); for the record of a motion take --method axis"
+            "one the torque rises slowly from about 0 while the axis rests until it moves, then goes back to 0 until "
+            "it rests again (`stickslip rig run breakaway`); for the record of a motion take --method axis"
         )
     estimates: list[Estimate] = []
     misfit: dict[str, float] = {}

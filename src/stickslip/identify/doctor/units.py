@@ -87,13 +87,14 @@ def reference_scale(view: View) -> Iterator[Finding]:
         return
     both: Array = np.stack([view.values("position"), view.values("position_reference")])
     both = both[:, np.isfinite(both).all(axis=0)]
-    spread = np.std(both, axis=1) if both.shape[1] else np.zeros(2)
+    spread = both.std(axis=1) if both.shape[1] else np.zeros(2)
     if not np.min(spread) > 0.0:
         return
     # Sizes first: absurd numbers overflow where they are squared.
-    away: Array = (both - np.mean(both, axis=1, keepdims=True)) / spread[:, None]
-    times, alike = float(spread[0] / spread[1]), float(np.mean(away[0] * away[1]))
-    if not alike > FOLLOWS or 1.0 / MOVES_ALIKE < times < MOVES_ALIKE:
+    away: Array = (both - both.mean(axis=1, keepdims=True)) / spread[:, None]
+    alike: Array = away[0] * away[1]
+    times = float(spread[0] / spread[1])
+    if not float(np.mean(alike)) > FOLLOWS or 1.0 / MOVES_ALIKE < times < MOVES_ALIKE:
         return
     farther = times if times > 1.0 else 1.0 / times
     message = (
