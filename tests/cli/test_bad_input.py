@@ -377,7 +377,7 @@ SIBLINGS = [
     (["compare", "no_value.toml", "model.toml"], "lacks 'value'"),
     (["compare", "wide.toml", "model.toml"], "cannot be read"),
     (["compare", "other_schema.toml", "model.toml"], "identify the axis again"),
-    (["compare", "one_run.toml", "model.toml"], "one_run.toml holds no model"),
+    (["compare", "one_run.toml", "model.toml"], "one_run.toml is a simulation, not a model"),
     (["compare", "empty.toml", "model.toml"], "empty.toml holds no model"),
     (["export", "small_study.toml", "--to", "c99"], "small_study.toml holds no model"),
     (["recommend", "heavy.toml"], "axis.inertia = 'heavy' must be a number"),
@@ -492,3 +492,45 @@ def test_a_damaged_manifest_is_named(folder: Path, capsys: pytest.CaptureFixture
         damage(manifest)
         (out / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
         assert named in complaint(capsys, "rerun", out)
+
+
+@pytest.mark.parametrize(
+    ("verb", "file", "is_a", "verbs"),
+    [
+        ("identify", "model.toml", "is a model, not a record", "stickslip export"),
+        ("doctor", "model.toml", "is a model, not a record", "stickslip recommend"),
+        ("analyse position", "study.toml", "is a study, not a record", "stickslip study"),
+        ("doctor", "report.html", "is a report, not a record", "browser"),
+        ("recommend", "log.csv", "is a record, not a model", "stickslip identify log.csv"),
+        ("compare model.toml", "log.csv", "is a record, not a model", "stickslip identify log.csv"),
+        ("compare model.toml", "run.toml", "is a simulation, not a model", "stickslip simulate run.toml"),
+        ("tune", "log.csv", "is a record, not a sweep", "stickslip identify log.csv"),
+        ("tune", "model.toml", "is a model, not a sweep", "stickslip recommend"),
+        (
+            "simulate",
+            "tune.toml",
+            "is a sweep with a table [tune], not a simulation",
+            "stickslip tune tune.toml",
+        ),
+        ("study", "sweep.toml", "is a sweep, not a study", "stickslip sweep sweep.toml"),
+    ],
+)
+def test_a_file_of_another_kind_is_named_with_the_verb_that_takes_it(
+    verb: str, file: str, is_a: str, verbs: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    shutil.copy(DATA / "small_study.toml", tmp_path / "study.toml")
+    shutil.copy(DATA / "one_run.toml", tmp_path / "run.toml")
+    texts = {
+        "model.toml": 'law = "coulomb"\n[parameters]\nfc = 0.2\n', "log.csv": "t,q\n0,0\n1,1\n",
+        "report.html": "<html>", "sweep.toml": 'study = "thesis"\n',
+        "tune.toml": 'study = "thesis"\n[tune."controller.gain"]\nrange = [0.0, 1.0]\n',
+    }  # fmt: skip
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    assert main([*verb.split(), file]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert f"{file} {is_a}" in said
+    assert verbs in said

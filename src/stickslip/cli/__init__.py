@@ -14,6 +14,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
+from stickslip.cli import _kinds
 from stickslip.errors import InputError, Interrupted, StickslipError
 
 __all__ = ["VERBS", "main", "parser_of"]
@@ -97,6 +98,7 @@ def _dispatch(argv: list[str]) -> int:
         return 0
     if args.verb is None:
         raise InputError(f"no verb; choose from {', '.join(VERBS)}; see `stickslip --help`")
+    _kinds.check(args)
     code: int = args.run(args)
     sys.stdout.flush()
     return code

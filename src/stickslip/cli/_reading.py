@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stickslip.cli._kinds import require
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -98,6 +100,7 @@ def open_record(
     from stickslip.readers import profiles
     from stickslip.readers.reading import open_table, record_of, with_source
 
+    require(path, "record")
     table = open_table(path)
     used = args.profile if args.profile and args.profile.exists() else profiles.remembered(table)
     used = used if args.profile is None or used == args.profile else None
