@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import shlex
 import sys
 import tomllib
@@ -18,8 +19,11 @@ from stickslip import Model
 from stickslip.cli import _output, main
 from stickslip.cli.recommend import parameters, percent
 from stickslip.control.recommended import read_recommended
+from stickslip.identify.drift import compare_models
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
+from stickslip.report.identification import _panel  # type: ignore[reportPrivateUsage]
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.virtual import virtual_rig
 
@@ -95,8 +99,31 @@ def test_where_a_parameter_is_open_the_curves_alone_decide(
     assert any("the curves alone decide" in note for note in result["notes"])
     assert result["changed"] == (result["curve_difference_over_band"] > 1.0)
     assert not any(c["changed"] for c in result["parameters"])
+    assert all(0.0 <= c["p"] <= 1.0 for c in result["parameters"])
     assert main(["compare", str(files[0]), str(files[1])]) == 0
     assert "together" not in capsys.readouterr().out
+
+
+def test_a_clear_change_has_its_percentage_and_a_bound_of_its_chance(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before, after = written(tmp_path / "a.toml"), written(tmp_path / "b.toml", fc=0.285 * 1.16)
+    assert main(["compare", str(before), str(after)]) == 0
+    shown = capsys.readouterr().out
+    assert re.search(r"^fc .* \+16 % .* < 1e-06 +changed$", shown, re.MULTILINE)
+    assert re.search(r"together: p < 1e-06$", shown, re.MULTILINE)
+    assert "(p at most 0.002)" in shown
+    same = compared(before, before, capsys)
+    assert same["curve_p"] == 1.0
+    assert [c["percent"] for c in same["parameters"]] == pytest.approx([0.0] * len(same["parameters"]))
+
+
+def test_each_band_has_the_colour_of_its_curve(tmp_path: Path) -> None:
+    found = [read_identified(written(tmp_path / f"{n}.toml", fc=fc)) for n, fc in (("a", 0.28), ("b", 0.32))]
+    curves = _panel(compare_models(*found).picture).curves
+    bands, lines = [c for c in curves if c.kind == "band"], [c for c in curves if c.kind == "line"]
+    assert [c.style.colour for c in bands] == [c.style.colour for c in lines]
+    assert len({c.style.colour for c in lines}) == 2
 
 
 def test_false_alarms_are_as_rare_as_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,6 +13,8 @@ import argparse
 import math
 from pathlib import Path
 
+LEAST = 1e-6
+"""A chance below it depends on how normal the estimates are, far out."""
 SUMMARY = "has the friction changed between two identified models?"
 
 
@@ -43,18 +45,33 @@ def run(args: argparse.Namespace) -> int:
         _output.print_json({**result.as_dict(), "plot": str(args.plot) if args.plot else None})
         return 0
     if result.changes:
-        print(f"{'parameter':<14}{'first':>11}{'second':>11}  {'difference, 95 %':<26} {'unit':<11} p (Holm)")
+        head = f"{'parameter':<14}{'first':>11}{'second':>11}{'change':>10}"
+        print(f"{head}  {'difference, 95 %':<26} {'unit':<11} p (Holm)")
     for c in result.changes:
         span = f"[{c.lower:.4g}, {c.upper:.4g}]"
+        change = "-" if math.isnan(c.percent) else f"{c.percent:+.3g} %"
         mark = "changed" if c.changed else ""
-        p = "-" if math.isnan(c.p) else f"{c.p:.2g}"
-        print(f"{c.name:<14}{c.first:>11.5g}{c.second:>11.5g}  {span:<26} {c.unit:<11} {p:<9}{mark}".rstrip())
+        line = f"{c.name:<14}{c.first:>11.5g}{c.second:>11.5g}{change:>10}"
+        print(f"{line}  {span:<26} {c.unit:<11} {chance(c.p):<9}{mark}".rstrip())
     if result.changes:
         print()
     if not math.isnan(result.p):
-        print(f"friction parameters together: p = {result.p:.2g}")
-    print(f"sliding curve: largest difference is {result.largest:.2g} times what the intervals explain")
+        print(f"friction parameters together: p {equal_to(result.p)}")
+    print(
+        f"sliding curve: largest difference is {result.largest:.2g} times what the intervals explain "
+        f"(p at most {result.curve_p:.1g})"
+    )
     for note in result.notes:
         print(note)
     print("The friction has changed." if result.changed else "No change that the intervals do not explain.")
     return 0
+
+
+def chance(p: float) -> str:
+    """A chance, or the bound below which its value tells nothing."""
+    return f"< {LEAST:g}" if p < LEAST else f"{p:.2g}"
+
+
+def equal_to(p: float) -> str:
+    """The same behind a letter."""
+    return chance(p) if p < LEAST else f"= {chance(p)}"

@@ -26,7 +26,7 @@ DRAWS = 400
 class Change:
     """One parameter in both models; ``p`` is the chance of such a difference without a change, after Holm.
 
-    Not a number where it cannot be told, as other parameters of the law are not identified.
+    It does not decide (``decides``) where other parameters of the law are not identified: the two may trade places.
     """
 
     name: str
@@ -36,11 +36,17 @@ class Change:
     lower: float
     upper: float
     p: float
+    decides: bool = True
 
     @property
     def changed(self) -> bool:
         """At the 5 % level of all parameters together."""
-        return self.p < 0.05
+        return self.decides and self.p < 0.05
+
+    @property
+    def percent(self) -> float:
+        """Change in per cent of the first value; not a number where that is 0, or the two differ in sign."""
+        return 100.0 * (self.second / self.first - 1.0) if self.first * self.second > 0.0 else math.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +61,9 @@ class Comparison:
         Of the joint test on those of the law (chi-square); not a number where the law has some that are not identified.
     velocity, difference, band : array, shape (n,)
         Second curve minus first, and the half-width that holds 95 % of the whole curves.
+    curve_p : float
+        Chance that curves of the same friction differ as much somewhere, at most: from `DRAWS` drawn, of which one more
+        counts than does.
     changed : bool
         Either test says so; the curves' alone where there is no other.
     notes : tuple of str
@@ -66,6 +75,7 @@ class Comparison:
     velocity: Array
     difference: Array
     band: Array
+    curve_p: float
     changed: bool
     notes: tuple[str, ...]
     picture: Picture
@@ -78,8 +88,8 @@ class Comparison:
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            "changed": self.changed, "p": self.p, "curve_difference_over_band": self.largest,
-            "parameters": [{**asdict(c), "changed": c.changed} for c in self.changes],
+            "changed": self.changed, "p": self.p, "curve_difference_over_band": self.largest, "curve_p": self.curve_p,
+            "parameters": [{**asdict(c), "percent": c.percent, "changed": c.changed} for c in self.changes],
             "curve": {
                 "velocity": self.velocity.tolist(), "difference": self.difference.tolist(), "band": self.band.tolist()
             },
@@ -125,9 +135,9 @@ def compare_models(
             "Both come from a record in common: their errors are not independent, and the test is too mild."
         )
     velocity = grid_of(first, second, top)
-    difference, band, sides = compared_curves(first, second, velocity, 1.0 - 0.5 * level)
+    difference, band, curve_p, sides = compared_curves(first, second, velocity, 1.0 - 0.5 * level)
     changed = bool(np.any(np.abs(difference) > band)) or p < 0.5 * level
-    return Comparison(changes, p, velocity, difference, band, changed, tuple(notes),
+    return Comparison(changes, p, velocity, difference, band, curve_p, changed, tuple(notes),
                       picture_of(first, velocity, sides, changed, (first, second)))  # fmt: skip
 
 
@@ -174,8 +184,10 @@ def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Ch
     left = sorted({e.name for e in (*first.estimates, *second.estimates)} - set(names))
     notes = [f"Not compared, since not identified in both: {', '.join(left)}."] if left else []
     if open_ones:
-        notes.append("As parameters of the law are not identified, the curves alone decide.")
-        joint, changes = math.nan, [replace(c, p=math.nan) for c in changes]
+        notes.append(
+            "As parameters of the law are not identified, the curves alone decide: others may have changed in exchange."
+        )
+        joint, changes = math.nan, [replace(c, decides=False) for c in changes]
     return tuple(changes), joint, notes
 
 
@@ -211,8 +223,9 @@ def grid_of(first: Identified, second: Identified, top: float | None) -> Array:
 
 def compared_curves(
     first: Identified, second: Identified, velocity: Array, inside: float
-) -> tuple[Array, Array, list[tuple[Array, Array]]]:  # fmt: skip
-    """Difference of the curves, the half-width that holds that part of whole curves, and each curve's own draws.
+) -> tuple[Array, Array, float, list[tuple[Array, Array]]]:  # fmt: skip
+    """Difference of the curves, the half-width that holds that part of whole curves, the chance of such a difference,
+    and each curve's own draws.
 
     The half-width is a multiple of the standard deviation at every velocity, the same multiple at all of them, so
     that it holds for the curve as a whole.
@@ -232,8 +245,11 @@ def compared_curves(
     rest = (sides[1][1][:count] - sides[1][0]) - (sides[0][1][:count] - sides[0][0])
     spread = np.sqrt(np.mean(rest**2, axis=0))
     spread = np.maximum(spread, 1e-12 * float(np.max(np.abs(sides[0][0]))))
-    factor = float(np.quantile(np.max(np.abs(rest) / spread, axis=1), inside))
-    return sides[1][0] - sides[0][0], factor * spread, sides
+    farthest = np.max(np.abs(rest) / spread, axis=1)
+    factor = float(np.quantile(farthest, inside))
+    difference = sides[1][0] - sides[0][0]
+    as_far = int(np.sum(farthest >= np.max(np.abs(difference) / spread)))
+    return difference, factor * spread, (as_far + 1) / (count + 1), sides
 
 
 def picture_of(
@@ -247,8 +263,8 @@ def picture_of(
     traces: list[Trace] = []
     for (best, drawn), label in zip(sides, labels, strict=True):
         low, high = np.percentile(drawn[:, rows], [2.5, 97.5], axis=0)
-        traces += [Trace("" if traces else "95 % bands", velocity[rows], low, "band", high)]
-        traces += [Trace(label, velocity[rows], best[rows])]
+        traces += [Trace("", velocity[rows], low, "own band", high)]
+        traces += [Trace(f"{label}, 95 % band", velocity[rows], best[rows])]
     message = "The friction has changed." if changed else "No change that the intervals do not explain."
     return Picture(
         "comparison", "Friction at constant velocity", message, f"velocity ({model.unit('rad/s')})",

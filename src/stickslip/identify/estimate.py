@@ -77,8 +77,8 @@ class Trace:
         Empty for none in the legend.
     x, y : array, shape (n,)
     kind : str
-        "line", "points", "open points", "faint" (one of many), "band" (between `y` and `y2`), or "vertical" (a line
-        at every x).
+        "line", "points", "open points", "faint" (one of many), "band" (between `y` and `y2`), "own band" (the same
+        in the colour of the line that follows), or "vertical" (a line at every x).
     y2 : array, shape (n,), optional
     """
 

@@ -60,7 +60,19 @@ def _panel(picture: Picture) -> plots.Panel:
     if picture.x_scale == "log":
         x_factor, x_label = 1.0, picture.x_label
     y_factor, y_label = _readable(picture.y_label, [t.y for t in picture.traces if t.kind != "vertical"])
-    curves = [_curve(trace, x_factor, y_factor, styles) for trace in picture.traces]
+    curves: list[plots.Curve] = []
+    below: Trace | None = None
+    for trace in picture.traces:
+        if trace.kind == "own band":
+            below = trace
+            continue
+        curve = _curve(trace, x_factor, y_factor, styles)
+        if below is not None and below.y2 is not None:
+            edge = plots.Style(curve.style.colour, "-", 0.6)
+            x, low, high = x_factor * below.x, y_factor * below.y, y_factor * below.y2
+            curves.append(plots.Curve(x, low, below.label, edge, kind="band", y2=high))
+            below = None
+        curves.append(curve)
     return plots.Panel(curves, y_label, x_label, x_scale=picture.x_scale)
 
 
