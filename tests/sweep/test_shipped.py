@@ -1,10 +1,14 @@
 """The sweeps that ship: they load, and a handful of their cases run and are drawn."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from stickslip.cli import main
+from stickslip.report import sweep_pictures
 from stickslip.report.sweep_pictures import draw
 from stickslip.sweep import execute
 from stickslip.sweep.block import compute
@@ -34,3 +38,44 @@ def test_the_gain_is_recommended_where_the_percentile_is_least(tmp_path):
     assert found.gains.min() > 0.5
     assert found.gains.max() < 1.1
     assert any(path.name.startswith("gain-") for path in draw(tmp_path, few))
+
+
+def gains_of(tmp_path, more):
+    """A sweep of the gain of a small study, not yet run."""
+    data = (Path(__file__).parents[1] / "data" / "small_study.toml").as_posix()
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        f'study = "{data}"\nonly = ["nominal", "sine", "FF-lugre"]\ncheck = "no"\n{more[0]}\n'
+        f'[vary."controller.gain"]\nrange = [0.5, 1.1]\n{more[1]}\n[vary."friction.fs"]\nscale = [0.9, 1.1]\n{more[2]}'
+    )
+    return path
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        (("cases = 149", "", ""), "149 cases are too few for .*; take 150 or more"),
+        (("method = 'grid'", "points = 20", "points = 19"), "each gain of the grid has 19 cases"),
+    ],
+)
+def test_no_gain_is_recommended_from_too_few_cases(tmp_path, capsys, more, why):
+    path, out = gains_of(tmp_path, more), tmp_path / "out"
+    assert main(["sweep", str(path), "--out", str(out)]) == 0
+    assert re.search(f"no gain is recommended: {why}", capsys.readouterr().err)
+    assert not list(out.rglob("gain-*"))
+    assert list(out.rglob("percentiles-*"))
+
+
+def test_a_gain_of_a_grid_is_one_of_its_points(tmp_path, monkeypatch):
+    sweep = load(gains_of(tmp_path, ("method = 'grid'", "points = 5", "points = 20")))
+    execute.run(sweep, tmp_path / "out")
+    found = recommended(tmp_path / "out", sweep, sweep.runs[0])
+    assert found.gains.tolist() == pytest.approx([0.5, 0.65, 0.8, 0.95, 1.1])
+    drawn = {}
+    monkeypatch.setattr(sweep_pictures, "draw_panels", lambda stem, *about: drawn.update({stem.name: about}))
+    draw(tmp_path / "out", sweep)
+    title, message, panels, _ = drawn["gain-signed-sine-nominal"]
+    assert title == "mine: controller.gain, friction.fs varied in study small_study"
+    assert panels[0].y_label == "95th percentile (mrad)"
+    assert "95th percentile of the RMS position error" in message
+    assert message.endswith(f"FF-lugre {found.gain:.2f}")

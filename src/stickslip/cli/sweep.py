@@ -41,6 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.cli import _output
     from stickslip.errors import InputError
     from stickslip.sweep import execute
+    from stickslip.sweep.gains import too_few
     from stickslip.sweep.plan import load
     from stickslip.sweep.summary import summarise, write_summary
 
@@ -64,6 +65,8 @@ def run(args: argparse.Namespace) -> int:
             backend = "processes" if args.processes else "threads"
             manifest = execute.run(sweep, out, args.jobs, backend, args.scheduler, progress, _output.warn)
         rows = summarise(out, sweep)
+        if why := too_few(sweep.drawn):
+            _output.warn(why)
         written = [write_summary(out, sweep, rows), out / "manifest.json"]
         if not args.no_report:
             from stickslip.report.sweep_pictures import draw

@@ -314,20 +314,26 @@ def _line(axes: Any, curve: Curve) -> None:
 
 
 def _plain_ticks(axes: Any, low: float, high: float) -> None:
-    """1, 2 and 5 of each decade: matplotlib's own labels overlap on short logarithmic axes."""
+    """1, 2 and 5 of each decade, or even steps where they are fewer than three: matplotlib's own labels overlap."""
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     ticks = [m * 10.0**d for d in decades for m in (1, 2, 5) if low * 0.999 <= m * 10.0**d <= high * 1.001]
+    if len(ticks) < 3:
+        from matplotlib.ticker import MaxNLocator
+
+        ticks = [t for t in MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, high) if low <= t <= high]
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
     axes.set_xticks([], minor=True)
 
 
 def _fill(axes: Any, panel: Panel, bare: bool) -> None:
     axes.set_xscale(panel.x_scale)
-    if panel.x_scale == "log" and panel.x_limits and panel.x_limits[1] < 300.0 * panel.x_limits[0]:
-        _plain_ticks(axes, *panel.x_limits)
     axes.set_yscale(panel.y_scale)
     for curve in panel.curves:
         _line(axes, curve)
+    low, high = panel.x_limits or axes.get_xlim()
+    if panel.x_scale == "log" and high < 300.0 * low:
+        _plain_ticks(axes, low, high)
+        axes.set_xlim(low, high)  # Ticks may have widened it.
     if panel.y_names:
         axes.set_yticks(range(len(panel.y_names)), panel.y_names)
         axes.set_ylim(len(panel.y_names) - 0.5, -0.5)

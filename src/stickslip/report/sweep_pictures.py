@@ -97,6 +97,7 @@ def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun])
     factor, shown = scaled(
         max(_or_zero(float(np.max(y[np.isfinite(y)], initial=0.0))) for y in lines.values()), unit
     )
+    label = f"95th percentile ({shown})"
     percent = 100.0 * widest(sweep.drawn.spreads)
     families = {"feedforward": "FF-", "feedback": "FB-"}
     panels: list[Panel] = []
@@ -104,14 +105,12 @@ def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun])
         members = [n for n in lines if n.startswith(prefix)]
         rest = [n for n in lines if not n.startswith(tuple(families.values()))]
         if members:
-            panels.append(
-                _lines(percent * levels, lines, [*rest, *members], factor, f"{what} ({shown})", family)
-            )
+            panels.append(_lines(percent * levels, lines, [*rest, *members], factor, label, family))
     if not panels:
-        panels.append(_lines(percent * levels, lines, list(lines), factor, f"{what} ({shown})", ""))
+        panels.append(_lines(percent * levels, lines, list(lines), factor, label, ""))
     message = (
-        f"{_choice(lines, percent)} 95th percentile over {sweep.drawn.cases} cases, every number that varies anywhere "
-        "within that distance"
+        f"{_choice(lines, percent)} 95th percentile of the {what} over {sweep.drawn.cases} cases, "
+        "every number that varies anywhere within that distance"
     )
     return _saved(stem, sweep.title, message, panels, 2.3)
 
@@ -245,8 +244,13 @@ def _gains(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Pa
         for n, c in found.items()
     ]
     said = ", ".join(f"{n} {c.gain:.2f}" for n, c in found.items())
-    panels = [Panel([*curves, *marks], f"{what} ({shown})", "gain of the compensator")]
-    message = f"recommended gain (least 95th percentile): {said}"
+    panels = [Panel([*curves, *marks], f"95th percentile ({shown})", "gain of the compensator")]
+    width = max(c.width for c in found.values())
+    steps = f" (steps of {width:.2g})" if width else ""
+    message = (
+        f"recommended gain, at which the 95th percentile of the {what} over {sweep.drawn.cases} cases is least{steps}: "
+        f"{said}"
+    )
     return _saved(stem, sweep.title, message, panels, 2.1)
 
 

@@ -140,7 +140,6 @@ def load(sweep: str | Path, moved: Mapping[str, Path] | None = None) -> Sweep:
 
 
 def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sweep:
-    title = table.text("title", name)
     study = _study(table, moved)
     only = table.texts("only", _names(study)) if table.has("only") else []
     runs = studies.select([*study.runs, *study.extras], only)
@@ -153,6 +152,7 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
     drawn, left_out = _drawn(table)
     tuned = _spreads(table, "tune", drawn.method) if table.has("tune") else []
     step, device = _lanes(table, metrics)
+    title = table.text("title", _title(name, study, drawn, tuned))
     percentile = table.positive("percentile", "%", 95.0) if tuned else 95.0
     if percentile > 100.0:
         raise table.error("percentile", "must be at most 100 %")
@@ -162,6 +162,16 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
     )  # fmt: skip
     _check(found, table)
     return found
+
+
+def _title(name: str, study: Study, drawn: Drawn, tuned: Sequence[Spread]) -> str:
+    """What a sweep without a title of its own does."""
+
+    def listed(names: Sequence[str]) -> str:
+        return f"{', '.join(names[:4])}{f' and {len(names) - 4} more' if len(names) > 4 else ''}"
+
+    varied = f"{listed([n for n in drawn.names if n != LEVEL])} varied in study {study.name}"
+    return f"{name}: {f'{listed([s.name for s in tuned])} tuned, ' if tuned else ''}{varied}"
 
 
 def _lanes(table: Table, metrics: Sequence[str]) -> tuple[float, str]:
