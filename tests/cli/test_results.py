@@ -191,6 +191,19 @@ def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
     assert f"fc {model_parameters['fc']:.4g} N·m;" in line
 
 
+def test_no_axes_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["recommend", str(written(tmp_path / "m.toml")), "--axes", "0"]) == 2
+    assert "--axes 0 must be at least 1" in capsys.readouterr().err
+
+
+def test_a_negative_gain_is_not_exported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model, out = written(tmp_path / "m.toml"), tmp_path / "out"
+    asked = ["export", str(model), "--to", "c99", "--compensator", "ff", "--gain", "-1", "--out", str(out)]
+    assert main(asked) == 2
+    assert "gain = -1 must be at least 0" in capsys.readouterr().err
+    assert not out.exists()
+
+
 def test_what_is_recommended_is_exported_and_run_by_the_commands_that_are_printed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -198,7 +211,7 @@ def test_what_is_recommended_is_exported_and_run_by_the_commands_that_are_printe
     monkeypatch.setattr("stickslip.identify.recommend.LEADS", (0.5,))
     monkeypatch.chdir(tmp_path)
     model, out = written(tmp_path / "m.toml"), tmp_path / "my axis" / "recommended.toml"
-    asked = ["recommend", str(model), "--bandwidth", "20", "--axes", "0", "--confirm", "0", "--out"]
+    asked = ["recommend", str(model), "--bandwidth", "20", "--axes", "1", "--confirm", "0", "--out"]
     assert main([*asked, str(out)]) == 0
     said = next(x for x in capsys.readouterr().out.splitlines() if x.startswith("next: "))
     command = shlex.split(said.removeprefix("next: stickslip "))

@@ -364,6 +364,11 @@ def test_a_sweep_is_run_again_from_its_manifest(tmp_path, capsys):
         ("scale = [0.8, 1.2]", "values = [0.8, 1.2]", "belongs to a grid"),
         ("scale = [0.8, 1.2]", "scal = [0.8, 1.2]", "give one of scale"),
         ("scale = [0.8, 1.2]", 'scale = ["a", 1.2]', "must be a number"),
+        (
+            'friction.fs"]\nscale = [0.8',
+            'controller.gain"]\nrange = [-0.8',
+            "end of a range: .*gain = -0.8 must be at",
+        ),
         ('"position_rms_rad"', '"position_rms"', "did you mean"),
         ("friction.fs", "friction.fss", "no run has a number"),
         ("cases = 600", "cases = 0", "at least 1"),
@@ -383,6 +388,16 @@ def test_bad_sweeps_are_told(tmp_path, old, new, message):
     path.write_text(text)
     with pytest.raises(ConfigError, match=message):
         load(path)
+
+
+@pytest.mark.parametrize("jobs", ["0", "-1"])
+def test_no_jobs_are_refused(tmp_path, capsys, jobs):
+    out = tmp_path / "out"
+    assert main(["sweep", str(SMALL), "--jobs", jobs, "--out", str(out)]) == 2
+    assert f"--jobs {jobs} must be at least 1; leave it out for one block a core" in capsys.readouterr().err
+    assert not out.exists()
+    assert main(["rerun", str(tmp_path), "--jobs", jobs]) == 2
+    assert f"--jobs {jobs} must be at least 1" in capsys.readouterr().err
 
 
 def test_more_cases_than_the_disk_has_room_for(small, tmp_path):

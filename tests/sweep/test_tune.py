@@ -84,6 +84,16 @@ def test_what_cannot_be_tuned(tmp_path, capsys):
     for old, new, message in (
         ("percentile = 75", "percentile = 101", "at most 100"),
         ('tune."controller.gain"', 'tune."controller.gian"', "no run has a number"),
+        (
+            "range = [0.0, 1.5]",
+            "range = [-0.5, 1.5]",
+            "tune: run .* at the end of a range: .*gain = -0.5 must be",
+        ),
+        (
+            'tune."controller.gain"',
+            'tune."friction.k"',
+            r"friction.k is a list; name an element, friction.k\[0\]",
+        ),
     ):
         path = tmp_path / "bad.toml"
         path.write_text(text.replace(old, new))

@@ -76,9 +76,14 @@ def run(args: argparse.Namespace) -> int:
 
     if args.out:
         writable(args.out, args.model)
-    for option in ("axes", "confirm"):
-        if getattr(args, option) < 0:
-            raise InputError(f"--{option} {getattr(args, option)} must be 0 or more")
+    if args.axes < 1:
+        raise InputError(
+            f"--axes {args.axes} must be at least 1: what is safe on the best estimate alone need not be on the machine"
+        )
+    if args.confirm < 0:
+        raise InputError(
+            f"--confirm {args.confirm} must be at least 0, which confirms nothing; leave it out for 39"
+        )
     found = read_identified(args.model)
     drive = Drive(
         args.bandwidth, args.damping, args.sample_time, args.counts_per_rev, args.torque_limit, args.amplitude,

@@ -24,10 +24,13 @@ def run(args: argparse.Namespace) -> int:
     if args.folder.name == "manifest.json" and args.folder.is_file():
         args.folder = args.folder.parent
     from stickslip.cli import _output
+    from stickslip.errors import InputError
     from stickslip.study.rerun import rerun as rerun_study
     from stickslip.sweep.rerun import is_sweep
     from stickslip.sweep.rerun import rerun as rerun_sweep
 
+    if args.jobs < 1:
+        raise InputError(f"--jobs {args.jobs} must be at least 1; give how many may run at a time")
     sweep = is_sweep(args.folder)
     rerun = rerun_sweep if sweep else rerun_study
     with _output.progress_bar("rerun") as progress:

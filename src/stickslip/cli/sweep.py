@@ -22,9 +22,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: sweep-SWEEP)")
     parser.add_argument("--cases", type=int, metavar="N", help="another number of cases than the file's")
-    parser.add_argument(
-        "--jobs", type=int, default=0, metavar="N", help="blocks at a time (default: one a core)"
-    )
+    parser.add_argument("--jobs", type=int, metavar="N", help="blocks at a time (default: one a core)")
     parser.add_argument("--processes", action="store_true", help="use processes instead of threads")
     parser.add_argument(
         "--scheduler", default="", metavar="URL", help="of Dask, tcp://host:8786: its workers run it"
@@ -57,13 +55,17 @@ def run(args: argparse.Namespace) -> int:
                 f"--cases {args.cases}: at least 1, and not for a grid; change its points instead"
             )
         sweep = replace(sweep, drawn=replace(sweep.drawn, cases=args.cases))
+    if args.jobs is not None and args.jobs < 1:
+        raise InputError(f"--jobs {args.jobs} must be at least 1; leave it out for one block a core")
     if sweep.left_out:
         _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(sweep.left_out)}")
     out: Path = args.out or Path(f"sweep-{sweep.name}")
     try:
         with _output.progress_bar(sweep.name) as progress:
             backend = "processes" if args.processes else "threads"
-            manifest = execute.run(sweep, out, args.jobs, backend, args.scheduler, progress, _output.warn)
+            manifest = execute.run(
+                sweep, out, args.jobs or 0, backend, args.scheduler, progress, _output.warn
+            )
         rows = summarise(out, sweep)
         if why := too_few(sweep.drawn):
             _output.warn(why)

@@ -306,13 +306,23 @@ def _check(sweep: Sweep, table: Table) -> None:
             )
     for run in sweep.runs:
         for numbers in _ends(sweep.drawn):
-            values = {k: _plain(v[0]) for k, v in sweep.values(run, numbers[None, :]).items()}
-            try:
-                varied(run, values)
-            except InputError as error:
-                raise ConfigError(
-                    f"{table.label('vary')}: run {run.key} at the end of a range: {error}"
-                ) from None
+            _try(
+                run, {k: _plain(v[0]) for k, v in sweep.values(run, numbers[None, :]).items()}, table, "vary"
+            )
+        for s in (s for s in sweep.tuned if belongs(run, s.name)):
+            base = value_of(run, s.name)
+            if isinstance(base, tuple):
+                raise ConfigError(f"{table.label('tune')}: {s.name} is a list; name an element, {s.name}[0]")
+            for end in (s.low, s.high):
+                _try(run, {s.name: end * (base if s.factor else 1.0)}, table, "tune")
+
+
+def _try(run: PlannedRun, values: Mapping[str, Any], table: Table, key: str) -> None:
+    """Refuse numbers at the end of a range with which the run cannot be run."""
+    try:
+        varied(run, values)
+    except InputError as error:
+        raise ConfigError(f"{table.label(key)}: run {run.key} at the end of a range: {error}") from None
 
 
 def _all_numbers(run: PlannedRun) -> list[str]:

@@ -43,8 +43,11 @@ class Compensator:
     velocity: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.gain):
-            raise ParameterError(f"{self.name}: gain = {self.gain:g} must be a finite number")
+        if not (self.gain >= 0.0 and math.isfinite(self.gain)):
+            raise ParameterError(
+                f"{self.name}: gain = {self.gain:g} must be at least 0 and finite; 1 cancels the whole model, and a "
+                "negative one would add to the friction"
+            )
         if self.filter_hz is not None and not (self.filter_hz > 0.0 and math.isfinite(self.filter_hz)):
             raise ParameterError(f"{self.name}: filter_hz = {self.filter_hz:g} Hz must be greater than 0")
         for name, value, unit in (("lead", self.lead, "s"), ("deadband", self.deadband, "rad/s")):
