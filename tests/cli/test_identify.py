@@ -300,13 +300,33 @@ def test_a_saved_profile_is_never_used_in_silence(
     assert main(calls) == 0
     second = capsys.readouterr()
     line = f"read by the saved profile {kept}, which says position=q:deg; delete that file to forget it"
-    assert line in second.err
+    assert "profile" not in second.err  # at length it is said once, when it was written
     assert line in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert second.out == first.out
+    assert second.out == f"{first.out}profile: {kept}\n"
     assert main([*calls, "--map", "position=q:deg"]) == 0  # all that the profile says
-    assert "saved profile" not in capsys.readouterr().err
+    third = capsys.readouterr()
+    assert "profile" not in third.err
+    assert third.out == first.out
+    assert main(["doctor", "log.csv"]) == 0
+    assert line in capsys.readouterr().out
     kept.unlink()
     assert main(calls) == 0
     third = capsys.readouterr()
     assert "saved profile" not in third.err
     assert third.out != first.out
+
+
+def test_a_log_without_torque_gets_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    time = 1e-3 * np.arange(3000)
+    table = np.column_stack([time, np.sin(3.0 * time)])
+    np.savetxt("log.csv", table, "%.9g", ",", header="clock,position", comments="")
+    for method in ("axis", "breakaway"):
+        assert main(["identify", "log.csv", "--map", "time=clock", "--method", method]) == 2
+        *kept, line = capsys.readouterr().err.splitlines()
+        assert all("is kept in the profile" in x for x in kept)
+        assert "torque" in line
+        assert "--map torque=COLUMN:UNIT" in line
+    assert kept == []

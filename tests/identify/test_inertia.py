@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from stickslip import Model
-from stickslip.cli.identify import interval
+from stickslip.cli.identify import show
 from stickslip.errors import InputError
 from stickslip.identify.axis_trial import Trial
-from stickslip.identify.estimate import Estimate
+from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.inertia import frequency_response, inertia, verdict_on
 from stickslip.machines.servo import ServoAxis
+from stickslip.report.identified import shown
 from stickslip.simulation.driven import Drive, Mechanics, drive_axis
 
 J = 4.2757e-4  # thesis 4.2
@@ -96,9 +97,15 @@ def test_what_cannot_be_fitted_is_said() -> None:
         inertia([], AXIS)
 
 
-def test_a_value_below_zero_and_an_interval_of_many_decades_are_called_what_they_are():
+def test_a_value_below_zero_and_an_interval_of_many_decades_are_called_what_they_are(capsys):
     assert "below 0" in verdict_on(-2.0, -1.0)
     assert verdict_on(-2.0, 1.0) == "the data do not tell it from 0"
     wide = Estimate("k", "N·m/rad", "k", 1.0, 1.0, 3e-12, 3e16, False, "")
-    assert interval(wide) == "[not determined]"
-    assert interval(replace(wide, lower=1e-3, upper=9.0)) == "[0.001, 9]"
+    show(Identification("axis", None, (wide, replace(wide, name="fs", lower=0.5, upper=2.0)), np.eye(2), {}))
+    line, other = capsys.readouterr().out.splitlines()[2:4]
+    assert line.split() == ["k", "not", "determined", "N·m/rad", "not", "identified"]
+    assert other.split()[1:4] == ["1", "[0.5,", "2]"]
+    assert line.index("N·m/rad") == other.index("N·m/rad")
+    row = shown(wide)
+    assert (row["value"], row["interval"]) == ("not determined", "-")
+    assert "the model's 1 is one choice among many" in row["verdict"]

@@ -342,3 +342,22 @@ def test_pickles_are_refused(tmp_path):
     (tmp_path / "a.npy").write_bytes(buffer.getvalue())
     with pytest.raises(InputError, match="without objects"):
         open_table(tmp_path / "a.npy")
+
+
+@pytest.mark.parametrize(
+    ("name", "stated", "factor"),
+    [
+        ("time_s", True, 1.0),
+        ("t_s", True, 1.0),
+        ("sec", True, 1.0),
+        ("time_ms", True, 1e-3),
+        ("t", False, 1.0),
+    ],
+)
+def test_a_time_column_whose_name_ends_in_its_unit_states_it(tmp_path, name, stated, factor):
+    path = tmp_path / "log.csv"
+    path.write_text(f"{name},q_rad\n" + "".join(f"{i},{0.1 * i}\n" for i in range(1, 40)))
+    record = read(path)
+    column = next(c for c in record.meta["reading"]["columns"] if c["channel"] == "time")
+    assert (column["source"] == "name") == stated
+    assert record.time[-1] - record.time[0] == pytest.approx(38.0 * factor)

@@ -115,12 +115,15 @@ def open_record(
         or args.sample_time is not None
         or (args.profile and not used)
     ):
-        written = profiles.save(profiles.merged(args.map, drive, args.sample_time, kept), table, args.profile)
+        merged = profiles.merged(args.map, drive, args.sample_time, kept)
+        if kept is None or not profiles.alike(merged, kept):
+            written = profiles.save(merged, table, args.profile)
     notes: tuple[Finding, ...] = ()
     if args.profile is None:
         said = profiles.merged(args.map, drive, args.sample_time, None)
         notes = profile_notes(used, kept, said, written)
         record.meta["reading"]["findings"] += [note.as_data() for note in notes]
+        record.meta["reading"]["profile"] = str(used) if used and notes and not written else ""
     return Opened(with_source(record, path), used, written, notes)
 
 

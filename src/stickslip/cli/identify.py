@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip.cli import _reading
-from stickslip.cli._methods import METHODS, all_laws, law_file, values
+from stickslip.cli._methods import METHODS, all_laws, law_file, torque_channel, values
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -121,6 +121,11 @@ def run(args: argparse.Namespace) -> int:
     model_file, report_file = places(args.out)
     sources = [checked(path, args) for path in args.files]
     sources += [checked(path, args, held_out=True) for path in args.validation]
+    driven([s.record for s in sources], args)
+    for path, s in zip([*args.files, *args.validation], sources, strict=True):
+        for finding in s.findings:
+            if finding.level == "warning":
+                print(f"stickslip: {path}: {finding.line()}", file=sys.stderr)
     left_out: list[str] = []
     if "all" in args.law:
         tried, left_out = all_laws()
@@ -147,6 +152,9 @@ def run(args: argparse.Namespace) -> int:
         show(found)
         for what, path in made.items():
             print(f"{what.partition('_')[0]}: {path}")
+        for path in dict.fromkeys(s.record.meta["reading"].get("profile", "") for s in sources):
+            if path:
+                print(f"profile: {path}")
     return 0
 
 
@@ -235,8 +243,18 @@ def written(
     return made
 
 
+def driven(records: Sequence[Record], args: argparse.Namespace) -> None:
+    """Refuse records that lack what the method needs, before anything else is said of them."""
+    if args.method in METHODS:
+        torque_channel(records, args)
+    else:
+        axis = axis_of(records[0], args)
+        for record in records:
+            trial(record, axis, args)
+
+
 def checked(path: Path, args: argparse.Namespace, held_out: bool = False) -> Source:
-    """Read a record and let the doctor look at it; warnings go to stderr."""
+    """Read a record and let the doctor look at it."""
     from stickslip.errors import InputError
     from stickslip.identify.doctor import examine
     from stickslip.report.identified import Source
@@ -245,9 +263,11 @@ def checked(path: Path, args: argparse.Namespace, held_out: bool = False) -> Sou
         if errors := examine(record).errors:
             raise InputError(f"{path}: {errors[0].line()}; see `stickslip doctor {path}`")
 
-    diagnosis = examine(_reading.read_record(path, args, accept))
-    for finding in diagnosis.warnings:
-        print(f"stickslip: {path}: {finding.line()}", file=sys.stderr)
+    opened = _reading.open_record(path, args, accept)
+    if opened.written:
+        for finding in opened.notes:
+            print(f"stickslip: {path}: {finding.line()}", file=sys.stderr)
+    diagnosis = examine(opened.record)
     return Source(path.name, diagnosis.record, diagnosis.findings, source_of(diagnosis.record), held_out)
 
 
@@ -309,7 +329,8 @@ def show(found: Identification) -> None:
     print(f"{found.method.replace('_', ' ')}{law}\n")
     width = max(16, *(len(e.name) + 2 for e in found.estimates)) if found.estimates else 16
     for e in found.estimates:
-        print(f"{e.name:<{width}}{e.value:>12.5g}  {interval(e):<26} {e.unit:<11} {verdict(e)}".rstrip())
+        value = f"{'not determined':<40}" if e.undetermined else f"{e.value:>12.5g}  {interval(e):<26}"
+        print(f"{e.name:<{width}}{value} {e.unit:<11} {verdict(e)}".rstrip())
     print()
     for name, number in found.misfit.items():
         print(f"{name:<32}{number:>12.5g}  {found.misfit_unit(name)}".rstrip())
@@ -325,8 +346,6 @@ def interval(e: Estimate) -> str:
 
     if math.isnan(e.lower) or math.isnan(e.upper):
         return "[unknown]"
-    if e.undetermined:
-        return "[not determined]"
     return f"[{e.lower:.5g}, {e.upper:.5g}]"
 
 

@@ -234,7 +234,9 @@ def noted(found: Identification, *more: str) -> Identification:
     """The same with these notes, and which parameters are not identified."""
     missing = [e.name for e in found.estimates if not e.identified]
     last = (
-        [f"Not identified: {', '.join(missing)}; their values are one choice among many."] if missing else []
+        [f"Not identified: {', '.join(missing)}; the model's values of them are one choice among many."]
+        if missing
+        else []
     )
     return replace(found, notes=(*found.notes, *more, *strange_loop(found), *rising(found.estimates), *last))
 

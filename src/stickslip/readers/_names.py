@@ -89,7 +89,7 @@ WORDS = _table(
 
 WHOLE = _table(
     """
-    time: t ts secs s sec time_s tout t_s
+    time: t ts secs s sec tout
     position: q qm q_m x y th 6064 607a_actual pl.fb s-0-0051 s-0-0053 px x_m qmes q_act pos_estimate
         encoder.pos_estimate p_act r2521 phi_m theta_m theta_l q_l q_meas
     velocity: v w dq qd_m dqm dx qdot n 606c vl.fb s-0-0040 vx vel_estimate r0061 r61 r0063 r63 dq_act v_act
@@ -121,6 +121,8 @@ WANTED = _words(
 )
 """Words that say that a quantity is wanted, not measured."""
 
+SECONDS = frozenset(["s", "sec", "secs"])
+"""Names of a time that are its unit."""
 ERROR = frozenset(["deviation", "diff", "err", "error", "fehler", "following", "lag"])
 LOAD_SIDE = frozenset(
     [
@@ -210,7 +212,7 @@ def role_of(name: str, unit: str = "") -> Name:
     bare, inner = _without_unit(name)
     if not unit and not inner and not _whole(bare):
         bare, inner = _without_tail(bare)
-    stated = unit or inner
+    stated = unit or inner or (bare if bare.lower() in SECONDS else "")
     parts = words(bare)
     if not _NO_SIGNAL.isdisjoint(parts):
         return Name("", 0, stated, "", "")

@@ -21,7 +21,7 @@ from stickslip.readers._choose import parse_mapping
 from stickslip.readers._convert import Drive
 from stickslip.readers._table import Table
 
-__all__ = ["Profile", "fingerprint", "folder", "load", "merged", "remembered", "save"]
+__all__ = ["Profile", "alike", "fingerprint", "folder", "load", "merged", "remembered", "save"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +40,12 @@ class Profile:
     mapping: Mapping[str, str]
     drive: Drive
     sample_time: float | None = None
+
+
+def alike(first: Profile, second: Profile) -> bool:
+    """Whether both say the same; a number that nobody gave (not a number) is equal to another."""
+    said = [(dict(p.mapping), p.drive.known(), p.sample_time) for p in (first, second)]
+    return said[0] == said[1]
 
 
 def fingerprint(table: Table) -> str:

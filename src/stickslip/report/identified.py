@@ -153,14 +153,18 @@ def interval(e: Estimate) -> str:
     """The 95 % interval in words."""
     if math.isnan(e.lower) or math.isnan(e.upper):
         return "unknown"
-    return "not determined" if e.undetermined else f"{number(e.lower)} to {number(e.upper)}"
+    return "-" if e.undetermined else f"{number(e.lower)} to {number(e.upper)}"
 
 
 def shown(e: Estimate) -> dict[str, Any]:
-    """An estimate as a row."""
+    """An estimate as a row; where the interval tells nothing, the value does not either."""
+    value, verdict = number(e.value), e.verdict
+    if e.undetermined:
+        value, chosen = "not determined", f"the model's {value} is one choice among many"
+        verdict = f"{verdict}; {chosen}" if verdict else chosen
     return {
-        "name": e.name, "unit": e.unit, "value": number(e.value), "interval": interval(e), "good": e.identified,
-        "verdict": e.verdict,
+        "name": e.name, "unit": e.unit, "value": value, "interval": interval(e), "good": e.identified,
+        "verdict": verdict,
     }  # fmt: skip
 
 
