@@ -507,6 +507,13 @@ def test_a_damaged_manifest_is_named(folder: Path, capsys: pytest.CaptureFixture
         ("tune", "log.csv", "is a record, not a sweep", "stickslip identify log.csv"),
         ("tune", "model.toml", "is a model, not a sweep", "stickslip recommend"),
         (
+            "sweep",
+            "model.toml",
+            "is a model, not a sweep (`study` and tables [vary.NAME])",
+            "stickslip recommend",
+        ),
+        ("sweep", "study.toml", "is a study, not a sweep", "stickslip study study.toml"),
+        (
             "simulate",
             "tune.toml",
             "is a sweep with a table [tune], not a simulation",

@@ -16,6 +16,7 @@ WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "identify": {"model": ("model",)},
     "compare": {"first": ("model",), "second": ("model",)},
     "recommend": {"model": ("model",)},
+    "sweep": {"sweep": ("sweep", "tuning")},
     "tune": {"tune": ("tuning", "sweep")},
     "simulate": {"file": ("simulation", "model")},
     "study": {"study": ("study",)},

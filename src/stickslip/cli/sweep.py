@@ -50,9 +50,12 @@ def run(args: argparse.Namespace) -> int:
     if sweep.tuned:
         raise InputError(f"{args.sweep} has a table [tune]; run `stickslip tune {args.sweep}`")
     if args.cases is not None:
-        if args.cases < 1 or sweep.drawn.method == "grid":
+        if args.cases < 1:
+            raise InputError(f"--cases {args.cases} must be at least 1")
+        if sweep.drawn.method == "grid":
             raise InputError(
-                f"--cases {args.cases}: at least 1, and not for a grid; change its points instead"
+                f"--cases {args.cases}: {args.sweep} is a grid, whose points make its {sweep.drawn.cases} cases; "
+                "change `points` or `values` in it, or its `method` to sobol"
             )
         sweep = replace(sweep, drawn=replace(sweep.drawn, cases=args.cases))
     if args.jobs is not None and args.jobs < 1:

@@ -149,7 +149,7 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
     runs = [replace(r, numerics=replace(r.numerics, tolerance=tolerance, output=r.duration)) for r in runs]
     metrics = table.texts("metrics", METRICS) if table.has("metrics") else list(USUAL)
     check = table.choice("check", ("yes", "no"), "yes") == "yes"
-    drawn, left_out = _drawn(table)
+    drawn, left_out = _drawn(table, {r.axis.friction.law.name for r in runs})
     tuned = _spreads(table, "tune", drawn.method) if table.has("tune") else []
     step, device = _lanes(table, metrics)
     title = table.text("title", _title(name, study, drawn, tuned))
@@ -202,11 +202,11 @@ def _names(study: Study) -> list[str]:
 # ---- what varies ---------------------------------------------------------------------------------------------
 
 
-def _drawn(table: Table) -> tuple[Drawn, tuple[str, ...]]:
-    """The cases, and the model's estimates that do not vary."""
+def _drawn(table: Table, laws: set[str]) -> tuple[Drawn, tuple[str, ...]]:
+    """The cases, and the model's estimates that do not vary; `laws` are those of the runs' friction."""
     method = table.choice("method", METHODS, "sobol")
     spreads = _spreads(table, "vary", method) if table.has("vary") else []
-    estimates, correlation, left_out = _estimates(table)
+    estimates, correlation, left_out = _estimates(table, laws)
     if not spreads and not estimates:
         raise ConfigError(f'{table.label("vary")} is missing; give at least one [vary."friction.fs"]')
     if method == "grid":
@@ -249,7 +249,9 @@ def _spread(name: str, table: Table, method: str) -> Spread:
     key = given[0]
     listed = Table({key: table.values[key]}, table.document, table.path).rest()[key]
     if not isinstance(listed, list) or not listed:
-        raise table.error(key, "must be a list of numbers")
+        raise table.error(
+            key, f"must be {'a list of numbers' if key == 'values' else 'two numbers, [low, high]'}"
+        )
     numbers = cast("list[float]", listed)
     factor = key == "scale" or (
         key == "values" and table.choice("of", ("value", "factor"), "value") == "factor"
@@ -258,7 +260,9 @@ def _spread(name: str, table: Table, method: str) -> Spread:
         if method != "grid":
             raise table.error(key, f"belongs to a grid; give scale or range for method {method!r}")
         return Spread(name, min(numbers), max(numbers), factor, values=tuple(map(float, numbers)))
-    if len(numbers) != 2 or not numbers[0] < numbers[1]:
+    if len(numbers) != 2:
+        raise table.error(key, "must be two numbers, [low, high]")
+    if not numbers[0] < numbers[1]:
         raise table.error(key, "is empty; give [low, high] with low below high")
     logarithmic = table.choice("steps", ("linear", "logarithmic"), "linear") == "logarithmic"
     if logarithmic and numbers[0] <= 0.0:
@@ -268,7 +272,7 @@ def _spread(name: str, table: Table, method: str) -> Spread:
 
 
 def _estimates(
-    table: Table,
+    table: Table, laws: set[str]
 ) -> tuple[tuple[Estimate, ...], tuple[tuple[float, ...], ...], tuple[str, ...]]:
     """What `model = "model.toml"` says is uncertain: the law's parameters and the inertia; and what else it holds."""
     if not table.has("model"):
@@ -276,6 +280,12 @@ def _estimates(
     found = read_identified(table.document.locate(table.text("model")))
     law = {f.name for f in found.model.law.fields}
     own = [i for i, e in enumerate(found.estimates) if e.name.partition("[")[0] in law]
+    if own and found.model.law.name not in laws:
+        raise table.error(
+            "model",
+            f"holds law {found.model.law.name}, and the friction of the runs is of law {', '.join(sorted(laws))}, "
+            f"which has other parameters; take a study with [friction.NAME] law = {{model = {table.text('model')!r}}}",
+        )
     kept = sorted([*own, *(i for i, e in enumerate(found.estimates) if e.name == "inertia")])
     left_out = tuple(e.name for i, e in enumerate(found.estimates) if i not in kept)
     if not kept:
