@@ -191,6 +191,32 @@ def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
     assert f"fc {model_parameters['fc']:.4g} N·m;" in line
 
 
+def test_a_torque_limit_below_friction_is_no_safe_axis(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["recommend", str(written(tmp_path / "m.toml")), "--torque-limit", "0.1"]) == 2
+    streams = capsys.readouterr()
+    assert "torque limit 0.1 N·m: the drive cannot move the axis, whose friction is" in streams.err
+    assert streams.out == ""
+
+
+def test_the_margin_that_is_printed_is_what_the_table_says(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (1.0,))
+    monkeypatch.setattr("stickslip.identify.recommend.LEADS", (0.0,))
+    model = written(tmp_path / "m.toml", law="coulomb")
+    assert main(["recommend", str(model), "--bandwidth", "20", "--axes", "1", "--confirm", "0"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    said = next(line for line in lines if line.startswith("margin of gain:"))
+    rows = [line.split() for line in lines if line.startswith("coulomb         feedforward")]
+    unsafe = [float(row[2]) for row in rows if " no: " in f" {' '.join(row)}"]
+    safe = [float(row[2]) for row in rows if float(row[2]) < min(unsafe)]
+    assert (
+        said == f"margin of gain:    {max(safe):.3g} (safe at gain {max(safe):.3g}, not at {min(unsafe):.3g})"
+    )
+
+
 def test_no_axes_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["recommend", str(written(tmp_path / "m.toml")), "--axes", "0"]) == 2
     assert "--axes 0 must be at least 1" in capsys.readouterr().err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +16,7 @@ from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.control.sampled import Memory, sampled_by, settings
-from stickslip.errors import ParameterError
+from stickslip.errors import InputError, ParameterError
 from stickslip.identify import recommend as recommending
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
@@ -91,18 +92,25 @@ def test_a_setting_that_is_unsafe_on_an_axis_drawn_later_gives_way(monkeypatch: 
     assert all("rough motion on an axis drawn later" in c.unsafe for c in fed)
 
 
-@pytest.mark.parametrize(("why", "margin"), [("useless", 3.0), ("unsafe", 1.8), ("unsafe beyond", 1.98)])
-def test_the_margin_counts_only_what_is_not_safe(
-    monkeypatch: pytest.MonkeyPatch, why: str, margin: float
+@pytest.mark.parametrize(
+    ("why", "margin", "first"),
+    [("useless", 2.5, 1.5), ("unsafe", 1.1, 0.9), ("unsafe beyond", 1.1, 0.99), ("never", 3.0, math.inf)],
+)
+def test_the_margin_is_what_is_safe_and_counts_only_what_is_not(
+    monkeypatch: pytest.MonkeyPatch, why: str, margin: float, first: float
 ) -> None:
     """At 0.9 there is less error than at 0.5, but for the reason `why` it is not taken; at 1.5 everything is rough."""
 
     def judged(bench: recommending.Bench, setting: Setting) -> recommending.Candidate:
         later = len(bench.plants) > 2
-        rough = setting.kind == "feedback" or setting.gain >= 1.5
+        rough = setting.kind == "feedback" or (setting.gain >= 1.5 and why != "never")
         rough |= why == "unsafe" and later and setting.gain == 0.9
         rough |= why == "unsafe beyond" and setting.gain == pytest.approx(0.99)
-        left = 0.98 if why == "useless" and later and setting.gain == 0.9 else 1.0 - 0.5 * setting.gain
+        left = (
+            0.98
+            if why in ("useless", "never") and later and setting.gain == 0.9
+            else 1.0 - 0.5 * setting.gain
+        )
         return recommending.Candidate(setting, (left,) * len(bench.plants), ("rough motion",) * rough)
 
     monkeypatch.setattr(recommending.Bench, "judged", judged)
@@ -111,9 +119,20 @@ def test_the_margin_counts_only_what_is_not_safe(
     assert advice.chosen
     assert advice.chosen.setting.gain == 0.5
     assert advice.margin == pytest.approx(margin)
+    assert advice.unsafe_gain == pytest.approx(first)
     table = [c for c in advice.candidates if c.setting.gain == 0.9 and c.setting.kind == "feedforward"]
     assert any(c.refused for c in table)
-    assert any(c.useless for c in table) == (why == "useless")
+    assert any(c.useless for c in table) == (why in ("useless", "never"))
+
+
+def test_a_drive_that_cannot_move_the_axis_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(
+        InputError, match=r"torque limit 0.33 N·m: the drive cannot move .* friction is 0.335 N·m"
+    ):
+        recommend(identified(0.02), Drive(20.0, torque_limit=0.33), axes=1, confirm=2)
+    monkeypatch.setattr(recommending, "GAINS", (0.5,))
+    advice = recommend(identified(0.1), Drive(20.0, torque_limit=0.336), axes=4, confirm=0)
+    assert re.match(r"On [1-4] of 5 axes the torque limit .* lies below their friction", advice.notes[0])
 
 
 def test_a_law_without_intervals_is_simulated_once_and_promises_nothing(

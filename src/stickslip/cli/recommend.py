@@ -157,17 +157,29 @@ def show(result: Recommendation, unit: Callable[[str], str]) -> None:
         print(f"lead:              {c.setting.lead:.4g} s")
         print(f"deadband:          {c.setting.deadband:.4g} {unit('rad/s')}")
         print(f"error reduction:   {reduction(result)}")
-        edge = "none found up to 1.5" if math.isinf(result.margin) else f"{result.margin:.3g}"
-        print(f"margin of gain:    {edge}")
+        print(f"margin of gain:    {margin(c, result)}")
     for note in result.notes:
         print(note)
 
 
 def safety(c: Candidate) -> str:
     """Whether it is safe; why it is not, or not worth it."""
+    from stickslip.identify.recommend import WORTH
+
     if c.unsafe:
         return f"no: {', '.join(c.unsafe)}"
-    return f"yes, but {c.useless}" if c.useless else "yes"
+    useless = c.useless or ("hardly less error" if c.worst > WORTH else "")
+    return f"yes, but {useless}" if useless else "yes"
+
+
+def margin(chosen: Candidate, result: Recommendation) -> str:
+    """How many times the gain is safe, and the gains of the table that tell so."""
+    last = f"{result.margin:.3g} (safe at gain {result.margin * chosen.setting.gain:.3g}"
+    return (
+        f"{last}, not at {result.unsafe_gain:.3g})"
+        if math.isfinite(result.unsafe_gain)
+        else f"{last}, the highest tried)"
+    )
 
 
 def same(chosen: Candidate) -> tuple[str, str, float, float]:

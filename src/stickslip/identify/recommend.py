@@ -21,7 +21,7 @@ from stickslip.control.linear import place
 from stickslip.errors import InputError
 from stickslip.identify.draws import draw_models, sliding_torque
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.setting_bench import Bench, Candidate, Setting, on_both, rings_alone
+from stickslip.identify.setting_bench import Bench, Candidate, Setting, on_both, resistance, rings_alone
 from stickslip.identify.setting_trial import Drive
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
@@ -60,7 +60,9 @@ class Recommendation:
     linear_error : float
         RMS error of the linear controller alone on the best estimate, rad.
     margin : float
-        Lowest gain tried at which some axis is no longer safe, over the chosen one; infinite where none was found.
+        Highest gain tried, over the chosen one, up to which it is safe on all axes.
+    unsafe_gain : float
+        Lowest gain tried above the chosen one at which it is not safe on some axis; infinite where there is none.
     candidates : tuple of Candidate
     axes : int
         On how many the candidates were simulated, the best estimate among them.
@@ -76,6 +78,7 @@ class Recommendation:
     gains: dict[str, float]
     linear_error: float
     margin: float
+    unsafe_gain: float
     candidates: tuple[Candidate, ...]
     axes: int
     notes: tuple[str, ...] = ()
@@ -111,7 +114,7 @@ class Recommendation:
         return {
             "chosen": self.chosen.as_dict() if self.chosen else None,
             "model": self.model.as_dict() if self.model else None, "gains": self.gains,
-            "linear_error_rms": self.linear_error, "margin": self.margin,
+            "linear_error_rms": self.linear_error, "margin": self.margin, "unsafe_gain": self.unsafe_gain,
             "reduction": list(self.reduction) if self.chosen else None, "reduction_confidence": self.confidence,
             "axes": self.axes, "axes_confirmed": self.confirmed_on, "notes": list(self.notes),
             "linear_alone_rings": self.rings, "drive": asdict(self.drive),
@@ -147,7 +150,8 @@ def recommend(
     Raises
     ------
     InputError
-        If there is no inertia, or the linear controller alone cannot be simulated.
+        If there is no inertia, the drive is too weak to move the axis, or the linear controller alone cannot be
+        simulated.
     """
     j = inertia if inertia is not None else found.axis.get("inertia")
     unit = found.unit("kg·m²")
@@ -155,6 +159,12 @@ def recommend(
         raise InputError(f"{found.path} holds no inertia; give --inertia in {unit}")
     if not 0.0 < j < math.inf:
         raise InputError(f"inertia = {j:g} {unit} must be greater than 0; give another one with --inertia")
+    if drive.torque_limit <= (friction := resistance(found.model, drive)):
+        torque = found.unit("N·m")
+        raise InputError(
+            f"torque limit {drive.torque_limit:g} {torque}: the drive cannot move the axis, whose friction is "
+            f"{friction:.3g} {torque} along this motion; give a --torque-limit above it"
+        )
     linear = Controller(
         place("PD", float(j), drive.bandwidth, drive.damping), None, drive.torque_limit, drive.sample_time,
         drive.encoder_counts,
@@ -177,16 +187,18 @@ def recommend(
     chosen, rejected, unsafe = confirmed(candidates, bench, others)
     unsafe += [c.setting for c in candidates if c.unsafe]
     candidates = [rejected.get(c.setting, c) for c in candidates]
-    margin = math.inf
+    margin, unsafe_gain = math.nan, math.inf
     if chosen:
         beyond = [on_both(replace(chosen.setting, gain=gain), bench, others) for gain in BEYOND]
         candidates += beyond
-        margin = margin_of(chosen.setting, [*unsafe, *(c.setting for c in beyond if c.unsafe)])
+        unsafe += [c.setting for c in beyond if c.unsafe]
+        margin, unsafe_gain = margin_of(chosen.setting, unsafe, [c.setting for c in beyond if not c.unsafe])
     account.end()
+    notes = notes_on(found, chosen, candidates, weak_on([*bench.plants, *others.plants[1:]], drive))
     return Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, dict(linear.gains._asdict()),
-        first.moving["position_rms_rad"], margin, tuple(candidates), len(bench.plants),
-        tuple(notes_on(found, chosen, candidates)), drive, rung, float(j),
+        first.moving["position_rms_rad"], margin, unsafe_gain, tuple(candidates), len(bench.plants),
+        tuple(notes), drive, rung, float(j),
     )  # fmt: skip
 
 
@@ -253,10 +265,14 @@ def alike(one: Setting, other: Setting) -> bool:
     return (one.law, one.kind, one.deadband) == (other.law, other.kind, other.deadband)
 
 
-def margin_of(chosen: Setting, unsafe: Sequence[Setting]) -> float:
-    """The lowest higher gain that is not safe, over the chosen one."""
-    higher = [s.gain for s in unsafe if alike(s, chosen) and s.gain > chosen.gain]
-    return min(higher, default=math.inf) / chosen.gain
+def margin_of(chosen: Setting, unsafe: Sequence[Setting], safe: Sequence[Setting]) -> tuple[float, float]:
+    """The highest gain up to which all are safe, over the chosen one, and the lowest higher one that is not.
+
+    `safe` are those that are safe on all axes, besides the chosen one with `GUARD` times its gain: it was insisted on.
+    """
+    first = min((s.gain for s in unsafe if alike(s, chosen) and s.gain > chosen.gain), default=math.inf)
+    last = max(g for g in (chosen.gain, GUARD * chosen.gain, *(s.gain for s in safe)) if g < first)
+    return last / chosen.gain, first
 
 
 def best_of(candidates: Sequence[Candidate]) -> Candidate | None:
@@ -317,8 +333,19 @@ def with_lead(candidate: Candidate, bench: Bench) -> Candidate:
     return next(c for c in safe if c.worst <= ALIKE * least)
 
 
-def notes_on(found: Identified, chosen: Candidate | None, candidates: Sequence[Candidate]) -> Iterator[str]:
+def weak_on(plants: Sequence[RigidAxis], drive: Drive) -> str:
+    """On how many axes the friction is above the torque limit; empty where on none."""
+    count = sum(resistance(plant.friction, drive) >= drive.torque_limit for plant in plants)
+    return f"{count} of {len(plants)}" if count else ""
+
+
+def notes_on(
+    found: Identified, chosen: Candidate | None, candidates: Sequence[Candidate], weak: str = ""
+) -> Iterator[str]:
     """What the user must know."""
+    if weak:
+        limit = "the torque limit of the drive lies below their friction"
+        yield f"On {weak} axes {limit}, though not below that of the best estimate: they do not move."
     unknown = [e.name for e in found.estimates if not e.identified]
     if not found.law_estimates[0]:
         yield "The law has no intervals: only its best estimate was simulated, and nothing is said about its error."

@@ -7,15 +7,18 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
+from stickslip.identify.draws import sliding_torque
 from stickslip.identify.setting_trial import AT_REST, Drive, Trial, dangers, rings, run
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 
-__all__ = ["Bench", "Candidate", "Setting", "on_both", "rings_alone"]
+__all__ = ["Bench", "Candidate", "Setting", "on_both", "resistance", "rings_alone"]
 
 LOOKED_AT = 16
 """Axes on which the linear controller alone is judged: the best estimate and some drawn ones."""
@@ -139,6 +142,15 @@ def on_both(setting: Setting, bench: Bench, others: Bench) -> Candidate:
     here = bench.judged(setting)
     there = here if here.unsafe else others.judged(setting)
     return replace(here, unsafe=there.unsafe)
+
+
+def resistance(model: Model, drive: Drive) -> float:
+    """The greatest friction along the slow sinusoid, break-away among it, N·m; 0 where the law does not tell it."""
+    if not model.law.steady:
+        return 0.0
+    fastest = 2.0 * math.pi * drive.amplitude * drive.frequency
+    v = fastest * np.concatenate([np.linspace(0.0, 1.0, 200), -np.linspace(1e-9, 1.0, 200)])
+    return float(np.max(np.abs(sliding_torque(model, v))))
 
 
 def rings_alone(bench: Bench, inertia: float, torque: str) -> str:
