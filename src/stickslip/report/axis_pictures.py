@@ -14,7 +14,9 @@ from stickslip.identify.axis_search import FittedAxis
 from stickslip.identify.draws import curve_band, sliding_torque
 from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.record import Record
+from stickslip.report.axis_evidence import measured_friction, slow_rows
 from stickslip.report.plots import envelope, quantity
+from stickslip.simulation.driven import Mechanics
 
 __all__ = ["data_pictures", "pictures_of"]
 
@@ -109,6 +111,27 @@ def fits(output: FittedAxis) -> list[Picture]:
                 f"Root mean square of the difference: {quantity(off, unit)}", "time (s)", f"{signal} ({unit})",
                 (over_time("measured", trial.time, seen), over_time("simulated", trial.time, simulated)),
             ))  # fmt: skip
+    return [*out, *close_up(output, runs)]
+
+
+def close_up(output: FittedAxis, runs: Sequence[Array]) -> list[Picture]:
+    """The slow motion of the first record: in pictures of all of it, friction's part is a line's width."""
+    out: list[Picture] = []
+    problem = output.problem
+    trial = problem.trials[0]
+    rows = slow_rows(trial)
+    if rows is None or not runs:
+        return out
+    time = trial.time[rows]
+    for signal in problem.signals:
+        seen, simulated = measured(trial, signal)[rows], runs[0][rows, PLACE[signal]]
+        off = float(np.sqrt(np.mean((simulated - seen) ** 2)))
+        unit = problem.units[signal]
+        out.append(Picture(
+            f"slow-{signal}", f"{trial.name}: {signal} in slow motion, measured and simulated",
+            f"Root mean square of the difference here: {quantity(off, unit)}", "time (s)", f"{signal} ({unit})",
+            (over_time("measured", time, seen), over_time("simulated", time, simulated)),
+        ))  # fmt: skip
     return out
 
 
@@ -221,12 +244,27 @@ def curve_picture(found: Identification, top: float) -> Picture | None:
             side * curve_band(found.model, own, known, side * grid), [2.5, 97.5], axis=0
         )
         traces += [Trace(f"95 % band{word}", grid, low, "band", high), Trace(f"best fit{word}", grid, curve)]
+    points = points_of(found)
+    traces += points
     unit = getattr(found.details["axis"], "unit", str)
     unsure = ", ".join(e.name for e in own if not e.identified)
     message = f"Not identified: {unsure}." if unsure else "Every parameter of the law is identified."
     return Picture(
         "sliding-curve", f"Friction at constant velocity: {found.model.law.title or found.model.law.name}",
-        f"{message} The band holds 95 % of the laws that the data allow.", f"velocity ({unit('rad/s')})",
+        f"{message} The band holds 95 % of the laws that the data allow."
+        f"{' Points: where the torque is steady.' if points else ''}", f"velocity ({unit('rad/s')})",
         f"friction torque ({unit('N·m')})",
         tuple(traces), "log",
     )  # fmt: skip
+
+
+def points_of(found: Identification) -> list[Trace]:
+    """Friction as the records show it, beside the curve; none where it depends on more than the speed."""
+    inverse, mechanics = found.details.get("inverse"), found.details.get("mechanics")
+    if not isinstance(inverse, InverseDynamics) or (
+        isinstance(mechanics, Mechanics) and mechanics.load_motor > 0.0
+    ):
+        return []
+    sides = measured_friction(inverse, mechanics if isinstance(mechanics, Mechanics) else None)
+    kinds = (("measured, v > 0", "points"), ("measured, v < 0", "open points"))
+    return [Trace(label, x, y, kind) for (label, kind), (x, y) in zip(kinds, sides, strict=True) if x.size]

@@ -14,6 +14,7 @@ from typing import Any
 from stickslip.finding import Finding
 from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.record import Record
+from stickslip.report.axis_evidence import judgements
 from stickslip.report.axis_pictures import data_pictures, pictures_of
 from stickslip.report.identification import draw_picture_to
 from stickslip.report.page import filled, replaced
@@ -132,13 +133,16 @@ def tally(found: Identification, sources: Sequence[Source]) -> list[dict[str, An
         {"count": f"{good} of {len(found.estimates)}", "words": "numbers identified"},
         {"count": str(warnings), "words": "warnings about the records"},
     ]
+    judged = judgements(found)
     for name, words in (
         ("position_relative", "position error of the simulation"),
         ("drive_relative", "drive error of the simulation"),
         ("inverse_dynamics_relative", "torque error of the inverse dynamics"),
     ):
         if name in found.misfit:
-            out.append({"count": f"{100.0 * float(found.misfit[name]):.3g} %", "words": words})
+            told = judged.get(name, "")
+            count = f"{100.0 * float(found.misfit[name]):.3g} %"
+            out.append({"count": count, "words": words, "judged": told, "good": told.startswith("good")})
     return out
 
 

@@ -1,0 +1,150 @@
+"""What the report of an axis sets beside the fit: friction as measured, the slow motion close up, and what noise is."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.axis_inverse import InverseDynamics
+from stickslip.identify.axis_search import FittedAxis
+from stickslip.identify.axis_trial import Trial
+from stickslip.identify.estimate import Identification
+from stickslip.identify.loop_check import position_noise
+from stickslip.record import encoder_step
+from stickslip.simulation.driven import Mechanics
+
+__all__ = ["judgements", "measured_friction", "slow_rows"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+BINS, FEWEST = 24, 8
+"""Of speed, over three decades; samples that one needs."""
+ACCELERATING, STEADY = 0.3, 0.1
+"""Parts of friction: the torque that accelerates, and the middle half of a bin, beyond which a point tells nothing."""
+WINDOW, STEPS, SLOWER = 15, 12, 0.3
+"""Part of a record that is shown close up is one over it; steps of the encoder that it moves there at least, and what
+part of the usual way at most."""
+GOOD = 3.0
+"""Times the noise, up to which a misfit is called good."""
+
+
+# ---- friction as measured -----------------------------------------------------------------------------------------
+
+
+def measured_friction(inverse: InverseDynamics, mechanics: Mechanics | None) -> list[tuple[Array, Array]]:
+    """Speeds and friction torques of the record itself, for motion in the positive and the negative direction.
+
+    The torque less what accelerates and what acts from outside, medians over bins of speed. Only where the axis hardly
+    accelerates, and where the torque is steady: at reversals, and where it sticks and slips, friction is no function of
+    the speed.
+
+    Parameters
+    ----------
+    inverse : InverseDynamics
+    mechanics : Mechanics or None
+        With the inertia and offset that were found at last; those of the inverse dynamics where None.
+
+    Returns
+    -------
+    list of (array, array)
+        rad/s (m/s) and N·m (N), both positive; empty where there are none.
+    """
+    values = dict(zip(inverse.names, inverse.values.tolist(), strict=True))
+    if mechanics is not None:
+        values["inertia"] = mechanics.inertia
+        if "offset" in values:
+            values["offset"] = mechanics.offset
+    other = [i for i, n in enumerate(inverse.names) if not n.startswith(("fc", "fv"))]
+    outside: Array = inverse.matrix[:, other] @ np.array([values[inverse.names[i]] for i in other])
+    friction = inverse.torque - outside
+    accelerating = values["inertia"] * inverse.matrix[:, inverse.names.index("inertia")]
+    even = np.abs(accelerating) < ACCELERATING * np.abs(friction)
+    top = float(np.max(np.abs(inverse.velocity)))
+    edges = np.geomspace(1e-3 * top, top * (1.0 + 1e-9), BINS + 1)
+    out: list[tuple[Array, Array]] = []
+    for side in (1.0, -1.0):
+        speed, torque = side * inverse.velocity[even], side * friction[even]
+        points: list[tuple[float, float]] = []
+        for low, high in itertools.pairwise(edges.tolist()):
+            inside = (speed >= low) & (speed < high)
+            if np.sum(inside) < FEWEST:
+                continue
+            first, middle, last = np.percentile(torque[inside], [25.0, 50.0, 75.0])
+            if last - first < STEADY * middle:
+                points.append((float(np.median(speed[inside])), float(middle)))
+        table = np.array(points).reshape(-1, 2)
+        out.append((table[:, 0], table[:, 1]))
+    return out
+
+
+# ---- the slow motion ------------------------------------------------------------------------------------------------
+
+
+def slow_rows(trial: Trial) -> slice | None:
+    """Rows of a fifteenth of a record in which the axis moves least, but some steps of its encoder and a thousandth of
+    its way; None where it moves as much everywhere, or the record is short."""
+    length = trial.time.size // WINDOW
+    if length < 100:
+        return None
+    whole = float(np.ptp(trial.position))
+    least = max(STEPS * encoder_step(trial.position), 1e-3 * whole)
+    begins = range(0, trial.time.size - length, max(length // 4, 1))
+    ways = {
+        b: float(np.ptp(trial.position[b : b + length])) for b in begins if trial.rows[b : b + length].all()
+    }
+    moving = {b: w for b, w in ways.items() if w > least}
+    if not moving:
+        return None
+    begin = min(moving, key=lambda b: moving[b])
+    return (
+        slice(begin, begin + length) if moving[begin] < SLOWER * float(np.median([*ways.values()])) else None
+    )
+
+
+# ---- how large a misfit is ------------------------------------------------------------------------------------------
+
+
+def judgements(found: Identification) -> dict[str, str]:
+    """What a misfit is beside the noise of its signal, by its name among the headline numbers."""
+    output, inverse = found.details.get("output"), found.details.get("inverse")
+    out: dict[str, str] = {}
+    if isinstance(output, FittedAxis):
+        trials = output.problem.trials
+        noise = {"position": levels([position_noise(t.position) for t in trials])}
+        if "drive" in output.problem.signals:
+            noise["drive"] = levels([signal_noise(t.signal()) for t in trials])
+        what = {"position": "the encoder's rounding" if has_encoder(trials) else "the noise of the position"}
+        for signal, level in noise.items():
+            rms = float(found.misfit.get(f"{signal}_rms", math.nan))
+            out[f"{signal}_relative"] = beside(rms, level, what.get(signal, "the noise of the signal"))
+        if inverse is not None:
+            # Its filters round every reversal: even the true axis leaves some per cent.
+            out["inverse_dynamics_relative"] = "a first look, from which the search starts"
+    return {k: v for k, v in out.items() if v}
+
+
+def beside(rms: float, level: float, what: str) -> str:
+    """A misfit over a noise, in words; empty where there is no noise to compare it with."""
+    if not (rms >= 0.0 and level > 1e-6 * rms):
+        return ""
+    times = rms / level
+    return f"good: at {what}" if times <= GOOD else f"{times:.2g} times {what}"
+
+
+def has_encoder(trials: Sequence[Trial]) -> bool:
+    """Whether every position moves in steps."""
+    return all(encoder_step(t.position) > 0.0 for t in trials)
+
+
+def signal_noise(signal: Array) -> float:
+    """Standard deviation of a signal's white noise, from third differences."""
+    return 1.4826 * float(np.median(np.abs(np.diff(signal, 3)))) / math.sqrt(20.0)
+
+
+def levels(each: Sequence[float]) -> float:
+    """The level of several records together: root mean square."""
+    return math.sqrt(math.fsum(x * x for x in each) / len(each))
