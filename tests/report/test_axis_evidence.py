@@ -85,6 +85,7 @@ def test_misfits_are_judged_beside_the_noise() -> None:
     assert told["position_relative"] == "good: at the encoder's rounding"
     assert beside(1.0, 0.5, "the noise") == "good: at the noise"
     assert beside(1.0, 0.04, "the noise") == "25 times the noise"
+    assert beside(1.0, 0.000321, "the noise") == "3100 times the noise"
     assert beside(1.0, 0.0, "the noise") == beside(math.nan, 1.0, "the noise") == ""
 
 

@@ -121,6 +121,9 @@ def judgements(found: Identification) -> dict[str, str]:
         for signal, level in noise.items():
             rms = float(found.misfit.get(f"{signal}_rms", math.nan))
             out[f"{signal}_relative"] = beside(rms, level, what.get(signal, "the noise of the signal"))
+        told = out["position_relative"]
+        if told and not told.startswith("good") and not all(t.closed_loop for t in trials):
+            out["position_relative"] = f"{told}: the recorded torque alone lets it drift (--loop holds it)"
         if inverse is not None:
             # Its filters round every reversal: even the true axis leaves some per cent.
             out["inverse_dynamics_relative"] = "a first look, from which the search starts"
@@ -132,7 +135,7 @@ def beside(rms: float, level: float, what: str) -> str:
     if not (rms >= 0.0 and level > 1e-6 * rms):
         return ""
     times = rms / level
-    return f"good: at {what}" if times <= GOOD else f"{times:.2g} times {what}"
+    return f"good: at {what}" if times <= GOOD else f"{float(f'{times:.2g}'):g} times {what}"
 
 
 def has_encoder(trials: Sequence[Trial]) -> bool:
