@@ -1,6 +1,7 @@
 """The C of every registered law and of the sampled controller against compiled and plain Python."""
 
 import ctypes
+import re
 import shutil
 import subprocess
 
@@ -12,7 +13,7 @@ from stickslip import plugins
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
-from stickslip.control.linear import place
+from stickslip.control.linear import Gains, place
 from stickslip.control.sampled import Memory, sampled_by, settings
 from stickslip.errors import InputError
 from stickslip.export import c99
@@ -203,3 +204,62 @@ def test_the_readme_says_what_the_check_allows(single, said):
     readme = c99.write(Job(Model("coulomb", fc=0.3), "axis", single=single)).files["README.md"]
     assert said in readme
     assert "within 0.0" not in readme
+
+
+MODEL = Model("stribeck", k=50.0, fs=0.33, fc=0.28, vs=0.1, sigma2=0.02)
+
+
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize(
+    ("controller", "said"),
+    [
+        (
+            Controller(Gains(kp=0.0), Feedforward(MODEL), sample_time=1e-3),
+            "The compensating torque, every 0.001 s",
+        ),
+        (
+            Controller(Gains(kp=0.0), Feedback(MODEL, filter_hz=10.0), sample_time=2e-3),
+            "The compensating torque, every",
+        ),
+        (
+            Controller(place("PD", 1e-3, 10.0, 1.0), Feedforward(MODEL), sample_time=1e-3),
+            "The whole controller, every",
+        ),
+    ],
+    ids=["ff", "fb", "PD and ff"],
+)
+def test_what_the_readme_shows_compiles_and_gives_the_torque(controller, said, single, tmp_path):
+    files = c99.write(Job(MODEL, "axis", controller, single=single)).files
+    readme = files["README.md"]
+    assert said in readme
+    for name, content in files.items():
+        (tmp_path / name).write_text(str(content))
+    law, loop = re.findall(r"```c\n(.*?)```", readme, re.DOTALL)
+    real = "float" if single else "double"
+    given = "v0 = 0, v1 = 0, dt = 1e-3f, position = 0, wanted = 0, wanted_velocity = 2"
+    result = "compensation" if "compensation =" in loop else "command"
+    (tmp_path / "shown.c").write_text(
+        f"#include <stdio.h>\n{law.splitlines()[0]}\nint main(void) {{\n{real} {given};\n"
+        f'{law.partition(chr(10))[2]}{loop}printf("%.9g %.9g", (double)torque, (double){result});\nreturn 0; }}\n'
+    )
+    built = [
+        COMPILERS[0],
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-pedantic",
+        "shown.c",
+        "axis.c",
+        "-lm",
+        "-o",
+        "shown",
+    ]
+    subprocess.run(built, cwd=tmp_path, check=True)
+    shown = subprocess.run(
+        ["./shown"], cwd=tmp_path, check=True, capture_output=True, text=True
+    ).stdout.split()
+    assert float(shown[0]) == 0.0
+    friction = MODEL.law.steady(2.0, MODEL.parameters)
+    wanted = {"ff": friction, "fb": 0.0}["fb" if controller.compensator.__class__ is Feedback else "ff"]
+    assert float(shown[1]) == pytest.approx(wanted + 2.0 * controller.gains.kr, rel=1e-5)

@@ -35,6 +35,7 @@ def write(job: Job) -> Export:
         "x": x, "title": ascii_only(job.model.law.title), "controller": job.controller is not None,
         "surroundings": ", ".join(f"{u!r}f" for u in Surroundings()),
         "sample_time": job.controller.sample_time if job.controller else 1e-3,
+        "alone": job.controller is not None and c99.compensates_alone(job.controller),
     }  # fmt: skip
     return Export(
         {

@@ -15,6 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from stickslip.control.controller import Controller
 from stickslip.control.sampled import Memory, Settings, sampled_by, settings
 from stickslip.export._analysis import analyse, merged
 from stickslip.export._c import Dialect, functions, head, safe
@@ -208,7 +209,13 @@ def controller_of(job: Job, dialect: Dialect) -> Mapping[str, Any] | None:
         "init": [*given(fields_of(Settings), numbers, "n", dialect)],
         "reset": [*given(fields_of(Memory), zeros, "m", dialect)],
         "sample_time": numbers["sample_time"],
+        "alone": compensates_alone(job.controller),
     }
+
+
+def compensates_alone(controller: Controller) -> bool:
+    """Whether it has no loop of its own: its torque belongs to that of another controller."""
+    return not any(controller.gains)
 
 
 # ---- the check -------------------------------------------------------------------------------------------------
