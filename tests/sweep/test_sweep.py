@@ -436,6 +436,19 @@ def test_more_cases_than_the_disk_has_room_for(small, tmp_path):
         dataset.room_for(tmp_path, huge)
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_every_block_in_hand_is_kept_when_it_is_interrupted(small, tmp_path, monkeypatch, jobs):
+    begun = []
+    monkeypatch.setattr(execute, "compute", lambda *task: begun.append(task) or block.compute(*task))
+    with pytest.raises(KeyboardInterrupt):
+        execute.run(
+            small, tmp_path, jobs=jobs, progress=lambda done, of: done and signal.raise_signal(signal.SIGINT)
+            if len(list(tmp_path.rglob("*.parquet"))) == 1 else None,
+        )  # fmt: skip
+    assert len(begun) == 1 or jobs > 1
+    assert len(list(tmp_path.rglob("*.parquet"))) == len(begun)
+
+
 def test_an_interrupted_sweep_gives_none_of_joblibs_advice(small, recwarn):
     blocks = execute.computed(small, small.blocks, jobs=2)
     next(blocks)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import functools
 import importlib
+import itertools
 import json
 import os
 import re
+import signal
 import tempfile
 import time
 import warnings
@@ -93,12 +95,13 @@ def run(
     if progress:
         progress(done, sweep.cases)
     with interrupts_between_runs() as check:
-        for block in computed(sweep, missing, jobs or os.cpu_count() or 1, backend, scheduler):
+        goes_on = functools.partial(_passes, check)
+        for block in computed(sweep, missing, jobs or os.cpu_count() or 1, backend, scheduler, goes_on):
             dataset.keep_block(folder, sweep, block)
             done += len(block.numbers)
             if progress:
                 progress(done, sweep.cases)
-            check()
+        check()
     timings = {
         "wall_s": time.perf_counter() - clock, "cpu_s": time.process_time() - cpu, "jobs": jobs,
         "blocks_computed": len(missing), "blocks_found": found,
@@ -154,6 +157,15 @@ def claim(folder: Path, sweep: Sweep) -> Path:
     return prepared_folder(folder)
 
 
+def _passes(check: Callable[[], None]) -> bool:
+    """Whether no interruption was asked for."""
+    try:
+        check()
+    except KeyboardInterrupt:
+        return False
+    return True
+
+
 def _size(sweep: Sweep, block: tuple[int, int]) -> int:
     return min(BLOCK, sweep.drawn.cases - block[1])
 
@@ -162,13 +174,17 @@ def _size(sweep: Sweep, block: tuple[int, int]) -> int:
 
 
 def computed(
-    sweep: Sweep, blocks: Sequence[tuple[int, int]], jobs: int, backend: str = "threads", scheduler: str = ""
-) -> Iterator[Block]:
-    """The blocks as they get done; those of a killed worker are computed again."""
+    sweep: Sweep, blocks: Sequence[tuple[int, int]], jobs: int, backend: str = "threads", scheduler: str = "",
+    goes_on: Callable[[], bool] = lambda: True,
+) -> Iterator[Block]:  # fmt: skip
+    """The blocks as they get done; those of a killed worker are computed again.
+
+    None is begun any more once `goes_on` says no, but those in hand are done.
+    """
     left, last = dict.fromkeys(blocks), ""
     for _ in range(MOST_TRIES):
         try:
-            for block in _once(sweep, list(left), jobs, backend, scheduler):
+            for block in _once(sweep, list(left), jobs, backend, scheduler, goes_on):
                 del left[block.run, block.start]
                 yield block
             return
@@ -187,22 +203,33 @@ def _killed() -> tuple[type[BaseException], ...]:
 
 
 def _once(
-    sweep: Sweep, blocks: Sequence[tuple[int, int]], jobs: int, backend: str, scheduler: str
-) -> Iterator[Block]:
-    if not blocks:
+    sweep: Sweep, blocks: Sequence[tuple[int, int]], jobs: int, backend: str, scheduler: str,
+    goes_on: Callable[[], bool],
+) -> Iterator[Block]:  # fmt: skip
+    if not blocks or not goes_on():
         return
+    begun = itertools.takewhile(lambda _: goes_on(), blocks)
     joblib: Any = importlib.import_module("joblib")
     # What an interruption leaves undone is said by the verb; joblib's advice is for those who iterate themselves.
     warnings.filterwarnings("ignore", r"\d+ tasks (which were still|have been)", UserWarning)
     if not scheduler and (jobs == 1 or backend == "threads"):
-        tasks = (joblib.delayed(compute)(sweep, *block) for block in blocks)
-        yield from joblib.Parallel(jobs, backend="threading", return_as="generator_unordered")(tasks)
+        tasks = (joblib.delayed(compute)(sweep, *block) for block in begun)
+        # As many at a time as run: what waits in a queue could not be held back any more.
+        yield from joblib.Parallel(
+            jobs, backend="threading", return_as="generator_unordered", pre_dispatch="n_jobs"
+        )(tasks)
         return
     parcel = Parcel.of(sweep)
-    tasks = (joblib.delayed(compute_parcel)(parcel, *block) for block in blocks)
+    work = compute_parcel if scheduler else compute_undisturbed
+    tasks = (joblib.delayed(work)(parcel, *block) for block in begun)
+    ahead = "2*n_jobs" if scheduler else "n_jobs"  # The way to another machine is worth a queue.
     with _cluster(scheduler) as options:
         yield from joblib.Parallel(
-            -1 if scheduler else jobs, return_as="generator_unordered", batch_size=1, **options
+            -1 if scheduler else jobs,
+            return_as="generator_unordered",
+            batch_size=1,
+            pre_dispatch=ahead,
+            **options,
         )(tasks)
 
 
@@ -269,6 +296,15 @@ def _loaded(parcel: Parcel) -> Sweep:
 def compute_parcel(parcel: Parcel, run: int, start: int) -> Block:
     """Compute a block in another process."""
     return compute(_loaded(parcel), run, start)
+
+
+def compute_undisturbed(parcel: Parcel, run: int, start: int) -> Block:
+    """Compute a block in a process of this terminal: Ctrl-C reaches it too, but it is for the command to stop it."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        return compute_parcel(parcel, run, start)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 # ---- the manifest ------------------------------------------------------------------------------------------------
