@@ -79,3 +79,14 @@ def test_a_gain_of_a_grid_is_one_of_its_points(tmp_path, monkeypatch):
     assert panels[0].y_label == "95th percentile (mrad)"
     assert "95th percentile of the RMS position error" in message
     assert message.endswith(f"FF-lugre {found.gain:.2f}")
+
+
+def test_a_gain_drawn_as_a_factor_is_told_as_a_gain(tmp_path):
+    path = gains_of(tmp_path, ("method = 'grid'", "points = 2", "points = 20"))
+    path.write_text(path.read_text().replace("range", "scale"))
+    sweep = load(path)
+    execute.run(sweep, tmp_path / "out")
+    own = sweep.runs[0].control.compensator.gain
+    found = recommended(tmp_path / "out", sweep, sweep.runs[0])
+    assert own != 1.0
+    assert found.gains.tolist() == pytest.approx([0.5 * own, 1.1 * own])

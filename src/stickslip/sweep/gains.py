@@ -11,6 +11,7 @@ import numpy as np
 
 from stickslip.study.plan import PlannedRun
 from stickslip.sweep.dataset import read
+from stickslip.sweep.numbers import value_of
 from stickslip.sweep.plan import Sweep
 from stickslip.sweep.sample import Drawn
 from stickslip.sweep.summary import LEAST_CASES
@@ -72,7 +73,10 @@ def recommended(folder: Path, sweep: Sweep, run: PlannedRun) -> Recommended:
     if too_few(sweep.drawn):
         return Recommended(np.zeros(0), np.zeros(0), math.nan, math.nan, math.nan)
     columns = read(folder, sweep, run, [GAIN, sweep.metrics[0]])
-    gain, values = columns[GAIN], columns[sweep.metrics[0]]
+    spread = sweep.drawn.spreads[sweep.drawn.names.index(GAIN)]
+    # Drawn may be factors on the run's own gain.
+    gain = columns[GAIN] * (float(value_of(run, GAIN)) if spread.factor else 1.0)
+    values = columns[sweep.metrics[0]]
     if sweep.drawn.method == "grid":
         middles, place = np.unique(gain, return_inverse=True)
         width = 0.0
