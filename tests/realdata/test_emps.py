@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 from stickslip.identify.axis_inverse import inverse_dynamics
 from stickslip.identify.axis_output import output_error
 from stickslip.identify.axis_trial import Trial
+from stickslip.identify.loop_check import doubted_loops
 from stickslip.machines.servo import ServoAxis
 from stickslip.plugins import law
 from stickslip.simulation.driven import Loop, control_signal
@@ -47,6 +49,14 @@ def test_the_loop_makes_the_recorded_voltage(emps: tuple[Trial, ServoAxis]) -> N
     assert trial.drive is not None
     made = control_signal(trial.loop, trial.time, trial.reference, trial.position)
     assert np.sqrt(np.mean((made - trial.drive)[3:] ** 2)) < 4.7e-3
+
+
+def test_its_gains_are_not_doubted_and_wrong_ones_are(emps: tuple[Trial, ServoAxis]) -> None:
+    trial, _ = emps
+    assert trial.loop is not None
+    assert doubted_loops([trial]) == []
+    (said,) = doubted_loops([replace(trial, loop=replace(trial.loop, kd=2.0 * trial.loop.kd))])
+    assert "kd 486.9 given, 243.4" in said
 
 
 def test_inverse_dynamics_gives_the_published_parameters(emps: tuple[Trial, ServoAxis]) -> None:

@@ -9,7 +9,9 @@ squares of the recorded signal over reference and position give them, whatever t
 - A signal that is recorded some rows later takes from the gain on the velocity. The delay is the one that fits best.
 - Residuals are correlated: the intervals leave stretches of time out (`stickslip.identify.jackknife`).
 
-`benchmarks/loop_doubted.py` measures it: see there.
+`benchmarks/loop_doubted.py`, seeds 20 to 49: of 360 records with the right gains 2 were doubted, both with a fifth of
+the controller's rows and without its period; of 540 with all rows and 16384 counts or more, a kd of twice the true one,
+a kp 41 % above it, and kr left out or put in were doubted in 537.
 """
 
 from __future__ import annotations
@@ -96,7 +98,8 @@ def doubted_loops(trials: Sequence[Trial], gain: float = 1.0) -> list[str]:
         if found is not None and (differing := found.differing()):
             out.append(
                 f"{trial.name} shows another controller than the loop given: {'; '.join(differing)}. The gains given "
-                f"miss the recorded signal by {found.missed:.0%}, those shown by {found.left:.1%}: check --loop."
+                f"miss the recorded signal by {found.missed:.0%}, those shown by {found.left:.1%}: check --loop, its "
+                "period too."
             )
     return out
 
