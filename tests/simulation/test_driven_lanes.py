@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import math
 import os
 import platform
+import types
 from typing import Any
 
 import numpy as np
@@ -18,7 +21,7 @@ from stickslip.laws import LAWS
 from stickslip.model import Model
 from stickslip.plugins import law as law_named
 from stickslip.simulation import _driven_lanes as lanes
-from stickslip.simulation import driven_lanes
+from stickslip.simulation import _lanes_run, driven_lanes
 from stickslip.simulation.driven import Drive, Mechanics, drive_axis
 from stickslip.simulation.straight_line import Name, NotStraight, Trace, traced
 from stickslip.spec import Surroundings
@@ -69,6 +72,16 @@ def compared(prepared: Prepared, found: Array, model: Model) -> tuple[float, flo
     whole = prepared.course.run(AXIS, model.parameters)[:, 3]
     inside = [prepared.low_pass(x) for x in (found - whole, whole)]
     return float(np.sqrt(np.mean(inside[0] ** 2))), float(np.sqrt(np.mean(inside[1] ** 2)))
+
+
+@pytest.mark.parametrize("module", [lanes, _lanes_run], ids=["observer", "closed loops"])
+def test_a_kernels_own_array_is_used_until_its_end(module: types.ModuleType):
+    # Compiled code frees an array after its last use, whatever a pointer into it reads or writes later.
+    kernels = [f for f in ast.parse(inspect.getsource(module)).body if isinstance(f, ast.FunctionDef)]
+    rooms = [f for f in kernels if any("aligned(" in ast.unparse(line) for line in f.body)]
+    assert rooms
+    for kernel in rooms:
+        assert "room" in ast.unparse(kernel.body[-1]), kernel.name
 
 
 def test_noise_shakes_both_alike():

@@ -17,7 +17,7 @@ from stickslip.identify.axis_problem import mechanics_of
 from stickslip.identify.axis_start import steady_fits
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.corrections import BAND, Criterion
-from stickslip.identify.observer import Motion, Prepared, prepare
+from stickslip.identify.observer import ROUGH, Motion, Prepared, prepare
 from stickslip.identify.optimum import cost_of
 from stickslip.identify.prediction_error import PredictionError, prediction_error
 from stickslip.identify.secant import Secants
@@ -35,7 +35,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 SLOWER = (0.02, 0.1, 0.5)
 """Parts of the usual speed at which a Stribeck effect is looked for."""
 WORSE = 1.1
-BEST, SPREAD = 5, 5
+BEST, SPREAD = 4, 4
 """Starts that are followed: those of the lowest sums of squares, and some of all others, since a stiffness that is far
 off hides how right the rest of a start is."""
 ROUNDS = ((BEST + SPREAD, 20), (3, 50))
@@ -128,7 +128,9 @@ def searched(
     for model in starting_points(trials, axis, law, start, given):
         vector, inertia = laid_out(trials, axis, law, start, model, given, free, frozen, extras)
         # All start from one inertia.
-        records = records or [prepare(m, law, inertia, abs(start.coulomb), band) for m in motions]
+        records = records or [
+            prepare(m, law, inertia, abs(start.coulomb), band, rounding=ROUGH) for m in motions
+        ]
         criteria.append(Criterion.first(records, law, vector, mechanics))
     costs = mapped(lambda c: cost_of(c.residuals(c.vector.start)), criteria)
     # Several ways lead to one start: it counts once.
@@ -149,13 +151,11 @@ def searched(
     criterion, search = running[0]
     # Outliers would choose among hops by plain squares: from here on the likelihood that weighs them decides.
     adapted = criterion.adapted(search.u)
-    best = (*descended(adapted, search.u), adapted)
-    rng = np.random.default_rng(seed)
-    for _ in range(hops):
-        there = hop(adapted.vector, best[1], {f.name for f in law.fields}, rng)
-        if math.isfinite(cost_of(adapted.residuals(there))):
-            best = min(best, (*descended(adapted, there), adapted), key=lambda entry: entry[0])
-    return adapted, best[1]
+    best = descended(adapted, search.u)
+    rng, own = np.random.default_rng(seed), {f.name for f in law.fields}
+    others = [hop(adapted.vector, best[1], own, rng) for _ in range(hops)]
+    reached = mapped(functools.partial(descended, adapted), others)
+    return adapted, min([best, *reached], key=lambda entry: entry[0])[1]
 
 
 def spread(count: int, most: int) -> list[int]:
@@ -174,8 +174,11 @@ def apart(running: Sequence[tuple[Criterion, Secants]]) -> list[tuple[Criterion,
 
 
 def descended(criterion: Criterion, start: Array) -> tuple[float, Array]:
-    """Sum of squares and coordinates that a few steps from a start reach."""
-    search = criterion.search(start)
+    """Sum of squares and coordinates that a few steps from a start reach; infinite where it cannot be simulated."""
+    try:
+        search = criterion.search(start)
+    except InputError:
+        return math.inf, start
     search.run(EVALUATIONS, SETTLED)
     return search.cost, search.u
 

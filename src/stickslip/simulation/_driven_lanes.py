@@ -24,8 +24,8 @@ MOST = 200  # iterations of a stage
 # ---- entries of n ----------------------------------------------------------------------------------------------
 (
     INERTIA, OFFSET, DRIVE_GAIN, BACK_EMF, LOAD_MOTOR, LOAD_EXTERNAL, SCALED, SPRING, FORGETS, RETURNS, SLACK,
-    NUMBERS,
-) = range(12)  # fmt: skip
+    ROUNDING, NUMBERS,
+) = range(13)  # fmt: skip
 # ---- rows of the signals: torque's signal, position now and next, damping, velocity wanted, whether the damper is
 # firm, torque from outside, whether the row is followed by another, and after how long -----------------------------
 SIGNAL, SEEN, NEXT, DAMPING, GOAL, FIRM, DISTURBANCE, GOES_ON, PERIOD, SIGNALS = range(10)
@@ -80,8 +80,8 @@ def improve(w: Any, lane: int, n: Any, p: Any) -> bool:
     crossed = (f * f_last <= 0.0) & (phase > GUESSED)
     other = select(crossed, last, w[OTHER * LANES + lane])
     size = select(abs(x) > 1e-2, abs(x), 1e-2)
-    fine = (abs(f) <= n[INERTIA] * ROUNDING * size) | (f - f != 0.0)
-    close = (abs(x - other) <= ROUNDING * size) & (phase > GUESSED) & (crossed | (phase == NARROWS))
+    fine = (abs(f) <= n[INERTIA] * n[ROUNDING] * size) | (f - f != 0.0)
+    close = (abs(x - other) <= n[ROUNDING] * size) & (phase > GUESSED) & (crossed | (phase == NARROWS))
     open_ = phase < SOLVED
     done = fine | close
     # ---- where the line through the last two leads; its slope is kept as its inverse: divisions take long ----
@@ -243,6 +243,7 @@ def follow_lanes(
             look_back(w, lane, n)
         for lane in range(count):
             out[t, lane] = w[PULLED * LANES + lane]
+    room[0] = 0.0  # So long it is needed: an array is freed after its last use, whatever points into it.
 
 
 def aligned(size: int) -> Any:

@@ -226,6 +226,7 @@ def solve_lanes(
     z = pointer(room, 0)
     for base in range(0, columns.shape[0], LANES):
         solve_block(z, c, columns, start, h, reference, cuts, sums, ends, base)
+    room[0] = 0.0  # So long it is needed: an array is freed after its last use, whatever points into it.
 
 
 def aligned(size: int) -> Any:

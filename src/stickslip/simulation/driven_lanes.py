@@ -155,8 +155,8 @@ def cuts_within(rows: int, allowed: Any, warm: int, n: int) -> list[int]:
 class Stretches:
     """A held drive with an observer, laid out in stretches."""
 
-    def __init__(self, law: Law, drive: Drive, cuts: Sequence[int], warm: int) -> None:
-        self.law, self.drive, self.cuts, self.warm = law, drive, list(cuts), warm
+    def __init__(self, law: Law, drive: Drive, cuts: Sequence[int], warm: int, rounding: float) -> None:
+        self.law, self.drive, self.cuts, self.warm, self.rounding = law, drive, list(cuts), warm, rounding
         n = drive.time.size
         ends = [*self.cuts[1:], n]
         self.begins = [max(0, c - warm) for c in self.cuts]
@@ -205,7 +205,7 @@ class Stretches:
         n[lanes.DRIVE_GAIN], n[lanes.BACK_EMF] = mechanics.drive_gain, mechanics.back_emf
         n[lanes.LOAD_MOTOR], n[lanes.LOAD_EXTERNAL] = mechanics.load_motor, mechanics.load_external
         n[lanes.SCALED], n[lanes.SPRING], n[lanes.FORGETS] = self.scaled, drive.spring, drive.forgets
-        n[lanes.RETURNS], n[lanes.SLACK] = drive.returns, drive.slack
+        n[lanes.RETURNS], n[lanes.SLACK], n[lanes.ROUNDING] = drive.returns, drive.slack, self.rounding
         return tuple(n.tolist())
 
     def corrections(self, mechanics: Mechanics, parameters: Any) -> Array | None:
