@@ -1,4 +1,4 @@
-"""The compiled zero-phase filter is SciPy's."""
+"""The filters and spectra are SciPy's."""
 
 from __future__ import annotations
 
@@ -8,8 +8,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from stickslip.identify.filters import ZeroPhase
+from stickslip.identify.filters import (
+    RIPPLE,
+    ZeroPhase,
+    butterworth_poles,
+    cross_spectrum,
+    decimated,
+    low_pass,
+    spectrum,
+)
 from stickslip.identify.side_by_side import mapped
+
+
+def wandering(n: int, seed: int):
+    return np.cumsum(np.random.default_rng(seed).standard_normal(n))
+
+
+def alike(found, expected, scale):
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * float(np.max(np.abs(scale))))
 
 
 @settings(deadline=None)  # the first call compiles
@@ -17,11 +33,40 @@ from stickslip.identify.side_by_side import mapped
     order=st.sampled_from([2, 4, 6]), corner=st.floats(5.0, 400.0), n=st.integers(60, 400),
     seed=st.integers(0, 100),
 )  # fmt: skip
-def test_the_filter_is_that_of_scipy(order: int, corner: float, n: int, seed: int):
-    x = np.cumsum(np.random.default_rng(seed).standard_normal(n))
-    filtered = ZeroPhase(order, corner, 1000.0)
+def test_the_low_pass_is_that_of_scipy(order: int, corner: float, n: int, seed: int):
+    x = wandering(n, seed)
     expected = signal.sosfiltfilt(signal.butter(order, corner, fs=1000.0, output="sos"), x)
-    assert filtered(x) == pytest.approx(expected, rel=1e-9, abs=1e-9 * float(np.max(np.abs(x))))
+    alike(low_pass(x, corner, 1000.0, order), expected, x)
+
+
+@pytest.mark.parametrize(("reach", "n"), [(30, 400), (30, 30)])
+def test_a_series_is_continued_as_far_as_it_goes(reach: int, n: int):
+    x = wandering(n, 3)
+    expected = signal.sosfiltfilt(signal.butter(2, 0.08, output="sos"), x, padlen=min(reach, n - 1))
+    alike(ZeroPhase(butterworth_poles(2), 0.08, 2.0, reach)(x), expected, x)
+
+
+@settings(deadline=None)
+@given(factor=st.integers(2, 40), n=st.integers(100, 900), seed=st.integers(0, 100))
+def test_decimation_is_that_of_scipy_but_for_the_gain_at_rest(factor: int, n: int, seed: int):
+    x = wandering(n, seed)
+    sos = signal.cheby1(4, RIPPLE, 0.8 / factor, output="sos")
+    at_rest = 10.0 ** (-RIPPLE / 20.0)
+    alike(decimated(x, factor), signal.sosfiltfilt(sos, x)[::factor] / at_rest**2, x)
+
+
+@given(n=st.integers(40, 700), length=st.integers(16, 128), seed=st.integers(0, 100))
+def test_spectra_are_those_of_scipy(n: int, length: int, seed: int):
+    length = min(length, n)
+    x, y = wandering(n, seed), wandering(n, seed + 1)
+    f, power = spectrum(x, 250.0, length)
+    f_scipy, expected = signal.welch(x, 250.0, window="hann", nperseg=length)
+    assert f == pytest.approx(f_scipy)
+    alike(power, expected, expected)
+    expected = signal.csd(x, y, 250.0, window="hann", nperseg=length)[1]
+    found = cross_spectrum(x, y, 250.0, length)
+    alike(found.real, expected.real, expected)
+    alike(found.imag, expected.imag, expected)
 
 
 def test_side_by_side_keeps_the_order_and_hands_errors_on():

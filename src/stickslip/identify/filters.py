@@ -1,15 +1,15 @@
-"""Zero-phase filters and spectra, from scipy.signal, with types."""
+"""Zero-phase filters and spectra: those of scipy.signal, whose import takes longer than to identify an axis's inertia.
 
-# scipy.signal is typed in part only.
-# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
-# pyright: reportGeneralTypeIssues=false, reportCallIssue=false, reportArgumentType=false, reportAssignmentType=false
+Low-passes are second-order sections of the bilinear transform, their corner prewarped (Oppenheim and Schafer,
+Discrete-Time Signal Processing, 7.1; see `docs/decisions/0019-filters-of-our-own.md`). Tests hold all to scipy.signal.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
-from scipy import signal
 
 from stickslip.simulation._biquads import zero_phase
 
@@ -18,45 +18,83 @@ __all__ = ["ZeroPhase", "cross_spectrum", "decimated", "low_pass", "spectrum"]
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 
+RIPPLE = 0.05
+"""dB in the pass band of what `decimated` filters with."""
+PASSES = np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
+"""The section that lets everything through."""
 
-def low_pass(x: Array, corner: float, rate: float, order: int = 4) -> Array:
-    """x behind a Butterworth low-pass run forwards and backwards; corner and rate in Hz."""
-    b, a = signal.butter(order, corner, fs=rate)
-    return np.asarray(signal.filtfilt(b, a, x), dtype=np.float64)
+
+def butterworth_poles(order: int) -> Complex:
+    """Poles above the real axis of the analogue low-pass with the corner 1 rad/s; the order is even."""
+    angle = math.pi * (2.0 * np.arange(order // 2) + order + 1.0) / (2.0 * order)
+    return np.exp(1j * angle)
+
+
+def chebyshev_poles(order: int, ripple: float) -> Complex:
+    """The same of Chebyshev's first kind; `ripple` in dB."""
+    angle = math.pi * (2.0 * np.arange(order // 2) + 1.0) / (2.0 * order)
+    flat = math.asinh(1.0 / math.sqrt(10.0 ** (0.1 * ripple) - 1.0)) / order
+    return -math.sinh(flat) * np.sin(angle) + 1j * math.cosh(flat) * np.cos(angle)
 
 
 class ZeroPhase:
-    """A Butterworth low-pass run forwards and backwards, for many series: `scipy.signal.sosfiltfilt`, laid out once."""
+    """A low-pass run forwards and backwards, for many series; a constant passes as it is.
 
-    def __init__(self, order: int, corner: float, rate: float) -> None:
-        self.sections = signal.butter(order, corner, fs=rate, output="sos")
-        self.start = signal.sosfilt_zi(self.sections)
-        self.reach = 3 * (2 * len(self.sections) + 1)
+    Parameters
+    ----------
+    poles : array, shape (m,)
+        Of the analogue low-pass with the corner 1 rad/s, those above the real axis.
+    corner, rate : float
+        Hz; the corner below half the rate.
+    reach : int, optional
+        Values by which a series is continued at its ends, turned over; scipy.signal's unless given.
+    """
+
+    def __init__(self, poles: Complex, corner: float, rate: float, reach: int | None = None) -> None:
+        s = math.tan(math.pi * corner / rate) * poles
+        z = (1.0 + s) / (1.0 - s)
+        ones, a1, a2 = np.ones(z.size), -2.0 * z.real, np.abs(z) ** 2
+        b = 0.25 * (1.0 + a1 + a2)
+        sections = np.column_stack([b, 2.0 * b, b, ones, a1, a2])
+        # One that lets everything through makes their number even.
+        self.sections = np.vstack([sections, PASSES]) if z.size % 2 else sections
+        # What a section that has long seen ones remembers.
+        self.start = np.column_stack([1.0 - self.sections[:, 0], self.sections[:, 2] - self.sections[:, 5]])
+        self.reach = 3 * (2 * z.size + 1) if reach is None else reach
 
     def __call__(self, x: Array) -> Array:
         """The series, turned over at its ends, behind the filter, shape (n,)."""
-        reach = self.reach
+        reach = min(self.reach, x.size - 1)
         ends = 2.0 * x[0] - x[reach:0:-1], 2.0 * x[-1] - x[-2 : -reach - 2 : -1]
         y = np.concatenate([ends[0], x, ends[1]])
         zero_phase(self.sections, self.start, y)
-        return y[reach:-reach]
+        return y[reach : y.size - reach]
+
+
+def low_pass(x: Array, corner: float, rate: float, order: int = 4) -> Array:
+    """x behind a Butterworth low-pass run forwards and backwards; corner and rate in Hz."""
+    return ZeroPhase(butterworth_poles(order), corner, rate)(x)
 
 
 def decimated(x: Array, factor: int) -> Array:
     """Every `factor`-th value behind a zero-phase Chebyshev low-pass at 0.8 of the new Nyquist frequency."""
-    if factor == 1:
-        return x
-    sos = signal.cheby1(4, 0.05, 0.8 / factor, output="sos")
-    return np.asarray(signal.sosfiltfilt(sos, x), dtype=np.float64)[::factor]
+    return x if factor == 1 else ZeroPhase(chebyshev_poles(4, RIPPLE), 0.8 / factor, 2.0)(x)[::factor]
 
 
 def spectrum(x: Array, rate: float, length: int) -> tuple[Array, Array]:
     """Frequencies (Hz) and power density by Welch's method, Hann windows of `length` samples, half overlapping."""
-    f, power = signal.welch(x, rate, window="hann", nperseg=length)
-    return np.asarray(f, dtype=np.float64), np.asarray(power, dtype=np.float64)
+    return np.fft.rfftfreq(min(length, x.size), 1.0 / rate), cross_spectrum(x, x, rate, length).real
 
 
 def cross_spectrum(x: Array, y: Array, rate: float, length: int) -> Complex:
     """Cross power density conj(X) Y by Welch's method, Hann windows of `length` samples, half overlapping."""
-    _, power = signal.csd(x, y, rate, window="hann", nperseg=length)
-    return np.asarray(power, dtype=np.complex128)
+    length = min(length, x.size)
+    window = 0.5 - 0.5 * np.cos(2.0 * math.pi * np.arange(length) / length)
+
+    def transformed(series: Array) -> Complex:
+        pieces = np.lib.stride_tricks.sliding_window_view(series, length)[:: length - length // 2]
+        return np.fft.rfft(window * (pieces - np.mean(pieces, axis=1, keepdims=True)))
+
+    power = np.mean(np.conj(transformed(x)) * transformed(y), axis=0) / (rate * np.sum(window**2))
+    power[1 : power.size - (length % 2 == 0)] *= 2.0  # Negative frequencies; zero and Nyquist have none.
+    return power

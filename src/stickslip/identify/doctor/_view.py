@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import shlex
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.identify.filters import ZeroPhase, butterworth_poles
 from stickslip.record import Record, encoder_step
 
 __all__ = ["Array", "Column", "Smooth", "View", "is_number", "row"]
@@ -150,13 +150,7 @@ class View:
             return None
         grid = np.linspace(float(self.time[0]), float(self.time[-1]), count)
         period = span / (count - 1)
-        signal: Any = importlib.import_module("scipy.signal")
-        sections = signal.butter(2, 0.08, output="sos")
-
-        def filtered(values: Array) -> Array:
-            return np.asarray(
-                signal.sosfiltfilt(sections, values, padlen=min(30, values.size - 1)), dtype=np.float64
-            )
+        filtered = ZeroPhase(butterworth_poles(2), 0.08, 2.0, reach=30)
 
         def at_grid(channel: str) -> Array:
             return np.interp(grid, self.time, self.values(channel))
