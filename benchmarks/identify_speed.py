@@ -29,6 +29,8 @@ ROWS, LIMIT = 25_000, 3.0
 SEEDS = {"coulomb": 18100, "stribeck": 18101, "lugre": 18102, "gms": 18103}
 EMPS = Path(os.environ.get("STICKSLIP_DATA", "../shared/data")) / "emps" / "DATA_EMPS.mat"
 IDENTIFY = ["-m", "stickslip", "identify"]
+AS_INSTALLED = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+"""With the package's bytecode kept, as an installation has it."""
 
 
 def written(folder: Path) -> dict[str, list[str]]:
@@ -57,7 +59,9 @@ def saved(path: Path, header: str, table: np.ndarray) -> Path:
 def taken(command: list[str]) -> tuple[float, float, str]:
     """Time elapsed and CPU time of a process, s, and what it printed."""
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    done = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, *command], capture_output=True, text=True, check=False, env=AS_INSTALLED
+    )
     elapsed, after = time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode:
         raise SystemExit(done.stderr)

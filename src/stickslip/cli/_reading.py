@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def read_record(
-    path: Path, args: argparse.Namespace, accept: Callable[[Record], None] = lambda _: None
+    path: Path, args: argparse.Namespace, accept: Callable[[Record], object] = lambda _: None
 ) -> Record:
     """As `open_record`, for verbs that show no columns: stderr says where a saved profile had a part in it.
 
@@ -85,7 +85,7 @@ def read_record(
 
 
 def open_record(
-    path: Path, args: argparse.Namespace, accept: Callable[[Record], None] = lambda _: None
+    path: Path, args: argparse.Namespace, accept: Callable[[Record], object] = lambda _: None
 ) -> Opened:
     """Read a file as the options say, with the profile of its layout; keep what `--map` and the others say, unless
     `accept` raises on the record: what reads it wrongly is not for the next file.
@@ -107,7 +107,6 @@ def open_record(
     kept = profiles.load(used) if used else None
     drive = _drive(args)
     record = record_of(table, args.map, drive=drive, profile=kept, sample_time=args.sample_time)
-    accept(record)
     written = None
     if (
         args.map
@@ -115,6 +114,7 @@ def open_record(
         or args.sample_time is not None
         or (args.profile and not used)
     ):
+        accept(record)
         merged = profiles.merged(args.map, drive, args.sample_time, kept)
         if kept is None or not profiles.alike(merged, kept):
             written = profiles.save(merged, table, args.profile)

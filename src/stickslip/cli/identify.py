@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from stickslip.identify.axis_trial import Trial
+    from stickslip.identify.doctor import Diagnosis
     from stickslip.identify.estimate import Estimate, Identification
     from stickslip.machines.servo import ServoAxis
     from stickslip.record import Record
@@ -132,8 +133,9 @@ def run(args: argparse.Namespace) -> int:
         args.law = [*tried, *(x for x in args.law if x != "all" and x not in tried)]
     _output.say(f"method {args.method}, {sum(len(s.record) for s in sources)} samples")
     if not args.no_report:
-        # The library that draws loads while compiled code runs.
-        threading.Thread(target=importlib.import_module, args=("matplotlib.figure",)).start()
+        # What draws and writes it loads while compiled code runs.
+        names = ("matplotlib.figure", "matplotlib.backends.backend_svg", "jinja2")
+        threading.Thread(target=lambda: [importlib.import_module(name) for name in names]).start()
     found = identified(sources, args)
     if left_out:
         names = ", ".join(left_out)
@@ -259,15 +261,17 @@ def checked(path: Path, args: argparse.Namespace, held_out: bool = False) -> Sou
     from stickslip.identify.doctor import examine
     from stickslip.report.identified import Source
 
-    def accept(record: Record) -> None:
-        if errors := examine(record).errors:
-            raise InputError(f"{path}: {errors[0].line()}; see `stickslip doctor {path}`")
+    def accepted(record: Record) -> Diagnosis:
+        found = examine(record)
+        if found.errors:
+            raise InputError(f"{path}: {found.errors[0].line()}; see `stickslip doctor {path}`")
+        return found
 
-    opened = _reading.open_record(path, args, accept)
+    opened = _reading.open_record(path, args, accepted)
     if opened.written:
         for finding in opened.notes:
             print(f"stickslip: {path}: {finding.line()}", file=sys.stderr)
-    diagnosis = examine(opened.record)
+    diagnosis = accepted(opened.record)
     return Source(path.name, diagnosis.record, diagnosis.findings, source_of(diagnosis.record), held_out)
 
 

@@ -23,6 +23,7 @@ from stickslip.identify.axis_trial import Trial
 from stickslip.identify.corrections import BAND, FIRST, Criterion, robust_std
 from stickslip.identify.estimate import silent
 from stickslip.identify.observer import Prepared, prepare
+from stickslip.identify.side_by_side import mapped
 from stickslip.identify.vector import Vector
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
@@ -90,19 +91,22 @@ def foreseen(
     InputError
         If a record has no drive signal, too little is held out, or no law could be fitted.
     """
-    failures: dict[str, str] = {}
-    found: dict[str, tuple[Criterion, Array]] = {}
-    for number, law in enumerate(laws, 1):
-        progress(f"{law.name}: law {number} of {len(laws)}")
+    motions, band = watched(fitted, axis, options["values"], options["free"])
+
+    def search(law: Law) -> tuple[Criterion, Array] | str:
+        progress(f"{law.name}: law {laws.index(law) + 1} of {len(laws)}")
         own = options_of(law, options, laws)
         values, free = own["values"], own["free"]
-        motions, band = watched(fitted, axis, values, free)
         try:
-            found[law.name] = searched(
+            return searched(
                 fitted, axis, law, motions, inverse, values, free, own["frozen"], own["extras"], band, seed=0, hops=0
             )  # fmt: skip
         except InputError as error:
-            failures[law.name] = str(error)
+            return str(error)
+
+    searches = dict(zip((law.name for law in laws), mapped(search, laws), strict=True))
+    found = {name: result for name, result in searches.items() if not isinstance(result, str)}
+    failures = {name: result for name, result in searches.items() if isinstance(result, str)}
     if not found:
         raise InputError("; ".join(failures.values()))
     # Weighed for all as by the law that lacks least where it was fitted.

@@ -22,7 +22,6 @@ parameters are a minimum also where the soft one parts from a contact that stick
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -181,11 +180,11 @@ def prediction_error(
     spread = spread_of(criterion, optimum)
     shaken = shaken_steps(criterion, optimum, np.random.default_rng(seed))
     others = [
-        replace(criterion, records=observed(speed=SLOWER)),
-        replace(criterion, records=observed(grasp=GRASP)),
         replace(criterion, freedom=STRICTER),
+        replace(criterion, records=observed(grasp=GRASP)),
+        replace(criterion, records=observed(speed=SLOWER)),
     ]
-    moved = [c.adapted(u).descend(u, 6, 10.0 * TOLERANCE).u - u for c in others]
+    moved = mapped(lambda c: c.adapted(u).descend(u, 6, 10.0 * TOLERANCE).u - u, others)
     beside = sum((np.outer(d, d) for d in moved), np.zeros_like(shaken))
     accepted, named = feasible(law, vector.law_parameters(u)), vector.named(u)
     assert accepted is not None
@@ -246,10 +245,9 @@ def shaken_steps(criterion: Criterion, optimum: Optimum, rng: np.random.Generato
 
 def random_signs(rng: np.random.Generator, time: Array) -> Array:
     """A smooth Gaussian series of unit variance that forgets within `MEMORY`, shape (n,)."""
-    ndimage: Any = importlib.import_module("scipy.ndimage")  # it carries no types
-
-    samples = MEMORY / float(time[1] - time[0])
-    x: Array = ndimage.gaussian_filter1d(rng.standard_normal(time.size), samples / 2.0, mode="wrap")
+    samples = 0.5 * MEMORY / float(time[1] - time[0])
+    smooth = np.exp(-2.0 * (math.pi * samples * np.fft.rfftfreq(time.size)) ** 2)
+    x = np.fft.irfft(smooth * np.fft.rfft(rng.standard_normal(time.size)), time.size)
     return x / math.sqrt(float(np.mean(x * x)))
 
 

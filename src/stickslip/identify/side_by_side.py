@@ -4,38 +4,46 @@ from __future__ import annotations
 
 import functools
 import os
-import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
 __all__ = ["mapped"]
 
 T = TypeVar("T")
 R = TypeVar("R")
-_inside = threading.local()
 
 
 @functools.cache
-def _pool() -> ThreadPoolExecutor:
-    """As many threads as this process may use cores."""
+def _helpers() -> ThreadPoolExecutor | None:
+    """A thread for every core but the caller's that this process may use."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return ThreadPoolExecutor(cores, "stickslip")
+    return ThreadPoolExecutor(cores - 1, "stickslip") if cores > 1 else None
 
 
 # A forked process has none of its parent's threads.
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_pool.cache_clear)
+    os.register_at_fork(after_in_child=_helpers.cache_clear)
 
 
 def mapped(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
-    """The function of every item, in their order; one after another inside of another call of this."""
-    given = list(items)
-    if len(given) < 2 or getattr(_inside, "works", False):
+    """The function of every item, in their order, which may call this in turn.
+
+    The caller takes part: it works on what no helper has begun. So nobody waits for work that nobody does, and calls
+    within calls keep all cores busy.
+    """
+    given, helpers = list(items), _helpers()
+    if len(given) < 2 or helpers is None:
         return [function(x) for x in given]
-
-    def marked(item: T) -> R:
-        _inside.works = True
-        return function(item)
-
-    return list(_pool().map(marked, given))
+    asked: list[Future[R]] = [helpers.submit(function, x) for x in given]
+    own: dict[int, R] = {}
+    try:
+        # From the end, where helpers come last.
+        for i in reversed(range(len(given))):
+            if not asked[i].cancel():
+                break
+            own[i] = function(given[i])
+        return [own[i] if i in own else f.result() for i, f in enumerate(asked)]
+    finally:
+        for f in asked:
+            f.cancel()
