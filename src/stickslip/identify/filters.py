@@ -83,7 +83,8 @@ def decimated(x: Array, factor: int) -> Array:
 
 def spectrum(x: Array, rate: float, length: int) -> tuple[Array, Array]:
     """Frequencies (Hz) and power density by Welch's method, Hann windows of `length` samples, half overlapping."""
-    return np.fft.rfftfreq(min(length, x.size), 1.0 / rate), cross_spectrum(x, x, rate, length).real
+    f = np.fft.rfftfreq(min(length, x.size), 1.0 / rate)
+    return f, np.asarray(cross_spectrum(x, x, rate, length).real, dtype=np.float64)
 
 
 def cross_spectrum(x: Array, y: Array, rate: float, length: int) -> Complex:

@@ -18,7 +18,6 @@ from stickslip.jit import pointer, select
 from stickslip.simulation._driven_lanes_names import HOLDS, LANES, STATES, law, withstood
 
 GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
-ROUNDING = 1e-8  # of the velocity, relative above 1e-2: it leaves a hundred-thousandth of the corrections
 MOST = 200  # iterations of a stage
 
 # ---- entries of n ----------------------------------------------------------------------------------------------
