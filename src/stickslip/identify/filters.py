@@ -83,7 +83,7 @@ def decimated(x: Array, factor: int) -> Array:
 
 def spectrum(x: Array, rate: float, length: int) -> tuple[Array, Array]:
     """Frequencies (Hz) and power density by Welch's method, Hann windows of `length` samples, half overlapping."""
-    f = np.fft.rfftfreq(min(length, x.size), 1.0 / rate)
+    f = np.asarray(np.fft.rfftfreq(min(length, x.size), 1.0 / rate), dtype=np.float64)
     return f, np.asarray(cross_spectrum(x, x, rate, length).real, dtype=np.float64)
 
 
