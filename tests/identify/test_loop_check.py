@@ -83,6 +83,21 @@ def test_rows_at_the_limit_say_nothing_of_the_gains() -> None:
     assert doubted_loops([replace(cut, loop=replace(cases.LOOP, limit=limit))]) == []
 
 
+def test_a_gain_that_a_record_does_not_excite_is_not_doubted() -> None:
+    made = recorded(16384, 16384)
+    rng = np.random.default_rng(3)
+    push = 0.4 * np.repeat(rng.standard_normal(made.time.size // 50), 50)
+    held = np.zeros(made.time.size)
+    drive = Drive(made.time, held, "feedback", cases.LOOP, disturbance=push, max_step=2e-4)
+    out = drive_axis(Mechanics(cases.INERTIA), cases.model("coulomb"), drive)
+    still = replace(made, reference=held, position=out[:, 0], drive=out[:, 2])
+    assert doubted_loops([replace(still, loop=replace(cases.LOOP, kr=0.0))]) == []
+    (said,) = doubted_loops([replace(still, loop=replace(cases.LOOP, kd=0.16))])
+    assert "kd 0.16 given, 0.08" in said
+    # So short that one stretch is all there is.
+    assert shown_gains(still.until(200)) is not None
+
+
 def test_nothing_is_said_without_signal_or_rows() -> None:
     made = recorded(16384, 16384)
     assert shown_gains(replace(made, drive=None)) is None

@@ -189,7 +189,8 @@ def with_intervals(x: Array, u: Array, time: Array, velocity_noise: float) -> tu
     normal = (x / scale).T @ (x / scale) / u.size
     own = own_variance(x, kd)
     normal[kd, kd] -= min(velocity_noise, 0.99 * own) / scale[kd] ** 2
-    cleared = np.linalg.solve(normal, (x / scale).T @ u / u.size) / scale
+    # A gain that the record does not excite has a column of 0.
+    cleared = np.linalg.lstsq(normal, (x / scale).T @ u / u.size, rcond=None)[0] / scale
     half += np.abs(cleared - values) if velocity_noise < 0.5 * own else np.inf
     return values[:count], half[:count]
 
