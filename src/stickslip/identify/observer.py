@@ -22,7 +22,7 @@ from stickslip.simulation.driven import Course, Drive, Mechanics
 from stickslip.simulation.driven_lanes import Stretches, cut
 from stickslip.spec import Law
 
-__all__ = ["ROUGH", "Motion", "Prepared", "prepare"]
+__all__ = ["EXACT", "GRASP", "ROUGH", "Motion", "Prepared", "prepare"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

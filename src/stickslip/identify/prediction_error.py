@@ -35,7 +35,7 @@ from stickslip.identify.corrections import BAND, Criterion, MakeMechanics, stude
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.jackknife import BlockCovariance, leave_blocks_out
 from stickslip.identify.noise import Noise
-from stickslip.identify.observer import GRASP, Motion, Prepared, prepare
+from stickslip.identify.observer import EXACT, GRASP, ROUGH, Motion, Prepared, prepare
 from stickslip.identify.optimum import Optimum
 from stickslip.identify.side_by_side import mapped
 from stickslip.identify.uncertainty import interval_of, verdict_on
@@ -166,8 +166,8 @@ def prediction_error(
         If a motion is too short for the band, or the model gives no finite values at the start.
     """
 
-    def observed(speed: float = 1.0, grasp: float = math.inf) -> list[Prepared]:
-        return [prepare(m, law, inertia, friction, band, speed, grasp) for m in motions]
+    def observed(speed: float = 1.0, grasp: float = math.inf, rounding: float = EXACT) -> list[Prepared]:
+        return [prepare(m, law, inertia, friction, band, speed, grasp, rounding) for m in motions]
 
     criterion = Criterion.first(observed(), law, vector, mechanics)
     u = vector.start if start is None else start
@@ -181,8 +181,8 @@ def prediction_error(
     shaken = shaken_steps(criterion, optimum, np.random.default_rng(seed))
     others = [
         replace(criterion, freedom=STRICTER),
-        replace(criterion, records=observed(grasp=GRASP)),
-        replace(criterion, records=observed(speed=SLOWER)),
+        replace(criterion, records=observed(grasp=GRASP, rounding=ROUGH)),
+        replace(criterion, records=observed(speed=SLOWER, rounding=ROUGH)),
     ]
     moved = mapped(lambda c: c.adapted(u).descend(u, 6, 10.0 * TOLERANCE).u - u, others)
     beside = sum((np.outer(d, d) for d in moved), np.zeros_like(shaken))

@@ -334,6 +334,9 @@ def _fill(axes: Any, panel: Panel, bare: bool) -> None:
     if panel.x_scale == "log" and high < 300.0 * low:
         _plain_ticks(axes, low, high)
         axes.set_xlim(low, high)  # Ticks may have widened it.
+    elif panel.x_scale == "log":
+        # Decades as 0.01, not as powers of ten, whose typesetting takes as long as the rest of the picture.
+        axes.xaxis.set_major_formatter("{x:g}")
     if panel.y_names:
         axes.set_yticks(range(len(panel.y_names)), panel.y_names)
         axes.set_ylim(len(panel.y_names) - 0.5, -0.5)
