@@ -13,6 +13,7 @@ from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, pid, place
+from stickslip.errors import InputError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation import _forcing as forcing
@@ -317,3 +318,10 @@ def test_elements_under_an_open_loop_torque_are_left_to_the_adaptive_integrator(
     assert record.meta["integrator"] == "adaptive"
     # identification.json of the reference: the largest position of this record.
     assert record["position"].max() == pytest.approx(0.3368436348, abs=1e-6)
+
+
+def test_a_feedforward_over_too_long_a_run_is_refused(monkeypatch):
+    monkeypatch.setattr(forcing, "MOST_CELLS", 3000)
+    controller = Controller(PD, Feedforward(GMS))
+    with pytest.raises(InputError, match=r"duration = 400 s: .*more than 3000 pieces.*shorter run"):
+        exact.run(loop(GMS, controller, SINE, 400.0))

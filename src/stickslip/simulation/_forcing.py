@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.errors import InputError
 from stickslip.jit import call_profile, call_step, kernel, pointer
 from stickslip.simulation._case import Array, Case
 
@@ -187,8 +188,8 @@ def feedforward(case: Case) -> tuple[Array, list[float]]:
 
     Raises
     ------
-    RuntimeError
-        If the torque changes too fast to be tabulated.
+    InputError
+        If the torque changes too often to be tabulated over so long a run.
     """
     side = case.compensator
     duration = float(case.breaks[-1])
@@ -209,7 +210,10 @@ def feedforward(case: Case) -> tuple[Array, list[float]]:
                 break
             room *= 8
             if room > MOST_CELLS:
-                raise RuntimeError("feedforward: the torque changes too fast to be tabulated")
+                raise InputError(
+                    f"duration = {duration:g} s: the compensator's torque along the reference changes too often to be "
+                    f'tabulated (more than {MOST_CELLS} pieces); give a shorter run, or integrator = "fixed"'
+                )
         _tables[key] = (cells[:n].copy(), kinks_of(cells[:n]))
         if len(_tables) > MOST_TABLES:
             _tables.popitem(last=False)
