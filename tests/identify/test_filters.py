@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
+from stickslip.errors import InputError
 from stickslip.identify.filters import (
     RIPPLE,
     ZeroPhase,
@@ -37,6 +38,14 @@ def test_the_low_pass_is_that_of_scipy(order: int, corner: float, n: int, seed: 
     x = wandering(n, seed)
     expected = signal.sosfiltfilt(signal.butter(order, corner, fs=1000.0, output="sos"), x)
     alike(low_pass(x, corner, 1000.0, order), expected, x)
+
+
+@pytest.mark.parametrize("corner", [0.0, -5.0, 500.0, 600.0, float("nan")])
+def test_a_corner_beyond_half_the_rate_is_refused(corner: float):
+    with pytest.raises(InputError, match=r"corner .* Hz of a low-pass must be above 0 and below 500 Hz"):
+        low_pass(wandering(100, 1), corner, 1000.0)
+    with pytest.raises(InputError, match=r"order 3 .* even"):
+        low_pass(wandering(100, 1), 5.0, 1000.0, order=3)
 
 
 @pytest.mark.parametrize(("reach", "n"), [(30, 400), (30, 30)])

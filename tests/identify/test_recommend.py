@@ -130,6 +130,14 @@ def test_a_drive_that_cannot_move_the_axis_is_refused(monkeypatch: pytest.Monkey
         InputError, match=r"torque limit 0.33 N·m: the drive cannot move .* friction is 0.335 N·m"
     ):
         recommend(identified(0.02), Drive(20.0, torque_limit=0.33), axes=1, confirm=2)
+    found = identified(0.02)
+    viscous = replace(
+        found, model=Model(found.model.law, **found.model.parameters._replace(sigma2=2.0)._asdict())
+    )
+    with pytest.raises(
+        InputError, match=r"torque limit 0.5 N·m: the drive cannot follow .* smaller --amplitude"
+    ):
+        recommend(viscous, Drive(20.0, torque_limit=0.5), axes=1, confirm=2)
     monkeypatch.setattr(recommending, "GAINS", (0.5,))
     advice = recommend(identified(0.1), Drive(20.0, torque_limit=0.336), axes=4, confirm=0)
     assert re.match(r"On [1-4] of 5 axes the torque limit .* lies below their friction", advice.notes[0])

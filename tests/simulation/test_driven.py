@@ -200,6 +200,25 @@ def test_a_law_of_ones_own_is_driven_too(tmp_path: Path) -> None:
     assert np.ptp(out[:, 0]) > 1e-3
 
 
+def test_a_course_asked_again_is_asked_anew_where_anything_differs() -> None:
+    model, axis = example("stribeck"), Mechanics(INERTIA)
+    course = Course(model.law, sine())
+    first = course.run(axis, model.parameters)
+    kept = first.copy()
+    first[:] = math.nan  # What a caller does to its copy is its own affair.
+    assert np.array_equal(course.run(axis, model.parameters), kept)
+    other = model.parameters._replace(fc=1.1 * model.parameters.fc)
+    asked = [
+        {"gain": 0.5}, {"start": np.array([0.1, 0.0])}, {"start": (0.0, 0.2)}, {"gain": 0.5, "start": (0.0, 0.2)},
+    ]  # fmt: skip
+    runs = [course.run(axis, model.parameters, **a) for a in asked] + [course.run(axis, other)]  # type: ignore[arg-type]
+    fresh = [Course(model.law, sine()).run(axis, model.parameters, **a) for a in asked]  # type: ignore[arg-type]
+    fresh.append(Course(model.law, sine()).run(axis, other))
+    for one, alone in zip(runs, fresh, strict=True):
+        assert np.array_equal(one, alone)
+        assert not np.array_equal(one, kept)
+
+
 def test_bad_drives_are_refused() -> None:
     time = np.array([0.0, 1.0, 1.0])
     with pytest.raises(InputError, match="ascend strictly"):

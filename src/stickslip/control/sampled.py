@@ -1,8 +1,8 @@
 """The controller as a drive runs it: every sample time, from a counted position, its output held in between.
 
 Velocity is the difference of the last two measured positions over the sample time; the compensator's velocity
-may pass a second-order Butterworth low-pass (bilinear transform, corner prewarped: Oppenheim and Schafer,
-Discrete-Time Signal Processing, 7.1); the integral is a sum of trapezoids.
+may pass a second-order Butterworth low-pass (bilinear transform, corner prewarped: ``oppenheim1999``, section
+7.1); the integral is a sum of trapezoids.
 
 Written in the scalar subset (`stickslip.subset`): the fixed-step integrator and the rigs run it compiled, exports
 write it in other languages. Arguments: the settings ``n``, the memory ``m``, and the compensator's law with its

@@ -139,6 +139,8 @@ def inverse_dynamics(
     """
     if not trials:
         raise InputError("no record; give at least one")
+    if cutoff is not None and not cutoff > 0.0:
+        raise InputError(f"cutoff = {cutoff:g} Hz must be greater than 0")
     corner = min(suitable_cutoff(t) for t in trials) if cutoff is None else cutoff
     columns = [_columns(t, axis, corner, per_direction, harmonics, harmonic_period) for t in trials]
     names, units = _names(axis, per_direction, harmonics)

@@ -1,7 +1,7 @@
 """Zero-phase filters and spectra: those of scipy.signal, whose import takes longer than to identify an axis's inertia.
 
-Low-passes are second-order sections of the bilinear transform, their corner prewarped (Oppenheim and Schafer,
-Discrete-Time Signal Processing, 7.1; see `docs/decisions/0019-filters-of-our-own.md`). Tests hold all to scipy.signal.
+Low-passes are second-order sections of the bilinear transform, their corner prewarped (``oppenheim1999``,
+section 7.1; see `docs/decisions/0019-filters-of-our-own.md`). Tests hold all to scipy.signal.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.errors import InputError
 from stickslip.simulation._biquads import zero_phase
 
 __all__ = ["ZeroPhase", "cross_spectrum", "decimated", "low_pass", "spectrum"]
@@ -26,6 +27,8 @@ PASSES = np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
 
 def butterworth_poles(order: int) -> Complex:
     """Poles above the real axis of the analogue low-pass with the corner 1 rad/s; the order is even."""
+    if order < 2 or order % 2:
+        raise InputError(f"order {order} of a low-pass must be even, 2 or more")
     angle = math.pi * (2.0 * np.arange(order // 2) + order + 1.0) / (2.0 * order)
     return np.exp(1j * angle)
 
@@ -48,9 +51,18 @@ class ZeroPhase:
         Hz; the corner below half the rate.
     reach : int, optional
         Values by which a series is continued at its ends, turned over; scipy.signal's unless given.
+
+    Raises
+    ------
+    InputError
+        If the corner does not lie between 0 and half the rate.
     """
 
     def __init__(self, poles: Complex, corner: float, rate: float, reach: int | None = None) -> None:
+        if not 0.0 < corner < 0.5 * rate:
+            raise InputError(
+                f"corner {corner:g} Hz of a low-pass must be above 0 and below {0.5 * rate:g} Hz, half the rate"
+            )
         s = math.tan(math.pi * corner / rate) * poles
         z = (1.0 + s) / (1.0 - s)
         ones, a1, a2 = np.ones(z.size), -2.0 * z.real, np.abs(z) ** 2

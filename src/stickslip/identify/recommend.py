@@ -21,7 +21,15 @@ from stickslip.control.linear import place
 from stickslip.errors import InputError
 from stickslip.identify.draws import draw_models, sliding_torque
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.setting_bench import Bench, Candidate, Setting, on_both, resistance, rings_alone
+from stickslip.identify.setting_bench import (
+    Bench,
+    Candidate,
+    Setting,
+    breakaway,
+    on_both,
+    resistance,
+    rings_alone,
+)
 from stickslip.identify.setting_trial import Drive
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
@@ -150,7 +158,7 @@ def recommend(
     Raises
     ------
     InputError
-        If there is no inertia, the drive is too weak to move the axis, or the linear controller alone cannot be
+        If there is no inertia, the drive is too weak for the motion, or the linear controller alone cannot be
         simulated.
     """
     j = inertia if inertia is not None else found.axis.get("inertia")
@@ -159,12 +167,7 @@ def recommend(
         raise InputError(f"{found.path} holds no inertia; give --inertia in {unit}")
     if not 0.0 < j < math.inf:
         raise InputError(f"inertia = {j:g} {unit} must be greater than 0; give another one with --inertia")
-    if drive.torque_limit <= (friction := resistance(found.model, drive)):
-        torque = found.unit("N·m")
-        raise InputError(
-            f"torque limit {drive.torque_limit:g} {torque}: the drive cannot move the axis, whose friction is "
-            f"{friction:.3g} {torque} along this motion; give a --torque-limit above it"
-        )
+    refuse_weak(found, drive)
     linear = Controller(
         place("PD", float(j), drive.bandwidth, drive.damping), None, drive.torque_limit, drive.sample_time,
         drive.encoder_counts,
@@ -200,6 +203,26 @@ def recommend(
         first.moving["position_rms_rad"], margin, unsafe_gain, tuple(candidates), len(bench.plants),
         tuple(notes), drive, rung, float(j),
     )  # fmt: skip
+
+
+def refuse_weak(found: Identified, drive: Drive) -> None:
+    """Refuse a torque limit at which the axis does not move, or does not follow.
+
+    Raises
+    ------
+    InputError
+    """
+    limit, torque = drive.torque_limit, found.unit("N·m")
+    if limit <= (held := breakaway(found.model)):
+        raise InputError(
+            f"torque limit {limit:g} {torque}: the drive cannot move the axis, whose friction is {held:.3g} {torque}; "
+            "give a --torque-limit above it"
+        )
+    if limit <= (friction := resistance(found.model, drive)):
+        raise InputError(
+            f"torque limit {limit:g} {torque}: the drive cannot follow this motion, along which friction reaches "
+            f"{friction:.3g} {torque}; give a --torque-limit above it, or a smaller --amplitude or --frequency"
+        )
 
 
 class Account:
@@ -345,7 +368,7 @@ def notes_on(
     """What the user must know."""
     if weak:
         limit = "the torque limit of the drive lies below their friction"
-        yield f"On {weak} axes {limit}, though not below that of the best estimate: they do not move."
+        yield f"On {weak} axes {limit}, though not below that of the best estimate: they do not follow."
     unknown = [e.name for e in found.estimates if not e.identified]
     if not found.law_estimates[0]:
         yield "The law has no intervals: only its best estimate was simulated, and nothing is said about its error."

@@ -144,6 +144,11 @@ def on_both(setting: Setting, bench: Bench, others: Bench) -> Candidate:
     return replace(here, unsafe=there.unsafe)
 
 
+def breakaway(model: Model) -> float:
+    """The torque that the contact withstands at rest, N·m; 0 where the law does not tell it."""
+    return float(np.abs(sliding_torque(model, np.zeros(1)))[0]) if model.law.steady else 0.0
+
+
 def resistance(model: Model, drive: Drive) -> float:
     """The greatest friction along the slow sinusoid, break-away among it, N·m; 0 where the law does not tell it."""
     if not model.law.steady:

@@ -241,10 +241,11 @@ class Course:
             pull. Rows after a divergence are NaN.
         """
         # Weights, misfits and pictures ask for one run after the other at one place.
-        asked = (mechanics, parameters, gain, start)
+        begin = None if start is None else (float(start[0]), float(start[1]))
+        asked = (mechanics, parameters, gain, begin)
         last = self._last
         if last is None or last[0] != asked:
-            self._last = last = asked, self._run(mechanics, parameters, gain, start)
+            self._last = last = asked, self._run(mechanics, parameters, gain, begin)
         return last[1].copy()
 
     def _run(
