@@ -361,3 +361,12 @@ def test_a_time_column_whose_name_ends_in_its_unit_states_it(tmp_path, name, sta
     column = next(c for c in record.meta["reading"]["columns"] if c["channel"] == "time")
     assert (column["source"] == "name") == stated
     assert record.time[-1] - record.time[0] == pytest.approx(38.0 * factor)
+
+
+@pytest.mark.parametrize("header", ["t,s,v,torque", "t,s,torque", "s,t,q,torque"])
+def test_a_column_s_is_not_taken_for_the_time_beside_a_t(tmp_path, header):
+    path = tmp_path / "log.csv"
+    row = ",".join(["{0}"] * len(header.split(",")))
+    path.write_text(f"{header}\n" + "".join(row.format(0.1 * i) + "\n" for i in range(40)))
+    with pytest.raises(InputError, match=r"time may be any of .*; say which with --map time="):
+        read(path)

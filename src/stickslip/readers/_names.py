@@ -121,8 +121,8 @@ WANTED = _words(
 )
 """Words that say that a quantity is wanted, not measured."""
 
-SECONDS = frozenset(["s", "sec", "secs"])
-"""Names of a time that are its unit."""
+SECONDS = frozenset(["sec", "secs"])
+"""Names of a time that are its unit. A bare "s" may as well be a displacement (and does not beat a "t")."""
 ERROR = frozenset(["deviation", "diff", "err", "error", "fehler", "following", "lag"])
 LOAD_SIDE = frozenset(
     [
