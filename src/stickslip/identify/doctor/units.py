@@ -18,9 +18,10 @@ POSITION = {"deg": DEG, "rev": REV, "mm": 1e-3, "um": 1e-6}
 VELOCITY = {"deg/s": DEG, "rpm": RPM, "rev/s": REV, "mm/s": 1e-3, "mm/min": 1e-3 / 60}
 TIME = {"ms": 1e-3, "us": 1e-6}
 LINEAR_ONLY = ("mm", "um", "mm/s", "mm/min")
-FOLLOWS, MOVES_ALIKE = 0.95, 5.0
-"""Correlation with its reference from which on a position follows it; and how many times as far, or as little, it may
-then go: a weak loop that holds a weight goes a third of the way."""
+FOLLOWS, MOVES_ALIKE, THAT_UNIT = 0.95, 5.0, 0.01
+"""Correlation with its reference from which on a position follows it; how many times as far, or as little, it may then
+go: a weak loop that holds a weight goes a third of the way; and how near that is to a unit's size: gears of 60 and 6 are
+5 % from degrees and revolutions."""
 
 
 def assumed(view: View) -> Iterator[Finding]:
@@ -105,10 +106,10 @@ def reference_scale(view: View) -> Iterator[Finding]:
         if (name in LINEAR_ONLY) != linear:
             continue
         for channel, expected in (("position", 1.0 / size), ("position_reference", size)):
-            if abs(math.log(times / expected)) < 0.05:
+            if abs(math.log(times / expected)) < THAT_UNIT:
                 level = "warning" if view.stated(channel) else "error"
                 said = f"{message}: {channel} in {name} rather than {unit}"
-                remedy = f"say {view.mapped(channel, name)}, if it is so"
+                remedy = f"say {view.mapped(channel, name)}, or {view.mapped(channel, unit)} if it is right"
                 yield Finding(level, f"{channel.replace('_', '-')}-unit", said, remedy=remedy)
                 return
     yield Finding(
