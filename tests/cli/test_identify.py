@@ -249,6 +249,12 @@ def test_break_away_from_ramps(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert any(v == pytest.approx(0.3, abs=0.01) for v in values)
     assert any(v == pytest.approx(0.33, abs=0.01) for v in values)
     assert (tmp_path / "o" / "report.html").exists()
+    again = ["identify", str(path), "--out", str(tmp_path / "o"), "--no-report", "--threshold"]
+    assert main([*again, "0.05", "--method", "breakaway"]) == 0
+    assert "velocity threshold 0.05 rad/s" in capsys.readouterr().out
+    assert main([*again, "-1", "--method", "breakaway"]) == 2
+    assert main([*again, "0.05"]) == 2
+    assert "--threshold is for --method breakaway" in capsys.readouterr().err
 
 
 def test_inertia_from_a_frequency_response(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -92,7 +92,8 @@ def breakaway(records: Sequence[Record], args: argparse.Namespace) -> Identifica
     """Torque at the break, per direction."""
     from stickslip.identify.breakaway import identify_breakaway
 
-    return identify_breakaway(records, torque=torque_channel(records, args))
+    options = {} if args.threshold is None else {"threshold": args.threshold}
+    return identify_breakaway(records, torque=torque_channel(records, args), **options)
 
 
 def sliding(records: Sequence[Record], args: argparse.Namespace) -> Identification:

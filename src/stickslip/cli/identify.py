@@ -71,6 +71,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--torque", metavar="CHANNEL", help="motor_torque, sensor_torque, ... (not axis)")
     parser.add_argument("--elements", type=int, default=0, metavar="N", help="of GMS (presliding; 0: chosen)")
+    parser.add_argument(
+        "--threshold", type=float, metavar="V", help="velocity that is motion, rad/s or m/s (breakaway; 0.01)"
+    )
     _axis_arguments(parser.add_argument_group("axis"))
     parser.add_argument(
         "--out",
@@ -172,6 +175,10 @@ def sane(args: argparse.Namespace) -> None:
         raise InputError(f"--elements {args.elements} must be 0 or more")
     if args.noise is not None and not (math.isfinite(args.noise) and args.noise > 0.0):
         raise InputError(f"--noise {args.noise:g} must be greater than 0")
+    if args.threshold is not None and not (math.isfinite(args.threshold) and args.threshold > 0.0):
+        raise InputError(f"--threshold {args.threshold:g} must be greater than 0")
+    if args.threshold is not None and args.method != "breakaway":
+        raise InputError(f"--threshold is for --method breakaway; --method {args.method} has none")
     if args.validation and args.method != "axis":
         raise InputError(f"--hold-out is for --method axis; --method {args.method} has none")
 

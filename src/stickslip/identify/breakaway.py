@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,15 +17,18 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identify.segments import slope_of
-from stickslip.record import Record
+from stickslip.record import Record, encoder_step
 
 __all__ = ["Break", "find_breaks", "identify_breakaway"]
 
 WINDOW = 0.02
 """s, over which a velocity is taken where the record has none."""
 RAMP = 0.7
-"""Part of its torque by which the torque must have risen at rest before a break-away that a ramp brought about. Where
-an axis that follows a reference sticks and slips, it rises by a fifth or so."""
+"""Part of its torque by which the torque must have risen at rest before a break-away that a ramp surely brought about.
+Where an axis that follows a reference sticks and slips, it rises by up to a half; after a ramp from a torque that is
+held, against gravity say, by as little: such a record is not told from one of a motion, so that neither is refused."""
+COUNTS = 3.0
+"""Counts of the encoder, within `WINDOW`, that are motion rather than creep or noise."""
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -126,7 +129,12 @@ def identify_breakaway(
     Raises
     ------
     InputError
-        If the axis never breaks away, or most times without a torque ramp from rest: that is no break-away record.
+        If the axis never breaks away.
+
+    Notes
+    -----
+    Where fewer than half of the break-aways follow a torque ramp from rest (`Break.ramped`), nothing counts as
+    identified and a note says so: most likely that is the record of a motion.
     """
     several = [records] if isinstance(records, Record) else list(records)
     breaks = [b for r in several for b in find_breaks(r, torque=torque, threshold=threshold, rest=rest)]
@@ -136,12 +144,6 @@ def identify_breakaway(
             "torque higher or lower the threshold"
         )
     ramps = sum(b.ramped for b in breaks)
-    if 2 * ramps < len(breaks):
-        raise InputError(
-            f"no break-away record: {len(breaks)} times the axis moved off, {ramps} of them after a torque ramp. In "
-            "one the torque rises slowly from about 0 while the axis rests until it moves, then goes back to 0 until "
-            "it rests again (`stickslip rig run breakaway`); for the record of a motion take --method axis"
-        )
     estimates: list[Estimate] = []
     misfit: dict[str, float] = {}
     for direction, word in ((1, "positive"), (-1, "negative")):
@@ -153,17 +155,42 @@ def identify_breakaway(
     if rate is not None:
         estimates.append(rate)
     notes = [f"{len(breaks)} break-aways from channel {torque!r}, velocity threshold {threshold:g} rad/s."]
-    if rate is not None and (rate.lower > 0.0 or rate.upper < 0.0):
+    if 2 * ramps < len(breaks):
+        estimates = [replace(e, identified=False, verdict="few torque ramps from rest") for e in estimates]
+    elif rate is not None and (rate.lower > 0.0 or rate.upper < 0.0):
         notes.append(f"Break-away depends on the ramp rate: {rate.value:.3g} N·m per tenfold rate.")
-    if ramps < len(breaks):
-        notes.append(
-            f"{len(breaks) - ramps} of them followed no torque ramp from rest, and may lie elsewhere."
-        )
+    notes += ramp_notes(len(breaks), ramps) + count_notes(several, threshold)
     few = tuple(["Repeat the ramp at other angles; one break-away has no spread."] if len(breaks) < 3 else [])
     return Identification(
         "breakaway", None, tuple(estimates), np.eye(len(estimates)), misfit, tuple(notes), few,
         (angle_picture(breaks, estimates),), {"breaks": breaks},
     )  # fmt: skip
+
+
+def ramp_notes(found: int, ramps: int) -> list[str]:
+    """What is to be said where only so many of the break-aways that were found followed a torque ramp."""
+    if ramps == found:
+        return []
+    if 2 * ramps >= found:
+        return [f"{found - ramps} of them followed no torque ramp from rest, and may lie elsewhere."]
+    return [
+        f"Only {ramps} of them followed a torque ramp from rest, so that nothing counts as identified: is it the "
+        "record of a motion? Then take --method axis. In a break-away record the torque rises slowly while the "
+        "axis rests until it moves, then goes back until it rests (`stickslip rig run breakaway`). Where it was ramped "
+        f"from a torque held, less than {1.0 - RAMP:.0%} of the break-away torque is to be held for it to count."
+    ]
+
+
+def count_notes(records: Sequence[Record], threshold: float) -> list[str]:
+    """That a few counts of an encoder pass the threshold."""
+    steps = [encoder_step(r["position"]) for r in records if "velocity" not in r.channels]
+    enough = COUNTS * max(steps, default=0.0) / WINDOW
+    if enough < 1.25 * threshold:
+        return []
+    return [
+        f"Fewer than {COUNTS:g} counts of the encoder within {WINDOW:g} s pass the threshold, so that creep or noise "
+        f"may be taken for a break-away: try --threshold {enough:.2g}."
+    ]
 
 
 def student(dof: int) -> float:

@@ -20,8 +20,8 @@ TIME = {"ms": 1e-3, "us": 1e-6}
 LINEAR_ONLY = ("mm", "um", "mm/s", "mm/min")
 FOLLOWS, MOVES_ALIKE, THAT_UNIT = 0.95, 5.0, 0.01
 """Correlation with its reference from which on a position follows it; how many times as far, or as little, it may then
-go: a weak loop that holds a weight goes a third of the way; and how near that is to a unit's size: gears of 60 and 6 are
-5 % from degrees and revolutions."""
+go: a weak loop that holds a weight goes a third of the way; and how near that is to a unit's size: gears of 60 and 6
+are 5 % from degrees and revolutions."""
 
 
 def assumed(view: View) -> Iterator[Finding]:
