@@ -4,7 +4,7 @@
 
 Each seed is an axis with a law, a loop (PR, PD or PID), a programme of velocities and coloured noise
 (`coverage_records`). Its record is as fine as what the controller saw, or rounded when the controller saw the exact
-position, or its torque two rows late, or every fifth row alone.
+position, or its torque or its reference two rows late, or every fifth row alone.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from stickslip.identify.axis_trial import Trial
 from stickslip.identify.loop_check import shown_gains
 from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
 
-KINDS = ("as seen", "rounded", "late", "every fifth row")
+KINDS = ("as seen", "rounded", "late", "reference late", "every fifth row")
 COUNTS = (2000, 16384, 1_000_000)
 KINDS_OF_LOOP = ("PR", "PD", "PID")
 
@@ -63,6 +63,8 @@ def trial(seed: int, counts: int, kind: str) -> Trial:
     position, signal = count * np.floor(out[:, 0] / count + 0.5), out[:, 2] + noise
     if kind == "late":
         signal = np.concatenate([signal[[0, 0]], signal[:-2]])
+    if kind == "reference late":
+        reference = np.concatenate([reference[[0, 0]], reference[:-2]])
     every = 5 if kind == "every fifth row" else 1
     return Trial(
         f"seed {seed}", time[::every], position[::every], signal[::every], "torque", reference[::every], loop

@@ -36,6 +36,17 @@ def test_the_bibliography_is_read_whole() -> None:
         assert entry.count("{") == entry.count("}"), key
 
 
+def test_every_key_in_a_docstring_is_in_the_bibliography() -> None:
+    import stickslip
+
+    cited = {
+        key
+        for path in Path(stickslip.__file__).parent.rglob("*.py")
+        for key in re.findall(r"``([a-z]+(?:19|20)\d\d[a-z]?)``", path.read_text(encoding="utf-8"))
+    }
+    assert {"fuller1987", "broyden1965"} <= cited <= set(bibliography())
+
+
 @pytest.mark.parametrize(
     ("argv", "keys"),
     [

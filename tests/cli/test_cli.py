@@ -271,3 +271,9 @@ def test_a_reader_that_leaves_early(folder: Path) -> None:
         ["bash", "-c", f"{command} study thesis --print | head -1"], capture_output=True, check=False
     )
     assert done.stderr == b""
+
+
+def test_a_chance_that_there_is_not_is_a_dash() -> None:
+    from stickslip.cli.compare import chance
+
+    assert [chance(p) for p in (float("nan"), 0.25, 1e-9)] == ["-", "0.25", "< 1e-06"]

@@ -65,6 +65,44 @@ def test_wrong_gains_are_told_with_those_that_the_record_shows(name: str, counts
     assert not any(f"{g} " in said for g in GAINS if g != name)
 
 
+@pytest.mark.parametrize("late", [1, 2, -1])
+def test_a_reference_that_is_recorded_late_is_no_other_controller(late: int) -> None:
+    for seed in range(2):
+        made = recorded(16384, 16384, seed)
+        assert made.reference is not None
+        rows = np.clip(np.arange(made.time.size) - late, 0, made.time.size - 1)
+        made = replace(made, reference=made.reference[rows])
+        for name, gains in ({"as it was": {}} | WRONG).items():
+            shown = shown_gains(replace(made, loop=replace(cases.LOOP, **gains)))
+            assert shown is not None
+            assert bool(shown.differing()) == bool(gains), name
+
+
+def test_a_reference_that_is_recorded_late_is_told() -> None:
+    # Stiffer: rows of the reference are worth more of the signal.
+    loop = Loop(kp=30.0, kd=0.3)
+    time = 1e-3 * np.arange(6000)
+    reference = cases.wanted(time, 0)
+    drive = Drive(time, reference, "feedback", loop, max_step=2e-4)
+    out = drive_axis(Mechanics(cases.INERTIA), cases.model("stribeck"), drive)
+    made = Trial("log.csv", time, out[:, 0], out[:, 2], "torque", reference, loop)
+    assert doubted_loops([made]) == []
+    for late, said in ((2, "2 rows late"), (1, "1 row late"), (-1, "1 row early")):
+        moved = reference[np.clip(np.arange(time.size) - late, 0, time.size - 1)]
+        (note,) = doubted_loops([replace(made, reference=moved)])
+        assert f"log.csv: the reference seems recorded {said}; so shifted, the loop given" in note
+        (note,) = doubted_loops([replace(made, reference=moved, loop=Loop(kp=30.0, kd=0.6))])
+        assert "kd 0.6 given, 0.3" in note
+
+
+def test_a_signal_with_its_sign_turned_is_told_with_the_gains_as_shown() -> None:
+    made = recorded(16384, 16384)
+    assert made.drive is not None
+    (said,) = doubted_loops([replace(made, drive=-made.drive)])
+    assert f"kp {cases.LOOP.kp:.4g} given, -{cases.LOOP.kp:.2g}"[:-1] in said
+    assert said.endswith("the recorded signal's sign may be turned.")
+
+
 def test_a_factor_on_the_output_belongs_to_the_gains() -> None:
     made = recorded(16384, 16384)
     halved = replace(made, loop=replace(cases.LOOP, kp=4.0, kd=0.04, kr=0.04))

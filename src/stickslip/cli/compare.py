@@ -68,7 +68,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def chance(p: float) -> str:
-    """A chance, or the bound below which its value tells nothing."""
+    """A chance, or the bound below which its value tells nothing; "-" where there is none."""
+    if math.isnan(p):
+        return "-"
     return f"< {LEAST:g}" if p < LEAST else f"{p:.2g}"
 
 

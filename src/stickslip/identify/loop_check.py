@@ -1,12 +1,14 @@
 """Whether a controller that was given is the one that made a record: its gains, found from the record itself.
 
 A linear controller's output is linear in its gains, u = kp e + ki (integral of e) + kr dr - kd dy, so that least
-squares of the recorded signal over reference and position give them, whatever the axis is. Three things would mislead:
+squares of the recorded signal over reference and position give them, whatever the axis is. Four things would mislead:
 
-- Noise and rounding of the position make the gain on the velocity look smaller (errors in variables: Fuller,
-  Measurement Error Models, 1987, 1.1). Means over stretches of rows are fitted, so long that it does not matter; what
+- Noise and rounding of the position make the gain on the velocity look smaller (errors in variables:
+  ``fuller1987``, section 1.1). Means over stretches of rows are fitted, so long that it does not matter; what
   is left counts as uncertain.
 - A signal that is recorded some rows later takes from the gain on the velocity. The delay is the one that fits best.
+- A reference that is recorded some rows late or early looks like another gain on its velocity: gains that explain the
+  signal with the reference shifted are not doubted.
 - Residuals are correlated: the intervals leave stretches of time out (`stickslip.identify.jackknife`).
 
 `benchmarks/loop_doubted.py`, seeds 20 to 49: of 360 records with the right gains 2 were doubted, both with a fifth of
@@ -35,6 +37,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 GAINS = ("kp", "ki", "kr", "kd")
 DELAYS = range(-2, 5)
 """Rows by which the recorded signal may follow the position."""
+LATE = (0, 1, -1, 2, -2)
+"""Rows by which the recorded reference may be late, likeliest first."""
 LENGTHS = (1, 2, 4, 8, 16, 32)
 """Rows of which means are taken."""
 NOISY = 0.01
@@ -63,6 +67,9 @@ class ShownGains:
         Root mean square of what each gain multiplies, over that of the signal.
     left, missed : float
         Parts of the signal (root mean squares) that the shown gains and the given ones do not explain.
+    late : int
+        Rows by which the reference must be recorded late for the given gains to explain the signal; 0 where they do
+        so without, or no such shift helps.
     """
 
     given: Array
@@ -71,10 +78,16 @@ class ShownGains:
     parts: Array
     left: float
     missed: float
+    late: int = 0
+
+    @property
+    def turned(self) -> bool:
+        """Whether every gain that was given is shown with the other sign."""
+        return bool(np.any(self.given > 0.0) and np.all(self.values[self.given > 0.0] < 0.0))
 
     def differing(self) -> list[str]:
         """Each gain that is clearly another than given, in words; empty where the given ones explain the signal."""
-        if self.left > EXPLAINED or self.missed < max(MISSED, WORSE * self.left):
+        if self.late or self.left > EXPLAINED or self.missed < bound(self.left):
             return []
         shown = np.maximum(self.values, 0.0)
         off = np.abs(shown - self.given)
@@ -85,23 +98,42 @@ class ShownGains:
         )
         return [
             f"{name} {g:.4g} given, {v:.4g} ± {h:.2g} shown"
-            for name, g, v, h, is_told in zip(GAINS, self.given, shown, self.half_widths, told, strict=True)
+            for name, g, v, h, is_told in zip(
+                GAINS, self.given, self.values, self.half_widths, told, strict=True
+            )
             if is_told
         ]
 
 
+def bound(left: float) -> float:
+    """Part of the signal that gains may leave where the best ones leave so much."""
+    return max(MISSED, WORSE * left)
+
+
 def doubted_loops(trials: Sequence[Trial], gain: float = 1.0) -> list[str]:
-    """A sentence for each record that clearly was made by other gains than given; `gain` as in `shown_gains`."""
-    out: list[str] = []
-    for trial in trials:
-        found = shown_gains(trial, gain)
-        if found is not None and (differing := found.differing()):
-            out.append(
-                f"{trial.name} shows another controller than the loop given: {'; '.join(differing)}. The gains given "
-                f"miss the recorded signal by {found.missed:.0%}, those shown by {found.left:.1%}: check --loop, its "
-                "period too."
-            )
-    return out
+    """A sentence for each record that clearly was made by other gains than given, or whose reference is recorded rows
+    late or early; `gain` as in `shown_gains`."""
+    found = [(trial.name, shown_gains(trial, gain)) for trial in trials]
+    return [said for name, shown in found if shown is not None and (said := doubt(name, shown))]
+
+
+def doubt(name: str, shown: ShownGains) -> str:
+    """What is to be said of a record's loop; empty where nothing is."""
+    if shown.late:
+        rows = f"{abs(shown.late)} row{'s' if abs(shown.late) > 1 else ''} {'late' if shown.late > 0 else 'early'}"
+        return f"{name}: the reference seems recorded {rows}; so shifted, the loop given makes the recorded signal."
+    differing = shown.differing()
+    if not differing:
+        return ""
+    why = (
+        "every gain shown is negative: the recorded signal's sign may be turned."
+        if shown.turned
+        else "check --loop, its period too; a filter or a feedforward in the controller can look like this as well."
+    )
+    return (
+        f"{name} shows another controller than the loop given: {'; '.join(differing)}. The gains given miss the "
+        f"recorded signal by {shown.missed:.0%}, those shown by {shown.left:.1%}: {why}"
+    )
 
 
 def shown_gains(trial: Trial, gain: float = 1.0) -> ShownGains | None:
@@ -136,12 +168,32 @@ def shown_gains(trial: Trial, gain: float = 1.0) -> ShownGains | None:
     u = u / (gain * trial.gain)
     values, half_widths = with_intervals(x, u, time, velocity_noise)
     given = np.array([getattr(trial.loop, name) for name in GAINS])
+    parts = np.sqrt(np.mean(x[:, :-1] ** 2, axis=0)) / max(rms(u), 1e-300)
+    left, missed = rms(u - x @ solved(x, u)) / max(rms(u), 1e-300), unexplained(x, u, given)
+    late = rows_late(trial, length, gain, given, bound(left)) if missed >= bound(left) else 0
+    return ShownGains(given, values, half_widths, parts, left, missed, late)
+
+
+def unexplained(x: Array, u: Array, given: Array) -> float:
+    """Part of a signal that gains leave, but for a constant."""
     missed = u - x[:, :-1] @ given
-    size = max(rms(u), 1e-300)
-    return ShownGains(
-        given, values, half_widths, np.sqrt(np.mean(x[:, :-1] ** 2, axis=0)) / size,
-        rms(u - x @ solved(x, u)) / size, rms(missed - np.mean(missed)) / size,
-    )  # fmt: skip
+    return rms(missed - np.mean(missed)) / max(rms(u), 1e-300)
+
+
+def rows_late(trial: Trial, length: int, gain: float, given: Array, most: float) -> int:
+    """Rows by which the reference must be late for the given gains to leave the least of the signal; 0 where that is
+    more than `most`."""
+    assert trial.reference is not None
+    assert trial.loop is not None
+    least, best = most, 0
+    for late in LATE:
+        rows = np.clip(np.arange(trial.time.size) + late, 0, trial.time.size - 1)
+        columns = columns_of(replace(trial, reference=trial.reference[rows]), trial.loop)
+        for delay in DELAYS:
+            x, u, _ = means(trial, columns, length, delay)
+            if (left := unexplained(x, u / (gain * trial.gain), given)) < least:
+                least, best = left, late
+    return best
 
 
 def columns_of(trial: Trial, loop: Loop) -> Array:
@@ -185,7 +237,7 @@ def with_intervals(x: Array, u: Array, time: Array, velocity_noise: float) -> tu
     freedom = [max(spread.freedom(row) - 1.0, 1.0) for row in np.eye(count + 1)]
     std = np.sqrt(np.diag(spread.covariance)) / scale
     half: Array = special.stdtrit(np.array(freedom), 0.975) * std
-    # Without the noise of the velocity in the normal equations they would be these (Fuller 1987, 2.2).
+    # Without the noise of the velocity in the normal equations they would be these (``fuller1987``, section 2.2).
     normal = (x / scale).T @ (x / scale) / u.size
     own = own_variance(x, kd)
     normal[kd, kd] -= min(velocity_noise, 0.99 * own) / scale[kd] ** 2
