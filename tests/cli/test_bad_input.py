@@ -379,7 +379,7 @@ SIBLINGS = [
     (["compare", "other_schema.toml", "model.toml"], "identify the axis again"),
     (["compare", "one_run.toml", "model.toml"], "one_run.toml is a simulation, not a model"),
     (["compare", "empty.toml", "model.toml"], "empty.toml holds no model"),
-    (["export", "small_study.toml", "--to", "c99"], "small_study.toml holds no model"),
+    (["export", "small_study.toml", "--to", "c99"], "small_study.toml is a study, not a model"),
     (["recommend", "heavy.toml"], "axis.inertia = 'heavy' must be a number"),
     (["recommend", "negative.toml"], "inertia = -1 kg·m² must be greater than 0"),
     (["recommend", "model.toml", "--inertia", "nan"], "inertia = nan kg·m² must be greater than 0"),
@@ -520,6 +520,10 @@ def test_a_damaged_manifest_is_named(folder: Path, capsys: pytest.CaptureFixture
             "stickslip tune tune.toml",
         ),
         ("study", "sweep.toml", "is a sweep, not a study", "stickslip sweep sweep.toml"),
+        ("export --to c99", "log.csv", "is a record, not a model", "stickslip identify log.csv"),
+        ("export --to c99", "study.toml", "is a study, not a model", "stickslip study study.toml"),
+        ("rig run breakaway --rig", "model.toml", "is a model, not a rig", "stickslip recommend"),
+        ("rig commission --rig", "log.csv", "is a record, not a rig", "stickslip identify log.csv"),
     ],
 )
 def test_a_file_of_another_kind_is_named_with_the_verb_that_takes_it(

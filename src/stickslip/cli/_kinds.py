@@ -20,6 +20,8 @@ WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "tune": {"tune": ("tuning", "sweep")},
     "simulate": {"file": ("simulation", "model")},
     "study": {"study": ("study",)},
+    "export": {"file": ("model", "simulation")},
+    "rig": {"rig": ("rig",)},
 }
 """Per verb and argument, the kinds of file that it takes, or knows better what to say of; records are looked at where
 they are read."""
@@ -31,7 +33,7 @@ WORDS = {
     "sweep": ("a sweep", "a sweep (`study` and tables [vary.NAME])"),
     "tuning": ("a sweep with a table [tune]", "a sweep with a table [tune]"),
     "simulation": ("a simulation", "a simulation (tables [friction], [reference], [controller])"),
-    "rig": ("a rig", "a rig (a table [rig])"),
+    "rig": ("a rig", "a rig (a machine's name, its TOML file, or one with a table [rig])"),
     "report": ("a report", "a report"),
 }
 """Each kind in two or three words, and how one that is asked for is described."""
@@ -87,7 +89,7 @@ def check(args: argparse.Namespace) -> None:
     InputError
     """
     for name, wanted in WANTED.get(args.verb, {}).items():
-        if (path := getattr(args, name)) is not None:
+        if (path := getattr(args, name, None)) is not None:  # `rig list` has none
             require(path, *wanted)
 
 
