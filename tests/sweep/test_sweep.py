@@ -324,6 +324,35 @@ def test_killed_at_random_times_it_goes_on(small, undisturbed, tmp_path):
     assert table(tmp_path).equals(undisturbed)
 
 
+def test_what_was_changed_travels_too(small):
+    changed = replace(small, drawn=replace(small.drawn, cases=300, seed=4), metrics=small.metrics[:1])
+    there = execute.Parcel.of(changed).load()
+    assert (there.drawn, there.metrics) == (changed.drawn, changed.metrics)
+    with pytest.raises(InputError, match="would compute other numbers: install the same version"):
+        replace(execute.Parcel.of(changed), fingerprints=("other", "ones")).load()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="signals of a terminal")
+def test_an_interruption_from_the_terminal_reaches_processes_too_and_drops_nothing(tmp_path):
+    command = [sys.executable, "-m", "stickslip", "sweep", str(SMALL), "--out", str(tmp_path), "--no-report"]
+    process = subprocess.Popen(
+        [*command, "--cases", "6000", "--processes", "--jobs", "2"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        text=True, cwd=Path(__file__).parents[2], start_new_session=True,
+    )  # fmt: skip
+    while process.poll() is None and not list(tmp_path.rglob("*.parquet")):
+        time.sleep(0.01)
+    before = len(list(tmp_path.rglob("*.parquet")))
+    os.killpg(process.pid, signal.SIGINT)  # As Ctrl-C does: to every process of the terminal's foreground.
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert "stopping" in said
+    assert "Traceback" not in said
+    kept = list(tmp_path.rglob("*.parquet"))
+    assert len(kept) > before  # What the processes had in hand.
+    assert all(dataset.fingerprint_of(path) for path in kept)
+
+
 def test_percentiles_and_shares(small, tmp_path):
     few = replace(small, drawn=replace(small.drawn, cases=40))
     execute.run(few, tmp_path)

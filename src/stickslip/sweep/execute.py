@@ -7,6 +7,8 @@ import importlib
 import itertools
 import json
 import os
+import pickle
+import platform
 import re
 import signal
 import tempfile
@@ -14,7 +16,7 @@ import time
 import warnings
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -35,6 +37,8 @@ ADDRESS = re.compile(r"(?:[a-z]+://)?(?:[^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):\d{1,5}
 BACKENDS = ("threads", "processes")
 MOST_TRIES = 5
 """So often workers may be killed before the command gives up; what is done is kept."""
+MAY_CHANGE = ("drawn", "metrics", "check", "step", "device")
+"""Of a sweep, since it was read."""
 Progress = Callable[[int, int], None]
 
 
@@ -267,25 +271,49 @@ class Parcel:
         Of the sweep's own file.
     files : tuple of (str, str, bytes)
         Path as written, name and content, of that file and of all that it and its study refer to.
+    changed : bytes
+        What was changed since they were read, such as the number of cases.
+    fingerprints : tuple of str
+        Of the runs.
     """
 
     name: str
     files: tuple[tuple[str, str, bytes], ...]
+    changed: bytes
+    fingerprints: tuple[str, ...]
 
     @staticmethod
     def of(sweep: Sweep) -> Parcel:
         """Pack a sweep."""
         everything = {sweep.source.name: sweep.source, **sweep.study.files, **sweep.files}
         named = ((w, f"{i}-{p.name}", p.read_bytes()) for i, (w, p) in enumerate(everything.items()))
-        return Parcel(sweep.source.name, tuple(named))
+        changed = pickle.dumps({name: getattr(sweep, name) for name in MAY_CHANGE})
+        return Parcel(sweep.source.name, tuple(named), changed, fingerprints(sweep))
 
     def load(self) -> Sweep:
-        """Unpack it, and load it from there."""
+        """Unpack it, and load it from there.
+
+        Raises
+        ------
+        InputError
+            If another version of this package runs here.
+        """
         folder = Path(tempfile.mkdtemp(prefix="stickslip-sweep-"))
         for _, name, content in self.files:
             (folder / name).write_bytes(content)
         moved = {written: folder / name for written, name, _ in self.files[1:]}
-        return load(folder / self.files[0][1], moved)
+        sweep = replace(load(folder / self.files[0][1], moved), **pickle.loads(self.changed))
+        if fingerprints(sweep) != self.fingerprints:
+            raise InputError(
+                f"a worker on {platform.node()} would compute other numbers: install the same version of stickslip "
+                "there"
+            )
+        return sweep
+
+
+def fingerprints(sweep: Sweep) -> tuple[str, ...]:
+    """Of all runs."""
+    return tuple(sweep.fingerprint(i) for i in range(len(sweep.runs)))
 
 
 @functools.lru_cache(maxsize=4)
