@@ -327,12 +327,12 @@ def compute_parcel(parcel: Parcel, run: int, start: int) -> Block:
 
 
 def compute_undisturbed(parcel: Parcel, run: int, start: int) -> Block:
-    """Compute a block in a process of this terminal: Ctrl-C reaches it too, but it is for the command to stop it."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        return compute_parcel(parcel, run, start)
-    finally:
-        signal.signal(signal.SIGINT, before)
+    """Compute a block in a process of this terminal: Ctrl-C reaches it too, but it is for the command to stop it.
+
+    It stays deaf to it, since an interruption may come between two blocks.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return compute_parcel(parcel, run, start)
 
 
 # ---- the manifest ------------------------------------------------------------------------------------------------
