@@ -78,9 +78,10 @@ def test_a_reference_that_is_recorded_late_is_no_other_controller(late: int) -> 
             assert bool(shown.differing()) == bool(gains), name
 
 
-def test_a_reference_that_is_recorded_late_is_told() -> None:
+@pytest.mark.parametrize("kr", [0.0, 0.3])
+def test_a_reference_that_is_recorded_late_is_told(kr: float) -> None:
     # Stiffer: rows of the reference are worth more of the signal.
-    loop = Loop(kp=30.0, kd=0.3)
+    loop = Loop(kp=30.0, kd=0.3, kr=kr)
     time = 1e-3 * np.arange(6000)
     reference = cases.wanted(time, 0)
     drive = Drive(time, reference, "feedback", loop, max_step=2e-4)
@@ -91,8 +92,10 @@ def test_a_reference_that_is_recorded_late_is_told() -> None:
         moved = reference[np.clip(np.arange(time.size) - late, 0, time.size - 1)]
         (note,) = doubted_loops([replace(made, reference=moved)])
         assert f"log.csv: the reference seems recorded {said}; so shifted, the loop given" in note
-        (note,) = doubted_loops([replace(made, reference=moved, loop=Loop(kp=30.0, kd=0.6))])
-        assert "kd 0.6 given, 0.3" in note
+        for wrong, told in (({"kd": 0.6}, "kd 0.6 given, 0.3 "), ({"kp": 42.0}, "kp 42 given, 30 ")):
+            (note,) = doubted_loops([replace(made, reference=moved, loop=replace(loop, **wrong))])
+            assert told in note
+            assert note.count(" given, ") == 1
 
 
 def test_a_signal_with_its_sign_turned_is_told_with_the_gains_as_shown() -> None:

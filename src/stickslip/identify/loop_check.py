@@ -19,7 +19,7 @@ a kp 41 % above it, and kr left out or put in were doubted in 537.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -33,12 +33,16 @@ from stickslip.simulation.driven import Loop, control_signal
 __all__ = ["GAINS", "ShownGains", "doubted_loops", "shown_gains"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Means = tuple[Array, Array, Array]
+"""Columns beside a constant, signal, time."""
 
 GAINS = ("kp", "ki", "kr", "kd")
 DELAYS = range(-2, 5)
 """Rows by which the recorded signal may follow the position."""
 LATE = (0, 1, -1, 2, -2)
 """Rows by which the recorded reference may be late, likeliest first."""
+CLEARLY = 0.5
+"""Part of the squares left with the reference as it is that a shifted one may leave for the shift to be believed."""
 LENGTHS = (1, 2, 4, 8, 16, 32)
 """Rows of which means are taken."""
 NOISY = 0.01
@@ -66,7 +70,8 @@ class ShownGains:
     parts : array, shape (4,)
         Root mean square of what each gain multiplies, over that of the signal.
     left, missed : float
-        Parts of the signal (root mean squares) that the shown gains and the given ones do not explain.
+        Parts of the signal (root mean squares) that the shown gains and the given ones do not explain, each with the
+        reference shifted by as many rows as suits them.
     late : int
         Rows by which the reference must be recorded late for the given gains to explain the signal; 0 where they do
         so without, or no such shift helps.
@@ -163,37 +168,56 @@ def shown_gains(trial: Trial, gain: float = 1.0) -> ShownGains | None:
         velocity_noise = 2.0 * (noise / (max(length, span) * trial.period)) ** 2
         if velocity_noise < NOISY * own_variance(x, GAINS.index("kd")):
             break
-    tries = [means(trial, columns, length, delay) for delay in DELAYS]
-    x, u, time = min(tries, key=lambda t: float(np.mean((t[1] - t[0] @ solved(t[0], t[1])) ** 2)))
-    u = u / (gain * trial.gain)
-    values, half_widths = with_intervals(x, u, time, velocity_noise)
     given = np.array([getattr(trial.loop, name) for name in GAINS])
+    factor = gain * trial.gain
+    tries = {0: delayed(trial, columns, length, factor)}
+    if unexplained(*best_of(tries[0])[:2], given) >= MISSED:
+        for late in LATE[1:]:
+            tries[late] = delayed(trial, columns_of(shifted(trial, late), trial.loop), length, factor)
+    x, u, time = best_of(tries[likeliest(tries)])
+    values, half_widths = with_intervals(x, u, time, velocity_noise)
     parts = np.sqrt(np.mean(x[:, :-1] ** 2, axis=0)) / max(rms(u), 1e-300)
-    left, missed = rms(u - x @ solved(x, u)) / max(rms(u), 1e-300), unexplained(x, u, given)
-    late = rows_late(trial, length, gain, given, bound(left)) if missed >= bound(left) else 0
-    return ShownGains(given, values, half_widths, parts, left, missed, late)
+    left = math.sqrt(residual(x, u)) / max(rms(u), 1e-300)
+    by_row = {late: min(unexplained(x, u, given) for x, u, _ in some) for late, some in tries.items()}
+    late = min(by_row, key=lambda row: by_row[row])
+    needed = by_row[late] < bound(left) <= by_row[0]
+    return ShownGains(given, values, half_widths, parts, left, by_row[late], late if needed else 0)
+
+
+def shifted(trial: Trial, late: int) -> Trial:
+    """The same with the reference that many rows earlier."""
+    assert trial.reference is not None
+    rows = np.clip(np.arange(trial.time.size) + late, 0, trial.time.size - 1)
+    return replace(trial, reference=trial.reference[rows])
+
+
+def delayed(trial: Trial, columns: Array, length: int, factor: float) -> list[Means]:
+    """Means with the signal each of the `DELAYS` later, without a factor on it."""
+    tries = [means(trial, columns, length, delay) for delay in DELAYS]
+    return [(x, u / factor, time) for x, u, time in tries]
+
+
+def best_of(tries: Sequence[Means]) -> Means:
+    """Those in which gains explain most."""
+    return min(tries, key=lambda t: residual(t[0], t[1]))
+
+
+def likeliest(tries: Mapping[int, Sequence[Means]]) -> int:
+    """Rows by which the reference is late: 0 unless others leave clearly less, as kr stands for them nearly."""
+    left = {late: residual(*best_of(some)[:2]) for late, some in tries.items()}
+    least = min(left, key=lambda row: left[row])
+    return least if left[least] < CLEARLY * left[0] else 0
+
+
+def residual(x: Array, u: Array) -> float:
+    """Mean square of what no gains explain."""
+    return float(np.mean((u - x @ solved(x, u)) ** 2))
 
 
 def unexplained(x: Array, u: Array, given: Array) -> float:
     """Part of a signal that gains leave, but for a constant."""
     missed = u - x[:, :-1] @ given
     return rms(missed - np.mean(missed)) / max(rms(u), 1e-300)
-
-
-def rows_late(trial: Trial, length: int, gain: float, given: Array, most: float) -> int:
-    """Rows by which the reference must be late for the given gains to leave the least of the signal; 0 where that is
-    more than `most`."""
-    assert trial.reference is not None
-    assert trial.loop is not None
-    least, best = most, 0
-    for late in LATE:
-        rows = np.clip(np.arange(trial.time.size) + late, 0, trial.time.size - 1)
-        columns = columns_of(replace(trial, reference=trial.reference[rows]), trial.loop)
-        for delay in DELAYS:
-            x, u, _ = means(trial, columns, length, delay)
-            if (left := unexplained(x, u / (gain * trial.gain), given)) < least:
-                least, best = left, late
-    return best
 
 
 def columns_of(trial: Trial, loop: Loop) -> Array:
@@ -210,7 +234,7 @@ def columns_of(trial: Trial, loop: Loop) -> Array:
     return columns
 
 
-def means(trial: Trial, columns: Array, length: int, delay: int) -> tuple[Array, Array, Array]:
+def means(trial: Trial, columns: Array, length: int, delay: int) -> Means:
     """Columns beside a constant, signal and time, as means over `length` rows, where nothing is cut off."""
     assert trial.drive is not None
     assert trial.loop is not None
