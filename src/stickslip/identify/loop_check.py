@@ -11,10 +11,10 @@ squares of the recorded signal over reference and position give them, whatever t
   signal with the reference shifted are not doubted.
 - Residuals are correlated: the intervals leave stretches of time out (`stickslip.identify.jackknife`).
 
-`benchmarks/loop_doubted.py`, seeds 20 to 49: of 450 records with the right gains 2 were doubted without the controller's
-period, 1 with it, all with a fifth of its rows; of 720 with all rows and 16384 counts or more, a kd of twice the true
-one, a kp 41 % above it, and kr left out or put in were doubted in 717. A filter of the velocity, of which `Loop` knows
-nothing, is another controller: one at 100 Hz is doubted in some records, slower ones in most.
+`benchmarks/loop_doubted.py`, seeds 20 to 49: of 450 records with the right gains 2 were doubted without the
+controller's period, 1 with it, all with a fifth of its rows; of 720 with all rows and 16384 counts or more, a kd of
+twice the true one, a kp 41 % above it, and kr left out or put in were doubted in 717. A filter of the velocity, of
+which `Loop` knows nothing, is another controller: one at 100 Hz is doubted in some records, slower ones in most.
 """
 
 from __future__ import annotations
