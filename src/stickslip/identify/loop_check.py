@@ -4,7 +4,7 @@ A linear controller's output is linear in its gains, u = kp e + ki (integral of 
 squares of the recorded signal over reference and position give them, whatever the axis is. Four things would mislead:
 
 - Noise and rounding of the position make the gain on the velocity look smaller (errors in variables:
-  ``fuller1987``, section 1.1). Means over stretches of rows are fitted, so long that it does not matter; what
+  ``fuller1987``). Means over stretches of rows are fitted, so long that it does not matter; what
   is left counts as uncertain.
 - A signal that is recorded some rows later takes from the gain on the velocity. The delay is the one that fits best.
 - A reference that is recorded some rows late or early looks like another gain on its velocity: gains that explain the
@@ -262,7 +262,7 @@ def with_intervals(x: Array, u: Array, time: Array, velocity_noise: float) -> tu
     freedom = [max(spread.freedom(row) - 1.0, 1.0) for row in np.eye(count + 1)]
     std = np.sqrt(np.diag(spread.covariance)) / scale
     half: Array = special.stdtrit(np.array(freedom), 0.975) * std
-    # Without the noise of the velocity in the normal equations they would be these (``fuller1987``, section 2.2).
+    # Without the noise of the velocity in the normal equations they would be these (``fuller1987``).
     normal = (x / scale).T @ (x / scale) / u.size
     own = own_variance(x, kd)
     normal[kd, kd] -= min(velocity_noise, 0.99 * own) / scale[kd] ** 2
