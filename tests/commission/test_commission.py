@@ -393,7 +393,9 @@ def test_a_stick_slip_stage_that_is_left_out_is_said(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "seed"), [("thesis-dry", 11), ("thesis-grease", 11)])
+@pytest.mark.parametrize(
+    ("name", "seed"), [("thesis-dry", 11), pytest.param("thesis-grease", 11, marks=pytest.mark.long)]
+)
 def test_the_thesis_machines(name, seed):
     m = replace(machine(name), seed=seed)
     done = commission(VirtualRig(m))

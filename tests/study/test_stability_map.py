@@ -47,7 +47,9 @@ def test_cogging_moves_an_axis_that_has_little_stiffness_left():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "least"), [("thesis-dry", 130), ("thesis-grease", 136)])
+@pytest.mark.parametrize(
+    ("name", "least"), [("thesis-dry", 130), pytest.param("thesis-grease", 136, marks=pytest.mark.long)]
+)
 def test_the_whole_map(name, least, tmp_path):
     plant = machine(name)
     advice = stability(axis_of(plant), Drive(PD10), plant.models, (0.0,)).recommended
