@@ -25,7 +25,7 @@ def wandering(n: int, seed: int):
     return np.cumsum(np.random.default_rng(seed).standard_normal(n))
 
 
-def alike(found, expected, scale):
+def assert_alike(found, expected, scale):
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * float(np.max(np.abs(scale))))
 
 
@@ -37,7 +37,7 @@ def alike(found, expected, scale):
 def test_the_low_pass_is_that_of_scipy(order: int, corner: float, n: int, seed: int):
     x = wandering(n, seed)
     expected = signal.sosfiltfilt(signal.butter(order, corner, fs=1000.0, output="sos"), x)
-    alike(low_pass(x, corner, 1000.0, order), expected, x)
+    assert_alike(low_pass(x, corner, 1000.0, order), expected, x)
 
 
 @pytest.mark.parametrize("corner", [0.0, -5.0, 500.0, 600.0, float("nan")])
@@ -52,7 +52,7 @@ def test_a_corner_beyond_half_the_rate_is_refused(corner: float):
 def test_a_series_is_continued_as_far_as_it_goes(reach: int, n: int):
     x = wandering(n, 3)
     expected = signal.sosfiltfilt(signal.butter(2, 0.08, output="sos"), x, padlen=min(reach, n - 1))
-    alike(ZeroPhase(butterworth_poles(2), 0.08, 2.0, reach)(x), expected, x)
+    assert_alike(ZeroPhase(butterworth_poles(2), 0.08, 2.0, reach)(x), expected, x)
 
 
 @settings(deadline=None)
@@ -61,7 +61,7 @@ def test_decimation_is_that_of_scipy_but_for_the_gain_at_rest(factor: int, n: in
     x = wandering(n, seed)
     sos = signal.cheby1(4, RIPPLE, 0.8 / factor, output="sos")
     at_rest = 10.0 ** (-RIPPLE / 20.0)
-    alike(decimated(x, factor), signal.sosfiltfilt(sos, x)[::factor] / at_rest**2, x)
+    assert_alike(decimated(x, factor), signal.sosfiltfilt(sos, x)[::factor] / at_rest**2, x)
 
 
 @given(n=st.integers(40, 700), length=st.integers(16, 128), seed=st.integers(0, 100))
@@ -71,11 +71,11 @@ def test_spectra_are_those_of_scipy(n: int, length: int, seed: int):
     f, power = spectrum(x, 250.0, length)
     f_scipy, expected = signal.welch(x, 250.0, window="hann", nperseg=length)
     assert f == pytest.approx(f_scipy)
-    alike(power, expected, expected)
+    assert_alike(power, expected, expected)
     expected = signal.csd(x, y, 250.0, window="hann", nperseg=length)[1]
     found = cross_spectrum(x, y, 250.0, length)
-    alike(found.real, expected.real, expected)
-    alike(found.imag, expected.imag, expected)
+    assert_alike(found.real, expected.real, expected)
+    assert_alike(found.imag, expected.imag, expected)
 
 
 def test_side_by_side_keeps_the_order_and_hands_errors_on():

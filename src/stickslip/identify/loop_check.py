@@ -28,6 +28,7 @@ import numpy as np
 
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.jackknife import leave_blocks_out
+from stickslip.identify.noise import white_std
 from stickslip.record import encoder_step
 from stickslip.simulation.driven import Loop, control_signal
 
@@ -297,5 +298,4 @@ def rms(x: Array) -> float:
 
 def position_noise(position: Array) -> float:
     """Standard deviation of a position's noise, rad (m): that of its rounding, or what third differences show."""
-    rough = 1.4826 * float(np.median(np.abs(np.diff(position, 3)))) / math.sqrt(20.0)
-    return max(rough, encoder_step(position) / math.sqrt(12.0))
+    return max(white_std(position), encoder_step(position) / math.sqrt(12.0))

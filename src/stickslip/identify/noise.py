@@ -16,7 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 
-__all__ = ["Noise", "as_noise", "noise_of_fit", "noise_of_repeats", "quantile"]
+__all__ = ["Noise", "as_noise", "noise_of_fit", "noise_of_repeats", "quantile", "white_std"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -77,6 +77,15 @@ def as_noise(level: Noise | float | None) -> Noise | None:
     if not (level > 0.0 and math.isfinite(level)):
         raise InputError(f"noise = {level:g} must be greater than 0; leave it out where it is unknown")
     return Noise(float(level), "given")
+
+
+def white_std(signal: Array) -> float:
+    """Standard deviation of the white noise of equally spaced samples, in their unit, from third differences.
+
+    The median of their size is that of the noise alone where the signal is smooth; a third difference multiplies the
+    variance of white noise by 20.
+    """
+    return 1.4826 * float(np.median(np.abs(np.diff(signal, 3)))) / math.sqrt(20.0)
 
 
 def quantile(noise: Noise, dof: int = 1) -> float:

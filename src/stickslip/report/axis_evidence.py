@@ -14,6 +14,7 @@ from stickslip.identify.axis_search import FittedAxis
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Identification
 from stickslip.identify.loop_check import position_noise
+from stickslip.identify.noise import white_std
 from stickslip.record import encoder_step
 from stickslip.simulation.driven import Mechanics
 
@@ -116,7 +117,7 @@ def judgements(found: Identification) -> dict[str, str]:
         trials = output.problem.trials
         noise = {"position": levels([position_noise(t.position) for t in trials])}
         if "drive" in output.problem.signals:
-            noise["drive"] = levels([signal_noise(t.signal()) for t in trials])
+            noise["drive"] = levels([white_std(t.signal()) for t in trials])
         what = {"position": "the encoder's rounding" if has_encoder(trials) else "the noise of the position"}
         for signal, level in noise.items():
             rms = float(found.misfit.get(f"{signal}_rms", math.nan))
@@ -141,11 +142,6 @@ def beside(rms: float, level: float, what: str) -> str:
 def has_encoder(trials: Sequence[Trial]) -> bool:
     """Whether every position moves in steps."""
     return all(encoder_step(t.position) > 0.0 for t in trials)
-
-
-def signal_noise(signal: Array) -> float:
-    """Standard deviation of a signal's white noise, from third differences."""
-    return 1.4826 * float(np.median(np.abs(np.diff(signal, 3)))) / math.sqrt(20.0)
 
 
 def levels(each: Sequence[float]) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -107,7 +108,7 @@ def fits(output: FittedAxis) -> list[Picture]:
             off = float(np.sqrt(np.mean((simulated - seen)[trial.rows] ** 2)))
             unit = problem.units[signal]
             out.append(Picture(
-                f"fit-{place + 1}-{signal}", f"{trial.name}: {signal}, measured and simulated",
+                f"fit-{place + 1}-{signal}", f"{Path(trial.name).name}: {signal}, measured and simulated",
                 f"Root mean square of the difference: {quantity(off, unit)}", "time (s)", f"{signal} ({unit})",
                 (over_time("measured", trial.time, seen), over_time("simulated", trial.time, simulated)),
             ))  # fmt: skip
@@ -128,7 +129,7 @@ def close_up(output: FittedAxis, runs: Sequence[Array]) -> list[Picture]:
         off = float(np.sqrt(np.mean((simulated - seen) ** 2)))
         unit = problem.units[signal]
         out.append(Picture(
-            f"slow-{signal}", f"{trial.name}: {signal} in slow motion, measured and simulated",
+            f"slow-{signal}", f"{Path(trial.name).name}: {signal} in slow motion, measured and simulated",
             f"Root mean square of the difference here: {quantity(off, unit)}", "time (s)", f"{signal} ({unit})",
             (over_time("measured", time, seen), over_time("simulated", time, simulated)),
         ))  # fmt: skip
