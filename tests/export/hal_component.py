@@ -28,7 +28,7 @@ NAME: /[a-zA-Z_][a-zA-Z0-9_]*/
 BODY: /(.|\n)+/
 %ignore /[ \t\r\n]+/
 """
-TYPES = {"float": "double", "bit": "int"}
+TYPES = {"float": "double", "bit": "int", "s32": "int"}
 
 
 class Component:

@@ -9,9 +9,12 @@ import math
 from lark import Lark, Token, Tree
 
 GRAMMAR = r"""
-start: (record | function)*
+package: (record | function)*
 record: "record" NAME [STRING] component* "end" NAME ";"
-component: NAME NAME ["[" INT "]"] ["=" value] [STRING] ";"
+component: NAME NAME ["[" INT "]"] [modification] ["=" value] [STRING] ";"
+modification: "(" start ("," fixed)? ")"
+start: "each"? "start" "=" expression
+fixed: "each"? "fixed" "=" "true"
 value: "{" expression ("," expression)* "}" -> listed | expression
 function: "function" NAME [STRING] input* output* ["protected" local*] "algorithm" statement* "end" NAME ";"
 input: "input" NAME NAME ";"
@@ -87,7 +90,9 @@ class Package:
 
     def __init__(self, text):
         inside = text[text.index("\n") + 1 : text.index("  model Contact")]
-        tree = Lark(GRAMMAR.replace("WORDS", WORDS), parser="lalr", maybe_placeholders=True).parse(inside)
+        tree = Lark(
+            GRAMMAR.replace("WORDS", WORDS), parser="lalr", start="package", maybe_placeholders=True
+        ).parse(inside)
         self.records, self.functions = {}, {}
         for part in tree.children:
             if part.data == "record":
@@ -100,9 +105,11 @@ class Package:
         """A record with its values."""
         out = {}
         for c in self.records[name].find_data("component"):
-            _, key, size, value, _ = c.children
+            _, key, size, modified, value, _ = c.children
+            assert modified is None or value is None, f"{key} has a start and a binding"
             if value is None:
-                out[str(key)] = [0.0] * int(size) if size else 0.0
+                start = self.value(modified.children[0].children[0], {}) if modified else 0.0
+                out[str(key)] = [start] * int(size) if size else start
             elif value.data == "listed":
                 out[str(key)] = [self.value(v, {}) for v in value.children]
             else:

@@ -9,13 +9,18 @@ PIECES = 3
 
 class Params(NamedTuple):
     register: Annotated[float, Par("N·m·s/rad", "b", "slope", positive=True)]
+    INFINITY: Annotated[float, Par("N·m·s/rad", "b_0", "slope, a macro of C", default=0.01)]
+    errno: Annotated[float, Par("N·m·s/rad", "b_1", "slope, a macro of C", default=0.02)]
+    end_if: Annotated[float, Par("N·m·s/rad", "b_2", "slope, a word of structured text", default=0.03)]
 
 
 def torque(end, double, p):
     total = 0.0
     for default in range(PIECES):
         total += p.register * end / PIECES + 0.0 * default * double
-    return total
+    PI = p.INFINITY + p.errno
+    NAN = p.end_if
+    return total + (PI + NAN) * end
 
 
 def step(v0, v1, dt, z, p, u):
@@ -27,4 +32,5 @@ def steady(v, p):
 
 
 LAW = Law("odd-names", Params, step, title="Odd names", equation="F = b v", source=("here",),
-          example={"register": 0.1}, steady=steady, passive="always")  # fmt: skip
+          example={"register": 0.1, "INFINITY": 0.01, "errno": 0.02, "end_if": 0.03},
+          steady=steady, passive="always")  # fmt: skip

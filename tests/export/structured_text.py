@@ -1,12 +1,15 @@
 """IEC 61131-3 structured text (types, functions, function blocks) run as Python, to try what is exported.
 
-The grammar is the part of the norm's Annex B that covers user types, POUs with VAR sections, assignments, IF,
-FOR, RETURN, EXIT and calls with named arguments. LREAL is a double, INT an int; names know no case.
+The grammar is the part of the norm's Annex B (edition 2, whose compilers refuse what only edition 3 has) that covers
+user types, POUs with VAR sections, assignments, IF, FOR, RETURN, EXIT and calls with named arguments: functions stand
+in expressions, names have no underscore at the end and no two in a row, real numbers a point. LREAL is a double, INT an
+int, BOOL neither; names know no case, are none of the norm's words, and name one thing.
 """
 
 import copy
 import functools
 import math
+import re
 
 from lark import Lark, Token, Tree
 
@@ -21,10 +24,9 @@ declaration: NAME ":" kind [":=" initial] ";"
 kind: "ARRAY"i "[" INT ".." INT "]" "OF"i NAME -> array | NAME -> named
 ?initial: "[" expression ("," expression)* "]" -> listed | expression
 
-?statement: assign | call_statement | if_ | for_ | return_ | exit_ | empty
+?statement: assign | if_ | for_ | return_ | exit_ | empty
 empty: ";"
 assign: place ":=" expression ";"
-call_statement: call ";"
 if_: "IF"i expression "THEN"i body ("ELSIF"i expression "THEN"i body)* ["ELSE"i body] "END_IF"i ";"
 for_: "FOR"i NAME ":=" expression "TO"i expression "DO"i body "END_FOR"i ";"
 return_: "RETURN"i ";"
@@ -47,17 +49,36 @@ COMPARE: "<=" | ">=" | "<>" | "<" | ">" | "="
 SIGN: "+" | "-"
 TIMES: "*" | "/" | /MOD\b/i
 TRUTH.2: /TRUE|FALSE/i
-NUMBER: /[0-9]+(\.[0-9]+)?([Ee][+-]?[0-9]+)?(?!\.\.)/
+NUMBER: /[0-9]+(\.[0-9]+([Ee][+-]?[0-9]+)?)?(?![.\w])/
 INT: /[0-9]+/
-NAME: /(?!(?:ELSE|ELSIF|THEN|DO|TO|OR|AND|NOT|RETURN|EXIT|IF|FOR|VAR|TYPE|FUNCTION|STRUCT)\b)(?!END_|VAR_)[A-Z_a-z]\w*/
+NAME: /_?[a-z][a-z0-9]*(_[a-z0-9]+)*(?!\w)/i
 COMMENT: /\(\*.*?\*\)/s
 %ignore COMMENT
 %ignore /\s+/
 """
+TOKENS = sorted(
+    {*re.findall(r'"([A-Z_]+)"i', GRAMMAR), "VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "TRUE", "FALSE"}
+)
+"""Words of the grammar itself: whole ones, which no name can be."""
+GRAMMAR = re.sub(r'"([A-Z_]+)"i', r"_K_\1", GRAMMAR) + "".join(f"_K_{w}: /{w}(?!\\w)/i\n" for w in TOKENS)
+GRAMMAR = GRAMMAR.replace("NAME: /", rf"NAME: /(?!(?:{'|'.join(TOKENS)})(?!\w))")
+WORDS = """
+action array at by case configuration constant date date_and_time do dt else elsif end_action end_case
+end_configuration end_for end_function end_function_block end_if end_program end_repeat end_resource end_step
+end_struct end_transition end_type end_var end_while en eno exit false for from function function_block f_edge if in
+initial_step interval mod not of on or and xor priority program read_only read_write repeat resource retain
+non_retain return r_edge single step string struct task then time time_of_day tod to transition true type until var
+var_access var_config var_external var_global var_in_out var_input var_output var_temp while with wstring bool sint
+int dint lint usint uint udint ulint real lreal byte word dword lword any any_num any_real any_int any_bit abs acos
+add asin atan concat cos delete div eq exp expt find ge gt insert le left len limit ln log lt max mid min move mul
+mux ne replace right rol ror sel shl shr sin sqrt sub tan trunc ctu ctd ctud f_trig r_trig rs sr tof ton tp
+"""
+"""Annex C of the norm, and the names of its types, functions and blocks."""
+KEYWORDS = set(re.findall(r"\w+", WORDS))
 LIBRARY = {
     "abs": abs, "exp": math.exp, "ln": math.log, "sqrt": math.sqrt, "sin": math.sin, "cos": math.cos, "tan": math.tan,
-    "atan": math.atan, "expt": math.pow, "min": min, "max": max, "sel": lambda c, a, b: b if c else a,
-    "int_to_lreal": float, "lint_to_lreal": float, "trunc_lint": math.trunc, "lreal_to_int": int,
+    "atan": math.atan, "expt": math.pow, "min": min, "max": max, "sel": lambda c, a, b: b if truth(c) else a,
+    "int_to_lreal": float, "lint_to_lreal": float, "lreal_to_lint": round, "lreal_to_int": round,
 }  # fmt: skip
 COMPARISONS = {"=": "==", "<>": "!="}
 
@@ -74,6 +95,8 @@ class Program:
                 self.types[names[0].lower()] = [c for c in part.children if isinstance(c, Tree)]
             else:
                 self.pous[names[0].lower()] = part
+        for scope in scopes(tree):
+            one_thing_each(scope, {*self.types, *self.pous})
         self.initial = {
             name: {
                 d.children[0].lower(): self.fresh(d)
@@ -110,16 +133,33 @@ class Program:
         """The statements of a POU as a Python function of its variables."""
         lines = [line for c in self.pous[name].children if is_statement(c) for line in statement(c)]
         source = "\n    ".join(["def run(v):", "pass", *lines])
-        found = {"call": self.call, "store": store, "both": both, "fmod": math.fmod, "library": LIBRARY}
+        found = {"call": self.call, "store": store, "both": both, "fmod": math.fmod, "library": LIBRARY,
+                 "truth": truth}  # fmt: skip
         exec(compile(source, name, "exec"), found)
         return found["run"]
 
     def call(self, name, **given):
-        inner = {name: 0.0, **self.instance(name)}
+        kind = self.pous[name].children[1].lower()
+        inner = {name: False if kind == "bool" else 0.0, **self.instance(name)}
         assert given.keys() <= inner.keys(), f"{name} has not all of the inputs {list(given)}"
         inner |= given
         self.run(name, inner)
         return inner[name]
+
+
+def scopes(tree):
+    """The names declared in the file, in every type and in every POU."""
+    yield [part.children[0] for part in tree.children]
+    for part in tree.children:
+        yield [d.children[0] for d in part.find_data("declaration")]
+
+
+def one_thing_each(names, known):
+    """Refuse words of the norm, names that differ by case alone, and variables called like a type or a function."""
+    lower = [name.lower() for name in names]
+    assert len(set(lower)) == len(lower), f"two of {sorted(lower)} are one name"
+    assert not KEYWORDS & set(lower), f"words of the norm: {KEYWORDS & set(lower)}"
+    assert set(lower) <= known or not known & set(lower), f"types or functions too: {known & set(lower)}"
 
 
 def constant(node):
@@ -132,11 +172,19 @@ def is_statement(node):
 
 def store(owner, key, value):
     assert key in owner if isinstance(owner, dict) else key < len(owner), f"undeclared {key}"
+    assert isinstance(owner[key], bool) is isinstance(value, bool), f"{key} := {value}"
     owner[key] = value
+
+
+def truth(value):
+    """A condition; numbers are none."""
+    assert isinstance(value, bool), f"{value} is no condition"
+    return value
 
 
 def both(kind, *results):
     """AND and OR work out all their operands, as a PLC may."""
+    assert all(isinstance(r, bool) for r in results), results
     return any(results) if kind == "or_" else all(results)
 
 
@@ -150,13 +198,11 @@ def statement(node):
     if node.data == "assign":
         *owner, key = keys(c[0])
         return [f"store(v{''.join(f'[{k}]' for k in owner)}, {key}, {value(c[1])})"]
-    if node.data == "call_statement":
-        return [value(c[0])]
     if node.data == "if_":
         *pairs, otherwise = c
         out = []
         for test, body in zip(pairs[::2], pairs[1::2]):
-            out += [f"{'elif' if out else 'if'} {value(test)}:", *indented(statement(body))]
+            out += [f"{'elif' if out else 'if'} truth({value(test)}):", *indented(statement(body))]
         return out if otherwise is None else [*out, "else:", *indented(statement(otherwise))]
     if node.data == "for_":
         name, first, last, body = c
@@ -188,7 +234,7 @@ def value(node):
     if kind == "negative":
         return f"(-{value(c[0])})"
     if kind == "not_":
-        return f"(not {value(c[0])})"
+        return f"(not truth({value(c[0])}))"
     if kind in ("or_", "and_"):
         return f"both({kind!r}, {', '.join(value(x) for x in c)})"
     if kind == "comparison":

@@ -9,7 +9,7 @@ from stickslip import plugins
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.export import arduino
+from stickslip.export import arduino, c99
 from stickslip.export.job import Job
 from stickslip.model import Model
 
@@ -29,6 +29,40 @@ def test_library_and_example_compile_and_run(job):
     assert result.passed, result.text
     broken = {**export.files, "examples/Step/Step.ino": "void setup() { joint_missing(); }"}
     assert arduino.check(job, type(export)(broken)).passed is False
+
+
+@pytest.mark.skipif(shutil.which("avr-g++") is None, reason="needs avr-g++")
+@pytest.mark.parametrize("law", ["dahl", "gms", "lugre"])
+def test_library_and_example_link_for_an_avr_whose_library_has_less(law):
+    model = Model(law, **plugins.law(law).example)
+    control = Controller(place("PID", 1e-3, 10.0, 1.0), Feedback(model, filter_hz=10.0), sample_time=2e-3)
+    for job in (Job(model, "joint"), Job(model, "joint", control)):
+        export = arduino.write(job)
+        assert "avr-g++" in arduino.check(job, export).text
+        without = {n: str(text).replace("#ifdef __AVR__", "#if 0") for n, text in export.files.items()}
+        found = arduino.check(job, type(export)(without))
+        assert found.passed is False
+        assert found.text.startswith("avr-g++: ")
+
+
+@pytest.mark.parametrize("law", ["dahl", "gms", "lugre"])
+def test_what_the_avr_lacks_is_as_good_as_the_librarys(law, tmp_path):
+    compiler = shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("needs gcc")
+    delta = {"delta_d": 1.4} if law == "dahl" else {}
+    export = c99.write(Job(Model(law, **{**plugins.law(law).example, **delta}), "x", single=True))
+    for name, text in export.files.items():
+        (tmp_path / name).write_text(str(text))
+    errors = []
+    for board in ([], ["-D__AVR__"]):
+        subprocess.run(
+            [compiler, "-O2", *board, "x.c", "x_check.c", "-lm", "-o", "check"], cwd=tmp_path, check=True
+        )
+        errors.append(
+            float(subprocess.run(["./check"], cwd=tmp_path, capture_output=True, check=True).stdout)
+        )
+    assert errors[1] <= 2.0 * errors[0] + 1e-7
 
 
 @pytest.mark.skipif(shutil.which("arm-none-eabi-g++") is None, reason="needs arm-none-eabi-g++")

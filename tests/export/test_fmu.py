@@ -227,6 +227,15 @@ def test_values_out_of_bounds_are_refused(version, tmp_path):
 
 
 @both_versions
+@pytest.mark.parametrize("target", ["fmu", "fmu-axis"])
+def test_shares_of_a_whole_are_refused_unless_they_add_up(target, version, tmp_path):
+    content = units(target, plugins.law("gms"))[version]
+    with pytest.raises(FMICallException):
+        instance(content, tmp_path, start=[("alpha[1]", 0.9)])  # with the others 1.65
+    instance(content, tmp_path, start=[("alpha[1]", 0.3), ("alpha[2]", 0.2)])
+
+
+@both_versions
 def test_fmpy_simulates_a_recorded_motion(version, tmp_path):
     law = plugins.law("lugre")
     file = tmp_path / "contact.fmu"

@@ -7,6 +7,7 @@ import pytest
 from hal_component import Component
 
 from laws import farthest, label, registered
+from stickslip import plugins
 from stickslip.export import linuxcnc
 from stickslip.export.job import Job
 from stickslip.model import Model
@@ -30,10 +31,12 @@ def test_the_function_gives_the_torque_of_the_law(law, tmp_path):
     velocity = np.cumsum(draw.normal(0.0, 0.01, 300)) * (draw.random(300) > 0.05)
     position, last = 0.0, float(velocity[0])
     made.place("load").value, made.place("temperature").value = 1.5, 35.0
+    time = 0.0
     for v in velocity:
         made.place("velocity").value, made.place("position").value = v, position
         made.run(1_000_000)
-        around = Surroundings(position=position, load=1.5, temperature=35.0)
+        time += 1_000_000 * 1e-9
+        around = Surroundings(position=position, load=1.5, temperature=35.0, time=time)
         expected = law.step(last, float(v), 1_000_000 * 1e-9, z, p, around)
         assert made.place("torque").value == expected
         position, last = position + 1e-3 * float(v), float(v)
@@ -70,3 +73,17 @@ def test_it_declares_what_halcompile_asks_for(tmp_path):
     assert made.includes == ["axis_law.c"]
     assert made.texts.count("text") == 3  # description, license, author
     assert "function" in made.texts
+
+
+def test_substeps_divide_the_step_of_a_period(tmp_path):
+    law = plugins.law("lugre")
+    model = Model(law, **law.example)
+    made, z = component(model, tmp_path), law.state(model.parameters)
+    made.place("substeps").value = 2
+    for last, v in ((0.1, 0.1), (0.1, -0.3), (-0.3, 0.2)):
+        made.place("velocity").value = v
+        made.run(1_000_000)
+        slope, dt = (v - last) / 2, 1_000_000 * 1e-9
+        law.step(last, last + slope, dt / 2, z, model.parameters, Surroundings())
+        torque = law.step(last + slope, v, dt / 2, z, model.parameters, Surroundings())
+        assert made.place("torque").value == torque

@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 from stickslip import plugins
 from stickslip.errors import InputError
 from stickslip.export._mujoco_run import drift, pulled
+from stickslip.export._nearest import COULOMB, carried
 from stickslip.export.job import CannotCarry, Job
+from stickslip.export.mujoco import LUGRE as LUGRE_FORM
 from stickslip.export.mujoco import holding_step, read, write, xml
 from stickslip.model import Model
 
@@ -129,6 +131,81 @@ def test_the_written_constraint_holds_a_load_that_mujocos_own_lets_creep(engine)
     crept = drift(engine.MjModel.from_xml_string(plain), 0.14)
     assert held < 1e-3
     assert crept > 0.1
+
+
+def test_the_nearest_of_an_asymmetric_law_keeps_its_bristle():
+    each = {"fs": 0.4, "fc": 0.3, "fs_negative": 0.36, "fc_negative": 0.26}
+    values = {"sigma0": 3.0e4, "sigma1": 0.7, "vs": 0.01, "sigma2": 0.02, **each}
+    order = job(Model("lugre", {"symmetry": "asymmetric"}, **values), nearest=True)
+    found = carried(order, "mujoco", (COULOMB, LUGRE_FORM))
+    p = found.model.parameters
+    assert (p.sigma0, p.sigma1) == (3.0e4, 0.7)
+    assert p.fc == pytest.approx(0.28, rel=0.01)
+    assert found.lost == ("the difference between the directions",)
+
+
+NESTED = """<mujoco>
+ <default><joint frictionloss="0.1" damping="0.01"/>
+  <default class="arm"><joint frictionloss="0.2"/><default class="hand"><joint damping="0.05"/></default></default>
+  <default class="driven"><dcmotor lugre="300 0.1 0.28 0.33 0.1"/></default></default>
+ <worldbody>
+  <body><joint name="base"/><geom size="1"/>
+   <body childclass="arm"><joint name="elbow"/><geom size="1"/>
+    <body><frame childclass="hand"><joint name="wrist" damping="0.5"/></frame><joint class="hand" name="finger"/>
+     <joint class="main" name="thumb" frictionloss="0"/><geom size="1"/></body></body></body>
+ </worldbody>
+ <tendon><fixed><joint joint="base" coef="1"/></fixed></tendon>
+ <equality><joint name="tie" joint1="base" joint2="elbow"/></equality>
+ {more}
+</mujoco>"""
+JOINTS = {
+    "base": (0.1, 0.01),
+    "elbow": (0.2, 0.01),
+    "wrist": (0.2, 0.5),
+    "finger": (0.2, 0.05),
+    "thumb": (0.0, 0.01),
+}
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_a_joint_has_what_its_defaults_give_it(joint):
+    p = read(NESTED.format(more=""), joint).parameters
+    assert (p.fc, p.sigma2) == JOINTS[joint]
+
+
+def test_mujoco_gives_the_joints_the_same(engine):
+    loaded = engine.MjModel.from_xml_string(NESTED.format(more=""))
+    names = [loaded.joint(i).name for i in range(loaded.njnt)]
+    assert {n: (loaded.dof_frictionloss[i], loaded.dof_damping[i]) for i, n in enumerate(names)} == JOINTS
+
+
+def test_a_motors_friction_comes_from_its_class_too():
+    motor = '<actuator><dcmotor class="driven" joint="base"/></actuator>'
+    p = read(NESTED.format(more=motor), "base").parameters
+    assert (p.sigma0, p.fs, p.sigma2) == (300.0, 0.33, 0.01)
+
+
+NAMELESS = "<mujoco><worldbody><body><joint frictionloss='{}'/><joint frictionloss='0.2'/></body></worldbody></mujoco>"
+
+
+@pytest.mark.parametrize(
+    ("text", "joint", "says"),
+    [
+        (NAMELESS.format(0.1), None, "2 of the file's joints have no name: give them one"),
+        (NAMELESS.format(0.1), "", "have no name"),
+        (NESTED.format(more=""), None, "name one of base, elbow, wrist, finger, thumb"),
+        (NESTED.format(more="").replace("elbow", "base"), "base", "2 joints of the file have that name"),
+        (NESTED.format(more="").replace('childclass="arm"', 'childclass="leg"'), "elbow",
+         "of class 'leg', which no <default> defines"),
+        ("<robot name='x'><joint name='a'><dynamics friction='1'/></joint></robot>", "a", "is a URDF"),
+        ("<svg/>", None, "root is <svg>"),
+        ("<mujoco><include file='d.xml'/><worldbody><body><joint name='a'/></body></worldbody></mujoco>", "a",
+         "includes d.xml"),
+    ],
+)  # fmt: skip
+def test_what_would_be_read_wrongly_is_refused(text, joint, says):
+    with pytest.raises(InputError, match=says):
+        read(text, joint)
 
 
 def test_a_contact_made_soft_enough_holds_its_load(engine):

@@ -169,10 +169,20 @@ def test_the_drives_unit_must_be_given():
 @pytest.mark.parametrize(
     ("change", "says"),
     [(("table[1].in  ", "table[99].in "), "no frict_comp.table.1..in"), (("entries        20", "entries 21"), "21"),
-     (("mode                 3", "mode x"), "must be a number")],
+     (("mode                 3", "mode x"), "must be a finite number"),
+     (("entries        20", "entries inf"), "must be a finite number"), (("entries        20", "entries 2.5"), "2.5"),
+     (("entries        20", "entries nan"), "must be a finite number")],
 )  # fmt: skip
 def test_a_damaged_list_is_named(change, says):
     text = list_of(STRIBECK)
     assert change[0] in text
     with pytest.raises(InputError, match=says):
         beckhoff.read(text.replace(*change), 2.4e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"), [((float("nan"),), "torque_per_unit"), ((1e-3, "spiral"), "motion 'spiral'")]
+)
+def test_what_a_list_is_read_with_is_checked(arguments, says):
+    with pytest.raises(InputError, match=says):
+        beckhoff.read(list_of(STRIBECK), *arguments)

@@ -44,3 +44,9 @@ def test_a_joints_name_is_written_as_xml_and_found_again():
 def test_a_damaged_file_is_named(text, says):
     with pytest.raises(InputError, match=says):
         urdf.read(text)
+
+
+def test_joints_of_one_name_are_not_merged():
+    one = "<joint name='a'><dynamics friction='{}'/></joint>"
+    with pytest.raises(InputError, match="several joints are called 'a'"):
+        urdf.read(f"<robot>{one.format(1)}{one.format(2)}</robot>", "a")

@@ -23,7 +23,8 @@ KEYWORDS = {
     "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed",
     "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while", "bool",
     "class", "new", "this", "template", "exp", "log", "pow", "floor", "ceil", "sqrt", "sin", "cos", "tan",
-    "fabs", "div", "abs", "y0", "y1", "j0", "j1", "gamma",
+    "fabs", "div", "abs", "y0", "y1", "j0", "j1", "gamma", "true", "false", "errno", "stdin", "stdout", "stderr",
+    "assert", "signgam", "linux", "unix",
 }  # fmt: skip
 """Words of C and C++, and names of the library, which a local name would hide."""
 MATH = {"fabs", "exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
@@ -204,8 +205,9 @@ class _C(Language):
 
 
 def safe(name: str) -> str:
-    """A name that neither C nor its library uses."""
-    return f"{name}_" if name in KEYWORDS else name
+    """A name that neither C nor its library uses; capitals may be macros (INFINITY, PI). Two names stay two."""
+    stem = name.rstrip("_")
+    return f"{name}_" if stem in KEYWORDS or (stem.isupper() and len(stem) > 1) else name
 
 
 def head(name: str, facts: Facts, dialect: Dialect) -> str:

@@ -211,6 +211,7 @@ def archive(
     values: dict[str, Any] = {
         "x": x, "fmi": fmi, "core": core, "variables": variables, "about": about, "sources": sources, "units": units,
         "title": ascii_only(job.model.law.title), "surroundings": ", ".join(repr(u) for u in Surroundings()),
+        "wholes": wholes_of(job), "shared": ", ".join(f.name for f in job.model.law.fields if f.par.shares),
         "holding": "_holding" in analyse(c99.translated(job)), **more,
     }  # fmt: skip
     described = render(f"fmu_{kind}.xml.j2", token="", **values)
@@ -226,6 +227,16 @@ def archive(
     if binary:
         files[f"binaries/{PLATFORMS[fmi]}/{x}.so"] = binary
     return _zipped(files), bool(binary)
+
+
+def wholes_of(job: Job) -> list[list[str]]:
+    """For every parameter whose elements share a whole, where they lie in the C structure of all values."""
+    law, p = job.model.law, job.model.parameters
+    return [
+        [f"p.{safe(f.name)}[{i}]" for i in range(len(getattr(p, f.name)))]
+        for f in law.fields
+        if f.par.shares and f.per_element
+    ]
 
 
 def _compiled(name: str, files: Mapping[str, str | bytes], sources: Sequence[str]) -> bytes | None:

@@ -172,8 +172,8 @@ class _Matlab(Language):
 
 
 def safe(name: str) -> str:
-    """A name that the language does not reserve."""
-    return f"{name}_" if name in KEYWORDS else name
+    """A name that the language does not reserve; two names stay two."""
+    return f"{name}_" if name.rstrip("_") in KEYWORDS else name
 
 
 def local(name: str) -> str:

@@ -61,8 +61,8 @@ TYPES = {"real": "Real", "int": "Integer", "bool": "Boolean"}
 
 
 def safe(name: str) -> str:
-    """A name that the language does not reserve."""
-    return f"{name}_" if name in KEYWORDS else name
+    """A name that the language does not reserve; two names stay two."""
+    return f"{name}_" if name.rstrip("_") in KEYWORDS else name
 
 
 class _Modelica(Language):

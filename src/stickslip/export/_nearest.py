@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from stickslip import plugins
+from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError, ParameterError
 from stickslip.export._sliding import Curve
 from stickslip.export.job import CannotCarry, Job
@@ -282,7 +283,7 @@ def losses(curve: Curve, form: Form) -> list[str]:
     if (
         "memory" not in form.keeps
         and law.state_fields
-        and not ("bristle" in form.keeps and is_bristle(curve))
+        and not ("bristle" in form.keeps and bristle_of(curve))
     ):
         bends = [f.par.meaning for f in law.state_fields if not isinstance(f.par, Mode)]
         memory = "; non-local memory" if law.non_local_memory else ""
@@ -299,10 +300,19 @@ def losses(curve: Curve, form: Form) -> list[str]:
     return out + [words for name, words in DEPENDENCES.items() if name in read and name not in form.keeps]
 
 
-def is_bristle(curve: Curve) -> bool:
-    """Whether the law is one bristle (LuGre, Dahl), the dependences on its surroundings aside."""
-    modes = curve.model.law.modes
-    return modes is not None and isinstance(modes(curve.model.parameters), Bristle)
+def bristle_of(curve: Curve) -> Bristle | None:
+    """The law's bristle where it is one (LuGre, Dahl), the dependences on direction and surroundings aside."""
+    law, p = curve.model.law, curve.model.parameters
+    if law.chosen.get("symmetry") == "asymmetric":
+        law, both = law.having(symmetry="symmetric"), p._asdict()
+        p = law.parameters({f.name: between(both[f.name], both.get(f.name + NEGATIVE)) for f in law.fields})
+    contact = law.modes(p) if law.modes else None
+    return contact if isinstance(contact, Bristle) else None
+
+
+def between(forth: Any, back: Any) -> Any:
+    """The mean of both directions' values, where they are numbers of their own."""
+    return 0.5 * (forth + back) if isinstance(forth, float) and isinstance(back, float) else forth
 
 
 def surroundings_of(model: Model) -> set[str]:
@@ -314,3 +324,11 @@ def surroundings_of(model: Model) -> set[str]:
         for node in ast.walk(tree)
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "u"
     } - {"applied"}
+
+
+def read_by(model: Model) -> str:
+    """What a law's torque depends on besides its motion, for people; empty where on nothing."""
+    read = surroundings_of(model)
+    known = ("position", "normal load", "temperature", "time")
+    names = [words for words, name in zip(known, DEPENDENCES, strict=True) if name in read]
+    return f"{', '.join(names[:-1])} and {names[-1]}" if names[1:] else "".join(names)

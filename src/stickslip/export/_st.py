@@ -9,24 +9,21 @@ from __future__ import annotations
 import ast
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 from stickslip.errors import LawError
 from stickslip.export._analysis import Facts, analyse
-from stickslip.export._hoist import hoisted
-from stickslip.export._language import ADDITIVE, ATOM, MULTIPLICATIVE, Language
+from stickslip.export._language import ADDITIVE, AND, ATOM, CONDITION, MULTIPLICATIVE, NOT, OR, Language
+from stickslip.export._st_names import RESERVED, named_in_st
 
-__all__ = ["HELPERS", "functions", "safe"]
+__all__ = ["HELPERS", "Names", "functions", "number"]
 
-KEYWORDS = {
-    "action", "array", "at", "bool", "byte", "by", "case", "constant", "configuration", "date", "do", "dt",
-    "dint", "else", "elsif", "end", "exit", "false", "for", "from", "function", "if", "in", "initial_step",
-    "int", "interval", "limit", "log", "ln", "lreal", "mod", "mux", "not", "of", "on", "or", "priority",
-    "program", "read_only", "real", "repeat", "resource", "retain", "return", "sel", "single", "sint", "step",
-    "string", "struct", "task", "then", "time", "to", "tod", "transition", "true", "type", "uint", "until",
-    "var", "while", "with", "word", "xor", "and", "abs", "min", "max", "move", "trunc",
-}  # fmt: skip
+TYPES = ("parameters", "state", "surroundings")
+IGNORED = {"BOOL": "done", "LREAL": "left_out"}
+"""What takes a result that nobody wants."""
+
 MATH = {
     "fabs": "ABS", "exp": "EXP", "log": "LN", "sqrt": "SQRT", "sin": "SIN", "cos": "COS", "tan": "TAN", "atan": "ATAN",
 }  # fmt: skip
@@ -41,15 +38,40 @@ HELPERS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
         "u := EXP(-2.0 * ABS(x));", "@ := (1.0 - u) / (1.0 + u);", "IF x < 0.0 THEN", "    @ := -@;", "END_IF;"]),
     "hypot": (["x", "y"], ["@ := SQRT(x * x + y * y);"]),
     "copysign": (["x", "y"], ["@ := ABS(x);", "IF y < 0.0 THEN", "    @ := -@;", "END_IF;"]),
-    "floor": (["x"], ["u := LINT_TO_LREAL(TRUNC_LINT(x));", "IF u > x THEN", "    u := u - 1.0;", "END_IF;",
+    # Right whether the conversion rounds, as the norm has it, or truncates.
+    "floor": (["x"], ["u := LINT_TO_LREAL(LREAL_TO_LINT(x));", "IF u > x THEN", "    u := u - 1.0;", "END_IF;",
                      "@ := u;"]),
 }  # fmt: skip
 """Kahan's expm1 and log1p, and what else the norm's library lacks."""
 
 
-def safe(name: str) -> str:
-    """A name that the norm does not reserve (it does not tell upper from lower case)."""
-    return f"{name}_" if name.lower() in KEYWORDS else name
+@dataclass(frozen=True)
+class Names:
+    """How things are called in the structured text of one export.
+
+    Attributes
+    ----------
+    prefix : str
+        Of functions and types.
+    words : mapping
+        Arguments, locals and fields of the law to their names.
+    functions : mapping
+        Functions of the law to their names, with the prefix.
+    """
+
+    prefix: str
+    words: Mapping[str, str]
+    functions: Mapping[str, str]
+
+    @classmethod
+    def of(cls, trees: Mapping[str, ast.FunctionDef], prefix: str, fields: Iterable[str]) -> Names:
+        """The names in hoisted functions, and of the fields of their structures."""
+        known = analyse(trees)
+        words = {name for facts in known.values() for name in (*facts.kinds, *facts.arguments)}
+        inner = named_in_st(trees, {*HELPERS, *TYPES})
+        functions = {name: f"{prefix}_{short}" for name, short in inner.items()}
+        taken = {*RESERVED, prefix.lower(), *(f.lower() for f in functions.values()), *IGNORED.values()}
+        return cls(prefix, named_in_st({*words, *fields}, taken), functions)
 
 
 class _St(Language):
@@ -58,27 +80,23 @@ class _St(Language):
     }  # fmt: skip
 
     def __init__(
-        self, name: str, prefix: str, facts: Facts, known: Mapping[str, Facts], counts: Mapping[str, int]
+        self, name: str, names: Names, facts: Facts, known: Mapping[str, Facts], counts: Mapping[str, int]
     ) -> None:
         super().__init__(facts)
-        self.own = prefix + name
-        self.prefix = prefix
+        self.own = names.functions[name]
+        self.names = names
         self.known = known
         self.counts = counts
         self.helpers: set[str] = set()
+        self.ignored: set[str] = set()
 
     # ---- expressions ---------------------------------------------------------------------------------
 
     def name(self, name: str) -> str:
-        return str(self.counts[name]) if name in self.facts.counts else safe(name)
+        return str(self.counts[name]) if name in self.facts.counts else self.names.words[name]
 
     def number(self, value: float) -> str:
-        if math.isinf(value):
-            return "1.0E308" if value > 0.0 else "-1.0E308"
-        text = repr(value)
-        mantissa, _, exponent = text.partition("e")
-        mantissa += "" if "." in mantissa else ".0"
-        return f"{mantissa}E{int(exponent)}" if exponent else mantissa
+        return number(value)
 
     def as_real(self, node: ast.expr) -> str:
         return f"INT_TO_LREAL({self.expression(node)})"
@@ -87,7 +105,7 @@ class _St(Language):
         assert isinstance(node.value, ast.Name)
         if node.value.id == "math":
             return {"pi": self.number(math.pi), "inf": self.number(math.inf)}[node.attr]
-        return f"{safe(node.value.id)}.{safe(node.attr)}"
+        return f"{self.names.words[node.value.id]}.{self.names.words[node.attr]}"
 
     def element(self, node: ast.Subscript) -> str:
         assert isinstance(node.value, ast.Attribute)
@@ -107,13 +125,16 @@ class _St(Language):
         if name == "int":
             return f"LREAL_TO_INT({self.helper('floor', node.args)})"
         callee = self.known[name]
-        given = [f"{safe(a)} := {self.given(g, a, callee)}" for g, a in zip(node.args, callee.arguments)]
-        return f"{self.prefix}{name}({', '.join(given)})"
+        given = [
+            f"{self.names.words[a]} := {self.given(g, a, callee)}"
+            for g, a in zip(node.args, callee.arguments)
+        ]
+        return f"{self.names.functions[name]}({', '.join(given)})"
 
     def given(self, node: ast.expr, argument: str, callee: Facts) -> str:
         """What is passed for an argument: a structure, an index or a number."""
         if argument in callee.structures and isinstance(node, ast.Name):
-            return safe(node.id)
+            return self.names.words[node.id]
         return self.expression(node) if callee.kinds.get(argument) == "int" else self.real(node)
 
     def library(self, name: str, arguments: Sequence[ast.expr]) -> str:
@@ -130,7 +151,7 @@ class _St(Language):
         """One of the functions that come along."""
         self.helpers.add(name)
         given = [f"{a} := {self.real(x)}" for a, x in zip(HELPERS[name][0], arguments)]
-        return f"{self.prefix}_{name}({', '.join(given)})"
+        return f"{self.names.prefix}_{name}({', '.join(given)})"
 
     def power(self, node: ast.BinOp) -> str:
         return self.library("pow", [node.left, node.right])
@@ -142,9 +163,15 @@ class _St(Language):
         # SEL evaluates both, which is harmless for arithmetic without a division.
         if any(isinstance(n, (ast.Div, ast.Call)) for n in ast.walk(node)):
             raise LawError(f"`{ast.unparse(node)}` has no translation; write it as an if statement")
-        return f"SEL({self.expression(node.test)}, {self.real(node.orelse)}, {self.real(node.body)})"
+        return f"SEL({self.truth(node.test)}, {self.real(node.orelse)}, {self.real(node.body)})"
 
     def written(self, node: ast.expr) -> tuple[str, int]:
+        # The norm has no numbers for conditions.
+        if isinstance(node, ast.BoolOp):
+            word = self.operators[type(node.op)]
+            return f" {word} ".join(self.truth(v) for v in node.values), AND if word == "AND" else OR
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            return f"NOT {self.truth(node.operand)}", NOT
         # Two signs in a row (a - -b) are no structured text.
         text, binds = super().written(node)
         return (
@@ -153,11 +180,23 @@ class _St(Language):
             else (text, binds)
         )
 
+    def truth(self, node: ast.expr) -> str:
+        """A condition inside another: a number is one by being different from 0."""
+        if self.kind(node) == "bool":
+            return self.expression(node, ATOM)
+        return f"({self.real(node, ADDITIVE)} <> 0.0)"
+
+    def real(self, node: ast.expr, at: int = CONDITION) -> str:
+        """An expression where a real number is wanted; a condition is 0 or 1."""
+        if self.kind(node) == "bool":
+            return f"SEL({self.expression(node)}, 0.0, 1.0)"
+        return super().real(node, at)
+
     # ---- statements ----------------------------------------------------------------------------------
 
     def declaration(self, name: str) -> list[str]:
-        zero = "0" if self.facts.kinds[name] == "int" else "0.0"
-        return [f"{safe(name)} := {zero};"]
+        zero = {"int": "0", "bool": "FALSE", "real": "0.0"}[self.facts.kinds[name]]
+        return [f"{self.names.words[name]} := {zero};"]
 
     def assignment(self, node: ast.Assign) -> list[str]:
         target = node.targets[0]
@@ -171,14 +210,19 @@ class _St(Language):
         return [f"{self.own} := {self.real(node.value)};", "RETURN;"]
 
     def call_statement(self, node: ast.Call) -> list[str]:
-        return [f"{self.call(node)};"]
+        # A function stands in an expression (edition 2), so that its result goes somewhere.
+        callee = self.known.get(node.func.id) if isinstance(node.func, ast.Name) else None
+        returns = callee is None or callee.returns
+        self.ignored.add("LREAL" if returns else "BOOL")
+        return [f"{IGNORED['LREAL' if returns else 'BOOL']} := {self.call(node)};"]
 
     def leave(self) -> str:
         return "EXIT;"
 
     def condition(self, node: ast.If, depth: int) -> list[str]:
         pad = self.indent * depth
-        out = [f"{pad}IF {self.expression(node.test)} THEN", *self.block(node.body, depth + 1)]
+        test = self.expression(node.test) if self.kind(node.test) == "bool" else self.truth(node.test)
+        out = [f"{pad}IF {test} THEN", *self.block(node.body, depth + 1)]
         if node.orelse:
             out += [f"{pad}ELSE", *self.block(node.orelse, depth + 1)]
         return [*out, f"{pad}END_IF;"]
@@ -190,38 +234,59 @@ class _St(Language):
         first, last = (["0"] if len(node.iter.args) == 1 else []) + [
             self.expression(a, ATOM) for a in node.iter.args
         ]
-        head = f"{pad}FOR {safe(node.target.id)} := {first} TO {last} - 1 DO"
+        head = f"{pad}FOR {self.names.words[node.target.id]} := {first} TO {last} - 1 DO"
         return [head, *self.block(node.body, depth + 1), f"{pad}END_FOR;"]
+
+
+def number(value: float) -> str:
+    """A number as the norm writes it: with a point, and digits on both its sides."""
+    if math.isinf(value):
+        return "1.0E308" if value > 0.0 else "-1.0E308"
+    mantissa, _, exponent = repr(float(value)).partition("e")
+    mantissa += "" if "." in mantissa else ".0"
+    return f"{mantissa}E{int(exponent)}" if exponent else mantissa
 
 
 def functions(
     trees: Mapping[str, ast.FunctionDef],
-    prefix: str,
+    names: Names,
     structures: Mapping[str, str],
     counts: Mapping[str, int],
 ) -> list[tuple[str, str, list[str]]]:
-    """Name, docstring and lines of every function, helpers and callees first."""
-    trees = hoisted(trees)
+    """Name, docstring and lines of every hoisted function, helpers and callees first."""
     known = analyse(trees)
     out: list[tuple[str, str, list[str]]] = []
     helpers: set[str] = set()
     for name, tree in trees.items():
         facts = known[name]
-        writer = _St(name, prefix, facts, known, counts)
+        writer = _St(name, names, facts, known, counts)
         body = writer.block(tree.body, 1)
         if body and body[-1].strip() == "RETURN;" and len(body[-1]) - len(body[-1].lstrip()) == 4:
             body.pop()  # the end returns by itself
+        if not facts.returns:
+            body = [*body, f"    {writer.own} := TRUE;"]
         helpers |= writer.helpers
-        head = [f"FUNCTION {prefix}{name} : {'LREAL' if facts.returns else 'BOOL'}"]
-        plain = [a for a in facts.arguments if structures.get(a) is None or a not in facts.structures]
-        shared = [a for a in facts.arguments if a not in plain]
-        types = {"real": "LREAL", "int": "INT", "bool": "BOOL"}
-        head += section("VAR_INPUT", [f"{safe(a)} : {types[facts.kinds.get(a, 'real')]};" for a in plain])
-        head += section("VAR_IN_OUT", [f"{safe(a)} : {prefix}_{structures[a]};" for a in shared])
-        own = [n for n in facts.kinds if n not in facts.arguments and n not in facts.counts]
-        head += section("VAR", [f"{safe(n)} : {types[facts.kinds[n]]};" for n in own])
-        out.append((name, ast.get_docstring(tree) or "", [*head, *(body or ["    ;"]), "END_FUNCTION"]))
-    return [(f"_{n}", n, helper_lines(prefix, n)) for n in HELPERS if n in helpers] + out
+        head = declared(facts, names, structures, writer.ignored)
+        first = f"FUNCTION {writer.own} : {'LREAL' if facts.returns else 'BOOL'}"
+        out.append(
+            (name, ast.get_docstring(tree) or "", [first, *head, *(body or ["    ;"]), "END_FUNCTION"])
+        )
+    return [(f"_{n}", n, helper_lines(names.prefix, n)) for n in HELPERS if n in helpers] + out
+
+
+def declared(facts: Facts, names: Names, structures: Mapping[str, str], ignored: Iterable[str]) -> list[str]:
+    """The VAR sections of a function."""
+    word = names.words
+    plain = [a for a in facts.arguments if structures.get(a) is None or a not in facts.structures]
+    shared = [a for a in facts.arguments if a not in plain]
+    own = [n for n in facts.kinds if n not in facts.arguments and n not in facts.counts]
+    kinds = {"real": "LREAL", "int": "INT", "bool": "BOOL"}
+    return [
+        *section("VAR_INPUT", [f"{word[a]} : {kinds[facts.kinds.get(a, 'real')]};" for a in plain]),
+        *section("VAR_IN_OUT", [f"{word[a]} : {names.prefix}_{structures[a]};" for a in shared]),
+        *section("VAR", [*(f"{word[n]} : {kinds[facts.kinds[n]]};" for n in own),
+                         *(f"{IGNORED[kind]} : {kind};" for kind in sorted(ignored))]),
+    ]  # fmt: skip
 
 
 def section(kind: str, lines: Sequence[str]) -> list[str]:

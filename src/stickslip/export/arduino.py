@@ -8,11 +8,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from stickslip.export import c99
+from stickslip.export import _c_control, c99
 from stickslip.export._text import ascii_only, render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target
-from stickslip.spec import Surroundings
 
 __all__ = ["TARGET"]
 
@@ -33,9 +32,10 @@ def write(job: Job) -> Export:
     x = job.name
     values: dict[str, Any] = {
         "x": x, "title": ascii_only(job.model.law.title), "controller": job.controller is not None,
-        "surroundings": ", ".join(f"{u!r}f" for u in Surroundings()),
+        "surroundings": ", ".join(f"{u!r}f" for u in job.surroundings),
         "sample_time": job.controller.sample_time if job.controller else 1e-3,
-        "alone": job.controller is not None and c99.compensates_alone(job.controller),
+        "given": _c_control.given_by(job.controller) if job.controller else "",
+        "alone": job.controller is not None and _c_control.compensates_alone(job.controller),
     }  # fmt: skip
     return Export(
         {
@@ -47,18 +47,23 @@ def write(job: Job) -> Export:
             "library.properties": render("arduino.properties.j2", **values),
             f"extras/{x}_check.c": c[f"{x}_check.c"],
             "extras/golden.csv": c["golden.csv"],
-            "README.md": render("arduino_readme.md.j2", **values),
+            "README.md": render("arduino_readme.md.j2", **values, **c99.about_substeps(job)),
         }
     )
 
 
+AVR = ("avr-g++", "-mmcu=atmega328p", "-std=gnu++11", "-Os", "-Wall", "-Werror", "-ffunction-sections",
+       "-fdata-sections", "-Wl,--gc-sections")  # fmt: skip
+MAIN = "#include <Arduino.h>\n#include <Step.ino>\nint main() { setup(); for (;;) loop(); }\n"
+
+
 def check(job: Job, export: Export) -> Check:
-    """Compile library and example with g++ as the Arduino tools would, and run the golden vectors."""
+    """Compile library and example as the Arduino tools would, with g++ and avr-g++, and run the golden vectors."""
     if shutil.which("g++") is None:
         return Check(None, "g++ is not installed")
     x = job.name
     with TemporaryDirectory() as folder:
-        for name, content in {**export.files, "stub/Arduino.h": STUB}.items():
+        for name, content in {**export.files, "stub/Arduino.h": STUB, "main.cpp": MAIN}.items():
             path = Path(folder, name)
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(str(content))
@@ -73,13 +78,18 @@ def check(job: Job, export: Export) -> Check:
             "examples/Step/Step.ino",
         ]
         vectors = ["-Isrc", f"src/{x}.cpp", "-x", "c++", f"extras/{x}_check.c", "-lm", "-o", "check"]
-        for arguments in (sketch, vectors):
-            built = c99.run(["g++", *FLAGS, *arguments], folder)
+        board = ["-Istub", "-Isrc", "-Iexamples/Step", "main.cpp", f"src/{x}.cpp", "-lm", "-o", "board"]
+        commands = [("g++", *FLAGS, *sketch), ("g++", *FLAGS, *vectors)]
+        commands += [(*AVR, *board)] if shutil.which(AVR[0]) else []
+        for command in commands:
+            built = c99.run(command, folder)
             if built.returncode:
-                return Check(False, f"g++: {built.stderr.strip().splitlines()[0]}")
+                return Check(False, f"{command[0]}: {built.stderr.strip().splitlines()[0]}")
         ran = c99.run(["./check"], folder)
-        error = float(ran.stdout or "nan")
-    return Check(ran.returncode == 0, f"g++: at most {error:.3g} N·m off the definition", {"g++": error})
+        error = c99.worst_in(ran.stdout)
+    tools = " and ".join(dict.fromkeys(command[0] for command in commands))
+    said = f"{tools} compile it; at most {error:.3g} N·m off the definition"
+    return Check(ran.returncode == 0, said, {"g++": error})
 
 
 TARGET = Target(
@@ -88,5 +98,6 @@ TARGET = Target(
     write,
     check,
     controller=True,
-    tried="g++ and arm-none-eabi-g++; not on a board",
+    around="position, load, temperature and time are yours to set in `u` (`_sample_turns` writes position and time)",
+    tried="g++, avr-g++ (ATmega328P) and arm-none-eabi-g++; not on a board",
 )

@@ -48,6 +48,8 @@ LOADS: dict[str, tuple[str, ...]] = {
            "load_friction_external_stribeck"),
 }  # fmt: skip
 LOADS["m6"] = (*LOADS["m5"], "load_friction_motor_quad", "load_friction_external_quad")
+LARGEST = 10**300
+"""What is not below it is no number of a motor: infinite, not a number, or a whole number that is no real one."""
 UNLOADED = "the growth of its viscous part with the load"
 
 
@@ -169,12 +171,12 @@ def read(text: str) -> Bam:
     """
     try:
         content: Any = json.loads(text)
-    except ValueError as error:
+    except (ValueError, TypeError, RecursionError) as error:
         raise InputError(f"this is no BAM file: {error}") from None
-    if not isinstance(content, dict) or cast("dict[str, Any]", content).get("model") not in LOADS:
+    table = cast("dict[str, Any]", content) if isinstance(content, dict) else {}
+    variant = table.get("model")
+    if not isinstance(variant, str) or variant not in LOADS:
         raise InputError('this is no BAM file: it has no "model" that is one of m1 to m6')
-    table = cast("dict[str, Any]", content)
-    variant = str(table["model"])
     bent = variant not in ("m1", "m3")
     fc, sigma2 = _number(table, "friction_base"), _number(table, "friction_viscous")
     loads = {key: _number(table, key) for key in LOADS[variant]}
@@ -194,7 +196,7 @@ def read(text: str) -> Bam:
 
 def _number(table: Mapping[str, Any], key: str) -> float:
     value = table.get(key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < LARGEST:
         raise InputError(f"a BAM file of model {table['model']} needs the number {key!r}, not {value!r}")
     return float(value)
 

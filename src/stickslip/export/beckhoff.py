@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.errors import InputError, UnknownName
 from stickslip.export._nearest import Curve, Form, Nearest, carried
 from stickslip.export._points import stiffness, table_form
 from stickslip.export._text import render
@@ -129,24 +129,32 @@ def read(text: str, torque_per_unit: float, motion: str = "rotary") -> Model:
     InputError
         If a number is missing or the points break the kernel's rules.
     """
+    if motion not in UNITS:
+        raise UnknownName("motion", motion, UNITS)
+    if not 0.0 < torque_per_unit < math.inf:
+        raise InputError(f"torque_per_unit = {torque_per_unit:g} N·m must be greater than 0")
     numbers: dict[str, float] = {}
     for line in text.splitlines():
         words = line.partition("#")[0].split()
         if len(words) == 2:
             try:
-                numbers[words[0]] = float(words[1])
+                value = float(words[1])
             except ValueError:
-                raise InputError(f"{words[0]} is {words[1]!r}; it must be a number") from None
+                value = math.nan
+            if not math.isfinite(value):
+                raise InputError(f"{words[0]} is {words[1]!r}; it must be a finite number")
+            numbers[words[0]] = value
 
     def number(name: str) -> float:
         if f"frict_comp.{name}" not in numbers:
             raise InputError(f"the list has no frict_comp.{name}")
         return numbers[f"frict_comp.{name}"]
 
-    count, scaling = int(number("table_entries")), number("scaling_factor")
-    if not 2 <= count <= ENTRIES:
+    entries, scaling = number("table_entries"), number("scaling_factor")
+    count = int(entries)
+    if not 2 <= entries <= ENTRIES or count != entries:
         raise InputError(
-            f"frict_comp.table_entries is {count}; the kernel takes 2 to {ENTRIES} (P-COMP-00042)"
+            f"frict_comp.table_entries is {entries:g}; the kernel takes 2 to {ENTRIES} (P-COMP-00042)"
         )
     rows = [(number(f"table[{i}].in"), number(f"table[{i}].out")) for i in range(count)]
     velocity = [v / UNITS[motion] for v, _ in rows]

@@ -7,30 +7,55 @@ and without contraction the code gives the bits of plain Python (tested); in sin
 
 from __future__ import annotations
 
+import math
 import shutil
 import subprocess
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from stickslip.control.controller import Controller
-from stickslip.control.sampled import Memory, Settings, sampled_by, settings
-from stickslip.export._analysis import analyse, merged
+import numpy as np
+
+from stickslip.control.sampled import Memory, Settings, settings
+from stickslip.export._analysis import Facts, analyse, merged
 from stickslip.export._c import Dialect, functions, head, safe
+from stickslip.export._c_control import (
+    LAYOUTS,
+    PUBLIC,
+    compensates_alone,
+    entries_of,
+    given_by,
+    rows_of,
+    wide,
+)
+from stickslip.export._nearest import read_by
+from stickslip.export._step_error import PARTS, about_steps
 from stickslip.export._text import ascii_only, first_line, render
-from stickslip.export.golden import as_csv, golden
+from stickslip.export.golden import (
+    Golden,
+    Surrounded,
+    answered,
+    as_csv,
+    golden_around,
+    golden_samples,
+    room_beside_jumps,
+)
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
 from stickslip.spec import Field, Law, Surroundings, fields_of
-from stickslip.subset import Layout, law_layouts, named
+from stickslip.subset import law_layouts, named
 
 __all__ = ["SINGLE_BOUND", "TARGET", "dialect_of", "translated", "write"]
 
 SINGLE_BOUND = 1e-2
 """Largest error of single precision, as a share of the largest torque: where a contact breaks away a step sooner or
 later by rounding, it is the fall of the torque in that step."""
+
+PACE = 1e3
+"""Of the time along the golden vectors, so that single precision sees slow changes too."""
 
 STRUCTURES = {
     "z": "state", "dz": "state", "g": "state", "p": "parameters", "u": "surroundings", "n": "settings", "m": "memory",
@@ -57,16 +82,7 @@ def translated(job: Job) -> dict[str, Any]:
     # The public ones first: they have the right to their names.
     entries = {"_steady": law.steady, "_holding": law.holding, "_step": law.step}
     entries = {name: function for name, function in entries.items() if function}
-    layouts = law_layouts(law)
-    if job.controller is not None:
-        helper = job.controller.compensator
-        entries["_sample"] = sampled_by(law if helper else None)
-        layouts = {
-            **layouts,
-            "n": Layout.of(fields_of(Settings), counted=False),
-            "m": Layout.of(fields_of(Memory), counted=False),
-        }
-    return merged(named(entries, layouts))
+    return merged(named({**entries, **entries_of(job)}, {**law_layouts(law), **LAYOUTS}))
 
 
 def write(job: Job) -> Export:
@@ -74,19 +90,26 @@ def write(job: Job) -> Export:
     law, p, dialect = job.model.law, job.model.parameters, dialect_of(job)
     trees = translated(job)
     known = analyse(trees)
-    public = [n for n in ("_step", "_steady", "_holding", "_sample") if n in trees]
+    public = [n for n in ("_step", "_steady", "_holding", *PUBLIC) if n in trees]
     written = functions(trees, dialect, public)
     about = {name: ascii_only(first_line(doc)) for name, doc, _ in written}
-    vectors = golden(job.model)
-    scale = float(max(abs(vectors.torque).max(), 1e-12))
+    vectors = golden_around(job.model, PACE)
+    room = jumps_of(job, vectors)
+    samples = golden_samples(job.controller, job.surroundings) if job.controller else None
     common: dict[str, Any] = {
+        "substeps_head": substeps_head(dialect, known["_step"]), "step_arguments": known["_step"].arguments,
         "x": job.name, "X": job.name.upper(), "title": ascii_only(law.title), "real": dialect.real,
         "counts": {dialect.count(n): size for n, size in counts_in(job.model).items()},
         "source": ascii_only("; ".join(law.source)),
         "equation": textwrap.wrap(ascii_only(law.equation), 110, break_long_words=False),
-        "surroundings": ", ".join(dialect.number(x) for x in Surroundings()),
-        "controller": controller_of(job, dialect), "bound": SINGLE_BOUND if job.single else 0.0, "scale": repr(scale),
-        "count": len(vectors.v0),
+        "surroundings": ", ".join(dialect.number(x) for x in job.surroundings),
+        "moved": isinstance(vectors, Surrounded), "columns": len(vectors),
+        "still": ", ".join(dialect.number(x) for x in Surroundings()),
+        "depends": read_by(job.model), "controller": controller_of(job, dialect),
+        "bound": SINGLE_BOUND if job.single else 0.0,
+        "scale": scale_of(vectors.torque),
+        "count": len(vectors.v0), "jumps": int((room > 0.0).sum()), "samples": rows_of(samples) if samples else [],
+        "samples_scale": scale_of(samples.torque) if samples else "", "wide": [*wide(known, dialect)],
     }  # fmt: skip
     header = render(
         "c99.h.j2",
@@ -100,11 +123,14 @@ def write(job: Job) -> Export:
         "c99.c.j2",
         **common,
         functions=code,
+        small=[n for n in ("expm1f", "log1pf") if f"{n}(" in text],
         extremes=[n for n in ("min", "max") if f"{job.name}_{n}(" in text],
         identified=[*initial(law.fields, p._asdict(), dialect)],
         reset=[*cleared(law, dialect)],
     )
-    rows = [", ".join(repr(float(x)) for x in row) for row in zip(*vectors)]
+    more = {"golden_samples.csv": as_csv(samples)} if samples else {}
+    columns = [*vectors, *([room] if job.single else [])]
+    rows = [", ".join(repr(float(x)) for x in row) for row in zip(*columns)]
     table = [
         {"name": f.name, "value": getattr(p, f.name), "unit": f.par.unit, "meaning": f.par.meaning}
         for f in law.fields
@@ -115,9 +141,44 @@ def write(job: Job) -> Export:
             f"{job.name}.c": source,
             f"{job.name}_check.c": render("c99_check.c.j2", **common, rows=rows),
             "golden.csv": as_csv(vectors),
-            "README.md": render("c99_readme.md.j2", **common, table=table),
+            **more,
+            "README.md": render("c99_readme.md.j2", **common, **about_substeps(job), table=table),
         }
     )
+
+
+def jumps_of(job: Job, vectors: Golden | Surrounded) -> Any:
+    """What single precision may differ by in each step beside a jump of the torque, N·m, shape (n,)."""
+    if not job.single or job.model.law.continuous:
+        return np.zeros(len(vectors.v0))
+    bound = SINGLE_BOUND * float(scale_of(vectors.torque))
+    around = vectors[5:] if isinstance(vectors, Surrounded) else None
+    return room_beside_jumps(partial(answered, job.model, around=around), vectors, bound)
+
+
+def substeps_head(dialect: Dialect, step: Facts) -> str:
+    """The head of the function that divides a step."""
+    given = head("_step", step, dialect).split(", ")
+    return ", ".join([*given[:3], "int count", *given[3:]]).replace("_step(", "_substeps(", 1)
+
+
+def about_substeps(job: Job) -> dict[str, Any]:
+    """What a README says of the error of a step, and how the C divides one."""
+    said = f"`{job.name}_substeps(v0, v1, dt, count, ...)` divides a step, the velocity linear in between."
+    helper = job.controller.compensator if job.controller else None
+    if helper is None:
+        return about_steps(job.model, said)
+    sampled = (
+        f"The sampled controller divides its sample in the same way, into `n.substeps` = {helper.substeps}."
+    )
+    return about_steps(
+        job.model, f"{said} {sampled}", parts=helper.substeps if helper.substeps > 1 else PARTS
+    )
+
+
+def scale_of(torque: Any) -> str:
+    """The largest torque, N·m, against which the bound of single precision counts."""
+    return repr(float(max(abs(torque).max(), 1e-12)))
 
 
 # ---- structures and their values ------------------------------------------------------------------------------
@@ -203,19 +264,16 @@ def controller_of(job: Job, dialect: Dialect) -> Mapping[str, Any] | None:
     """Initial values of the controller's structures."""
     if job.controller is None:
         return None
-    numbers = settings(job.controller)._asdict()
+    numbers = settings(job.controller)._replace(clock=1.0)._asdict()
     zeros = dict.fromkeys(Memory._fields, 0.0)
     return {
         "init": [*given(fields_of(Settings), numbers, "n", dialect)],
         "reset": [*given(fields_of(Memory), zeros, "m", dialect)],
         "sample_time": numbers["sample_time"],
         "alone": compensates_alone(job.controller),
+        "unlimited": math.isinf(job.controller.torque_limit),
+        "given": given_by(job.controller),
     }
-
-
-def compensates_alone(controller: Controller) -> bool:
-    """Whether it has no loop of its own: its torque belongs to that of another controller."""
-    return not any(controller.gains)
 
 
 # ---- the check -------------------------------------------------------------------------------------------------
@@ -236,11 +294,17 @@ def check(job: Job, export: Export) -> Check:
             if built.returncode:
                 return Check(False, f"{compiler}: {built.stderr.strip().splitlines()[0]}")
             ran = run(["./check"], folder)
-            errors[compiler] = float(ran.stdout or "nan")
+            errors[compiler] = worst_in(ran.stdout)
             if ran.returncode:
                 return Check(False, f"{compiler}: {errors[compiler]:.3g} N·m off the definition", errors)
     worst = max(errors.values())
     return Check(True, f"{' and '.join(compilers)}: at most {worst:.3g} N·m off the definition", errors)
+
+
+def worst_in(printed: str) -> float:
+    """The largest of the errors that the check printed, N·m; NaN if one is, or there are none."""
+    found = [float(x) for x in printed.split()]
+    return max(found) if found and not any(map(math.isnan, found)) else math.nan
 
 
 def run(command: Sequence[str], folder: str) -> subprocess.CompletedProcess[str]:
@@ -255,5 +319,6 @@ TARGET = Target(
     check,
     precision=True,
     controller=True,
+    around="position, load, temperature and time are yours to set in `u` (`_sample` writes position and time)",
     tried="gcc, clang: every bit",
 )

@@ -13,6 +13,7 @@ import numpy as np
 
 from stickslip.export._fmu import Variable, law_variables, numbered, surroundings_read, units_of
 from stickslip.export._fmu_run import played
+from stickslip.export._step_error import about_steps
 from stickslip.export._text import render
 from stickslip.export.golden import random_steps
 from stickslip.export.job import Check, Export, Job
@@ -22,6 +23,9 @@ from stickslip.spec import Surroundings
 __all__ = ["TARGET", "Moved", "moved"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+SUBSTEPS = (
+    "A communication step is one step of the law: shorter ones, the slope of the velocity kept, divide it."
+)
 
 
 class Moved(NamedTuple):
@@ -59,6 +63,7 @@ def write(job: Job) -> Export:
         variables=variables,
         files=list(files),
         compiled=not notes,
+        **about_steps(job.model, SUBSTEPS),
     )
     return Export({**files, "golden.csv": as_csv(moved(job)), "README.md": readme}, notes)
 
@@ -106,5 +111,6 @@ TARGET = Target(
     "FMI 2.0 and 3.0 co-simulation unit of a contact that is moved",
     write,
     check,
+    around="position, load, temperature and applied torque are inputs, time is the simulator's",
     tried="FMPy: every bit; libcosim (FMI 2.0); FMU manipulation toolbox",
 )

@@ -13,6 +13,7 @@ import numpy as np
 
 from stickslip.export._fmu import Variable, law_variables, numbered, surroundings_read, units_of
 from stickslip.export._fmu_run import played
+from stickslip.export._step_error import about_steps
 from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Setting, Target, settings_of
@@ -24,6 +25,7 @@ BOUND = 1e-9
 """Largest error against the package's own motion: rad, rad/s, N·m."""
 MAX_STEP = 1e-3
 """Longest part of a step to begin with, s."""
+SUBSTEPS = "The sample time is here the length of a part of a step: a smaller `max_step` makes shorter parts."
 
 
 class Driven(NamedTuple):
@@ -91,6 +93,7 @@ def write(job: Job) -> Export:
         variables=variables,
         files=list(files),
         compiled=not notes,
+        **about_steps(job.model, SUBSTEPS, held=True),
     )
     return Export({**files, "golden.csv": as_csv(driven(job)), "README.md": readme}, notes)
 
@@ -143,5 +146,6 @@ TARGET = Target(
     write,
     check,
     settings=(Setting("inertia", None, "inertia of the axis, kg·m²", lower=1e-15),),
+    around="load and temperature are inputs, position and time its own",
     tried="FMPy: the motion of `drive_axis` to the bit; FMU manipulation toolbox",
 )

@@ -1,18 +1,40 @@
-"""Golden vectors: random steps of a law and what plain Python answers to them."""
+"""Golden vectors: random steps of a law, random samples of a controller, and what plain Python answers to them."""
 
 from __future__ import annotations
 
 import io
+import math
+from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.control.controller import Controller
+from stickslip.control.sampled import Memory, sampled_by, settings
+from stickslip.export._nearest import surroundings_of
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
-__all__ = ["Golden", "as_csv", "golden", "random_steps"]
+__all__ = [
+    "Golden",
+    "Samples",
+    "Surrounded",
+    "answered",
+    "as_csv",
+    "golden",
+    "golden_around",
+    "golden_samples",
+    "random_steps",
+    "room_beside_jumps",
+]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+TRIED, ROUNDED, NEAR = 24, 1e-6, 0.1
+"""Motions that are tried beside a jump, what they differ by, and the share of the bound from which a torque counts."""
+STILL = Surroundings()
+FAR = 1000.0
+"""rad: where the samples' motion is, so that a loss of precision with the angle shows."""
 
 
 class Golden(NamedTuple):
@@ -26,6 +48,19 @@ class Golden(NamedTuple):
     dt: Array
     position: Array
     torque: Array
+
+
+class Surrounded(NamedTuple):
+    """Steps as `Golden` has them, with a load, a temperature in degrees Celsius and a time in s; shape (n,) each."""
+
+    v0: Array
+    v1: Array
+    dt: Array
+    position: Array
+    torque: Array
+    load: Array
+    temperature: Array
+    time: Array
 
 
 def random_steps(count: int, seed: int, scale: float = 1.0) -> tuple[Array, Array, Array, Array]:
@@ -44,19 +79,129 @@ def random_steps(count: int, seed: int, scale: float = 1.0) -> tuple[Array, Arra
 
 def golden(model: Model, count: int = 400, seed: int = 1) -> Golden:
     """Random steps and the torque of plain Python, from rest."""
-    v0, v1, dt, position = random_steps(count, seed)
+    steps = random_steps(count, seed)
+    return Golden(*steps, answered(model, *steps))
+
+
+def golden_around(model: Model, pace: float = 1.0, count: int = 400, seed: int = 1) -> Golden | Surrounded:
+    """As `golden`; of a law that depends on load, temperature or time, these move, time ``pace`` times as fast."""
+    read = surroundings_of(model)
+    if not read & {"load", "temperature", "time"}:
+        return golden(model, count, seed)
+    steps, draw = random_steps(count, seed), np.random.default_rng(seed + 1)
+    load = draw.uniform(0.5, 2.0, count) if "load" in read else np.full(count, STILL.load)
+    temperature = (
+        draw.uniform(15.0, 40.0, count) if "temperature" in read else np.full(count, STILL.temperature)
+    )
+    time = pace * np.cumsum(steps[2]) if "time" in read else np.full(count, STILL.time)
+    torque = answered(model, *steps, around=(load, temperature, time))
+    return Surrounded(*steps, torque, load, temperature, time)
+
+
+def answered(
+    model: Model,
+    v0: Array,
+    v1: Array,
+    dt: Array,
+    position: Array,
+    *,
+    around: tuple[Array, Array, Array] | None = None,
+) -> Array:
+    """The torques of plain Python along steps from rest, N·m; ``around``: load, temperature and time of each."""
     z, p = model.law.state(model.parameters), model.parameters
+    still = (np.full(v0.size, x) for x in (STILL.load, STILL.temperature, STILL.time))
     torque = [
-        model.law.step(float(a), float(b), float(h), z, p, Surroundings(position=float(x)))
-        for a, b, h, x in zip(v0, v1, dt, position)
+        model.law.step(float(a), float(b), float(h), z, p, Surroundings(*map(float, u)))
+        for a, b, h, *u in zip(v0, v1, dt, position, *(around or still))
     ]
-    return Golden(v0, v1, dt, position, np.array(torque, dtype=np.float64))
+    return np.array(torque, dtype=np.float64)
 
 
-def as_csv(vectors: Golden) -> str:
+def room_beside_jumps(
+    answer: Callable[[Array, Array, Array, Array], Array], vectors: Golden | Surrounded, bound: float
+) -> Array:
+    """What the torque of each step may be off besides `bound`, N·m: 0 but where a jump of it moves to another step.
+
+    Velocities and times a little off (`ROUNDED`, some roundings of single precision) are tried `TRIED` times.
+
+    Parameters
+    ----------
+    answer : callable
+        The torques along steps from rest, as `answered`.
+    vectors : Golden or Surrounded
+    bound : float
+        N·m
+    """
+    draw, most = np.random.default_rng(2), np.zeros(vectors.torque.size)
+    for _ in range(TRIED):
+        speed = 1.0 + ROUNDED * draw.uniform(-1.0, 1.0, vectors.v0.size + 1)
+        time = 1.0 + ROUNDED * draw.uniform(-1.0, 1.0, vectors.dt.size)
+        found = answer(vectors.v0 * speed[:-1], vectors.v1 * speed[1:], vectors.dt * time, vectors.position)
+        most = np.maximum(most, np.abs(found - vectors.torque))
+    return np.where(most > NEAR * bound, most + bound, 0.0)
+
+
+class Samples(NamedTuple):
+    """Samples of a controller in order; shape (n,) each.
+
+    position, wanted in rad, wanted_velocity in rad/s, wanted_acceleration in rad/s², torque in N·m.
+    """
+
+    position: Array
+    wanted: Array
+    wanted_velocity: Array
+    wanted_acceleration: Array
+    torque: Array
+
+
+def random_samples(controller: Controller, count: int, seed: int) -> tuple[Array, Array, Array, Array]:
+    """Position and reference of a motion with reversals, stops, a blocked axis and inputs that are no numbers."""
+    draw = np.random.default_rng(seed)
+    pieces = np.arange(count) // 20
+    speed: Array = 10.0 ** draw.uniform(-2.0, 0.5, count // 20 + 1) * draw.choice(
+        (-1.0, 1.0), count // 20 + 1
+    )
+    speed[::5] = 0.0
+    time = controller.sample_time
+    velocity: Array = speed[pieces]
+    wanted = FAR + np.cumsum(velocity) * time
+    lag = 1e-3 * np.cumsum(draw.standard_normal(count) * (velocity != 0.0)) * math.sqrt(time)
+    position = wanted - lag
+    # The axis is blocked until the limit holds the torque back, and comes free again.
+    most = controller.torque_limit / controller.linear.kp if controller.linear.kp else 1.0
+    blocked = slice(count // 2, 3 * count // 4)
+    position[blocked] -= 2.0 * min(most, 1.0)
+    position[count // 4 : count // 4 + 3] = math.nan
+    wanted[count - 20] = math.nan
+    return position, wanted, velocity, np.gradient(velocity, time)
+
+
+def golden_samples(
+    controller: Controller, around: Surroundings | None = None, count: int = 400, seed: int = 1
+) -> Samples:
+    """Random samples and the torque of plain Python, from the first sample on, at this load and temperature."""
+    inputs = random_samples(controller, count, seed)
+    helper = controller.compensator
+    n, p = settings(controller)._replace(clock=1.0), helper.model.parameters if helper else None
+    m = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0))
+    law = helper.model.law if helper else None
+    z, u = law.state(p) if law else None, SimpleNamespace(**(around or Surroundings())._asdict())
+    sample = sampled_by(law)
+    torque = [sample(*map(float, row), n, m, z, p, u) for row in zip(*inputs)]
+    return Samples(*inputs, np.array(torque, dtype=np.float64))
+
+
+HEADS: dict[type, str] = {
+    Golden: "v0_rad_s,v1_rad_s,dt_s,position_rad,torque_Nm",
+    Surrounded: "v0_rad_s,v1_rad_s,dt_s,position_rad,torque_Nm,load,temperature_degC,time_s",
+    Samples: "position_rad,wanted_rad,wanted_velocity_rad_s,wanted_acceleration_rad_s2,torque_Nm",
+}
+
+
+def as_csv(vectors: Golden | Surrounded | Samples) -> str:
     """The vectors as CSV; numbers with all their digits."""
     out = io.StringIO()
-    out.write("v0_rad_s,v1_rad_s,dt_s,position_rad,torque_Nm\n")
+    out.write(f"{HEADS[type(vectors)]}\n")
     for row in zip(*vectors):
         out.write(",".join(repr(float(x)) for x in row) + "\n")
     return out.getvalue()

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.model import Model
+from stickslip.spec import Surroundings
 
 __all__ = ["CannotCarry", "Check", "Export", "Job", "counts_in"]
 
@@ -41,6 +42,8 @@ class Job:
         times the velocity over which the law changes.
     settings : mapping
         Values of the target's own settings by name (`Target.settings`); what is not given has the default.
+    surroundings : Surroundings
+        Where the controller starts: what its `u` holds until somebody sets it.
     """
 
     model: Model
@@ -50,6 +53,7 @@ class Job:
     nearest: bool = False
     top_speed: float | None = None
     settings: Mapping[str, str | float] = field(default_factory=dict[str, str | float])
+    surroundings: Surroundings = field(default_factory=Surroundings)
 
     def __post_init__(self) -> None:
         if not IDENTIFIER.fullmatch(self.name):

@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from stickslip.export import c99
+from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target
@@ -21,6 +22,9 @@ from stickslip.export.target import Target
 __all__ = ["TARGET", "law_job", "write"]
 
 NOTE = "run in our tests against the golden vectors; not tried on a machine"
+
+
+SUBSTEPS = "The parameter `substeps` divides the step of a period, the velocity linear in between."
 
 
 def law_job(job: Job) -> Job:
@@ -38,7 +42,10 @@ def write(job: Job) -> Export:
         "hal": job.name.replace("_", "-"), "note": NOTE,
     }  # fmt: skip
     files = {f"{job.name}.comp": render("linuxcnc.comp.j2", **values), **code}
-    return Export({**files, "README.md": render("linuxcnc_readme.md.j2", **values)}, (NOTE,))
+    return Export(
+        {**files, "README.md": render("linuxcnc_readme.md.j2", **values, **about_steps(job.model, SUBSTEPS))},
+        (NOTE,),
+    )
 
 
 def check(job: Job, export: Export) -> Check:
@@ -65,5 +72,6 @@ TARGET = Target(
     "LinuxCNC HAL component",
     write,
     check,
+    around="position, load and temperature are pins, time runs by itself, no torque is applied from outside",
     tried="halcompile of LinuxCNC 2.9, gcc; not on a machine",
 )

@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from stickslip.export._matlab import HELPERS, functions, local, safe
+from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import as_csv, golden
 from stickslip.export.job import Check, Export, Job, counts_in
@@ -20,6 +21,9 @@ __all__ = ["BOUND", "TARGET"]
 
 BOUND = 1e-12
 """Largest relative error in Octave, whose exp and power are not the C library's."""
+
+
+SUBSTEPS = "A step is divided by calling the function several times with the velocities in between."
 
 
 def write(job: Job) -> Export:
@@ -42,7 +46,7 @@ def write(job: Job) -> Export:
             **files,
             f"{job.name}_check.m": render("matlab_check.m.j2", **common),
             "golden.csv": as_csv(golden(job.model)),
-            "README.md": render("matlab_readme.md.j2", **common),
+            "README.md": render("matlab_readme.md.j2", **about_steps(job.model, SUBSTEPS), **common),
         }
     )
 
@@ -121,5 +125,6 @@ TARGET = Target(
     "MATLAB and Octave functions",
     write,
     check,
+    around="position, load, temperature and time are yours to set in `u`",
     tried="Octave",
 )

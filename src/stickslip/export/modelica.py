@@ -11,7 +11,7 @@ import importlib
 import importlib.util
 import math
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,6 +20,7 @@ import numpy as np
 
 from stickslip.export._analysis import merged
 from stickslip.export._modelica import functions, safe
+from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, render
 from stickslip.export.golden import as_csv, golden
 from stickslip.export.job import Check, Export, Job, counts_in
@@ -30,7 +31,13 @@ from stickslip.subset import law_layouts, named
 __all__ = ["TARGET", "write"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-NOTE = "grammar and functions are checked in our tests, Axis is run in rumoca; not tried in Dymola or OpenModelica"
+NOTE = (
+    "grammar, functions and the number of equations are checked in our tests (pymoca), Axis is run in rumoca, and "
+    "Contact where the law has no state; not tried in Dymola or OpenModelica"
+)
+
+
+SUBSTEPS = "A shorter `samplePeriod` makes shorter steps."
 
 
 def write(job: Job) -> Export:
@@ -49,10 +56,13 @@ def write(job: Job) -> Export:
         "equation": textwrap.wrap(ascii_only(law.equation), 100, break_long_words=False),
         "source": ascii_only("; ".join(law.source)),
         "parameters": [*declared(law.fields, p, law.elements_in(p))],
-        "states": [*declared(law.state_fields, None, law.elements_in(p))] or ['Real none = 0.0 "this law has none";'],
-        "around": [f"Real {safe(n)} = {v!r};" for n, v in Surroundings()._asdict().items()],
+        "states": [*declared(law.state_fields, None, law.elements_in(p))] or none_taken(heads),
+        "around": [f"Real {safe(n)}(start = {v!r}, fixed = true);" for n, v in Surroundings()._asdict().items()],
+        "rest": ", ".join(f"{safe(n)} = {v!r}" for n, v in Surroundings()._asdict().items()),
         "functions": [[ascii_only(line) for line in lines] for _, _, lines in parts],
-        "step": called("step", heads["step"], "last, velocity, samplePeriod, z, p, u"),
+        "step": called("step", heads["step"], "last, velocity, elapsed, z, p, u"),
+        "remembers": takes_state(heads["step"]),
+        "holds_state": takes_state(heads.get("holding", ())),
         "outputs": "(torque, z)" if any("output State" in line for line in heads["step"]) else "torque",
         "events": events,
         "hold": [called("holding", heads["holding"], f"{side}, z, p, u") for side in ("1.0", "-1.0")] if events else [],
@@ -61,9 +71,20 @@ def write(job: Job) -> Export:
     files = {
         f"{job.name}.mo": render("modelica.mo.j2", **values),
         "golden.csv": as_csv(golden(job.model)),
-        "README.md": render("modelica_readme.md.j2", **values),
+        "README.md": render("modelica_readme.md.j2", **about_steps(job.model, SUBSTEPS), **values),
     }
     return Export(files, (NOTE,))
+
+
+def takes_state(head: Sequence[str]) -> bool:
+    """Whether a function has the state among its arguments."""
+    return any(line.split()[:2] == ["input", "State"] for line in head)
+
+
+def none_taken(heads: Mapping[str, Sequence[str]]) -> list[str]:
+    """The record of a law that remembers nothing, where its functions take one: never assigned, therefore bound."""
+    taken = any(" State " in line for lines in heads.values() for line in lines)
+    return ['Real none = 0.0 "this law has none";'] if taken else []
 
 
 def called(name: str, head: Sequence[str], given: str) -> str:
@@ -75,14 +96,20 @@ def called(name: str, head: Sequence[str], given: str) -> str:
 
 
 def declared(fields: Sequence[Field], p: Any, elements: int) -> Iterable[str]:
-    """Components of a record with their values and meaning."""
+    """Components of a record with their meaning; parameters with their values, what is assigned with where it starts.
+
+    A binding would be an equation, and what a model assigns has that of its algorithm.
+    """
     for f in fields:
         size = len(getattr(p, f.name)) if p is not None and f.per_element else elements
         array = f"[{size}]" if f.per_element else ""
-        start: Any = [0.0] * size if f.per_element else 0.0
-        value = getattr(p, f.name) if p is not None else start
-        shown = "{" + ", ".join(map(repr, value)) + "}" if f.per_element else repr(value)
         meaning = ascii_only(f"{f.par.meaning}, {f.par.unit}").replace('"', "'").replace("\\", "/")
+        if p is None:
+            each = "each " if f.per_element else ""
+            yield f'Real {safe(f.name)}{array}({each}start = 0.0, {each}fixed = true) "{meaning}";'
+            continue
+        value = getattr(p, f.name)
+        shown = "{" + ", ".join(map(repr, value)) + "}" if f.per_element else repr(value)
         yield f'Real {safe(f.name)}{array} = {shown} "{meaning}";'
 
 
@@ -158,5 +185,7 @@ TARGET = Target(
     "Modelica package",
     write,
     check,
-    tried="a grammar of Modelica, an evaluator; Axis in rumoca",
+    around="position, load and temperature are inputs and time the simulation's in Contact; in Axis they stand still, "
+    "as its parameter u",
+    tried="pymoca, an evaluator; in rumoca Axis, and Contact of laws without state",
 )

@@ -14,13 +14,14 @@ from typing import Any
 from xml.etree import ElementTree
 
 from stickslip.errors import InputError
+from stickslip.export._mujoco_read import Part, joint_named, parts
 from stickslip.export._mujoco_run import drift, pulled, spring
-from stickslip.export._nearest import COULOMB, Curve, Form, Nearest, carried, fit_stribeck
+from stickslip.export._nearest import COULOMB, Curve, Form, Nearest, bristle_of, carried, fit_stribeck
 from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
-from stickslip.spec import Bristle, Surroundings
+from stickslip.spec import Surroundings
 
 __all__ = ["TARGET", "holding_step", "read", "write", "xml"]
 
@@ -35,9 +36,7 @@ STICK = 1e-6
 def fit_bristle(curve: Curve) -> dict[str, float]:
     """LuGre's parameters: the law's own stiffness, or a bend of 1e-4 rad where it is rigid; curve by least squares."""
     sliding = fit_stribeck(curve, shape=SHAPE)
-    law, p = curve.model.law, curve.model.parameters
-    contact = law.modes(p) if law.modes else None
-    if isinstance(contact, Bristle):
+    if contact := bristle_of(curve):
         return {**sliding, "sigma0": contact.stiffness, "sigma1": contact.damping}
     return {**sliding, "sigma0": stiffness(curve) or sliding["fs"] / 1e-4, "sigma1": 0.0}
 
@@ -144,6 +143,8 @@ def for_timestep(found: Nearest, step: float, inertia: float, contact: str) -> t
 def read(text: str, joint: str | None = None) -> Model:
     """The friction of a joint of an MJCF file: LuGre where an actuator has it, else Coulomb and viscous.
 
+    What the file's ``<default>`` classes give a joint counts as if it stood there.
+
     Parameters
     ----------
     text : str
@@ -159,20 +160,29 @@ def read(text: str, joint: str | None = None) -> Model:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         raise InputError(f"this is no MJCF: {error}") from None
-    joints = {j.get("name", ""): j for j in root.iter("joint") if j.get("joint") is None}
-    if joint is None and len(joints) == 1:
-        (joint,) = joints
-    if joint is None or joint not in joints:
-        raise InputError(f"joint {joint!r}: name one of {', '.join(joints) or 'none: the file has no joint'}")
-    motors = [m for m in root.iter("dcmotor") if m.get("joint") == joint and m.get("lugre")]
+    if root.tag == "robot":
+        raise InputError("this is a URDF and no MJCF; read it with stickslip.export.urdf.read")
+    if root.tag not in ("mujoco", "mujocoinclude"):
+        raise InputError(f"this is no MJCF: its root is <{root.tag}>, not <mujoco>")
+    found = joint_named(root, joint)
+    lugre = [
+        m.attributes["lugre"]
+        for m in parts(root, "dcmotor")
+        if _drives(m, found) and m.attributes.get("lugre")
+    ]
     try:
-        damping = float(joints[joint].get("damping", "0").split()[0])
-        if motors:
-            numbers = [float(x) for x in str(motors[0].get("lugre")).split()]
+        damping = float(found.attributes.get("damping", "0").split()[0])
+        if lugre:
+            numbers = [float(x) for x in lugre[0].split()]
             return Model("lugre", sigma2=damping, delta_s=SHAPE, **dict(zip(MOTOR, numbers, strict=True)))
-        return Model("coulomb", fc=float(joints[joint].get("frictionloss", "0")), sigma2=damping)
+        return Model("coulomb", fc=float(found.attributes.get("frictionloss", "0")), sigma2=damping)
     except (ValueError, IndexError) as error:
-        raise InputError(f"joint {joint!r}: its friction cannot be read ({error})") from None
+        raise InputError(f"joint {found.name!r}: its friction cannot be read ({error})") from None
+
+
+def _drives(motor: Part, joint: Part) -> bool:
+    """Whether an actuator acts on that joint."""
+    return bool(joint.name) and motor.attributes.get("joint") == joint.name
 
 
 # ---- the check -------------------------------------------------------------------------------------------------

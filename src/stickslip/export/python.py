@@ -9,14 +9,18 @@ from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from stickslip.export._step_error import about_steps
 from stickslip.export._text import render
-from stickslip.export.golden import as_csv, golden
+from stickslip.export.golden import as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
 __all__ = ["TARGET"]
+
+
+SUBSTEPS = "`contact.step(v0, v1, dt, substeps=4)` divides a step, the velocity linear in between."
 
 
 def write(job: Job) -> Export:
@@ -38,8 +42,15 @@ def write(job: Job) -> Export:
         functions=[ast.unparse(tree) for tree in trees.values()],
         steady=law.steady is not None,
     )
-    files = {f"{job.name}.py": text, "golden.csv": as_csv(golden(job.model))}
-    return Export({**files, "README.md": render("python_readme.md.j2", x=job.name, law=law)})
+    files = {f"{job.name}.py": text, "golden.csv": as_csv(golden_around(job.model))}
+    return Export(
+        {
+            **files,
+            "README.md": render(
+                "python_readme.md.j2", **about_steps(job.model, SUBSTEPS), x=job.name, law=law
+            ),
+        }
+    )
 
 
 def constant(name: str) -> str:
@@ -91,5 +102,6 @@ TARGET = Target(
     "Python, one file without dependencies",
     write,
     check,
+    around="position, load and temperature are arguments of `step`, time runs by itself",
     tried="Python: every bit",
 )

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from stickslip.export._st import functions, safe
+from stickslip.export._hoist import hoisted
+from stickslip.export._st import Names, functions, number
+from stickslip.export._st_names import RESERVED, named_in_st
+from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import as_csv, golden
 from stickslip.export.job import Export, Job, counts_in
@@ -16,27 +19,56 @@ from stickslip.subset import law_layouts, named
 
 __all__ = ["TARGET"]
 
-STRUCTURES = {"z": "state", "p": "parameters", "u": "surroundings"}
-NOTE = (
-    "the grammar is checked and the statements are evaluated in our tests; not tried on a vendor's hardware"
+BLOCK = (
+    "velocity",
+    "sample_time",
+    "position",
+    "restart",
+    "load",
+    "temperature",
+    "applied",
+    "torque",
+    "last_velocity",
+    "elapsed",
+    "started",
+    "substeps",
+    "count",
+    "i",
+    "slope",
+    "p",
+    "z",
+    "u",
 )
+"""Variables of the function block, which has another name."""
+SUBSTEPS = "The block's input `substeps` divides the step of a cycle, the velocity linear in between."
+STRUCTURES = {"z": "state", "p": "parameters", "u": "surroundings"}
+NOTE = "taken by the compiler iec2c (matiec), run in our tests; not tried on a vendor's hardware"
 
 
 def write(job: Job) -> Export:
     """One file with types, functions and the block; golden vectors; how to use it."""
-    law, p, x = job.model.law, job.model.parameters, job.name
+    law, p = job.model.law, job.model.parameters
+    x = named_in_st([job.name], RESERVED | set(BLOCK))[job.name]
     elements = law.elements_in(p)
-    parts = functions(named({"_step": law.step}, law_layouts(law)), x, STRUCTURES, counts_in(job.model))
-    around = [f"{safe(n)} : LREAL := {v!r};" for n, v in Surroundings()._asdict().items()]
+    trees = hoisted(named({"_step": law.step}, law_layouts(law)))
+    fields = [f.name for f in (*law.fields, *law.state_fields)]
+    names = Names.of(trees, x, [*fields, *Surroundings._fields])
+    word = names.words
+    parts = functions(trees, names, STRUCTURES, counts_in(job.model))
+    around = [f"{word[n]} : LREAL := {number(v)};" for n, v in Surroundings()._asdict().items()]
     values: dict[str, Any] = {
         "x": x,
+        "file": f"{job.name}.st",
         "title": ascii_only(law.title),
         "equation": textwrap.wrap(ascii_only(law.equation), 110, break_long_words=False),
         "source": ascii_only("; ".join(law.source)),
-        "parameters": [*_declared(law.fields, p, elements)],
-        "states": [*_declared(law.state_fields, None, elements)] or ["none : LREAL;"],
+        "parameters": [*_declared(law.fields, p, elements, word)],
+        "states": [*_declared(law.state_fields, None, elements, word)] or ["none : LREAL;"],
         "around": around,
-        "cleared": [*_cleared(law.state_fields, elements)],
+        "cleared": [*_cleared(law.state_fields, elements, word)],
+        "word": word,
+        "step": names.functions["_step"],
+        "arguments": [word[a.arg] for a in trees["_step"].args.args],
         "note": NOTE,
     }
     code = [
@@ -47,14 +79,14 @@ def write(job: Job) -> Export:
         for name, doc, lines in parts
     ]
     files = {
-        f"{x}.st": render("st.st.j2", **values, functions=code),
+        f"{job.name}.st": render("st.st.j2", **values, functions=code),
         "golden.csv": as_csv(golden(job.model)),
-        "README.md": render("st_readme.md.j2", **values),
+        "README.md": render("st_readme.md.j2", **values, **about_steps(job.model, SUBSTEPS)),
     }
     return Export(files, (NOTE,))
 
 
-def _declared(fields: Sequence[Field], p: Any, elements: int) -> Iterable[str]:
+def _declared(fields: Sequence[Field], p: Any, elements: int, word: Mapping[str, str]) -> Iterable[str]:
     """Fields of a structure with their meaning, and their values where there are any."""
     for f in fields:
         size = len(getattr(p, f.name)) if p is not None and f.per_element else elements
@@ -62,23 +94,24 @@ def _declared(fields: Sequence[Field], p: Any, elements: int) -> Iterable[str]:
         start = ""
         if p is not None:
             value = getattr(p, f.name)
-            start = f" := [{', '.join(map(repr, value))}]" if f.per_element else f" := {value!r}"
+            start = f" := [{', '.join(map(number, value))}]" if f.per_element else f" := {number(value)}"
         meaning = ascii_only(f"{f.par.meaning}, {f.par.unit}")
-        yield f"{safe(f.name)} : {kind}{start.replace('e', 'E')}; (* {meaning} *)"
+        yield f"{word[f.name]} : {kind}{start}; (* {meaning} *)"
 
 
-def _cleared(fields: Sequence[Field], elements: int) -> Iterable[str]:
+def _cleared(fields: Sequence[Field], elements: int, word: Mapping[str, str]) -> Iterable[str]:
     """Statements that put the state to rest."""
     for f in fields:
         if f.per_element:
-            yield from (f"z.{safe(f.name)}[{i}] := 0.0;" for i in range(elements))
+            yield from (f"z.{word[f.name]}[{i}] := 0.0;" for i in range(elements))
         else:
-            yield f"z.{safe(f.name)} := 0.0;"
+            yield f"z.{word[f.name]} := 0.0;"
 
 
 TARGET = Target(
     "st",
     "IEC 61131-3 structured text, a function block",
     write,
-    tried="a grammar of IEC 61131-3, an evaluator; no vendor's tool",
+    around="position, load, temperature and applied torque are inputs, time runs by itself",
+    tried="iec2c (matiec) and gcc, a grammar of IEC 61131-3; no vendor's tool",
 )

@@ -76,6 +76,8 @@ class Target:
         The laws that it has room for, the simplest first; empty where it carries any.
     settings : tuple of Setting
         What it asks for besides the model (``--set NAME=VALUE``).
+    around : str
+        Where a law that depends on its surroundings finds them; what stands still is named.
     tried : str
         In what its output was tried.
     """
@@ -88,12 +90,14 @@ class Target:
     controller: bool = False
     forms: tuple[Form, ...] = ()
     settings: tuple[Setting, ...] = ()
+    around: str = ""
     tried: str = ""
 
     @property
     def carries(self) -> str:
         """What of a model it holds, for people."""
-        return " or ".join(form.words for form in self.forms) or ANY_LAW
+        any_law = f"{ANY_LAW}; {self.around}" if self.around else ANY_LAW
+        return " or ".join(form.words for form in self.forms) or any_law
 
 
 def settings_of(target: Target, given: Mapping[str, str | float]) -> dict[str, str | float]:

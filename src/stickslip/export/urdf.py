@@ -58,7 +58,11 @@ def read(text: str, joint: str | None = None) -> Model:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         raise InputError(f"this is no URDF: {error}") from None
-    found = {j.get("name", ""): d for j in root.iter("joint") if (d := j.find("dynamics")) is not None}
+    pairs = [(j.get("name", ""), d) for j in root.iter("joint") if (d := j.find("dynamics")) is not None]
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        twice = next(name for name, _ in pairs if sum(name == other for other, _ in pairs) > 1)
+        raise InputError(f"several joints are called {twice!r}; give each a name of its own")
     if joint is None and len(found) == 1:
         (joint,) = found
     if joint is None or joint not in found:

@@ -1,0 +1,165 @@
+"""A compensator leaves whole: offset, inertia, gain, lead and deadband, or the export says what it leaves out."""
+
+import numpy as np
+import pytest
+from test_c99 import COMPILERS, CONTROL, answers, built
+
+from stickslip.cli import main
+from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Gains, place
+from stickslip.control.recommended import read_recommended
+from stickslip.errors import ParameterError
+from stickslip.export.job import Job
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model, Reference
+from stickslip.rigs.loop import Loop
+from stickslip.rigs.procedures.track import Track
+from stickslip.rigs.rig import setpoints
+from stickslip.rigs.virtual import virtual_rig
+from stickslip.simulation.closed_loop import simulate
+
+MODEL = """law = "coulomb"
+[parameters]
+fc = 0.25
+sigma2 = 0.02
+[axis]
+inertia = 4e-4
+offset = -0.07
+{more}
+"""
+RECOMMENDED = """[recommended]
+compensator = "feedforward"
+gain = 0.8
+bandwidth = 20.0
+damping = 1.0
+inertia = 4e-4
+lead = 5e-4
+{more}
+"""
+FED = "offset = -0.07\ninertia_feedforward = 4e-4"
+COULOMB = Model("coulomb", fc=0.25, sigma2=0.02)
+INERTIA = 4e-4
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def write(more="", name="m.toml"):
+        (tmp_path / name).write_text(MODEL.format(more=more))
+        return name
+
+    return write
+
+
+def exported(capsys, *call):
+    """What the export says."""
+    assert main(["export", *call]) == 0
+    return capsys.readouterr().out
+
+
+@pytest.mark.skipif(not COMPILERS, reason="needs a C compiler")
+@pytest.mark.parametrize("kind", [Feedforward, Feedback])
+def test_the_simulation_runs_the_compensator_that_is_exported(kind, tmp_path):
+    """Along a move on an axis with friction: the torque held is that of the C at the same positions."""
+    helper = kind(COULOMB, 0.9, offset=-0.07, inertia_feedforward=INERTIA)
+    controller = Controller(place("PD", INERTIA, 20.0, 1.0), helper, 3.0, 1e-3)
+    reference = Reference("scurve", distance=0.5, velocity=2.0, acceleration=40.0, jerk=2000.0)
+    record = simulate(
+        RigidAxis(INERTIA, COULOMB), controller, reference, 0.6, integrator="fixed", output=1e-3
+    )
+    rows = [
+        np.flatnonzero(record.time == 1e-3 * k)[-1] for k in range(600)
+    ]  # as the controller has just acted
+    motion = reference.sample(1e-3 * np.arange(600) + 1e-11)
+    told = answers(
+        built(Job(COULOMB, "x", controller), CONTROL, tmp_path, COMPILERS[0]),
+        record["position"][rows], *motion.T,
+    )  # fmt: skip
+    np.testing.assert_allclose(told, record["motor_torque"][rows], atol=2e-9)
+    assert np.ptp(motion[:, 2]) * INERTIA > 0.03  # the inertia's part is seen
+
+
+def test_with_its_inertia_fed_forward_a_frictionless_axis_follows_without_error():
+    free = Model("coulomb", fc=0.0, sigma2=0.0)
+    reference = Reference("sine", amplitude=0.1, frequency=2.0)
+
+    def error(inertia):
+        helper = Feedforward(free, inertia_feedforward=inertia)
+        loop = Controller(place("PD", INERTIA, 5.0, 1.0), helper, sample_time=1e-4)
+        return simulate(RigidAxis(INERTIA, free), loop, reference, 1.0).meta["metrics"]["position_rms_rad"]
+
+    assert error(INERTIA) < 0.03 * error(0.0)
+
+
+def test_a_recommendation_leaves_with_its_offset_and_inertia(file, tmp_path, capsys):
+    name = file(RECOMMENDED.format(more=FED))
+    found = read_recommended(name).on(COULOMB)
+    assert (found.offset, found.inertia_feedforward) == (-0.07, INERTIA)
+    said = exported(capsys, name, "--to", "c99", "--compensator", "recommended", "--out", "out", "--check")
+    source = (tmp_path / "out" / "m.c").read_text()
+    for line in ("n->gain = 0.8;", "n->lead = 0.0005;", "n->offset = -0.07;", "n->inertia = 0.0004;"):
+        assert line in source
+    for words in ("0.8 times the law's torque", "`offset` = -0.07", "`inertia` = 0.0004 kg·m²"):
+        assert words in said
+        assert words in (tmp_path / "out" / "README.md").read_text()
+    assert "beside friction is not" not in said
+
+
+def test_a_recommendation_without_the_offset_of_its_axis_says_so(file, capsys):
+    said = exported(capsys, file(RECOMMENDED.format(more="offset = -0.01")), "--to", "c99",
+                    "--compensator", "recommended")  # fmt: skip
+    assert "the constant torque of -0.07 N·m that acts beside friction is not in the export" in said
+
+
+@pytest.mark.parametrize("target", ["c99", "st", "python", "linuxcnc"])
+def test_the_law_alone_of_a_recommendation_says_what_is_left_out(target, file, capsys):
+    said = exported(capsys, file(RECOMMENDED.format(more=FED)), "--to", target)
+    left = "feedforward with gain 0.8, lead 0.0005 s, offset -0.07 N·m, inertia feedforward 0.0004 kg·m²"
+    assert left in said
+    assert "the constant torque of -0.07 N·m that acts beside friction is not in the export" in said
+
+
+def test_a_models_compensator_has_the_offset_and_inertia_of_its_axis(file, tmp_path, capsys):
+    call = [file("gravity = 0.4"), "--to", "c99", "--compensator", "ff", "--out", "out"]
+    said = exported(capsys, *call)
+    source = (tmp_path / "out" / "m.c").read_text()
+    assert "n->offset = -0.07;" in source
+    assert "n->inertia = 0.0004;" in source
+    assert "gravity, up to 0.4 N·m over the angle" in said
+    said = exported(capsys, *call, "--offset", "0", "--inertia-feedforward", "0")
+    assert "no constant torque" in said
+    assert "the constant torque of -0.07 N·m that acts beside friction is not in the export" in said
+
+
+def test_the_mean_torque_of_a_map_of_the_angle_leaves(file, tmp_path, capsys):
+    angle = "ripple_order = []\nripple = []\nripple_phase = []\ntorque_offset = 0.03\n"
+    angle = f"[angle]\n{angle}torque_order = [1]\ntorque = [0.01]\ntorque_phase = [0]\n"
+    said = exported(capsys, file(RECOMMENDED.format(more=angle)), "--to", "c99", "--compensator", "recommended",
+                    "--out", "out")  # fmt: skip
+    assert "n->offset = 0.03;" in (tmp_path / "out" / "m.c").read_text()
+    assert "is not in the export but for the mean of the torque" in said
+
+
+def test_a_rig_runs_what_is_recommended_with_offset_and_inertia(file):
+    """Behind an open position loop the compensator's torque is all there is."""
+    rig = virtual_rig("ideal")
+    loop = Track(compensator="recommended", model=file(RECOMMENDED.format(more=FED))).controller(rig)
+    alone = Controller(Gains(kp=0.0), loop.compensator, sample_time=rig.sample_time)
+    with Loop(rig) as run:
+        run.run(setpoints(5, velocity=1.0, acceleration=100.0, closed=1.0), alone)
+        given = run.record()["compensation_torque"][-5:]
+    assert given == pytest.approx(0.8 * (0.25 + 0.02) - 0.07 + 4e-4 * 100.0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [({"offset": np.nan}, "offset"), ({"inertia_feedforward": -1.0}, "inertia_feedforward = -1 kg·m²")],
+)
+def test_what_cannot_be_fed_forward_is_refused(wrong, said):
+    with pytest.raises(ParameterError, match=said):
+        Feedforward(COULOMB, **wrong)
+    with pytest.raises(ParameterError, match="offset acts on samples"):
+        Controller(Gains(1.0), Feedback(COULOMB, offset=0.1))
