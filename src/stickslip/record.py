@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -80,16 +80,19 @@ class Record:
         InputError
             If there is no such file, or it is not a record.
         """
+        from stickslip.config import refuse_endless
         from stickslip.stream import MAGIC, load_stream
+
+        refuse_endless(Path(path))
 
         try:
             with open(path, "rb") as file:
                 if file.read(len(MAGIC)) == MAGIC:
                     return load_stream(path)
             with np.load(path, allow_pickle=False) as data:
-                header = json.loads(str(data["__header__"]))
-                channels = {k: data[k] for k in data.files if k not in ("time", "__header__")}
-                return cls(data["time"], channels, header["units"], header["meta"])
+                units, meta = _header(str(data["__header__"]))
+                values = {k: _real(k, data[k]) for k in data.files if k != "__header__"}
+                return cls(values.pop("time"), values, units, meta)
         except FileNotFoundError:
             raise InputError(f"no record at {path}; check the path") from None
         except InputError:
@@ -112,6 +115,25 @@ class Record:
         frame = pandas.DataFrame(dict(self.channels), index=pandas.Index(self.time, name="time"))
         frame.attrs.update(units=dict(self.units), meta=dict(self.meta))
         return frame
+
+
+def _header(text: str) -> tuple[dict[str, str], dict[str, Any]]:
+    """Units and meta as `Record.save` writes them."""
+    header: Any = json.loads(text)
+    units, meta = header["units"], header["meta"]
+    if not (isinstance(units, dict) and isinstance(meta, dict)):
+        raise ValueError("its units or its meta are no table")
+    named = cast("dict[str, Any]", units)
+    if odd := [name for name, unit in named.items() if not isinstance(unit, str)]:
+        raise ValueError(f"the unit of {odd[0]!r} is {named[odd[0]]!r}, which is no text")
+    return named, cast("dict[str, Any]", meta)
+
+
+def _real(name: str, values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """The array, if it holds real numbers: no fields, texts, dates or complex numbers."""
+    if values.dtype.kind not in "fiub":
+        raise ValueError(f"{name!r} holds {values.dtype}, which are no real numbers")
+    return values
 
 
 def encoder_step(position: Array) -> float:

@@ -1,40 +1,44 @@
 """Samples on their way to disk: a file that is a readable record at any instant, whatever ends the process.
 
 The file is a header (JSON: columns, units, meta), rows of 64-bit floats, and, once it was closed, a trailer (JSON:
-what was known only at the end). Rows are stored straight into the operating system's memory of the file (`mmap`), then
-their number: nothing is kept in the process, so ``kill -9`` loses no row that was committed. Space is reserved an
-extent ahead by a thread; a full disk is therefore known while there is still room for the samples of a stop.
+what was known only at the end). Rows are stored into ordinary memory. What keeps pace with a clock leaves writing them
+to a thread, every `PERIOD`: ``kill -9`` loses no more than came since. What keeps none writes them itself,
+`batch` by `batch`. Nothing that befalls the file (no room, a disk that does not answer, another process that shortens,
+overwrites or removes it) reaches the loop as anything but `Stream.fault`, which it looks at between two samples. Space
+is reserved an extent ahead; a full disk is therefore known while there is still room for the samples of a stop.
 """
 
 from __future__ import annotations
 
-import contextlib
 import json
-import mmap
 import os
 import struct
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from stickslip._stream_file import HEAD, MAGIC, StreamFile
 from stickslip.errors import InputError, RecordFault
 from stickslip.record import Record
 
-__all__ = ["MAGIC", "Stream", "load_stream"]
+__all__ = ["EXTENT", "MAGIC", "PERIOD", "Stream", "load_stream"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-MAGIC = b"STKSLIP1"
-HEAD = struct.Struct("<8sQQQQ")
-"""Magic, offset of the rows, their number, length of the header's JSON, length of the trailer's"""
-COUNT = 2  # place of the number of rows, in words of 8 bytes
-PAGE = 65536
-"""Mappings begin at multiples of this on every system"""
 EXTENT = 8192
 """Rows that are reserved at a time: 8 s at 1 kHz, and whole pages whatever the number of columns"""
+PERIOD = 0.02
+"""s after which the thread writes what has come"""
+KEPT = 256
+"""Extents that stay in memory; older ones are read back from the file"""
+PATIENT = 5
+"""Periods after which the thread writes where the loop that should wake it does not"""
+PATIENCE = 30.0
+"""s that a disk may take to answer where nothing moves meanwhile"""
 
 
 class Stream:
@@ -50,6 +54,10 @@ class Stream:
         As `stickslip.record.Record`'s.
     absent : sequence of str
         Columns that nothing is measured for: they are left out of the record.
+    paced : bool
+        Rows come by a clock: whoever commits them never waits for the disk, nor touches the file, and calls `spare`.
+    batch : int
+        Rows after which they are written where they come by no clock.
 
     Raises
     ------
@@ -65,32 +73,38 @@ class Stream:
         path: str | os.PathLike[str] | None = None,
         meta: Mapping[str, Any] | None = None,
         absent: Sequence[str] = (),
+        *,
+        paced: bool = False,
+        batch: int = 1,
     ) -> None:
         self.units = dict(units)
         self.path = None if path is None else Path(path)
         self.meta = dict(meta or {})
         self.absent = tuple(absent)
         self.fault: RecordFault | None = None
-        """Why no more room could be reserved; the rows that were reserved before can still be written."""
-        self._extents: list[Array] = []
+        """Why the record cannot go on; there still is room for the rows of a stop."""
+        self._paced, self._batch = paced, batch
+        self._due = 0.0
+        self._extents: list[Array | None] = []
         self._places: list[int] = []
+        self._ready = 0
         self._stride = 8 * len(self.units)
-        self._maps: list[mmap.mmap] = []
-        self._wanted = threading.Semaphore(0)
+        self._written = self._flushed = 0
         self._closing = False
-        self._file = -1
-        self._count = np.zeros(1, dtype=np.uint64)
-        self._written = 0
-        if self.path is not None:
-            self._create(self.path)
+        self._lock = threading.Lock()  # of the file; a paced loop never takes it
+        self._wanted = threading.Semaphore(0)
+        self._file = None if self.path is None else StreamFile(self.path, self._header(), len(self.units))
         try:
-            self._extend()
-            self._extend()
+            self._reserve()
         except OSError as error:
-            self._release()
+            if self._file is not None:
+                self._file.discard()
             raise RecordFault(f"{self.path}: no room for a record ({error.strerror}); make room") from None
-        self._thread = threading.Thread(target=self._reserve, name="record", daemon=True)
+        self._thread = threading.Thread(target=self._keep, name="record", daemon=True)
         self._thread.start()
+
+    def _header(self) -> bytes:
+        return json.dumps({"units": self.units, "meta": self.meta, "absent": self.absent}).encode()
 
     # ---- writing -----------------------------------------------------------------------------------------
 
@@ -108,158 +122,221 @@ class Stream:
             If there is no room left.
         """
         extent, begin = divmod(self._written, EXTENT)
-        if extent >= len(self._extents):
-            self._await_room()
-        return self._extents[extent][begin : begin + count]
+        if extent >= self._ready:
+            self._await_room(extent)
+        rows = self._extents[extent]
+        assert rows is not None
+        return rows[begin : begin + count]
 
     def place(self) -> int:
         """The address of the next row, for compiled code that writes it; raises as `room` does."""
-        self.room(1)
         extent, begin = divmod(self._written, EXTENT)
+        if extent >= self._ready:
+            self._await_room(extent)
         return self._places[extent] + begin * self._stride
 
     def commit(self, count: int = 1) -> None:
         """The next `count` rows hold samples: from now on they belong to the record."""
         before = self._written // EXTENT
         self._written += count
-        self._count[0] = self._written
-        if self._written // EXTENT != before:
+        now = self._written // EXTENT
+        if self._paced and self._written == count:
+            self._wanted.release()  # the first rows: the file is a record with rows from now on
+        if now != before:
+            self._wanted.release()
+            if self._paced and now + 1 >= self._ready and self.fault is None:
+                # The thread had a whole extent's time; one more extent is left for the rows of a stop.
+                self.fault = RecordFault(
+                    f"{self.path}: the disk has not answered for {EXTENT} rows; give another one"
+                )
+        if not self._paced and self._written - self._flushed >= self._batch:
+            self._write_now()
+
+    def spare(self) -> None:
+        """The loop now waits for its next sample: the thread may write, so as not to want the interpreter later."""
+        now = time.monotonic()
+        if now >= self._due:
+            self._due = now + PERIOD
             self._wanted.release()
 
-    def touch(self) -> None:
-        """Store into the next row, where there is time for it.
-
-        A page that the system has written to disk meanwhile is write-protected until the next store, which then takes
-        some µs.
-        """
-        extent, begin = divmod(self._written, EXTENT)
-        if extent < len(self._extents):
-            self._extents[extent][begin, -1] = 0.0
-
     def rows(self, begin: int, end: int) -> Array:
-        """A copy of committed rows, shape (end - begin, columns)."""
+        """A copy of committed rows, shape (end - begin, columns).
+
+        Raises
+        ------
+        RecordFault
+            If old ones were in the file alone, and are no longer.
+        """
         out = np.empty((end - begin, len(self.units)))
         done = begin
         while done < end:
             extent, first = divmod(done, EXTENT)
-            part = self._extents[extent][first : first + end - done]
-            out[done - begin : done - begin + len(part)] = part
-            done += len(part)
+            count = min(EXTENT - first, end - done)
+            kept = self._extents[extent]
+            if kept is not None:
+                out[done - begin : done - begin + count] = kept[first : first + count]
+            else:
+                assert self._file is not None
+                out[done - begin : done - begin + count] = self._file.read(done, count)
+            done += count
         return out
 
     def record(self) -> Record:
-        """What was committed so far."""
-        return _record(self.units, self.absent, self.rows(0, self._written), self.meta)
+        """What was committed so far; without what was in the file alone and is no longer."""
+        try:
+            rows = self.rows(0, self._written)
+        except RecordFault:
+            rows = self.rows(self._first_kept(), self._written)
+        return _record(self.units, self.absent, rows, self.meta)
 
     def close(self, meta: Mapping[str, Any] | None = None) -> None:
-        """End the record: give back the room that was not needed, and add to its meta."""
+        """End the record: give back the room that was not needed, and add to its meta.
+
+        What the file cannot take is said by `fault`; what another process did to it leaves the rows in a file of their
+        own beside it.
+        """
         if self._closing:
             return
         self._closing = True
         self._wanted.release()
-        self._thread.join()
+        self._thread.join(PATIENCE)
         self.meta |= meta or {}
-        if self._file >= 0:
-            self._finish({**(meta or {}), "complete": True})
-        self._release(keep_rows=self.path is None)
+        if self._file is None:
+            return
+        if self._thread.is_alive():
+            self.fault = self.fault or RecordFault(
+                f"{self.path}: the disk does not answer; the record is not whole"
+            )
+            return
+        self._finish(self._file, json.dumps({**(meta or {}), "complete": True}).encode())
 
-    # ---- the file ----------------------------------------------------------------------------------------
+    def discard(self) -> None:
+        """Remove the file of a record that has no rows, if it is still ours: its name is free again."""
+        if self._file is not None and not self._file.lost and self._written == 0:
+            self._file.discard()
 
-    def _create(self, path: Path) -> None:
-        text = json.dumps({"units": self.units, "meta": self.meta, "absent": self.absent}).encode()
-        start = -(-(HEAD.size + len(text)) // PAGE) * PAGE
+    # ---- the thread --------------------------------------------------------------------------------------
+
+    def _keep(self) -> None:
+        """Write what has come and reserve ahead, until it is closed."""
+        while not self._closing:
+            nothing = self._file is None or self._file.lost
+            self._wanted.acquire(timeout=None if nothing else PATIENT * PERIOD if self._paced else PERIOD)
+            try:
+                self._write()
+                if self.fault is None:
+                    self._reserve()
+            except (OSError, MemoryError) as error:
+                self._fail(error)
+
+    def _write(self) -> None:
+        """Write the rows that were committed since, then their number."""
+        file = self._file
+        if file is None or file.lost:
+            return
+        with self._lock:
+            if self._whole(file):
+                self._append(file)
+        self._forget()
+
+    def _write_now(self) -> None:
+        """As the thread does, from a loop that keeps no pace."""
+        file = self._file
+        if file is None or file.lost or not self._lock.acquire(timeout=PATIENCE):
+            return
         try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
-        except FileExistsError:
-            raise InputError(f"{path} exists; remove it or give another name") from None
+            self._append(file)  # whether it is still ours is looked at by the thread
         except OSError as error:
-            raise InputError(f"{path} cannot be created ({error.strerror}); give another name") from None
-        try:
-            _allocate(self._file, 0, start)
-            os.pwrite(self._file, HEAD.pack(MAGIC, start, 0, len(text), 0) + text, 0)
-        except OSError as error:
-            self._release()
-            raise RecordFault(f"{path}: no room for a record ({error.strerror}); make room") from None
-        head = mmap.mmap(self._file, PAGE, offset=0)
-        self._maps.append(head)
-        self._count = np.frombuffer(head, dtype="<u8", count=COUNT + 1)[COUNT:]
-        self._start = start
+            self._fail(error)
+        finally:
+            self._lock.release()
 
-    def _extend(self) -> None:
-        """Reserve one more extent and touch its pages, so that storing a row waits for nothing."""
-        rows = self._mapped() if self._file >= 0 else np.empty((EXTENT, len(self.units)))
-        rows[...] = 0.0  # every page is there before a sample wants it
-        self._places.append(rows.ctypes.data)
-        self._extents.append(rows)
+    def _whole(self, file: StreamFile) -> bool:
+        """Whether the file is still ours; a fault where it is not."""
+        lost = file.foreign()
+        if lost:
+            self.fault = self.fault or RecordFault(
+                f"{self.path} was {lost} by another process; what memory holds of the record goes to {file.beside}"
+            )
+        return not lost
 
-    def _mapped(self) -> Array:
-        width = len(self.units)
-        size = EXTENT * width * 8
-        offset = self._start + len(self._extents) * size
-        _allocate(self._file, offset, size)
-        mapped = mmap.mmap(self._file, size, offset=offset)
-        self._maps.append(mapped)
-        return np.frombuffer(mapped, dtype="<f8").reshape(EXTENT, width)
+    def _append(self, file: StreamFile) -> None:
+        end = self._written
+        while self._flushed < end:
+            extent, first = divmod(self._flushed, EXTENT)
+            rows = self._extents[extent]
+            assert rows is not None
+            part = rows[first : first + end - self._flushed]
+            file.write(part, self._flushed)
+            self._flushed += len(part)
+        file.tell_count(self._flushed)
 
     def _reserve(self) -> None:
-        """The thread: an extent ahead of the one that is written."""
-        while True:
-            self._wanted.acquire()
-            if self._closing:
-                return
-            try:
-                self._extend()
-            except (OSError, MemoryError) as error:
-                reason = getattr(error, "strerror", None) or error
-                self.fault = RecordFault(f"{self.path}: the record cannot grow ({reason}); make room")
-                return
-
-    def _await_room(self) -> None:
-        """Wait for the thread: only a loop that runs faster than the disk comes here."""
+        """Room in the file for the extent after this one, in memory for one more: storing a row waits for nothing."""
         extent = self._written // EXTENT
-        while extent >= len(self._extents):
+        if self._file is not None:
+            self._file.reserve((extent + 2) * EXTENT)
+        while len(self._extents) < extent + 3:
+            rows = np.empty((EXTENT, len(self.units)))
+            rows[...] = 0.0  # every page is there before a sample wants it
+            self._places.append(rows.ctypes.data)
+            self._extents.append(rows)
+        # What keeps no pace waits for the room in the file; what does may run ahead of it by an extent.
+        self._ready = extent + (3 if self._paced else 2)
+
+    def _forget(self) -> None:
+        """Old extents are in the file: give their memory back."""
+        for extent in range(self._flushed // EXTENT - KEPT, -1, -1):
+            if self._extents[extent] is None:
+                break
+            self._extents[extent] = None
+
+    def _first_kept(self) -> int:
+        return EXTENT * next((i for i, rows in enumerate(self._extents) if rows is not None), 0)
+
+    def _fail(self, error: OSError | MemoryError) -> None:
+        reason = getattr(error, "strerror", None) or error
+        self.fault = self.fault or RecordFault(f"{self.path}: the record cannot grow ({reason}); make room")
+
+    def _await_room(self, extent: int) -> None:
+        """Wait for the thread: only a loop that runs faster than the disk comes here, and no loop that keeps pace."""
+        until = time.monotonic() + PATIENCE
+        while extent >= self._ready:
             if self.fault is not None or not self._thread.is_alive():
                 raise self.fault or RecordFault(f"{self.path}: the record is closed")
+            if self._paced or time.monotonic() > until:
+                raise RecordFault(f"{self.path}: the disk does not answer; give another one")
             self._thread.join(1e-4)
 
-    def _finish(self, meta: Mapping[str, Any]) -> None:
-        """Cut the file after its last row and add the trailer."""
-        text = json.dumps(meta).encode()
-        end = self._start + self._written * len(self.units) * 8
+    # ---- the end -----------------------------------------------------------------------------------------
+
+    def _finish(self, file: StreamFile, trailer: bytes) -> None:
+        """Write what is left, cut the file after its last row and add the trailer."""
         try:
-            # Reserved room beyond the rows is given back first, so that a full disk takes the trailer.
-            self._release_maps()
-            os.ftruncate(self._file, end)
-            os.pwrite(self._file, text, end)
-            os.pwrite(self._file, struct.pack("<Q", len(text)), HEAD.size - 8)
-        except OSError:
-            return  # the rows are there; only what is known of the end is lost
+            self._write()
+        except OSError as error:
+            self._fail(error)
+        try:
+            if file.lost and self._written:
+                file = self._rescued(file)
+            if not file.lost:
+                file.finish(self._flushed, trailer)
+        except (OSError, InputError) as error:
+            self.fault = self.fault or RecordFault(
+                f"{self.path}: the end of the record was not written ({error})"
+            )
+        finally:
+            file.close()
 
-    def _release_maps(self) -> None:
-        """Let go of the mappings; whoever still holds rows of them keeps those alive."""
-        self._extents = []
-        self._count = np.zeros(1, dtype=np.uint64)
-        for mapped in self._maps:
-            with contextlib.suppress(BufferError):
-                mapped.close()
-        self._maps = []
-
-    def _release(self, *, keep_rows: bool = False) -> None:
-        if not keep_rows:
-            self._release_maps()
-        if self._file >= 0:
-            os.close(self._file)
-            self._file = -1
-
-
-def _allocate(file: int, offset: int, size: int) -> None:
-    """Reserve room on the disk; where the system cannot, by writing zeros."""
-    if hasattr(os, "posix_fallocate"):
-        os.posix_fallocate(file, offset, size)
-        return
-    zeros = bytes(min(size, 1 << 20))
-    for begin in range(offset, offset + size, len(zeros)):
-        os.pwrite(file, zeros[: offset + size - begin], begin)
+    def _rescued(self, lost: StreamFile) -> StreamFile:
+        """What memory holds, in a file beside the one that is no longer ours."""
+        first = self._first_kept()
+        lost.close()
+        beside = StreamFile(lost.beside, self._header(), len(self.units))
+        for begin in range(first, self._written, EXTENT):
+            beside.write(self.rows(begin, min(begin + EXTENT, self._written)), begin - first)
+        self._flushed = self._written - first
+        return beside
 
 
 # ---- reading ----------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ import pytest
 from axis_rig import AxisRig
 from test_ds402 import drive  # noqa: F401
 
+from stickslip.approval import allow_code
 from stickslip.errors import InputError, RigError
 from stickslip.plugins import rig_kind_names
 from stickslip.rigs.ds402 import Ds402
@@ -66,7 +67,8 @@ def replayed() -> Rig:
 def own(folder: Path) -> Rig:
     (folder / "mass.py").write_text(OWN)
     (folder / "mass.toml").write_text('[rig]\nkind = "mass.py"\n[rig.limits]\ntorque = 1\nspeed = 50\n')
-    return read_rig(folder / "mass.toml")
+    with allow_code():
+        return read_rig(folder / "mass.toml")
 
 
 MAKE: dict[str, Callable[[Any, Path], Rig]] = {
@@ -136,7 +138,7 @@ def test_a_file_that_is_no_rig(tmp_path):
     for text, message in (("x = 1", "defines no rig"), ("x = ", "cannot be imported")):
         (tmp_path / "own.py").write_text(text)
         (tmp_path / "rig.toml").write_text('[rig]\nkind = "own.py"\n')
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(InputError, match=message), allow_code():
             read_rig(tmp_path / "rig.toml")
         (tmp_path / "own.py").unlink()
     with pytest.raises(InputError, match="no file"):

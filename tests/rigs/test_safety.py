@@ -48,6 +48,7 @@ CROSSINGS = [
     ("following error", GOOD, HOLD._replace(position=math.nan)),
     ("not a number", GOOD._replace(position=math.nan), HOLD),
     ("not a number", GOOD, Setpoint(torque=math.nan)),
+    ("not a number", GOOD, HOLD._replace(velocity=math.nan)),
     ("the rig's fault", GOOD._replace(status=0x7500), HOLD),
     ("the rig's fault", GOOD._replace(status=math.nan), HOLD),
 ]

@@ -177,8 +177,9 @@ def test_what_is_written_is_what_is_read(tmp_path, count):
 def test_a_number_of_rows_that_outran_the_rows_is_cut(tmp_path):
     """What a crash of the machine may leave: the header on disk, the last rows not."""
     path = tmp_path / "a.stream"
-    filled(path, 500)._release()
+    stream = filled(path, 500)
     data = bytearray(path.read_bytes())
+    stream.close()
     data[65536 + 400 * 24 : 65536 + 500 * 24] = bytes(100 * 24)
     path.write_bytes(data)
     assert len(Record.load(path)) == 400

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -87,8 +88,8 @@ def control_of(
         raise InputError(
             f"controller: sample_time = {controller.sample_time:g} s, the rig's is {sample_time:g} s; give the rig's"
         )
-    chosen = controller or NOTHING
-    numbers = settings(chosen)._replace(sample_time=sample_time)
+    chosen = replace(controller or NOTHING, sample_time=sample_time)
+    numbers = settings(chosen)
     memory = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0))
     design_filter(numbers, memory)
     helper = chosen.compensator

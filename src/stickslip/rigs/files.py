@@ -16,11 +16,14 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 from stickslip import plugins
 from stickslip.config import Table, read_toml
-from stickslip.rigs.rig import Limits, Rig
+from stickslip.errors import InputError, StickslipError
+from stickslip.rigs.declared import checked
+from stickslip.rigs.rig import Limits, Rig, RigKind
 
 __all__ = ["limits_in", "read_rig"]
 
@@ -32,15 +35,28 @@ def read_rig(path: str | os.PathLike[str]) -> Rig:
     ------
     ConfigError
         Which key is wrong, and what is allowed.
+    CodeRefused
+        If its kind is code that nobody has approved.
     """
     with read_toml(Path(path)) as document, document.table("rig") as table:
         name = table.text("kind")
         if name.endswith(".py"):
-            kind = plugins.rig_kind(str(table.document.locate(name)))
+            kind = plugins.rig_kind(str(table.document.locate(name)), table.label("kind"))
         else:
             kind = plugins.rig_kind(table.choice("kind", plugins.rig_kind_names()))
+        if not isinstance(kind, RigKind):  # type: ignore[reportUnnecessaryIsInstance]
+            raise InputError(f"{name}: RIG = {kind!r} is no `RigKind(name, build, title)`")
         with table.blamed():
-            return kind.build(table)
+            return checked(_built(name, kind.build, table))
+
+
+def _built(name: str, build: Callable[[Table], Rig], table: Table) -> Rig:
+    try:
+        return build(table)
+    except StickslipError:
+        raise
+    except Exception as error:
+        raise InputError(f"rig {name}: build raised {type(error).__name__}: {error}; mend it") from error
 
 
 def limits_in(table: Table, default: Limits | None = None) -> Limits:

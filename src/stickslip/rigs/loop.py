@@ -15,7 +15,7 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -26,6 +26,8 @@ from stickslip.errors import InputError, Interrupted, RigError
 from stickslip.record import Record
 from stickslip.rigs import safety
 from stickslip.rigs._control import COLUMNS, REASON, STATE, UNITS, Control, control_of
+from stickslip.rigs.budget import BUDGET, Budget
+from stickslip.rigs.declared import FIELDS, answer, blamed, checked
 from stickslip.rigs.pace import TIMES, Account, Pace, soft_real_time
 from stickslip.rigs.reasons import crossed, told
 from stickslip.rigs.rig import BlockRig, Limits, Measurement, Rig, Setpoint, setpoints
@@ -67,11 +69,13 @@ class Loop:
         Keep pace with the clock. None: where the rig's clock is real, which always must.
     without_watchdog : bool
         Arm a rig that declares no watchdog: nothing takes its torque away if this process dies.
+    budget : float
+        By how much a controller in Python may fall behind the clock before the loop stops, s; only in real time.
 
     Raises
     ------
     InputError
-        If the limits are wider than the rig's, or it declares no watchdog.
+        If the limits are wider than the rig's, it declares no watchdog, or the budget is none.
     RigError
         From `run` and from entering: what the rig or the record could not do.
     """
@@ -85,8 +89,9 @@ class Loop:
         limits: Limits | None = None,
         realtime: bool | None = None,
         without_watchdog: bool = False,
+        budget: float = BUDGET,
     ) -> None:
-        self.rig = rig
+        self.rig = checked(rig)
         self.limits = rig.limits.narrowed(limits) if limits else rig.limits
         self.realtime = rig.capabilities.real_clock if realtime is None else realtime
         if rig.capabilities.real_clock and not self.realtime:
@@ -96,12 +101,16 @@ class Loop:
                 f"{rig.name}: no watchdog is declared, so nothing takes its torque away if this process dies; "
                 "give it one, or arm it with --no-watchdog (without_watchdog=True)"
             )
+        if not budget > 0.0:
+            raise InputError(f"budget = {budget:g} s must be greater than 0")
+        self._budget = budget
         self._pace = Pace(rig.sample_time)
         self._stream: Stream | None = None
         self._path, self._meta = path, dict(meta or {})
         self._controls: dict[int, tuple[Any, Control]] = {}
         self._control = self.prepare(None)
         self._fault: BaseException | None = None
+        self._late = False
         self._signals = Signals()
         self._undo = ExitStack()
         self._scratch = np.zeros(len(COLUMNS))
@@ -112,15 +121,17 @@ class Loop:
 
     def __enter__(self) -> Loop:
         with ExitStack() as undo:
-            self._stream = Stream(UNITS, self._path, self._described(), self._absent())
-            undo.callback(self._end_record)
+            self._signals.hear(undo)
             self._step.rehearse()  # compiles what the loop calls before anything moves
             if self.realtime:
                 self._pace.granted = undo.enter_context(soft_real_time())
-            self._signals.hear(undo)
-            undo.callback(self.rig.close)
-            first = self.rig.open()
-            self._control.measured[:] = first
+            # The record's thread takes over this one's priority: it holds the interpreter's lock for some µs.
+            self._stream = Stream(
+                UNITS, self._path, self._described(), self._absent(), paced=self.realtime, batch=BLOCK
+            )
+            undo.callback(self._end_record)
+            undo.callback(self._disarm)
+            self._control.measured[:] = answer(self.rig, "open", self.rig.open)
             self._undo = undo.pop_all()
         return self
 
@@ -129,8 +140,22 @@ class Loop:
             self._ramp_down()
             if self._signals.number and self._fault is None:
                 self._fault = self._signals.error  # it came between two runs
-        if kind is None and isinstance(self._fault, Interrupted):
+        if self._signals.number and self._fault is None:
+            self._fault = self._signals.error  # or while the record was closed
+        if kind is None and self._fault is not None and (self._late or isinstance(self._fault, Interrupted)):
             raise self._fault
+
+    def _disarm(self) -> None:
+        try:
+            with blamed(self.rig, "close"):
+                self.rig.close()
+        except (RigError, InputError) as error:
+            self._at_last(error)
+
+    def _at_last(self, fault: BaseException | None) -> None:
+        """What went wrong after the last sample; told by leaving the loop, unless something else is."""
+        if fault is not None and self._fault is None:
+            self._fault, self._late = fault, True
 
     def _described(self) -> dict[str, Any]:
         plain = self.limits.plain()
@@ -144,8 +169,8 @@ class Loop:
     def _end_record(self) -> None:
         if self._stream is not None:
             self._stream.close({"loop": self.account().plain(), "ended": self._ending()})
-            if self._stream.path is not None and self._stream.count == 0:
-                self._stream.path.unlink()  # the rig did not open: nothing to keep, and the name is free again
+            self._at_last(self._stream.fault)  # the file may fail at its end alone
+            self._stream.discard()  # where the rig did not open
 
     def _ending(self) -> str:
         return "as planned" if self._fault is None else str(self._fault)
@@ -171,7 +196,7 @@ class Loop:
 
         Parameters
         ----------
-        wanted : array, shape (n, 4)
+        wanted : array, shape (n, 5)
             A `Setpoint` per sample (`stickslip.rigs.rig.setpoints`).
         controller : Controller, callable or None
             None: the setpoints' torques alone.
@@ -189,6 +214,8 @@ class Loop:
             After the torque was ramped to zero: why.
         """
         stream = self._open_stream()
+        if wanted.ndim == 2 and wanted.shape[1] == len(Setpoint._fields) - 1:
+            wanted = np.column_stack([wanted, np.zeros(len(wanted))])  # without an acceleration
         if wanted.ndim != 2 or wanted.shape[1] != len(Setpoint._fields):
             raise InputError(
                 f"setpoints have shape {wanted.shape}; give (n, {len(Setpoint._fields)}), see setpoints()"
@@ -215,7 +242,7 @@ class Loop:
         if self.rig.capabilities.real_clock:
             self._rest(seconds)
         else:
-            self._control.measured[:] = self.rig.pause(seconds)
+            self._control.measured[:] = answer(self.rig, "pause", lambda: self.rig.pause(seconds))
             # The axis may have moved: no speed across the pause.
             self._control.safety[STARTED] = self._control.memory[BEGUN] = 0.0
         return Measurement(*self._control.measured)
@@ -278,15 +305,35 @@ class Loop:
         """Sample by sample through `Rig.exchange`."""
         times = self._pace.room(len(wanted))
         place, stride = wanted.ctypes.data, wanted.strides[0]
-        with self._pace.counting():
+        with ExitStack() as undo:
+            undo.enter_context(self._pace.counting())
+            ask = None if python is None else self._within_budget(stream, python, undo)
             for k in range(len(wanted)):
-                if python is None:
+                if ask is None:
                     self._sample(stream, place + k * stride, times[k])
                 else:
-                    self._ask_python(python, wanted[k])
-                    self._sample(stream, self._wanted.ctypes.data, times[k])
+                    self._ask_python(ask, wanted[k])
+                    if self._control.safety[STATE] != STOPPED:
+                        self._sample(stream, self._wanted.ctypes.data, times[k])
                 if self._control.safety[STATE] >= STOPPED:
                     return
+
+    def _within_budget(
+        self, stream: Stream | None, python: PythonController, undo: ExitStack
+    ) -> PythonController:
+        """The controller, watched in real time."""
+        if not self.realtime or math.isinf(self._budget):
+            return python
+
+        def take_over(reason: BaseException) -> None:
+            self._ask(reason)
+            self._ramp(stream)
+            self._signals.release()
+
+        rests = self._control.safety[TORQUE] == 0.0
+        budget = Budget(self.rig.sample_time, self._budget, take_over, rests=rests)
+        undo.enter_context(budget.watched())
+        return lambda measured, wanted: budget.call(python, measured, wanted)
 
     def _sample(self, stream: Stream | None, setpoint: int, times: Any) -> None:
         """One sample: control, record, keep pace, exchange. No exception leaves it: each is a reason to stop."""
@@ -303,13 +350,17 @@ class Loop:
             times[3] = time.thread_time_ns() - between
         if stream is not None and row != self._scratch.ctypes.data:
             stream.commit()
-            stream.touch()
         times[1] = time.perf_counter_ns() - begin
         if self.realtime:
+            if stream is not None:
+                stream.spare()
             times[0] = self._pace.wait(self._step.rehearse)
         measured = self._control.measured
         try:
-            measured[:] = self.rig.exchange(torque)
+            found = self.rig.exchange(torque)
+            if len(found) != FIELDS:  # a single number would be taken for all of them
+                raise RigError(f"{self.rig.name}: exchange gave {found!r}; it must give a Measurement")
+            measured[:] = found
         except BaseException as error:  # whatever it is: the torque goes to zero first
             measured[TIME] += self.rig.sample_time
             self._ask(error)
@@ -390,5 +441,6 @@ class Loop:
             if math.isnan(fault.time):
                 fault.time = at
             if fault.record is None:
-                fault.record = stream.record()
+                with suppress(MemoryError):
+                    fault.record = stream.record()
         return fault

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.capacity import number_of
 from stickslip.config import Table
 from stickslip.errors import InputError, RigError
 from stickslip.readers import read
 from stickslip.record import Record
+from stickslip.rigs.declared import FASTEST
 from stickslip.rigs.files import limits_in
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
 
@@ -24,6 +26,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 UNLIMITED = Limits(torque=1e9, speed=1e9)
 """Nothing moves: there is nothing to protect"""
 UNEVEN = 0.01  # of the sample time, by which a recorded time may be off before the record is resampled
+ROW = 150
+"""Bytes of a sample that is resampled, with what it is computed from"""
 CHANNELS = ("position", "motor_torque", "sensor_torque", "temperature", "status")
 
 
@@ -43,7 +47,7 @@ class Replay:
     Raises
     ------
     InputError
-        If the record has no position, or fewer than two samples.
+        If the record has no position, fewer than two samples or times that do not ascend, or the sample time is none.
     """
 
     name = "replay"
@@ -54,7 +58,8 @@ class Replay:
         if len(record) < 2:
             raise InputError("replay: the record has fewer than two samples; give a longer one")
         record["position"]  # raises where there is none
-        self.sample_time = sample_time or sample_time_of(record)
+        insist_on_order(record.time)
+        self.sample_time = usable(sample_time_of(record) if sample_time is None else sample_time)
         self.limits = limits or UNLIMITED
         self.capabilities = Capabilities(
             Watchdog(0.0, "nothing moves"),
@@ -73,7 +78,11 @@ class Replay:
         at = time
         # A gap is a pause of the run; what is merely uneven is resampled.
         if np.any(uneven & (steps < 2.0 * self.sample_time)):
-            count = round(float(time[-1] - time[0]) / self.sample_time) + 1
+            span = float(time[-1] - time[0])
+            count = (
+                number_of(span, self.sample_time, ROW, f"replay: {span:.4g} s", "give a longer sample_time")
+                + 1
+            )
             at = float(time[0]) + self.sample_time * np.arange(count, dtype=np.float64)
         rows = np.zeros((at.size, 1 + len(CHANNELS)))
         rows[:, 0] = at
@@ -130,7 +139,41 @@ def sample_time_of(record: Record) -> float:
     if isinstance(told, float):
         return told
     median: Any = np.median(np.diff(record.time))
-    return round(float(median), 9)
+    return round(float(median), 9) or float(median)
+
+
+def insist_on_order(time: Array) -> None:
+    """Refuse times that are no numbers or do not ascend.
+
+    Raises
+    ------
+    InputError
+        That names the first.
+    """
+    wrong = np.flatnonzero(~np.isfinite(time))
+    if wrong.size:
+        raise InputError(f"replay: time of row {wrong[0]} is {time[wrong[0]]}; leave such rows out")
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if back.size:
+        row = int(back[0])
+        raise InputError(
+            f"replay: time goes from {time[row]:.9g} to {time[row + 1]:.9g} s after row {row}, and must ascend; let "
+            "`stickslip doctor` look at the log"
+        )
+
+
+def usable(sample_time: float) -> float:
+    """The sample time, if a loop can run with it, s.
+
+    Raises
+    ------
+    InputError
+    """
+    if not FASTEST <= sample_time < math.inf:
+        raise InputError(
+            f"replay: sample_time = {sample_time:g} s must be at least {FASTEST:g}; give one, or mend the log's times"
+        )
+    return sample_time
 
 
 def build(settings: Table) -> Replay:

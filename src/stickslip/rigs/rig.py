@@ -75,6 +75,8 @@ class Setpoint(NamedTuple):
     closed: float = 0.0
     """1: the controller follows position and velocity, and the following error is watched. 0: torque alone; the
     controller forgets what it knew"""
+    acceleration: float = 0.0
+    """rad/s², for a compensator that feeds the inertia forward"""
 
 
 def setpoints(
@@ -84,14 +86,15 @@ def setpoints(
     velocity: Any = 0.0,
     torque: Any = 0.0,
     closed: Any = 0.0,
+    acceleration: Any = 0.0,
 ) -> Array:
-    """Setpoints of `count` samples, shape (count, 4).
+    """Setpoints of `count` samples, shape (count, 5).
 
-    ``position`` (rad), ``velocity`` (rad/s), ``torque`` (N·m) and ``closed`` (0 or 1) are numbers or arrays of that
-    length; see `Setpoint`.
+    ``position`` (rad), ``velocity`` (rad/s), ``torque`` (N·m), ``closed`` (0 or 1) and ``acceleration`` (rad/s²) are
+    numbers or arrays of that length; see `Setpoint`.
     """
     table = np.empty((count, len(Setpoint._fields)))
-    for i, column in enumerate((position, velocity, torque, closed)):
+    for i, column in enumerate((position, velocity, torque, closed, acceleration)):
         table[:, i] = column
     return table
 

@@ -126,8 +126,9 @@ def watch_state(y: Any, b: Any, s: Any) -> None:
 
 def idle(y: Any, w: Any, n: Any, m: Any) -> float:
     """The loop is open: the controller watches, so that it can be closed at any sample. Returns no torque."""
-    observe(y.position, y.position, n, m)
+    observe(0.0, y.position, 0.0, y.position, n, m)
     m.error_sum = 0.0
+    m.filtered = m.velocity
     m.compensation = 0.0
     m.started = 1.0
     m.seen = m.velocity
@@ -148,7 +149,7 @@ def control(y: Any, w: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
     u.time = y.time
     if abs(y.temperature) < UNBOUNDED:
         u.temperature = y.temperature
-    return w.torque + sample(y.position, w.position, w.velocity, n, m, z, p, u)
+    return w.torque + sample(y.position, w.position, w.velocity, w.acceleration, n, m, z, p, u)
 
 
 def ramp(b: Any, s: Any) -> None:
@@ -166,7 +167,9 @@ def guarded(y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: A
     watch_state(y, b, s)
     if s.state == RUNNING:
         torque = control(y, w, n, m, z, p, u)
-        if abs(torque) <= b.torque:
+        if m.fault != 0.0:
+            stop(NOT_FINITE, w.velocity, s)
+        elif abs(torque) <= b.torque:
             s.torque = torque
             if abs(y.position - s.origin) > b.travel:
                 s.state = ENDED

@@ -1,34 +1,183 @@
-"""SIGINT and SIGTERM as something that a loop looks at between two samples, so that it ends by its ramp."""
+"""Signals that would end or halt the process, heard by a loop between two samples, so that it ends by its ramp.
+
+In the main thread Python's own handlers note the signal, and the loop's `Interrupted` tells of it. Python hears signals
+in no other thread, and one that nobody hears ends the process at once. A loop in another thread therefore has the
+system call a compiled handler; when its torque is zero and its record closed, the signal is sent once more, to whom it
+would have gone. All loops of a process hear the same signal.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import functools
+import os
 import signal
 import threading
 from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
 
 from stickslip.errors import Interrupted
+from stickslip.jit import compiled_notice
 
-__all__ = ["Signals"]
+__all__ = ["ALWAYS", "UNLESS_USED", "Signals"]
+
+ALWAYS = ("SIGINT", "SIGTERM", "SIGBREAK")
+"""Heard whatever the program does with them otherwise"""
+UNLESS_USED = (
+    "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGALRM", "SIGVTALRM", "SIGPROF", "SIGUSR1", "SIGUSR2", "SIGXCPU", "SIGIO",
+    "SIGPWR",
+)  # fmt: skip
+"""Heard where they would end or halt the process; not where the program ignores them (`nohup`) or uses them"""
 
 
 class Signals:
     """Which signal asked for the end; 0 while none did."""
 
     def __init__(self) -> None:
-        self.number = 0
+        self._hearing = False
+        self._number = 0
+        self._before: dict[int, Any] = {}
+        self._released = False
 
-    def hear(self, undo: ExitStack) -> None:
-        """Hear them until `undo`; only the main thread may ask to."""
-        if threading.current_thread() is not threading.main_thread():
-            return
-        for number in (signal.SIGINT, signal.SIGTERM):
-            undo.callback(signal.signal, number, signal.getsignal(number))
-            signal.signal(number, self._on_signal)
+    @property
+    def number(self) -> int:
+        """The signal, or 0."""
+        return int(NOTED[0]) if self._hearing else self._number
 
     @property
     def error(self) -> Interrupted:
         """What it is told as."""
         return Interrupted(f"{signal.Signals(self.number).name} asked for the end")
 
-    def _on_signal(self, number: int, _: object) -> None:
-        self.number = number
+    def hear(self, undo: ExitStack) -> None:
+        """Hear them until `undo`. Off the main thread of a system without POSIX signals nothing can be heard."""
+        main = threading.current_thread() is threading.main_thread()
+        if not main and os.name != "posix":
+            return
+        self._released = False
+        with _changing:
+            if not _loops:
+                NOTED[0] = 0
+            _loops.add(id(self))
+        undo.callback(self._hear_main() if main else self._hear_elsewhere())
+        undo.callback(self._keep)
+        self._hearing = True
+
+    def release(self) -> None:
+        """Give the signals back before the end: the loop is held up and looks at none, but its torque is zero."""
+        if self._hearing and not self._released:
+            self._released = True
+            if not self._before:
+                _end_elsewhere(self)
+            elif self.number:
+                os.kill(os.getpid(), self.number)
+
+    def _keep(self) -> None:
+        self._number, self._hearing = int(NOTED[0]), False
+
+    def _hear_main(self) -> Any:
+        """Begin in the main thread; returns what ends it."""
+        found = {number: signal.getsignal(number) for number in (*_numbers(ALWAYS), *_numbers(UNLESS_USED))}
+        always = _numbers(ALWAYS)
+        self._before = {
+            # None is a handler that was not set from Python, and could not be restored.
+            n: old
+            for n, old in found.items()
+            if old is not None and (n in always or old is signal.SIG_DFL)
+        }
+        for number in self._before:
+            signal.signal(number, self._note)
+        return self._end_main
+
+    def _end_main(self) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        with _changing:
+            _loops.discard(id(self))
+            if _elsewhere:
+                _take()  # from what was just restored
+
+    def _note(self, number: int, frame: Any) -> None:
+        NOTED[0] = number
+        if self._released:
+            signal.signal(number, self._before[number])
+            signal.raise_signal(number)
+
+    def _hear_elsewhere(self) -> Any:
+        """Begin in another thread; returns what ends it."""
+        with _changing:
+            _elsewhere.add(id(self))
+            if len(_elsewhere) == 1:
+                _take()
+        return functools.partial(_end_elsewhere, self)
+
+
+# ---- handlers of the process, for loops off its main thread --------------------------------------------------------
+
+NOTED = np.zeros(1)
+"""The last signal that came while a loop heard; 0: none"""
+_changing = threading.Lock()
+_loops: set[int] = set()
+_elsewhere: set[int] = set()
+_replaced: dict[int, Any] = {}
+"""What the system called before, as its ``struct sigaction``"""
+DEFAULT = None
+"""SIG_DFL, as ctypes shows a null pointer"""
+
+
+def _numbers(names: tuple[str, ...]) -> tuple[int, ...]:
+    return tuple(int(getattr(signal, name)) for name in names if hasattr(signal, name))
+
+
+@functools.cache
+def _system() -> tuple[Any, Any]:
+    """The C library, and the compiled handler."""
+    library: Any = ctypes.CDLL(None)
+    library.signal.argtypes, library.signal.restype = [ctypes.c_int, ctypes.c_void_p], ctypes.c_void_p
+    library.sigaction.argtypes = [ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
+    return library, compiled_notice(NOTED)
+
+
+def _take() -> None:
+    """Have the system call the compiled handler."""
+    library, notice = _system()
+    for number in (*_numbers(ALWAYS), *_numbers(UNLESS_USED)):
+        old = _action(number)
+        if _handler(old) == notice.address or (
+            number not in _numbers(ALWAYS) and _handler(old) is not DEFAULT
+        ):
+            continue
+        _replaced[number] = old
+        library.signal(number, notice.address)
+
+
+def _end_elsewhere(heard: Signals) -> None:
+    """Give the signals back, where no other loop needs them, and send what came once more."""
+    with _changing:
+        if id(heard) not in _elsewhere:
+            return
+        _elsewhere.discard(id(heard))
+        _loops.discard(id(heard))
+        if _elsewhere:
+            return
+        library, notice = _system()
+        for number, old in _replaced.items():
+            if _handler(_action(number)) == notice.address:  # else the program has set its own meanwhile
+                library.sigaction(number, old, None)
+        _replaced.clear()
+        came = int(NOTED[0])
+    if came:
+        os.kill(os.getpid(), came)
+
+
+def _action(number: int) -> Any:
+    """What the system does at a signal: its ``struct sigaction``, whose first member is the handler."""
+    found = ctypes.create_string_buffer(256)
+    _system()[0].sigaction(number, None, found)
+    return found
+
+
+def _handler(action: Any) -> int | None:
+    return ctypes.c_void_p.from_buffer(action).value

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.capacity import number_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import RigError
-from stickslip.rigs.procedures.base import POSITION, Step
+from stickslip.rigs.procedures.base import BYTES, POSITION, Step
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["brake", "holder", "move", "now", "rough_inertia", "smooth", "speed_up", "uniform"]
+__all__ = ["brake", "holder", "move", "now", "rough_inertia", "samples", "smooth", "speed_up", "uniform"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -24,9 +25,20 @@ PUSH = 0.15
 """Of the torque limit, which planned accelerations use."""
 
 
+def samples(rig: Rig, seconds: float) -> int:
+    """How many samples so long a time has, at least 2.
+
+    Raises
+    ------
+    InputError
+        If they do not fit into memory.
+    """
+    return max(2, number_of(seconds, rig.sample_time, BYTES, f"{rig.name}, a step of {seconds:.3g} s"))
+
+
 def now(rig: Rig, seconds: float = 0.05) -> Step:
     """A step that only looks where the axis is."""
-    return Step(setpoints(max(2, round(seconds / rig.sample_time))))
+    return Step(setpoints(samples(rig, seconds)))
 
 
 def holder(rig: Rig, inertia: float, bandwidth: float) -> Controller:
@@ -48,14 +60,14 @@ def move(rig: Rig, controller: Controller, begin: float, end: float, inertia: fl
     distance = abs(end - begin)
     by_torque = math.sqrt(5.8 * distance * inertia / (PUSH * rig.limits.torque))
     by_speed = 1.9 * distance / (0.33 * rig.limits.speed)
-    count = max(2, round(max(by_torque, by_speed, 0.3) / rig.sample_time))
+    count = samples(rig, max(by_torque, by_speed, 0.3))
     position, velocity = smooth(begin, end, count, rig.sample_time)
     return Step(setpoints(count, position=position, velocity=velocity, closed=1.0), controller)
 
 
 def brake(rig: Rig, controller: Controller, begin: float, speed: float, inertia: float) -> Step:
     """A closed-loop stop from a speed."""
-    count = max(2, round(max(abs(speed) * inertia / (PUSH * rig.limits.torque), 0.1) / rig.sample_time))
+    count = samples(rig, max(abs(speed) * inertia / (PUSH * rig.limits.torque), 0.1))
     t = rig.sample_time * np.arange(1, count + 1)
     end = count * rig.sample_time
     position = begin + speed * (t - 0.5 * t**2 / end)
@@ -67,12 +79,13 @@ def uniform(
 ) -> tuple[Array, Array, float]:
     """Setpoints that speed up, and those at a constant speed over a travel; and where they end, rad."""
     dt = rig.sample_time
-    rise = max(2, round(max(abs(speed) * inertia / (PUSH * rig.limits.torque), 0.1) / dt))
+    rise = samples(rig, max(abs(speed) * inertia / (PUSH * rig.limits.torque), 0.1))
     t = dt * np.arange(1, rise + 1)
     ramp = setpoints(
         rise, position=begin + 0.5 * speed * t**2 / (rise * dt), velocity=speed * t / (rise * dt), closed=1.0
     )
     start = begin + 0.5 * speed * rise * dt
+    samples(rig, travel / abs(speed))
     count = max(2, math.ceil(travel / (abs(speed) * dt)))
     t = dt * np.arange(1, count + 1)
     level = setpoints(count, position=start + speed * t, velocity=speed, closed=1.0)

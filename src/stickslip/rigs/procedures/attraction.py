@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.record import Record
-from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, speed_up
+from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, samples, speed_up
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
@@ -54,7 +54,7 @@ class Attraction(Procedure):
         rows = yield now(rig)
         running, end = speed_up(rig, loop, float(rows[-1, POSITION]), self.mean, self.inertia)
         yield running
-        count = round(self.cycles / self.frequency / dt)
+        count = samples(rig, self.cycles / self.frequency)
         t, w = dt * np.arange(1, count + 1), 2.0 * math.pi * self.frequency
         position = end + self.mean * t + self.swing / w * (1.0 - np.cos(w * t))
         velocity = self.mean + self.swing * np.sin(w * t)

@@ -11,11 +11,13 @@ import dataclasses
 import math
 import os
 from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, cast
 
 import numpy as np
 
+from stickslip.capacity import insist_on_memory
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError, RigError, suggestion
 from stickslip.record import Record
@@ -24,7 +26,7 @@ from stickslip.rigs.loop import Loop
 from stickslip.rigs.pace import Account
 from stickslip.rigs.rig import Rig
 
-__all__ = ["Check", "CheckFailed", "Performed", "Plan", "Procedure", "Step", "Steps", "perform"]
+__all__ = ["Check", "CheckFailed", "Performed", "Plan", "Procedure", "Step", "Steps", "perform", "planned"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 KEPT = (
@@ -32,6 +34,11 @@ KEPT = (
     "velocity_reference", "torque_setpoint", "compensation_torque",
 )  # fmt: skip
 """Channels of a procedure's record. The loop's raw velocity, a difference of two counts, is left to the loop's own."""
+BYTES = 480
+"""Of memory that a sample takes: its setpoint, its row, copies of both, and what they are computed from"""
+DAY = 86400.0
+LONGEST, LONGEST_REST = 30.0 * DAY, 3650.0 * DAY
+"""s that a plan may run, and rest"""
 TIME, POSITION = COLUMNS.index("time"), COLUMNS.index("position")
 
 
@@ -49,6 +56,8 @@ class Plan:
         Longest time with the loop running, s; ramps that end at a break-away may be shorter.
     pauses : float
         Time that passes at rest besides, s.
+    held : float
+        Of the duration, what is in memory at once, s; 0: all of it.
     travel, speed, torque : float
         Greatest displacement from where it begins (rad), speed (rad/s) and torque (N·m) that it asks for.
     text : tuple of str
@@ -61,9 +70,10 @@ class Plan:
     torque: float
     text: tuple[str, ...] = ()
     pauses: float = 0.0
+    held: float = 0.0
 
     def within(self, rig: Rig) -> None:
-        """Refuse a plan beyond the rig's limits.
+        """Refuse a plan beyond the rig's limits, this machine's memory or all patience.
 
         Raises
         ------
@@ -82,6 +92,17 @@ class Plan:
             raise InputError(
                 f"the plan travels {self.travel:.4g} rad; {rig.name} has {room:.4g}; ask for less"
             )
+        for what, seconds, most in (
+            ("runs", self.duration, LONGEST), ("rests", self.pauses, LONGEST_REST),
+        ):  # fmt: skip
+            if not seconds <= most:
+                raise InputError(
+                    f"the plan {what} for {seconds / DAY:.3g} days; {most / DAY:g} are the most; ask for less"
+                )
+        held = self.held or self.duration
+        insist_on_memory(
+            BYTES * held / rig.sample_time, f"the plan's {held / rig.sample_time:.3g} samples at once"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,8 +277,42 @@ def perform(
     RigError
         If the run was stopped.
     """
-    plan = procedure.plan(rig)
+    plan = planned(procedure, rig)
     plan.within(rig)
+    with _blamed(procedure):
+        return _performed(procedure, rig, plan, path, progress, without_watchdog, realtime)
+
+
+def planned(procedure: Procedure, rig: Rig) -> Plan:
+    """What a procedure will do on a rig.
+
+    Raises
+    ------
+    InputError
+        If its options make no plan.
+    """
+    with _blamed(procedure):
+        return procedure.plan(rig)
+
+
+@contextmanager
+def _blamed(procedure: Procedure) -> Generator[None]:
+    """Arithmetic that fails is the options' fault: none of them is bounded by itself."""
+    try:
+        yield
+    except (ArithmeticError, ValueError, MemoryError) as error:
+        usual = {f.name: f.default for f in dataclasses.fields(procedure)}
+        given = {k: v for k, v in vars(procedure).items() if v != usual.get(k)}
+        words = ", ".join(f"{name} = {value}" for name, value in given.items()) or "its own options"
+        raise InputError(
+            f"{procedure.name}: nothing can be done with {words} ({error}); give other numbers"
+        ) from error
+
+
+def _performed(
+    procedure: Procedure, rig: Rig, plan: Plan, path: Any, progress: Any, without_watchdog: bool,
+    realtime: bool | None,
+) -> Performed:  # fmt: skip
     meta = {"procedure": procedure.name, "options": procedure.options()}
     described: Any = getattr(rig, "machine", None)
     if described is not None:
@@ -265,6 +320,11 @@ def perform(
     kept, account = _run(procedure, rig, path, meta, progress, without_watchdog, realtime)
     if account is not None:
         meta["loop"] = account.plain()
+    if not any(len(rows) for _, rows in kept):
+        raise InputError(
+            f"{procedure.name}: not one row was kept: every part is shorter than a row of the record; ask for longer "
+            "ones, or fewer samples a row"
+        )
     record = _record(rig, [rows for _, rows in kept], meta)
     ends = np.cumsum([len(rows) for _, rows in kept]).tolist()
     segments = tuple((label, end - len(rows), end) for (label, rows), end in zip(kept, ends, strict=True))
@@ -319,12 +379,12 @@ def averaged(rows: Array, count: int) -> Array:
     if count <= 1:
         return np.array(rows)
     whole = len(rows) // count
+    if whole == 0:
+        return rows[:0]
     return rows[: whole * count].reshape(whole, count, -1).mean(axis=1)
 
 
 def _record(rig: Rig, parts: Sequence[Array], meta: Mapping[str, Any]) -> Record:
-    if not parts:
-        raise InputError("the procedure kept no step")
     rows = np.concatenate(parts)
     able = rig.capabilities
     lacks = {"sensor_torque": not able.torque_sensor, "temperature": not able.temperature}

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.record import Record
-from stickslip.rigs.procedures._moves import ROOM, holder, move, now
+from stickslip.rigs.procedures._moves import ROOM, holder, move, now, samples
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
@@ -65,7 +65,7 @@ class Breakaway(Procedure):
         loop = holder(rig, self.inertia, self.bandwidth)
         rows = yield now(rig)
         origin = float(rows[-1, POSITION])
-        count = round(self.top(rig) / self.rate / dt)
+        count = samples(rig, self.top(rig) / self.rate)
         ramp = np.linspace(0.0, self.top(rig), count)
         step = math.radians(self.interval)
         for direction in (1.0, -1.0):

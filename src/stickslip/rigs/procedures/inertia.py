@@ -26,6 +26,7 @@ from stickslip.rigs.procedures._moves import (
     holder,
     now,
     rough_inertia,
+    samples,
     speed_up,
     uniform,
 )
@@ -130,7 +131,7 @@ class Inertia(Procedure):
         rows = yield Step(setpoints(round(0.05 / dt)), pause=1.0)
         running, end = speed_up(rig, follow, float(rows[-1, POSITION]), v, inertia)
         yield running
-        count = round(self.duration / dt)
+        count = samples(rig, self.duration)
         t = dt * np.arange(1, count + 1)
         wanted = setpoints(
             count,

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.record import Record
-from stickslip.rigs.procedures._moves import now
+from stickslip.rigs.procedures._moves import now, samples
 from stickslip.rigs.procedures.base import Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
@@ -51,7 +51,7 @@ class Presliding(Procedure):
     def steps(self, rig: Rig) -> Steps:
         """From rest, without a loop."""
         yield now(rig)
-        count = round(self.cycles / self.frequency / rig.sample_time)
+        count = samples(rig, self.cycles / self.frequency)
         t = rig.sample_time * np.arange(1, count + 1)
         torque = self.amplitude * np.sin(2.0 * math.pi * self.frequency * t)
         # Beyond the travel the axis has broken away, and the step ends.

@@ -14,7 +14,7 @@ import numpy as np
 
 from stickslip.record import Record
 from stickslip.rigs._control import COLUMNS
-from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, speed_up
+from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, samples, speed_up
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
@@ -76,7 +76,7 @@ class Resonance(Procedure):
         rows = yield Step(setpoints(2), pause=1.0)
         running, end = speed_up(rig, loop, float(rows[-1, POSITION]), v, self.inertia)
         yield running
-        count = round(self.duration / rig.sample_time)
+        count = samples(rig, self.duration)
         t = rig.sample_time * np.arange(1, count + 1)
         wanted = setpoints(
             count, position=end + v * t, velocity=v, torque=self.noise(rig, self.running(rig), 0), closed=1.0
@@ -90,7 +90,7 @@ class Resonance(Procedure):
 
     def noise(self, rig: Rig, rms: float, place: int) -> Array:
         """White from the lowest to the highest frequency, its peaks at most `CREST` times RMS."""
-        count = round(self.duration / rig.sample_time)
+        count = samples(rig, self.duration)
         f = np.fft.rfftfreq(count, rig.sample_time)
         inside = (f >= self.lowest) & (f <= self.highest / rig.sample_time)
         rng = np.random.default_rng((self.seed, place))

@@ -69,6 +69,8 @@ class Sliding(Procedure):
                 f"{self.degrees:g} degrees forth and back each",
             ),
             (self.rest + SHORT) * len(self.speeds),
+            # One velocity at a time, and of all the averaged rows.
+            travel / min(self.speeds) + max(rise) + total * min(1.0, rig.sample_time / LONGEST),
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:

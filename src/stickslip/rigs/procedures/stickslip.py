@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.record import Record
-from stickslip.rigs.procedures._moves import now
+from stickslip.rigs.procedures._moves import now, samples
 from stickslip.rigs.procedures.base import Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
@@ -42,7 +42,7 @@ class Stickslip(Procedure):
     def steps(self, rig: Rig) -> Steps:
         """From rest, without a loop."""
         yield now(rig)
-        count = round(self.cycles / self.frequency / rig.sample_time)
+        count = samples(rig, self.cycles / self.frequency)
         t = rig.sample_time * np.arange(count)
         torque = self.amplitude * np.sin(2.0 * math.pi * self.frequency * t)
         yield Step(
@@ -57,7 +57,7 @@ class Stickslip(Procedure):
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
         """It slipped in both directions, and stuck in between."""
         position = record["position"]
-        width = self.average * rig.sample_time
+        width = max(1, self.average) * rig.sample_time
         k = max(1, round(0.02 / width))
         speed = (position[k:] - position[:-k]) / (k * width)
         stuck = float(np.mean(np.abs(speed) < 0.01))

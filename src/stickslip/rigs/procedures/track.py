@@ -19,7 +19,7 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.machines.angle import AngleMap
 from stickslip.model import Model, Reference
 from stickslip.record import Record
-from stickslip.rigs.procedures._moves import ROOM
+from stickslip.rigs.procedures._moves import ROOM, samples
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
@@ -31,7 +31,8 @@ REFERENCES = {
     "step": (Reference("step", amplitude=0.01, tau=0.02), 3.0),
 }
 """Thesis eqs. 3.23 and 3.24, and figure 3.17's step; with their durations, s."""
-RECOMMENDED = ("linear", "bandwidth", "damping", "inertia", "gain", "filter", "lead", "deadband")
+RECOMMENDED = ("linear", "bandwidth", "damping", "inertia", "gain", "filter", "lead", "deadband", "offset",
+               "inertia_feedforward")  # fmt: skip
 """Options that a recommendation sets: it was simulated and measured with these, and with no others."""
 
 
@@ -41,15 +42,16 @@ class Track(Procedure):
 
     ``reference`` is low, high or step; ``linear`` PD, PID or PR with ``bandwidth`` (Hz), ``damping`` and ``inertia``
     (kg·m²) of its placement; ``compensator`` none, feedforward or feedback with ``model``, a model.toml or the name of
-    one of the machine's, its ``gain``, ``filter`` (Hz, 0: the machine's), ``lead`` (s, of feedforward) and ``deadband``
-    (rad/s); or recommended: all of that from the ``model``, a recommended.toml of `stickslip rig commission` (of this
-    machine) or `stickslip recommend`, and none of it given beside it. What a file knows of the angle
-    (``[angle]``) is compensated as well. ``duration`` in s (0: the reference's own).
+    one of the machine's, its ``gain``, ``filter`` (Hz, 0: the machine's), ``lead`` (s, of feedforward), ``deadband``
+    (rad/s), ``offset`` (N·m) and ``inertia_feedforward`` (kg·m²); or recommended: all of that from the ``model``, a
+    recommended.toml of `stickslip rig commission` (of this machine) or `stickslip recommend`, and none of it given
+    beside it. What a file knows of the angle (``[angle]``) is compensated as well. ``duration`` in s (0: the
+    reference's own).
     """
 
     name: ClassVar[str] = "track"
     title: ClassVar[str] = "follow one of the thesis's references (4.3.1.2)"
-    signed: ClassVar[tuple[str, ...]] = ("gain",)
+    signed: ClassVar[tuple[str, ...]] = ("gain", "offset")
 
     reference: str = "low"
     linear: str = "PD"
@@ -62,6 +64,8 @@ class Track(Procedure):
     filter: float = 0.0
     lead: float = 0.0
     deadband: float = 0.0
+    offset: float = 0.0
+    inertia_feedforward: float = 0.0
     duration: float = 0.0
     wait: float = 1.0
 
@@ -90,7 +94,11 @@ class Track(Procedure):
             If a name is unknown or the model is missing.
         """
         if self.compensator == "recommended":
-            return self.recommended(rig.name).controller(rig)
+            loop = read_recommended(self.model)
+            return dataclasses.replace(
+                self.recommended(rig.name).controller(rig), gains=loop.linear,
+                velocity_filter=loop.velocity_filter,
+            )  # fmt: skip
         if self.linear not in LINEAR:
             raise UnknownName("linear controller", self.linear, LINEAR)
         gains: Gains = place(self.linear, self.inertia, self.bandwidth, self.damping)
@@ -103,7 +111,9 @@ class Track(Procedure):
         corner = self.filter or (machine.filter if machine is not None else 0.0)
         corner = corner if math.isfinite(corner) else 0.0
         law = self.angle().on(self.law(rig))
-        helper = KINDS[self.compensator](law, self.gain, corner or None, self.lead, self.deadband)
+        helper = KINDS[self.compensator](
+            law, self.gain, corner or None, self.lead, self.deadband, self.offset, self.inertia_feedforward
+        )
         return Controller(gains, helper, limit, rig.sample_time)
 
     def recommended(self, machine: str) -> Track:
@@ -130,9 +140,10 @@ class Track(Procedure):
                 f"gain={found.gain:g}, ...)"
             )
         return dataclasses.replace(
-            self, linear="PD", compensator=found.compensator, bandwidth=found.bandwidth, damping=found.damping,
+            self, linear="PD", compensator=found.compensator, bandwidth=found.bandwidth or self.bandwidth,
+            damping=found.damping or self.damping,
             inertia=found.inertia, gain=found.gain, filter=found.filter or math.inf, lead=found.lead,
-            deadband=found.deadband,
+            deadband=found.deadband, offset=found.offset, inertia_feedforward=found.inertia_feedforward,
         )  # fmt: skip
 
     def angle(self) -> AngleMap:
@@ -155,10 +166,10 @@ class Track(Procedure):
         )
 
     def samples(self, rig: Rig) -> Any:
-        """Positions and velocities of the reference, shape (n, 2)."""
+        """Positions, velocities and accelerations of the reference, shape (n, 3)."""
         reference, seconds = self.wanted
-        t = rig.sample_time * np.arange(round(seconds / rig.sample_time))
-        return reference.sample(t)[:, :2]
+        t = rig.sample_time * np.arange(samples(rig, seconds))
+        return reference.sample(t)
 
     def plan(self, rig: Rig) -> Plan:
         """The reference."""
@@ -184,6 +195,7 @@ class Track(Procedure):
             len(samples),
             position=position,
             velocity=samples[:, 1],
+            acceleration=samples[:, 2],
             torque=self.angle().torque(position),
             closed=1.0,
         )

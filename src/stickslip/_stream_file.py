@@ -1,0 +1,162 @@
+"""The file of a `stickslip.stream.Stream`: what is written where, and whether it is still ours."""
+
+from __future__ import annotations
+
+import os
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError, RecordFault
+
+__all__ = ["HEAD", "MAGIC", "StreamFile"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+MAGIC = b"STKSLIP1"
+HEAD = struct.Struct("<8sQQQQ")
+"""Magic, offset of the rows, their number, length of the header's JSON, length of the trailer's"""
+COUNT = 16
+"""Place of the number of rows, bytes"""
+PAGE = 65536
+"""Rows begin at a multiple of this"""
+
+
+class StreamFile:
+    """The open file; every method may raise `OSError` where none is named.
+
+    Parameters
+    ----------
+    path : Path
+        It must not exist yet.
+    header : bytes
+        JSON: columns with their units, meta.
+    width : int
+        Columns.
+
+    Raises
+    ------
+    InputError
+        If it exists or cannot be created.
+    RecordFault
+        If there is no room for the header.
+    """
+
+    def __init__(self, path: Path, header: bytes, width: int) -> None:
+        self.path = path
+        self.lost = ""
+        """What another process did to the file; empty while it is ours."""
+        self._stride = 8 * width
+        self._header = header
+        self._count = 0
+        self._start = self._size = -(-(HEAD.size + len(header)) // PAGE) * PAGE
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+        except FileExistsError:
+            raise InputError(f"{path} exists; remove it or give another name") from None
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"{path} cannot be created ({reason}); give another name") from None
+        try:
+            allocate(self._file, 0, self._start)
+            whole_write(self._file, self._head() + header, 0)
+        except OSError as error:
+            self.discard()
+            raise RecordFault(f"{path}: no room for a record ({error.strerror}); make room") from None
+
+    @property
+    def beside(self) -> Path:
+        """Where the rows go if the file is lost: a name that is free."""
+        first = self.path.with_name(f"{self.path.name}.rescued")
+        names = (first.with_name(f"{first.name}-{i}") for i in range(2, 1000))
+        return first if not first.exists() else next((n for n in names if not n.exists()), first)
+
+    def reserve(self, rows: int) -> None:
+        """Make room for that many rows in all."""
+        size = self._start + rows * self._stride
+        if size > self._size and not self.lost:
+            allocate(self._file, self._size, size - self._size)
+            self._size = size
+
+    def foreign(self) -> str:
+        """What another process did to the file, in a word; empty where nothing shows."""
+        if not self.lost:
+            found = os.fstat(self._file)
+            if found.st_nlink == 0:
+                self.lost = "removed"
+            elif found.st_size < self._size:
+                self.lost = "shortened"
+            elif os.pread(self._file, HEAD.size, 0) != self._head():
+                self.lost = "overwritten"
+        return self.lost
+
+    def write(self, rows: Array, at: int) -> None:
+        """Write rows, the first of them at the place of row `at`."""
+        whole_write(self._file, np.ascontiguousarray(rows).data.cast("B"), self._start + at * self._stride)
+
+    def tell_count(self, count: int) -> None:
+        """From now on the first `count` rows belong to the record."""
+        if count != self._count:
+            whole_write(self._file, struct.pack("<Q", count), COUNT)
+            self._count = count
+
+    def read(self, at: int, count: int) -> Array:
+        """Rows that were written.
+
+        Raises
+        ------
+        RecordFault
+            If they are not there any more.
+        """
+        size = count * self._stride
+        try:
+            data = b"" if self.lost else os.pread(self._file, size, self._start + at * self._stride)
+        except OSError:
+            data = b""
+        if len(data) < size:
+            raise RecordFault(f"{self.path}: rows {at} to {at + count} can no longer be read from it")
+        return np.frombuffer(data, dtype="<f8").reshape(count, -1)
+
+    def finish(self, count: int, trailer: bytes) -> None:
+        """Cut the file after its last row and add the trailer."""
+        end = self._start + count * self._stride
+        # Room beyond the rows is given back first, so that a full disk takes the trailer.
+        os.ftruncate(self._file, end)
+        self._size = end
+        self.tell_count(count)
+        whole_write(self._file, trailer, end)
+        whole_write(self._file, struct.pack("<Q", len(trailer)), HEAD.size - 8)
+
+    def close(self) -> None:
+        """Close it; twice does no harm."""
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
+
+    def discard(self) -> None:
+        """Close and remove it: it holds nothing."""
+        self.close()
+        self.path.unlink(missing_ok=True)
+
+    def _head(self) -> bytes:
+        return HEAD.pack(MAGIC, self._start, self._count, len(self._header), 0)
+
+
+def whole_write(file: int, data: Any, at: int) -> None:
+    """`os.pwrite` until all is written: a disk that fills may take a part."""
+    left = memoryview(data)
+    while left:
+        done = os.pwrite(file, left, at)
+        left, at = left[done:], at + done
+
+
+def allocate(file: int, offset: int, size: int) -> None:
+    """Reserve room on the disk; where the system cannot, by writing zeros."""
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(file, offset, size)
+        return
+    zeros = bytes(min(size, 1 << 20))
+    for begin in range(offset, offset + size, len(zeros)):
+        whole_write(file, zeros[: offset + size - begin], begin)

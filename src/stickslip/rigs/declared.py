@@ -1,0 +1,77 @@
+"""What a rig says of itself and answers, checked: anybody may write one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+from stickslip.errors import InputError, RigError
+from stickslip.rigs.rig import Capabilities, Limits, Measurement, Rig
+
+__all__ = ["FASTEST", "FIELDS", "answer", "blamed", "checked"]
+
+FASTEST = 1e-7
+"""s, the shortest sample time"""
+FIELDS = len(Measurement._fields)
+Result = TypeVar("Result")
+
+
+def checked(rig: Rig) -> Rig:
+    """The rig, if what it says of itself can be used.
+
+    Raises
+    ------
+    InputError
+        That names the property.
+    """
+    kind = type(rig).__name__
+    name, sample_time = _told(kind, rig, "name"), _told(kind, rig, "sample_time")
+    limits, able = _told(kind, rig, "limits"), _told(kind, rig, "capabilities")
+    if not isinstance(name, str):
+        raise InputError(f"rig {kind}: name = {name!r} must be a text")
+    if not isinstance(sample_time, (int, float)) or not FASTEST <= sample_time < math.inf:
+        raise InputError(f"{name}: sample_time = {sample_time!r} s must be a number of at least {FASTEST:g}")
+    if not isinstance(limits, Limits):
+        raise InputError(f"{name}: limits = {limits!r} must be a `stickslip.rigs.rig.Limits`")
+    if not isinstance(able, Capabilities):
+        raise InputError(f"{name}: capabilities = {able!r} must be `stickslip.rigs.rig.Capabilities`")
+    for method in ("open", "exchange", "pause", "close", *(("exchange_block",) if able.blocks else ())):
+        if not callable(getattr(rig, method, None)):
+            raise InputError(f"{name}: it has no method {method}; see `stickslip.rigs.rig.Rig`")
+    return rig
+
+
+def _told(kind: str, rig: Rig, what: str) -> Any:
+    try:
+        return getattr(rig, what)
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"rig {kind}: {what} raised {type(error).__name__}: {error}; mend it") from error
+
+
+@contextmanager
+def blamed(rig: Rig, doing: str) -> Generator[None]:
+    """What a rig raises while it does something is told as its error; exits and what is meant for users as they are."""
+    try:
+        yield
+    except (RigError, InputError):
+        raise
+    except Exception as error:
+        raise RigError(f"{rig.name}: {doing} raised {type(error).__name__}: {error}") from error
+
+
+def answer(rig: Rig, doing: str, ask: Callable[[], Any]) -> Any:
+    """What a rig answers, as `Measurement` has it.
+
+    Raises
+    ------
+    RigError
+    """
+    with blamed(rig, doing):
+        found = ask()
+        if not isinstance(found, tuple) or len(found) != FIELDS:  # type: ignore[reportUnknownArgumentType]
+            raise RigError(f"{rig.name}: {doing} gave {found!r}; it must give a Measurement")
+        return tuple(float(x) for x in found)  # type: ignore[reportUnknownVariableType,reportUnknownArgumentType]
