@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from stickslip.subset import Layout
 
 EXAMPLES = {
     "sine": Reference("sine", amplitude=0.01, frequency=0.4),
+    "plain_sine": Reference("plain_sine", amplitude=0.01, frequency=0.4),
     "harmonic": Reference("harmonic", amplitude=0.01, frequency=0.4, phase=-1.5, velocity=0.01),
     "step": Reference("step", amplitude=0.01, tau=0.02),
     "ramp": Reference("ramp", velocity=0.3, end=1.2),
@@ -29,6 +31,25 @@ EXAMPLES = {
 
 def test_every_kind_has_an_example():
     assert set(EXAMPLES) >= set(plugins.reference_names())
+
+
+def test_the_sine_starts_from_rest_and_the_plain_one_does_not():
+    """A (1 - cos 2 pi f t) spans twice the amplitude that its name lets one expect: a kind of its own is A sin."""
+    quarter = [0.0, 0.625, 1.25]  # s, of 2.5 s
+    assert EXAMPLES["sine"].sample(quarter)[:, 0] == pytest.approx([0.0, 0.01, 0.02], abs=1e-15)
+    plain = EXAMPLES["plain_sine"].sample(quarter)
+    assert plain[:, 0] == pytest.approx([0.0, 0.01, 0.0], abs=1e-15)
+    assert plain[0, 1] == pytest.approx(2.0 * np.pi * 0.4 * 0.01)
+    assert EXAMPLES["plain_sine"].breaks(3.0) == pytest.approx([0.625, 1.875])
+
+
+@pytest.mark.parametrize(
+    "file", ["README.md", "docs/index.md", "docs/tutorial.md", "src/stickslip/cli/simulate.py"]
+)
+def test_it_is_said_where_a_sine_is_first_used(file):
+    text = (Path(__file__).parents[1] / file).read_text()
+    first = min(i for written in ('"sine"', 'kind = "sine"') if (i := text.find(written)) >= 0)
+    assert "(1 - cos" in text[first : first + 400]
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

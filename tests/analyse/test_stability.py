@@ -63,7 +63,7 @@ def test_the_drive_is_the_sampled_controller(gains, filter_hz):
     z, u = GMS.law.state(GMS.parameters), SimpleNamespace(**Surroundings()._asdict())
     run = sampled_by(GMS.law)
     angles = 1e-9 * np.concatenate([[0.0], np.random.default_rng(3).standard_normal(200).cumsum()])
-    told = [run(float(x), 0.0, 0.0, n, m, z, GMS.parameters, u) for x in angles]
+    told = [run(float(x), 0.0, 0.0, 0.0, n, m, z, GMS.parameters, u) for x in angles]
 
     drive = Drive(gains, Contact(sum(GMS.parameters.k), 0.0263), 0.7, filter_hz)
     a, b, c, d = drive.state_space()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from conftest import CASES, INERTIA, PLANT, thesis_run
+from conftest import CASES, INERTIA, PARAMETERS, PLANT, thesis_run
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
@@ -31,7 +31,47 @@ def test_errors_lie_within_the_estimate(run):
     found = accuracy.estimate(case)
     error = np.max(np.abs(exact.prepare(case).run()[0][:, 0] - exact.prepare(fine).run()[0][:, 0]))
     assert error <= max(found.error, 1e-7)
-    assert found.well_conditioned == (found.error <= 1e-6)
+    assert found.well_conditioned == (found.error <= 1e-6 and not found.depends_on_start)
+
+
+@pytest.mark.parametrize("rule", ["signed", "literal"])
+@pytest.mark.parametrize("law", ["coulomb", "stribeck"])
+def test_compensation_that_pushes_away_from_rest_depends_on_its_start(law, rule):
+    """Such runs called themselves well conditioned: steps are exact, but 1e-9 rad decides which way it goes first."""
+    axis, controller, reference, _ = thesis_run(f"low/nominal/FB-{law}")
+    record = simulate(axis, controller, reference, 1.0, slip_rule=rule, check=True)
+    found = record.meta["accuracy"]
+    assert found["depends_on_start"] is True
+    assert found["well_conditioned"] is False
+    runs = [
+        simulate(axis, controller, reference, 1.0, slip_rule=rule, initial=(start, 0.0), output=1e-3)
+        for start in (0.0, 1e-9, -1e-9)
+    ]
+    times = np.arange(0.0, 1.0, 1e-3)
+    there = [np.interp(times, r.time, r["position"]) for r in runs]
+    apart = max(np.abs(other - there[0]).max() for other in there[1:])
+    assert found["start_rad"] == pytest.approx(apart, rel=0.2)
+    assert apart > 1e-4
+
+
+@pytest.mark.parametrize(
+    "run", ["low/nominal/PD", "low/nominal/PID", "low/nominal/FB-lugre", "step/nominal/FB-gms"]
+)
+def test_other_runs_do_not(run):
+    axis, controller, reference, _ = thesis_run(run)
+    found = accuracy.estimate(prepare(axis, controller, reference, 1.0, slip_rule="literal"))
+    assert not found.depends_on_start
+    assert found.start < 3e-6
+
+
+def test_either_integrator_says_the_same():
+    loop = Controller(
+        PD.gains, Feedback(Model("lugre", **{**PARAMETERS["lugre"], "sigma0": 3.5e6, "sigma1": 0.0}))
+    )
+    case = prepare(AXIS, loop, SINE, 0.3)
+    exactly, adaptively = (accuracy.start_apart(case, name) for name in ("exact", "adaptive"))
+    assert exactly > 1e-7
+    assert adaptively == pytest.approx(exactly, rel=0.05)
 
 
 def test_a_linear_run_is_well_conditioned():

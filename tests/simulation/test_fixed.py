@@ -14,13 +14,14 @@ from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
-from stickslip.control.sampled import Memory, design_filter, low_passed, measured_position
+from stickslip.control.sampled import Memory, design_filter, low_passed
 from stickslip.errors import ParameterError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation import _meter as meter
 from stickslip.simulation import adaptive, fixed
 from stickslip.simulation._case import DIVERGED, DONE, NOT_FINITE, lay_out
+from stickslip.simulation._sampled import measured_position
 
 J = 3.8623e-4
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}

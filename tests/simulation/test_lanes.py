@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from lane_loops import loops
 
+from stickslip import jit
 from stickslip.errors import InputError, UnknownName
 from stickslip.jit import compiled_lanes, exponential
 from stickslip.simulation import batch, lanes
@@ -53,11 +54,11 @@ def test_a_step_with_more_switches_than_are_followed_is_told():
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 code")
-def test_the_step_runs_in_vectors():
+def test_the_step_runs_in_vectors(tmp_path, monkeypatch):
     _, _, many = loops("gms", "FB-gms", n=2, duration=0.01)
-    module = compiled_lanes(
-        f"METERED = True\n{many.text}\n# a text of its own, since cached code has no listing"
-    )
+    # Code read from a kept cache has no listing: an empty cache, and a text that no other test compiled.
+    monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path)
+    module = compiled_lanes(f"METERED = True\n{many.text}\n# {tmp_path}")
     c, h, n = many.shared, many.step, len(many.reference)
     ends = np.zeros((2, 3))
     start, cuts = np.array([0.0, 0.0, 1.0]), np.array([0, n])

@@ -14,9 +14,13 @@ from typing import Any
 import pytest
 
 from conftest import INERTIA, thesis_run
-from stickslip.errors import InputError
+from stickslip.approval import allow_code
+from stickslip.cli import _output
+from stickslip.errors import CodeRefused, InputError
 from stickslip.model import Model
 from stickslip.record import Record
+from stickslip.report._notes import notes
+from stickslip.report._view import StudyView
 from stickslip.study import study as studies
 from stickslip.study.files import KEYS
 from stickslip.study.plan import load, load_run, select
@@ -228,6 +232,27 @@ def test_fingerprints_tell_runs_apart() -> None:
     assert every == [run.fingerprint for run in (*load("thesis").runs, *load("thesis").extras)]
 
 
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [("4", ""), ("2.5", "substeps = 2.5 must be a whole number"), ("1001", "substeps = 1001 must be")],
+)
+def test_a_file_divides_the_samples_of_a_compensator(
+    small: studies.Study, tmp_path: Path, written: str, said: str
+) -> None:
+    file, own = tmp_path / "small_study.toml", "[controllers.FF-lugre]\n"
+    text = file.read_text().replace(own, f"{own}sample_time = 1e-3\n")
+    file.write_text(text.replace(own, f"{own}substeps = {written}\n"))
+    if said:
+        with pytest.raises(InputError, match=said):
+            load(file)
+        return
+    found = next(run for run in load(file).runs if run.controller == "FF-lugre")
+    assert found.control.compensator
+    assert found.control.compensator.substeps == 4
+    file.write_text(text)
+    assert next(r for r in load(file).runs if r.key == found.key).fingerprint != found.fingerprint
+
+
 def test_rerun_is_identical_and_sees_a_change(small: studies.Study, tmp_path: Path) -> None:
     out = tmp_path / "out"
     studies.run(small, out, ["sine"])
@@ -335,7 +360,10 @@ def test_a_law_from_a_file_serves_as_plant_and_compensator(small: studies.Study,
     text += '\n[laws.mine]\nlaw = "mine"\nlevel = 0.2\n\n[controllers.FF-mine]\nlinear = "PD"\n'
     text += 'compensator = "feedforward"\nlaw = "mine"\n\n[friction.own]\nlaw = "mine.py"\nlevel = 0.1\n'
     small.source.write_text(text)
-    study = load(small.source)
+    with pytest.raises(CodeRefused, match=r"plugins.*mine\.py"):
+        load(small.source)
+    with allow_code():
+        study = load(small.source)
     result = studies.run(study, tmp_path / "out", ["FF-mine", "sine", "own", "nominal"])
     assert [run.failure for run in result] == ["", ""]
     (tmp_path / "mine.py").unlink()  # Its copy serves.
@@ -357,3 +385,19 @@ def test_one_run_from_a_file() -> None:
     executed = studies.execute(run)
     assert executed.failure == ""
     assert executed.metrics["position_rms_rad"] > 0.0
+
+
+def test_a_study_names_the_runs_that_depend_on_their_start(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Coulomb feedback pushes away from rest, and 1e-9 rad decide which way: its metrics are those of one branch."""
+    only = ["literal", "low", "nominal", "FB-coulomb", "PD"]
+    for _ in range(2):  # run, and found finished
+        result = studies.run(studies.load("thesis"), tmp_path, only)
+        assert {r.controller: r.depends_on_start for r in result.runs} == {"PD": False, "FB-coulomb": True}
+    found = next(n for n in notes(StudyView(result)) if n.title == "Runs that depend on their start")
+    assert found.text.endswith(": literal/low/nominal/FB-coulomb.")
+    _output.print_study(result, None, 2)
+    said = capsys.readouterr().out
+    assert "these depend on their start (1e-9 rad beside" in said
+    assert "metrics): literal/low/nominal/FB-coulomb\n" in said

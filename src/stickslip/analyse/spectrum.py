@@ -28,6 +28,7 @@ PROMINENCE = 10.0
 NEAR = 0.12
 """Share of its frequency by which a peak may miss a mode and still be named after it."""
 FEWEST = 64
+MOST = 100_000_000
 
 
 @dataclass(frozen=True)
@@ -127,13 +128,20 @@ def evenly(record: Record, values: Array) -> tuple[Array, Array]:
     """
     first = np.flatnonzero(np.diff(record.time, prepend=-math.inf))  # a time may occur twice
     time = record.time[first]
-    good = np.isfinite(values[first])
+    good = np.isfinite(values[first]) & np.isfinite(time)
     time, values = time[good], values[first][good]
     if time.size < FEWEST:
         raise InputError(f"spectrum: {time.size} samples are too few; give at least {FEWEST}")
     # Rows at events lie between those of the grid: the usual spacing is the longest common one.
     spacing = float(np.quantile(np.diff(time), 0.9))
-    count = math.floor((time[-1] - time[0]) / spacing * (1.0 + 1e-9)) + 1
+    with np.errstate(over="ignore"):
+        count = float((time[-1] - time[0]) / spacing * (1.0 + 1e-9))
+    if not 0.0 < count <= MOST:
+        raise InputError(
+            f"spectrum: {time.size} times from {time[0]:g} to {time[-1]:g} s make no even grid of up to {MOST}; mend "
+            "them"
+        )
+    count = math.floor(count) + 1
     grid = np.arange(count, dtype=np.float64) * spacing + float(time[0])
     return grid, np.interp(grid, time, values)
 

@@ -36,6 +36,7 @@ from stickslip.analyse.stability_result import (
     Recommended,
     Stability,
 )
+from stickslip.control.controller import highest_corner
 from stickslip.control.linear import Gains
 from stickslip.model import Model
 
@@ -161,7 +162,7 @@ def _recommended(name: str, axis: Axis, drive: Drive, model: Model) -> Recommend
     with the contact down to 80 %, and at all factors that an encoder's counts may make.
     """
     for gain in TRIED_GAINS:
-        for corner in TRIED_FILTERS:
+        for corner in (f for f in TRIED_FILTERS if f <= highest_corner(drive.sample_time)):
             train, setting = with_law(
                 axis, replace(drive, filter_hz=corner), model, axis.amplitude, axis.ringing
             )

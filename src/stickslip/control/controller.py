@@ -6,10 +6,17 @@ import math
 from dataclasses import dataclass
 
 from stickslip.control.compensators._base import Compensator
-from stickslip.control.linear import Gains
+from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import ParameterError
 
-__all__ = ["Controller"]
+__all__ = ["Controller", "highest_corner"]
+
+FILTER_ROOM = 0.495  # of the sample rate: just below half of it, where a sampled low-pass ends
+
+
+def highest_corner(sample_time: float) -> float:
+    """Highest corner that a low-pass on samples can have, Hz; infinite in continuous time."""
+    return FILTER_ROOM / sample_time if sample_time > 0.0 else math.inf
 
 
 @dataclass(frozen=True)
@@ -18,8 +25,8 @@ class Controller:
 
     Attributes
     ----------
-    gains : Gains
-        Of the linear part (`stickslip.control.linear`).
+    gains : Gains or Cascade
+        Of the linear part (`stickslip.control.linear`); a cascade needs a sample time.
     compensator : Compensator or None
     torque_limit : float
         The size of T_m never exceeds it, N·m; infinite for none.
@@ -28,13 +35,22 @@ class Controller:
         takes the velocity as the difference of two measured positions.
     encoder_counts : float
         Counts per revolution of the encoder that a sampled controller reads; 0 measures exactly.
+    velocity_filter : float
+        Corner of a first-order low-pass on the velocity that the linear part sees, Hz; 0 for none. Only with a sample
+        time.
     """
 
-    gains: Gains
+    gains: Gains | Cascade
     compensator: Compensator | None = None
     torque_limit: float = math.inf
     sample_time: float = 0.0
     encoder_counts: float = 0.0
+    velocity_filter: float = 0.0
+
+    @property
+    def linear(self) -> Gains:
+        """The gains as those of one sum: a cascade's PID (`Cascade.pid`)."""
+        return self.gains.pid if isinstance(self.gains, Cascade) else self.gains
 
     def __post_init__(self) -> None:
         for name, value in self.gains._asdict().items():
@@ -52,7 +68,23 @@ class Controller:
             raise ParameterError(
                 "controller: an encoder is read by samples; give a sample_time greater than 0"
             )
+        if not math.isfinite(self.velocity_filter) or self.velocity_filter < 0.0:
+            raise ParameterError(
+                f"controller: velocity_filter = {self.velocity_filter:g} Hz must be at least 0"
+            )
+        for name, given in (
+            ("a cascade", isinstance(self.gains, Cascade)),
+            ("a velocity_filter", self.velocity_filter > 0.0),
+        ):
+            if given and self.sample_time == 0.0:
+                raise ParameterError(f"controller: {name} acts on samples; give a sample_time greater than 0")
         helper = self.compensator
-        if helper and self.sample_time == 0.0 and (helper.lead > 0.0 or helper.deadband > 0.0):
-            name = "lead" if helper.lead > 0.0 else "deadband"
-            raise ParameterError(f"controller: a {name} acts on samples; give a sample_time greater than 0")
+        corner = helper.filter_hz if helper else None
+        if helper and corner and corner > highest_corner(self.sample_time):
+            raise ParameterError(
+                f"{helper.name}: filter_hz = {corner:g} Hz is more than samples of {self.sample_time:g} s can be "
+                f"filtered with; give at most {highest_corner(self.sample_time):g} Hz, or none"
+            )
+        if helper and self.sample_time == 0.0 and helper.sampled:
+            name = helper.sampled[0]
+            raise ParameterError(f"controller: {name} acts on samples; give a sample_time greater than 0")

@@ -3,6 +3,8 @@
 T = kp (theta_d - theta) + kr theta_d' - kd theta' + ki integral of (theta_d - theta)
 
 PR ("proportional with rate feedback", eq. 3.4) has kr = 0, PD (eq. 3.5) and PID (eq. 3.11) have kr = kd.
+
+Besides the cascade of most drives, position P around velocity PI (`Cascade`).
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from typing import Annotated, NamedTuple
 from stickslip.errors import ParameterError
 from stickslip.spec import Par
 
-__all__ = ["LINEAR", "Gains", "pd", "pid", "place", "pr"]
+__all__ = ["LINEAR", "Cascade", "Gains", "pd", "pid", "place", "pr"]
 
 
 class Gains(NamedTuple):
@@ -27,6 +29,33 @@ class Gains(NamedTuple):
     kr: Annotated[
         float, Par("N·m·s/rad", "k_r", "gain on the reference velocity", lower=0.0, default=0.0)
     ] = 0.0
+
+
+class Cascade(NamedTuple):
+    """Position P around velocity PI, as drives have it; only with a sample time.
+
+    e_v = kv (theta_d - theta) + feed theta_d' - theta' is the error of the velocity, and
+    T = kvp e_v + kvi integral of e_v. The integral rests while the torque is at its limit and e_v would drive it
+    further (conditional integration).
+    """
+
+    kv: Annotated[float, Par("1/s", "K_v", "gain of the position loop", lower=0.0)]
+    kvp: Annotated[float, Par("N·m·s/rad", "K_p", "gain of the velocity loop", lower=0.0)]
+    kvi: Annotated[
+        float, Par("N·m/rad", "K_i", "integral gain of the velocity loop, kvp over its reset time", lower=0.0)
+    ] = 0.0
+    feed: Annotated[float, Par("-", "", "part of the reference velocity that is fed forward", lower=0.0)] = (
+        1.0
+    )
+
+    @property
+    def pid(self) -> Gains:
+        """The PID that it is, away from its limit and without a velocity filter, where ``feed`` is 1.
+
+        With less, the integral term's position differs: kvi (1 - feed) theta is left out.
+        """
+        kp = self.kvp * self.kv + self.kvi * self.feed
+        return Gains(kp, self.kvi * self.kv, self.kvp, self.kvp * self.feed)
 
 
 def pr(kp: float, kd: float) -> Gains:

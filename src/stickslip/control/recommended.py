@@ -7,16 +7,18 @@
 from __future__ import annotations
 
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from stickslip.config import read_toml
+from stickslip.config import Table, read_toml
 from stickslip.control.compensators._base import Compensator
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import InputError
 from stickslip.model import Model
+from stickslip.spec import fields_of
 
 __all__ = ["KINDS", "Recommended", "read_recommended"]
 
@@ -40,6 +42,15 @@ class Recommended:
         s, by which a feedforward looks ahead of the reference.
     deadband : float
         rad/s, velocities below which the law sees rest.
+    offset : float
+        N·m, constant torque against positive motion that is given beside friction's.
+    inertia_feedforward : float
+        kg·m², times the reference's acceleration: torque that is given too.
+    gains : Gains, Cascade or None
+        Of the linear loop that it was tried in; None: the PD of bandwidth and damping, which are 0 where gains are
+        given.
+    velocity_filter : float
+        Corner of that loop's low-pass on the velocity, Hz; 0: none.
     filter : float
         Corner of the low-pass on the velocity, Hz; 0: none.
     sample_time : float
@@ -58,15 +69,35 @@ class Recommended:
     filter: float = 0.0
     sample_time: float = 0.0
     machine: str = ""
+    offset: float = 0.0
+    inertia_feedforward: float = 0.0
+    gains: Gains | Cascade | None = None
+    velocity_filter: float = 0.0
+
+    @property
+    def linear(self) -> Gains | Cascade:
+        """The linear loop that it was tried in."""
+        return self.gains or place("PD", self.inertia, self.bandwidth, self.damping)
 
     def table(self) -> dict[str, Any]:
         """Plain data; what is left at its default is left out."""
-        usual = {"lead": 0.0, "deadband": 0.0, "filter": 0.0, "sample_time": 0.0, "machine": ""}
-        return {k: v for k, v in asdict(self).items() if usual.get(k) != v}
+        usual = {f.name: f.default for f in fields(self) if f.default is not MISSING}
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        if self.gains:
+            values |= {"loop": self.gains._asdict(), "gains": None, "bandwidth": None, "damping": None}
+        return {k: v for k, v in values.items() if v is not None and usual.get(k) != v}
 
     def on(self, model: Model) -> Compensator:
         """The compensator with its law."""
-        return KINDS[self.compensator](model, self.gain, self.filter or None, self.lead, self.deadband)
+        return KINDS[self.compensator](
+            model,
+            self.gain,
+            self.filter or None,
+            self.lead,
+            self.deadband,
+            self.offset,
+            self.inertia_feedforward,
+        )
 
 
 def read_recommended(path: str | os.PathLike[str]) -> Recommended:
@@ -85,9 +116,21 @@ def read_recommended(path: str | os.PathLike[str]) -> Recommended:
             "`stickslip rig commission` wrote"
         )
     with whole.table("recommended") as given:
+        own = _loop(given) if given.has("loop") else None
         return Recommended(
-            given.choice("compensator", KINDS), given.positive("gain", ""), given.positive("bandwidth", "Hz"),
-            given.positive("damping", ""), given.positive("inertia", "kg·m²"), given.number("lead", "s", 0.0, 0.0),
+            given.choice("compensator", KINDS), given.positive("gain", ""),
+            0.0 if own else given.positive("bandwidth", "Hz"), 0.0 if own else given.positive("damping", ""),
+            given.positive("inertia", "kg·m²"), given.number("lead", "s", 0.0, 0.0),
             given.number("deadband", "rad/s", 0.0, 0.0), given.number("filter", "Hz", 0.0, 0.0),
             given.number("sample_time", "s", 0.0, 0.0), given.text("machine", ""),
+            given.number("offset", "N·m", 0.0), given.number("inertia_feedforward", "kg·m²", 0.0, 0.0),
+            own, given.number("velocity_filter", "Hz", 0.0, 0.0),
         )  # fmt: skip
+
+
+def _loop(table: Table) -> Gains | Cascade:
+    """Gains of a PID, or of a cascade where there is a ``kv``."""
+    with table.table("loop") as given:
+        if given.has("kv"):
+            return Cascade(*(given.number(f.name, f.par.unit, 0.0, 0.0) for f in fields_of(Cascade)))
+        return Gains(*(given.number(f.name, f.par.unit, 0.0, 0.0) for f in fields_of(Gains)))

@@ -1,8 +1,13 @@
-"""The controller as a drive runs it: every sample time, from a counted position, its output held in between.
+"""The controller as a drive runs it: every sample time, from a measured position, its output held in between.
 
 Velocity is the difference of the last two measured positions over the sample time; the compensator's velocity
 may pass a second-order Butterworth low-pass (bilinear transform, corner prewarped: ``oppenheim1999``, section
-7.1); the integral is a sum of trapezoids.
+7.1); the linear controller's velocity may pass a first-order low-pass of its own. The integral is a sum of trapezoids,
+and rests while the torque limit holds the torque back and it would go further (conditional integration).
+
+An input that is no number leaves the memory alone: the torque that is held fades to 0, ``fault`` counts the samples,
+and the first usable one goes on from there. Positions may be split into whole turns and the rest (`sample_turns`), so
+that their differences are as exact after a thousand turns as in the first one, in single precision too.
 
 Written in the scalar subset (`stickslip.subset`): the fixed-step integrator and the rigs run it compiled, exports
 write it in other languages. Arguments: the settings ``n``, the memory ``m``, and the compensator's law with its
@@ -18,6 +23,7 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.binding import rescoped
 from stickslip.control.controller import Controller
+from stickslip.control.linear import Cascade, Gains
 from stickslip.spec import Law, Par
 
 __all__ = [
@@ -26,12 +32,20 @@ __all__ = [
     "NO_COMPENSATOR",
     "Memory",
     "Settings",
+    "follow",
+    "follow_turns",
+    "functions_by",
     "sample",
+    "sample_turns",
     "sampled_by",
     "settings",
 ]
 
 NO_COMPENSATOR, FROM_REFERENCE, FROM_MEASUREMENT = 0.0, 1.0, 2.0
+TURN = 2.0 * math.pi  # rad
+LARGEST = 1e9  # rad, rad/s, N·m, s: an input beyond it is no measurement
+FADE = 0.1
+"""s, over which a torque that was taken over fades."""
 
 
 class Settings(NamedTuple):
@@ -50,19 +64,37 @@ class Settings(NamedTuple):
     ]
     torque_limit: Annotated[float, Par("N·m", "T_max", "largest torque")]
     sample_time: Annotated[float, Par("s", "T", "sample time")]
-    encoder: Annotated[float, Par("-", "N", "counts per revolution; 0 measures exactly")]
     lead: Annotated[float, Par("s", "", "time by which a feedforward looks ahead of the reference")]
     deadband: Annotated[float, Par("rad/s", "", "velocity below which the compensator's law sees rest")]
+    kv: Annotated[
+        float,
+        Par(
+            "1/s", "K_v", "position gain of a cascade, whose velocity PI has kd and ki (N·m/rad); 0 for none"
+        ),
+    ]
+    feed: Annotated[float, Par("-", "", "part of the reference velocity that a cascade feeds forward")]
+    slow: Annotated[
+        float, Par("-", "", "part of its old value that the controller's velocity keeps a sample")
+    ]
+    fade: Annotated[float, Par("s", "", "over which a torque that was taken over, or held in a fault, fades")]
+    offset: Annotated[float, Par("N·m", "T_0", "constant torque that is fed forward")]
+    inertia: Annotated[float, Par("kg·m²", "J", "inertia whose torque along the reference is fed forward")]
+    clock: Annotated[float, Par("-", "", "1 where samples make the law's time, 0 where the caller gives it")]
+    substeps: Annotated[float, Par("-", "", "steps of the law into which a sample is divided")]
 
 
 class Memory(NamedTuple):
     """What the drive remembers from sample to sample."""
 
     started: Annotated[float, Par("-", "", "1 after the first sample")]
-    position: Annotated[float, Par("rad", "theta", "measured position")]
+    turns: Annotated[float, Par("-", "", "measured position: whole turns; 0 where they are not counted")]
+    position: Annotated[float, Par("rad", "theta", "measured position, less the whole turns")]
     velocity: Annotated[float, Par("rad/s", "v", "difference of measured positions over the sample time")]
     error: Annotated[float, Par("rad", "e", "reference less measured position")]
-    error_sum: Annotated[float, Par("rad·s", "", "integral of the error")]
+    error_sum: Annotated[
+        float, Par("rad·s", "", "integral of the error; of a cascade: of its velocity's, rad")
+    ]
+    filtered: Annotated[float, Par("rad/s", "", "velocity that the linear controller sees")]
     wanted_velocity: Annotated[float, Par("rad/s", "", "reference velocity one sample ago")]
     seen: Annotated[float, Par("rad/s", "", "velocity that the compensator's law saw")]
     in_1: Annotated[float, Par("rad/s", "", "filter: input one sample ago")]
@@ -74,18 +106,24 @@ class Memory(NamedTuple):
     back_2: Annotated[float, Par("-", "", "filter: weight of the output before")]
     compensation: Annotated[float, Par("N·m", "T_hat", "compensating torque")]
     torque: Annotated[float, Par("N·m", "T_m", "torque that is held")]
-
-
-def measured_position(position: float, counts: float) -> float:
-    """The position in whole counts of the encoder, rad; exact where it has none."""
-    if counts <= 0.0:
-        return position
-    count = 2.0 * math.pi / counts
-    return count * math.floor(position / count + 0.5)
+    seconds: Annotated[float, Par("s", "", "time since the first sample, in whole seconds")]
+    part: Annotated[float, Par("s", "", "the rest of that time")]
+    waited: Annotated[float, Par("s", "", "time without a usable input since the last one")]
+    growth: Annotated[
+        float, Par("rad·s", "", "by which this sample lets the integral grow; of a cascade: rad")
+    ]
+    fault: Annotated[
+        float, Par("-", "", "samples in a row whose inputs, or torque, were no numbers; 0: none")
+    ]
+    taken: Annotated[float, Par("N·m", "", "difference of the torque that was taken over from its own")]
+    share: Annotated[float, Par("-", "", "of that difference that is left")]
 
 
 def design_filter(n: Any, m: Any) -> None:
-    """Coefficients of the second-order Butterworth low-pass; its corner lies below half the sample rate."""
+    """Coefficients of the second-order Butterworth low-pass; its corner lies below half the sample rate.
+
+    `Controller` refuses another; the bound keeps a filter stable whose settings were changed afterwards.
+    """
     g = math.tan(0.5 * min(n.filter * n.sample_time, 0.99 * math.pi))
     scale = 1.0 / (1.0 + math.sqrt(2.0) * g + g * g)
     m.forward = g * g * scale
@@ -103,25 +141,42 @@ def low_passed(m: Any, x: float) -> float:
     return y
 
 
-def observe(position: float, wanted: float, n: Any, m: Any) -> None:
-    """Take a sample of the position: velocity, error and its integral."""
-    measured = measured_position(position, n.encoder)
-    error = wanted - measured
+def since(n: Any, m: Any) -> float:
+    """Time since the last usable sample, s."""
+    return n.sample_time + m.waited
+
+
+def observe(turns: float, position: float, wanted_turns: float, wanted: float, n: Any, m: Any) -> None:
+    """Take a sample of the position: velocity, error, and what the integral would gain by it."""
+    error = TURN * (wanted_turns - turns) + (wanted - position)
+    m.growth = 0.0
     if m.started == 0.0:
         m.velocity = 0.0
+        m.filtered = 0.0
         design_filter(n, m)
     else:
-        m.velocity = (measured - m.position) / n.sample_time
-        m.error_sum += 0.5 * n.sample_time * (m.error + error)
-    m.position = measured
+        m.velocity = (TURN * (turns - m.turns) + (position - m.position)) / since(n, m)
+        m.filtered = m.velocity + n.slow * (m.filtered - m.velocity)
+        m.growth = 0.5 * since(n, m) * (m.error + error)
+    m.turns = turns
+    m.position = position
     m.error = error
+
+
+def linear(wanted_velocity: float, n: Any, m: Any) -> float:
+    """Torque of the linear controller, N·m; in a cascade kd is the gain of the velocity loop and ki its integral's."""
+    if n.kv <= 0.0:
+        return n.kp * m.error + n.kr * wanted_velocity - n.kd * m.filtered + n.ki * (m.error_sum + m.growth)
+    error = n.kv * m.error + n.feed * wanted_velocity - m.filtered
+    m.growth = since(n, m) * error
+    return n.kd * error + n.ki * (m.error_sum + m.growth)
 
 
 def ahead(wanted_velocity: float, n: Any, m: Any) -> float:
     """The reference velocity a lead from now, rad/s, along its last two samples; rest stays rest."""
     found = wanted_velocity
     if m.started != 0.0 and wanted_velocity != 0.0:
-        found = wanted_velocity + n.lead * (wanted_velocity - m.wanted_velocity) / n.sample_time
+        found = wanted_velocity + n.lead * (wanted_velocity - m.wanted_velocity) / since(n, m)
     m.wanted_velocity = wanted_velocity
     return found
 
@@ -129,6 +184,17 @@ def ahead(wanted_velocity: float, n: Any, m: Any) -> float:
 def law_step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
     """The compensator's law; `sampled_by` puts it here."""
     return 0.0
+
+
+def law_steps(last: float, now: float, elapsed: float, n: Any, z: Any, p: Any, u: Any) -> float:
+    """The law over a sample, in `substeps` steps with the velocity linear in between. Returns its torque, N·m."""
+    parts = max(1.0, n.substeps)
+    before = last
+    for i in range(1, int(parts)):
+        after = last + (now - last) * (float(i) / parts)
+        law_step(before, after, elapsed / parts, z, p, u)
+        before = after
+    return law_step(before, now, elapsed / parts, z, p, u)
 
 
 def compensate(velocity: float, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
@@ -142,43 +208,172 @@ def compensate(velocity: float, n: Any, m: Any, z: Any, p: Any, u: Any) -> float
     elapsed = 0.0  # before the first sample nothing has moved yet
     if m.started != 0.0:
         last = m.seen
-        elapsed = n.sample_time
+        elapsed = since(n, m)
     m.seen = now
-    u.position = m.position
-    return n.gain * law_step(last, now, elapsed, z, p, u)
+    u.position = TURN * m.turns + m.position
+    return n.gain * law_steps(last, now, elapsed, n, z, p, u)
 
 
-def sample(
-    position: float, wanted: float, wanted_velocity: float, n: Any, m: Any, z: Any, p: Any, u: Any
-) -> float:
-    """One sample of the drive: measure, control, compensate, limit. Returns the torque to hold, N·m."""
-    observe(position, wanted, n, m)
-    torque = n.kp * m.error + n.kr * wanted_velocity - n.kd * m.velocity + n.ki * m.error_sum
+def unusable(
+    turns: float, position: float, wanted_turns: float, wanted: float, wanted_velocity: float,
+    wanted_acceleration: float, u: Any,
+) -> float:  # fmt: skip
+    """1 where an input is no number, or one that no machine has; else 0."""
+    size = abs(turns) + abs(position) + abs(wanted_turns) + abs(wanted) + abs(wanted_velocity)
+    size += abs(wanted_acceleration)
+    size += abs(u.load) + abs(u.temperature) + abs(u.time) + abs(u.applied)
+    if size < LARGEST:
+        return 0.0
+    return 1.0
+
+
+def faulty(n: Any, m: Any) -> float:
+    """A sample without a usable input: the torque that is held falls to 0 over the fade. Returns it, N·m."""
+    if m.fault == 0.0:
+        m.taken = m.torque
+    m.fault += 1.0
+    m.share = max(0.0, 1.0 - m.fault * n.sample_time / max(n.fade, n.sample_time))
+    m.torque = m.share * m.taken
+    m.compensation = 0.0
+    return m.torque
+
+
+def keep_time(n: Any, m: Any, u: Any) -> None:
+    """The law's time, s; whole seconds are kept apart, so that single precision loses no sample in years."""
+    if n.clock != 0.0:
+        u.time = m.seconds + m.part
+        m.part += n.sample_time
+        whole = math.floor(m.part)
+        m.seconds += whole
+        m.part -= whole
+
+
+def respond(
+    turns: float, position: float, wanted_turns: float, wanted: float, wanted_velocity: float,
+    wanted_acceleration: float, n: Any, m: Any, z: Any, p: Any, u: Any,
+) -> float:  # fmt: skip
+    """Measure, control, compensate. Returns the torque before the limit, N·m."""
+    observe(turns, position, wanted_turns, wanted, n, m)
+    torque = linear(wanted_velocity, n, m)
     m.compensation = 0.0
     if n.source == FROM_REFERENCE:
         m.compensation = compensate(ahead(wanted_velocity, n, m), n, m, z, p, u)
     elif n.source == FROM_MEASUREMENT:
         m.compensation = compensate(m.velocity, n, m, z, p, u)
-    m.torque = min(max(torque + m.compensation, -n.torque_limit), n.torque_limit)
+    m.compensation += n.offset + n.inertia * wanted_acceleration
+    return torque + m.compensation
+
+
+def taken_over(torque: float, n: Any, m: Any) -> float:
+    """The torque with what is left of the one that was taken over, or held in a fault, N·m."""
+    if m.fault > 0.0:
+        m.fault = 0.0
+        m.taken = m.torque - torque
+        m.share = 1.0
+    whole = torque
+    if m.share > 0.0:
+        whole = torque + m.share * m.taken
+        m.share = max(0.0, m.share - n.sample_time / max(n.fade, n.sample_time))
+    return whole
+
+
+def sample_turns(
+    turns: float, position: float, wanted_turns: float, wanted: float, wanted_velocity: float,
+    wanted_acceleration: float, n: Any, m: Any, z: Any, p: Any, u: Any,
+) -> float:  # fmt: skip
+    """One sample with positions as whole turns and the rest, rad. Returns the torque to hold, N·m."""
+    keep_time(n, m, u)
+    if unusable(turns, position, wanted_turns, wanted, wanted_velocity, wanted_acceleration, u) != 0.0:
+        m.waited += n.sample_time
+        return faulty(n, m)
+    torque = respond(
+        turns, position, wanted_turns, wanted, wanted_velocity, wanted_acceleration, n, m, z, p, u
+    )
     m.started = 1.0
+    m.waited = 0.0
+    if not abs(torque) < math.inf:
+        return faulty(n, m)
+    torque = taken_over(torque, n, m)
+    m.torque = min(max(torque, -n.torque_limit), n.torque_limit)
+    # The integral rests where the limit holds the torque back and it would go further.
+    if not n.ki * m.growth * (torque - m.torque) > 0.0:
+        m.error_sum += m.growth
     return m.torque
+
+
+def sample(
+    position: float, wanted: float, wanted_velocity: float, wanted_acceleration: float,
+    n: Any, m: Any, z: Any, p: Any, u: Any,
+) -> float:  # fmt: skip
+    """One sample of the drive: measure, control, compensate, limit. Returns the torque to hold, N·m."""
+    return sample_turns(0.0, position, 0.0, wanted, wanted_velocity, wanted_acceleration, n, m, z, p, u)
+
+
+def follow_turns(
+    turns: float, position: float, wanted_turns: float, wanted: float, wanted_velocity: float,
+    wanted_acceleration: float, torque: float, n: Any, m: Any, z: Any, p: Any, u: Any,
+) -> float:  # fmt: skip
+    """Watch one sample while another has the axis with `torque`, N·m; the sample that takes over starts there."""
+    keep_time(n, m, u)
+    m.error_sum = 0.0
+    m.share = 0.0
+    m.torque = 0.0
+    if abs(torque) < LARGEST:
+        m.torque = torque
+    if unusable(turns, position, wanted_turns, wanted, wanted_velocity, wanted_acceleration, u) != 0.0:
+        m.waited += n.sample_time
+        m.fault += 1.0
+        return m.torque
+    own = respond(turns, position, wanted_turns, wanted, wanted_velocity, wanted_acceleration, n, m, z, p, u)
+    m.started = 1.0
+    m.waited = 0.0
+    m.fault = 0.0
+    if n.ki > 0.0:
+        m.error_sum = (m.torque - own) / n.ki
+    else:
+        m.taken = m.torque - own
+        m.share = 1.0
+    return m.torque
+
+
+def follow(
+    position: float, wanted: float, wanted_velocity: float, wanted_acceleration: float, torque: float,
+    n: Any, m: Any, z: Any, p: Any, u: Any,
+) -> float:  # fmt: skip
+    """Watch one sample while another has the axis with `torque`, N·m; the sample that takes over starts there."""
+    return follow_turns(
+        0.0, position, 0.0, wanted, wanted_velocity, wanted_acceleration, torque, n, m, z, p, u
+    )
+
+
+def functions_by(law: Law | None) -> dict[str, Callable[..., float]]:
+    """The functions of this file by name, with the law of the compensator in its place; None compensates nothing."""
+    home = globals()
+    own = {
+        name: value
+        for name, value in home.items()
+        if isinstance(value, types.FunctionType) and value.__globals__ is home
+    }
+    if law is None:
+        return own
+    scope = dict(home)
+    scope.update({name: rescoped(function, scope) for name, function in own.items()})
+    scope["law_step"] = law.step
+    return {name: scope[name] for name in own}
 
 
 def sampled_by(law: Law | None) -> Callable[..., float]:
     """`sample` with the law of the compensator in its place; None compensates nothing."""
-    if law is None:
-        return sample
-    scope = dict(globals())
-    for name, value in globals().items():
-        if isinstance(value, types.FunctionType) and value.__globals__ is globals():
-            scope[name] = rescoped(value, scope)
-    scope["law_step"] = law.step
-    return scope["sample"]
+    return functions_by(law)["sample"]
 
 
 def settings(controller: Controller) -> Settings:
     """The numbers of a controller."""
     helper, gains = controller.compensator, controller.gains
+    cascade = gains if isinstance(gains, Cascade) else None
+    if isinstance(gains, Cascade):
+        gains = Gains(0.0, gains.kvi, gains.kvp)
+    corner = 2.0 * math.pi * controller.velocity_filter
     source = NO_COMPENSATOR
     if helper:
         source = FROM_REFERENCE if helper.velocity == "reference" else FROM_MEASUREMENT
@@ -192,7 +387,14 @@ def settings(controller: Controller) -> Settings:
         2.0 * math.pi * helper.filter_hz if helper and helper.filter_hz else 0.0,
         controller.torque_limit,
         controller.sample_time,
-        controller.encoder_counts,
         helper.lead if helper else 0.0,
         helper.deadband if helper else 0.0,
+        cascade.kv if cascade else 0.0,
+        cascade.feed if cascade else 0.0,
+        math.exp(-corner * controller.sample_time) if corner > 0.0 else 0.0,
+        FADE,
+        helper.offset if helper else 0.0,
+        helper.inertia_feedforward if helper else 0.0,
+        0.0,
+        float(helper.substeps) if helper else 1.0,
     )

@@ -46,9 +46,21 @@ class AngleMap:
         return abs(self.offset) + sum(self.beside.amplitude)
 
     def on(self, model: Model) -> Model:
-        """A law with this ripple: thesis 2.1.6."""
+        """A law with this ripple: thesis 2.1.6.
+
+        Raises
+        ------
+        InputError
+            If the law depends on the position already: the ripple would stand twice.
+        """
         if not self.ripple.order:
             return model
+        own = model.law.option_of("position_dependence")
+        if own not in ("", "none"):
+            raise InputError(
+                f"{model.law.name} depends on the position by position_dependence = {own!r} and by the ripple of "
+                "[angle]; leave one of them out"
+            )
         values: dict[str, Any] = {
             k: list(cast("tuple[float, ...]", v)) if isinstance(v, tuple) else v
             for k, v in model.parameters._asdict().items()

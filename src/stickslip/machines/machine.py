@@ -267,11 +267,13 @@ def _notes(top: Table) -> tuple[str, ...]:
 def _friction(table: Table) -> Model:
     with table, table.blamed():
         name = table.text("law")
-        law = plugins.law(name)
+        law = plugins.law(
+            str(table.document.locate(name)) if name.endswith(".py") else name, table.label("law")
+        )
         choices = {
             c.name: table.choice(c.name, c.options, c.default) for c in law.choices if table.has(c.name)
         }
-        return Model(name, choices, **table.rest())
+        return Model(law, choices, **table.rest())
 
 
 def _part(top: Table, key: str) -> Table | None:

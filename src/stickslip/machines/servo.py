@@ -80,7 +80,11 @@ class Motor:
     def _needed(self, name: str, quantity: str) -> float:
         value = getattr(self, name)
         if value is None:
-            raise ParameterError(f"motor: a drive signal that is a {quantity} needs {name}; give it")
+            option = f"--{name.replace('_', '-')}"
+            also = "" if name == "resistance" else ", or --drive-gain, the torque per unit of the signal"
+            raise ParameterError(
+                f"motor: a drive signal that is a {quantity} needs {name}; give {option}{also}"
+            )
         return value
 
 

@@ -3,4 +3,4 @@
 To add a kind, write its file and add its name to this tuple.
 """
 
-REFERENCES = ("sine", "harmonic", "step", "ramp", "staircase", "scurve", "table")
+REFERENCES = ("sine", "plain_sine", "harmonic", "step", "ramp", "staircase", "scurve", "table")

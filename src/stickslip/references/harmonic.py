@@ -38,7 +38,8 @@ def breaks(p: Any, duration: float) -> Sequence[float]:
     if p.amplitude == 0.0 or abs(p.velocity) >= abs(p.amplitude) * w:
         return []
     angle = math.acos(-p.velocity / (p.amplitude * w))
-    turns = range(math.floor(p.phase / (2.0 * math.pi)) - 1, math.ceil(p.frequency * duration + p.phase) + 2)
+    first = p.phase / (2.0 * math.pi)
+    turns = range(math.floor(first) - 1, math.ceil(p.frequency * duration + first) + 2)
     times = [(sign * angle - p.phase + 2.0 * math.pi * n) / w for n in turns for sign in (-1.0, 1.0)]
     return sorted(t for t in times if 1e-12 < t < duration)
 

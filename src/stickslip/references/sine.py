@@ -1,4 +1,7 @@
-"""Back and forth from rest: theta_d = A (1 - cos 2 pi f t); thesis eqs. 3.23 and 3.24."""
+"""Back and forth from rest: theta_d = A (1 - cos 2 pi f t), from 0 to 2 A; thesis eqs. 3.23 and 3.24.
+
+The plain sinusoid, A sin 2 pi f t, is `plain_sine`.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ __all__ = ["REFERENCE"]
 class Params(NamedTuple):
     """Parameters of the sinusoid."""
 
-    amplitude: Annotated[float, Par("rad", "A", "amplitude; the motion spans twice of it")]
+    amplitude: Annotated[float, Par("rad", "A", "amplitude; the motion A (1 - cos) spans from 0 to 2 A")]
     frequency: Annotated[float, Par("Hz", "f", "frequency", positive=True)]
 
 

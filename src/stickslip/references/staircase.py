@@ -44,7 +44,8 @@ def profile(t: float, p: Any, out: Any) -> None:
 
 def breaks(p: Any, duration: float) -> Sequence[float]:
     """The begin of every step."""
-    return [i * p.dwell for i in range(1, int(p.steps)) if i * p.dwell < duration]
+    count = min(p.steps, math.ceil(min(duration / p.dwell, 1e6)))
+    return [i * p.dwell for i in range(1, int(count)) if i * p.dwell < duration]
 
 
 def check(p: Any) -> str:

@@ -7,18 +7,31 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stickslip.control.controller import Controller
+from stickslip.errors import UnknownName
 from stickslip.jit import LawPointers, compiled_law, compiled_profile, flat
+from stickslip.laws._stick import SLIP_RULE
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout
 
-__all__ = ["COLUMNS", "UNITS", "Case", "Outcome", "Side", "lay_out", "surroundings"]
+__all__ = [
+    "COLUMNS",
+    "UNITS",
+    "Case",
+    "Outcome",
+    "Side",
+    "StepBudget",
+    "lay_out",
+    "ruled",
+    "slip_rules",
+    "surroundings",
+]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -156,6 +169,44 @@ def contact_stiffness(model: Model) -> float:
     return max(1.0, abs(torque) / 1e-9) if model.law.state_fields else 1.0
 
 
+def ruled(model: Model, slip_rule: str | None) -> Model:
+    """The model under a run's slip rule, where it has one; without a rule it keeps its own choice.
+
+    Raises
+    ------
+    UnknownName
+        If there is no such rule.
+    """
+    if slip_rule is None:
+        return model
+    if slip_rule not in SLIP_RULE.options:
+        raise UnknownName("slip rule", slip_rule, SLIP_RULE.options)
+    return model.having(slip_rule=slip_rule)
+
+
+def slip_rules(**models: Model | None) -> dict[str, str]:
+    """The slip rule of each model that has one, by the given names: what a record says of them."""
+    rules = {name: m.law.option_of("slip_rule") for name, m in models.items() if m is not None}
+    return {name: rule for name, rule in rules.items() if rule}
+
+
+class StepBudget(NamedTuple):
+    """How many steps an integrator may take: at the start, for each second, and for each break of the reference.
+
+    What goes beyond is far stiffer than its motion is long, and would take minutes without a word.
+    """
+
+    base: float
+    per_second: float
+    per_break: float
+    most: float = math.inf
+
+    def of(self, case: Case) -> float:
+        """Steps for a case."""
+        steps = self.per_second * float(case.numbers[DURATION]) + self.per_break * case.breaks.size
+        return min(self.base + steps, self.most)
+
+
 def lay_out(
     axis: RigidAxis,
     controller: Controller,
@@ -164,7 +215,7 @@ def lay_out(
     *,
     tolerance: float,
     grid: Array,
-    slip_rule: str = "signed",
+    slip_rule: str | None = None,
     initial: tuple[float, float] = (0.0, 0.0),
     metered: bool = True,
     max_step: float = math.inf,
@@ -172,11 +223,11 @@ def lay_out(
 ) -> Case:
     """Lay a closed loop out in flat arrays (compiles its laws and reference if they are not cached)."""
     helper = controller.compensator
-    plant = Side.of(axis.friction.having(slip_rule=slip_rule))
-    assist = Side.of(helper.model.having(slip_rule=slip_rule) if helper else None)
+    plant = Side.of(ruled(axis.friction, slip_rule))
+    assist = Side.of(ruled(helper.model, slip_rule) if helper else None)
     numbers = np.zeros(NUMBERS)
     numbers[INERTIA] = axis.inertia
-    gains = controller.gains
+    gains = controller.linear
     numbers[[KP, KI, KD, KR]] = gains.kp, gains.ki, gains.kd, gains.kr
     numbers[TORQUE_LIMIT] = controller.torque_limit
     numbers[DURATION], numbers[TOLERANCE], numbers[MAX_STEP] = duration, tolerance, max_step

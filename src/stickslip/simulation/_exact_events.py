@@ -23,7 +23,7 @@ from stickslip.simulation._exact_state import (
     INSIDE,
     KIND,
     LAYER,
-    LITERAL,
+    LITERAL_0,
     NARROW,
     OFFSET,
     POSITION,
@@ -351,7 +351,7 @@ def break_away(
             continue
         s = sliding(parameters, plan, sides, side, v)
         for i in range(first, last):
-            load = load_of(plan[LITERAL] > 0.0, direction, elements[i * ELEMENT_SIZE + FORCE])
+            load = load_of(plan[LITERAL_0 + side] > 0.0, direction, elements[i * ELEMENT_SIZE + FORCE])
             if (
                 elements[i * ELEMENT_SIZE + SLIPS] == 0.0
                 and load >= elements[i * ELEMENT_SIZE + SHARE] * s - ROUNDING

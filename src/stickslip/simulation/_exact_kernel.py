@@ -20,6 +20,7 @@ from stickslip.simulation._case import (
     STORM_EVENTS,
     STORM_TIME,
     TOLERANCE,
+    TOO_STIFF,
     VELOCITY_LIMIT,
 )
 from stickslip.simulation._exact_bend import bend
@@ -38,6 +39,7 @@ from stickslip.simulation._exact_state import (
     GRID_WRITTEN,
     HELD,
     LOOP_SIZE,
+    MOST_STEPS,
     POSITION,
     REJECTED,
     SIDE_SIZE,
@@ -261,4 +263,6 @@ def solve(
             return code
         if storms(count, loop):
             return STORM
+        if count[STEPS] > plan[MOST_STEPS]:
+            return TOO_STIFF
     return DONE

@@ -51,10 +51,10 @@ LOOP_SIZE = PROFILE_OUT + 3
 
 # ---- entries of `plan`: addresses (exact as floats), offsets and sizes ---------------------------------------
 (
-    CURVE_0, PARAMETERS_0, CURVE_1, PARAMETERS_1, PROFILE, PROFILE_PARAMETERS, LITERAL, FIRST_1, ELEMENTS, SIDES,
-    CELLS, GRID_ROWS, ROWS, SPACING, STIFFNESS_FLOOR, SHARED,
+    CURVE_0, PARAMETERS_0, CURVE_1, PARAMETERS_1, PROFILE, PROFILE_PARAMETERS, LITERAL_0, LITERAL_1, FIRST_1, ELEMENTS,
+    SIDES, CELLS, GRID_ROWS, ROWS, SPACING, STIFFNESS_FLOOR, SHARED, MOST_STEPS,
     PLAN_SIZE,
-) = range(17)  # fmt: skip
+) = range(19)  # fmt: skip
 """``parameters`` begins with Case.numbers; elements of side 1 begin at FIRST_1; SHARED: both sides have one curve."""
 
 # ---- entries of `count` --------------------------------------------------------------------------------------

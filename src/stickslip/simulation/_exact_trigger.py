@@ -15,7 +15,7 @@ from stickslip.simulation._exact_state import (
     ELEMENT_SIZE,
     INSIDE,
     LAYER,
-    LITERAL,
+    LITERAL_0,
     LOAD_AT_0,
     LOAD_SLOPE,
     LOWEST,
@@ -56,7 +56,7 @@ def heaviest(plan: Any, elements: Any, sides: Any, side: int, theta: float, v: f
     """Largest load per share among a side's sticking elements, N·m."""
     top = -1e300
     first = first_of(plan, side)
-    literal = plan[LITERAL] > 0.0
+    literal = plan[LITERAL_0 + side] > 0.0
     direction = 1.0 if v >= 0.0 else -1.0
     for i in range(first, first + int(sides[side * SIDE_SIZE + STICKING])):
         e = pointer(elements, i * ELEMENT_SIZE)

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import functools
+import math
 
 from stickslip.control.sampled import Memory, Settings, sampled_by
-from stickslip.jit import compiled_sample
+from stickslip.jit import compiled_sample, kernel
 from stickslip.spec import Law, Surroundings, fields_of
 from stickslip.subset import Layout, law_layouts
 
-__all__ = ["COMPENSATION", "MEMORY", "sampler"]
+__all__ = ["COMPENSATION", "FAULT", "MEMORY", "measured_position", "sampler"]
 
-COMPENSATION, MEMORY = Memory._fields.index("compensation"), len(Memory._fields)
-"""Place of the compensating torque in the memory, and its size; the law's state follows the memory."""
+COMPENSATION, FAULT, MEMORY = *map(Memory._fields.index, ("compensation", "fault")), len(Memory._fields)
+"""Places of the compensating torque and of the fault in the memory, and its size; the law's state follows it."""
+
+
+@kernel()
+def measured_position(position: float, counts: float) -> float:
+    """The position in whole counts of the encoder, rad; exact where it has none."""
+    if counts <= 0.0:
+        return position
+    count = 2.0 * math.pi / counts
+    return count * math.floor(position / count + 0.5)
 
 
 @functools.cache

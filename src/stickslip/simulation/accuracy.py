@@ -16,15 +16,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.simulation import adaptive, exact
-from stickslip.simulation._case import DONE, KICK, TOLERANCE, Case, Outcome
+from stickslip.simulation._case import DONE, KICK, POSITION_0, TOLERANCE, Case, Outcome
 
-__all__ = ["Accuracy", "estimate"]
+__all__ = ["BESIDE", "Accuracy", "branches", "estimate", "start_apart"]
 
 KICKS = (2.0, -2.0)
 """Over what a step may be wrong by."""
 WELL = 10.0
 """Largest error of a well-conditioned run, over the tolerance."""
 LOOSER = 10.0
+BESIDE = 1e-9
+"""Distance of the starts that are tried beside a run's own, rad."""
+BRANCHES = 1e4
+"""Growth of that distance from which another branch was taken; motions that are but sensitive stay below 2e3."""
 POSITION, EVENT = 3, 8
 
 
@@ -36,15 +40,23 @@ class Accuracy(NamedTuple):
     error : float
         Estimate of the largest error in position on the grid, rad; infinite where a repeated run ends early.
     well_conditioned : bool
-        Whether that is at most ten times the tolerance.
+        Whether that is at most ten times the tolerance, and the run does not depend on its start.
+    start : float
+        Largest distance on the grid from a run that starts `BESIDE` on either side, rad.
+    depends_on_start : bool
+        Whether such a run takes another branch: compensation that pushes away from rest, whose first direction any
+        deviation decides.
     """
 
     error: float
     well_conditioned: bool
+    start: float
+    depends_on_start: bool
 
 
 def estimate(case: Case, integrator: str = "exact") -> Accuracy:
-    """Repeat a run with wrong steps (exact), or at ten times the tolerance (adaptive); about three times its price.
+    """Repeat a run with wrong steps (exact) or at ten times the tolerance (adaptive), and from starts beside its own;
+    about four times its price.
 
     Parameters
     ----------
@@ -63,7 +75,42 @@ def estimate(case: Case, integrator: str = "exact") -> Accuracy:
         error = _looser(case)
     else:
         raise ValueError(f"the {integrator} integrator has no tolerance to be held to")
-    return Accuracy(error, error <= WELL * float(case.numbers[TOLERANCE]))
+    start = start_apart(case, integrator)
+    well = error <= WELL * float(case.numbers[TOLERANCE]) and not branches(start)
+    return Accuracy(error, well, start, branches(start))
+
+
+def branches(start: float) -> bool:
+    """Whether a run that starts `BESIDE` takes another branch, by its largest distance, rad."""
+    return start > BRANCHES * BESIDE
+
+
+def start_apart(case: Case, integrator: str = "exact") -> float:
+    """Largest distance on the grid of runs that start `BESIDE` on either side, rad; infinite where one ends early."""
+    if integrator == "exact":
+        prepared = exact.prepare(case)
+        begin = float(prepared.parameters[POSITION_0])
+        runs = [_started(prepared, begin + side) for side in (0.0, BESIDE, -BESIDE)]
+        codes = [code for _, code, _ in runs]
+        positions = [motion[:, 0] for motion, _, _ in runs]
+    else:
+        outcomes = [adaptive.run(_beside(case, side)) for side in (0.0, BESIDE, -BESIDE)]
+        codes, positions = [o.code for o in outcomes], [_positions(o) for o in outcomes]
+    if any(code != DONE for code in codes):
+        return math.inf
+    return max(_apart(positions[0], other, True) for other in positions[1:])
+
+
+def _started(prepared: exact.Prepared, position: float) -> Any:
+    parameters = prepared.parameters.copy()
+    parameters[POSITION_0] = position
+    return replace(prepared, parameters=parameters).run()
+
+
+def _beside(case: Case, side: float) -> Case:
+    numbers = case.numbers.copy()
+    numbers[POSITION_0] += side
+    return replace(case, numbers=numbers)
 
 
 def _kicked(case: Case) -> float:

@@ -54,6 +54,7 @@ from stickslip.simulation._case import (
     VELOCITY_LIMIT,
     Case,
     Outcome,
+    StepBudget,
 )
 from stickslip.simulation._loop import (
     COMPENSATION_TORQUE,
@@ -87,7 +88,7 @@ __all__ = ["can_run", "run"]
 EVENT_ROWS = 20_000
 CREEP, STEEPEST = 1e-9, 1e6
 """Velocity (rad/s) at which a law's slope is taken, and the relaxation rate (1/s) that explicit steps can follow."""
-MOST_STEPS = 50_000_000
+STEPS = StepBudget(1_000_000, 1_000_000, 2_000, 50_000_000)
 
 
 def can_run(case: Case) -> str:
@@ -117,7 +118,7 @@ def run(case: Case) -> Outcome:
     rows = np.empty((case.grid.size + EVENT_ROWS, len(COLUMNS)))
     acc = new_meter(numbers[DURATION], settle_band_of(case.reference, float(numbers[DURATION])))
     turns = np.empty((4096, 2))
-    counts = np.zeros(4, dtype=np.int64)
+    counts = np.array([0, 0, 0, 0, STEPS.of(case)], dtype=np.int64)
     code, time = integrate(
         *arrays_of(case), y, tolerances(case), case.breaks, case.grid, rows, acc, turns, counts
     )
@@ -249,7 +250,7 @@ def integrate(
 ) -> tuple[int, float]:
     """Run the loop from rest to the last break. Returns how it ended and when.
 
-    ``counts`` receives steps, rejected steps, events and rows.
+    ``counts`` receives steps, rejected steps, events and rows; its last entry is how many steps there may be.
     """
     n = y.shape[0]
     k, nodes, trial = np.zeros((STAGES + 1, n)), np.zeros((SIGNALS, 5)), np.zeros(TRIAL)
@@ -302,7 +303,7 @@ def integrate(
                     storm_start, storm_events = t, 0
                 if storm_events > STORM_EVENTS or rounds == 9:
                     code = STORM
-            if code == DONE and counts[0] + counts[1] > MOST_STEPS:
+            if code == DONE and counts[0] + counts[1] > counts[4]:
                 code = TOO_STIFF
         if code != DONE:
             break

@@ -24,13 +24,16 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.record import Record
 from stickslip.simulation import _case
-from stickslip.simulation._case import COLUMNS, UNITS, Case, Outcome, lay_out
+from stickslip.simulation._case import COLUMNS, UNITS, Case, Outcome, lay_out, slip_rules
 from stickslip.simulation._meter import metrics
 
-__all__ = ["INTEGRATORS", "Choice", "integrator_for", "prepare", "simulate"]
+__all__ = ["INTEGRATORS", "Choice", "integrator_for", "prepare", "run_case", "simulate"]
 
 INTEGRATORS = ("exact", "adaptive", "fixed")
 """In the order in which `integrator="auto"` tries them."""
+
+MOST_STEPS = 1e9
+"""Of a fixed length"""
 
 REASONS: dict[int, tuple[type[SimulationError], str]] = {
     _case.DIVERGED: (Divergence, "position or velocity left every reasonable bound"),
@@ -41,7 +44,11 @@ REASONS: dict[int, tuple[type[SimulationError], str]] = {
     ),
     _case.NO_STEP: (StepFailure, "no step that meets the tolerance was found"),
     _case.ROWS_FULL: (StepFailure, "the record is full"),
-    _case.TOO_STIFF: (StepFailure, "the case is too stiff for explicit steps; use the fixed integrator"),
+    _case.TOO_STIFF: (
+        StepFailure,
+        "far more steps than a motion of its length takes: friction is too stiff for the inertia; check both, or use "
+        "the fixed integrator",
+    ),
 }
 
 
@@ -54,7 +61,7 @@ def simulate(
     integrator: str = "auto",
     tolerance: float = 1e-9,
     time_step: float = 1e-4,
-    slip_rule: str = "signed",
+    slip_rule: str | None = None,
     output: float | Sequence[float] | np.ndarray[Any, Any] = 1e-3,
     initial: tuple[float, float] = (0.0, 0.0),
     metered: bool = True,
@@ -75,8 +82,9 @@ def simulate(
         Position error that a well-conditioned run may gather, rad (exact and adaptive).
     time_step : float
         Longest step of the fixed integrator, s.
-    slip_rule : {"signed", "literal"}
-        The rule from stick to slip of every law in the loop that has one (`stickslip.laws._stick`).
+    slip_rule : {"signed", "literal"}, optional
+        The rule from stick to slip of every law in the loop that has one (`stickslip.laws._stick`), in place of its own
+        choice; left out, each law keeps the rule that it was made with.
     output : float or array
         Spacing of the record's time grid, s, or its times.
     initial : tuple of float
@@ -84,15 +92,18 @@ def simulate(
     metered : bool
         Whether metrics and energies are accumulated during the run.
     check : bool
-        Whether the error of the run is estimated (exact and adaptive), at about three times its price.
+        Whether the error of the run is estimated (exact and adaptive), at about four times its price.
 
     Returns
     -------
     Record
         The grid and the events; channels as in ``record.units``. ``record.meta["metrics"]`` holds the metrics,
         ``record.meta["energy"]`` the balance: motor work = friction loss + kinetic energy + residual, J;
-        ``record.meta["accuracy"]``, if asked for, ``error_rad``, the estimate of the largest error in position, and
-        ``well_conditioned``, whether that is at most ten times the tolerance (`stickslip.simulation.accuracy`).
+        ``record.meta["accuracy"]``, if asked for, ``error_rad``, the estimate of the largest error in position,
+        ``start_rad``, how far a run ends up that starts 1e-9 rad beside, ``depends_on_start``, whether that is another
+        branch of the motion, and ``well_conditioned``, whether the error is at most ten times the tolerance and no
+        branch depends on the start (`stickslip.simulation.accuracy`).
+        ``record.meta["slip_rules"]`` says by which rule each law ran that has one (``friction``, ``compensator``);
         ``record.meta["refused"]``, where "auto" did not take the first integrator, says why, by integrator.
 
     Raises
@@ -107,14 +118,40 @@ def simulate(
         axis, controller, reference, duration,
         tolerance=tolerance, slip_rule=slip_rule, output=output, initial=initial, metered=metered,
     )  # fmt: skip
+    return run_case(case, integrator, time_step, slip_rule, check=check)
+
+
+def run_case(
+    case: Case,
+    integrator: str,
+    time_step: float,
+    slip_rule: str | None,
+    *,
+    check: bool = False,
+    start: bool = False,
+) -> Record:
+    """Run what `prepare` has laid out; arguments, record and errors as of `simulate`.
+
+    With `start` alone, only the dependence on the start is looked at, where the exact integrator runs the case: that
+    costs a tenth of the run.
+    """
     name, run, refused = integrator_for(case, integrator)
+    if name == "fixed":
+        _insist_on_steps("time_step", time_step, float(case.numbers[_case.DURATION]))
     outcome: Outcome = run(case, time_step) if name == "fixed" else run(case)
     how: dict[str, Any] = {"integrator": name, "slip_rule": slip_rule}
     if refused:
         how["refused"] = dict(refused)
     if check and name != "fixed" and outcome.code == _case.DONE:
         found = importlib.import_module("stickslip.simulation.accuracy").estimate(case, name)
-        how["accuracy"] = {"error_rad": found.error, "well_conditioned": found.well_conditioned}
+        how["accuracy"] = {
+            "error_rad": found.error, "well_conditioned": found.well_conditioned,
+            "start_rad": found.start, "depends_on_start": found.depends_on_start,
+        }  # fmt: skip
+    elif start and name == "exact" and outcome.code == _case.DONE:
+        accuracy = importlib.import_module("stickslip.simulation.accuracy")
+        apart = accuracy.start_apart(case, name)
+        how["accuracy"] = {"start_rad": apart, "depends_on_start": accuracy.branches(apart)}
     record = _record(case, outcome, how)
     if outcome.code != _case.DONE:
         kind, why = REASONS[outcome.code]
@@ -129,7 +166,7 @@ def prepare(
     duration: float,
     *,
     tolerance: float = 1e-9,
-    slip_rule: str = "signed",
+    slip_rule: str | None = None,
     output: float | Sequence[float] | np.ndarray[Any, Any] = 1e-3,
     initial: tuple[float, float] = (0.0, 0.0),
     metered: bool = True,
@@ -140,12 +177,22 @@ def prepare(
             raise ParameterError(f"simulate: {name} = {value:g} {unit} must be greater than 0")
     if not all(math.isfinite(x) for x in initial):
         raise ParameterError(f"simulate: initial = {initial} must be two finite numbers")
-    if slip_rule not in ("signed", "literal"):
-        raise UnknownName("slip rule", slip_rule, ("signed", "literal"))
+    if controller.sample_time > 0.0:
+        _insist_on_steps("sample_time", controller.sample_time, duration)
     return lay_out(
         axis, controller, reference, float(duration),
         tolerance=tolerance, grid=_grid(output, duration), slip_rule=slip_rule, initial=initial, metered=metered,
     )  # fmt: skip
+
+
+def _insist_on_steps(name: str, step: float, duration: float) -> None:
+    """Refuse more steps than a computer takes within an hour or so; every integrator bounds its own besides."""
+    if not (step > 0.0 and duration / step <= MOST_STEPS):
+        count = duration / step if step > 0.0 else math.inf
+        raise ParameterError(
+            f"simulate: {name} = {step:g} s makes {count:.3g} steps of {duration:g} s, {MOST_STEPS:g} at most; use a "
+            "longer one or a shorter duration"
+        )
 
 
 def _grid(output: float | Sequence[float] | np.ndarray[Any, Any], duration: float) -> Any:
@@ -153,9 +200,12 @@ def _grid(output: float | Sequence[float] | np.ndarray[Any, Any], duration: floa
     if isinstance(output, (int, float)):
         if not (math.isfinite(output) and output > 0.0):
             raise ParameterError(f"simulate: output = {output:g} s must be greater than 0")
-        count = math.floor(duration / output * (1.0 + 1e-12))
+        ratio = duration / output * (1.0 + 1e-12)
+        count = math.floor(ratio) if math.isfinite(ratio) else ratio
         if count > 50_000_000:
-            raise ParameterError(f"simulate: output = {output:g} s gives {count} rows; use a larger spacing")
+            raise ParameterError(
+                f"simulate: output = {output:g} s gives {count:.3g} rows; use a larger spacing"
+            )
         # Multiples of the spacing, not a running sum, so that the grid is what a person would write down.
         return np.minimum(np.arange(count + 1) * float(output), duration)
     times = np.asarray(output, dtype=np.float64)
@@ -198,28 +248,33 @@ def integrator_for(case: Case, name: str = "auto") -> Choice:
 def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
     rows = outcome.rows
     columns = np.ascontiguousarray(rows.T)
+    helper, plant, assist = case.controller.compensator, case.plant.model, case.compensator.model
+    assert plant is not None
     meta: dict[str, Any] = {
         "what": "simulation",
         "version": stickslip.__version__,
         **how,
+        "slip_rules": slip_rules(friction=plant, compensator=assist),
         "tolerance": float(case.numbers[_case.TOLERANCE]),
         "duration": float(case.numbers[_case.DURATION]),
         "ended": outcome.time,
         "inertia": case.axis.inertia,
-        "friction": case.axis.friction.as_dict(),
+        "friction": plant.as_dict(),
         "gains": case.controller.gains._asdict(),
         "reference": case.reference.as_dict(),
         "counts": outcome.counts,
     }
-    helper = case.controller.compensator
-    if helper:
+    if helper and assist:
         meta["compensator"] = {
             "kind": helper.name,
             "gain": helper.gain,
             "filter_hz": helper.filter_hz,
             "lead": helper.lead,
             "deadband": helper.deadband,
-            **helper.model.as_dict(),
+            "offset": helper.offset,
+            "inertia_feedforward": helper.inertia_feedforward,
+            "substeps": helper.substeps,
+            **assist.as_dict(),
         }
     if case.numbers[_case.METERED] and outcome.code == _case.DONE:
         meta["metrics"] = {k: float(v) for k, v in metrics(outcome.meter, outcome.turns).items()}

@@ -36,15 +36,18 @@ from stickslip.simulation._case import (
     Case,
     Outcome,
     Side,
+    StepBudget,
 )
 from stickslip.simulation._exact_kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, LONGEST_STEP, solve
 from stickslip.simulation._forcing import NO_CELLS, feedforward
 from stickslip.simulation._meter import SIZE, close_standstill, new_meter, settle_band_of
 from stickslip.spec import Bristle, Elements, Law, Option
 
-__all__ = ["Prepared", "can_run", "prepare", "run"]
+__all__ = ["Prepared", "can_run", "is_literal", "prepare", "run"]
 
 EVENT_ROWS = 20_000
+STEPS = StepBudget(300_000, 300_000, 1_000, 50_000_000)
+"""The thesis's runs take 90,000 a second at most."""
 TURNS = 20_000
 NOTHING: Array = np.zeros((0, 2))
 NOTHING_1: Array = np.zeros(1)
@@ -82,7 +85,7 @@ def can_run(case: Case) -> str:
             return f"the exact integrator cannot take the {where}: {complaint}"
     plant = elements_of(case.plant)
     springs = isinstance(plant, Elements) and any(math.isfinite(k) for k in plant.stiffness)
-    if springs and controller.gains.kp == 0.0:
+    if springs and controller.linear.kp == 0.0:
         return (
             "the exact integrator needs a proportional gain with this plant: in a free slide, every spring slipping,"
             " it loses digits"
@@ -96,6 +99,11 @@ def modulations(law: Law) -> str:
     """The options that make the law depend on its surroundings, for people."""
     named = [f"{c.name} = {law.chosen[c.name]}" for c in law.choices if law.option(c).reads_surroundings]
     return ", ".join(named)
+
+
+def is_literal(side: Side) -> bool:
+    """Whether a side's elements break away by the literal slip rule (`stickslip.laws._stick`)."""
+    return side.model is not None and side.model.law.option_of("slip_rule") == "literal"
 
 
 def _complaint(side: Side) -> str:
@@ -202,6 +210,7 @@ def prepare(case: Case) -> Prepared:
         assert e is not None
         plan[col.CURVE_0 + 2 * i] = 0 if e.constant_curve else side.pointers.sliding
         plan[col.PARAMETERS_0 + 2 * i] = sum(b.size for b in blocks)
+        plan[col.LITERAL_0 + i] = 1.0 if is_literal(side) else 0.0
         blocks.append(side.parameters)
         if isinstance(e, Elements):
             finite += [
@@ -216,14 +225,13 @@ def prepare(case: Case) -> Prepared:
     plan[col.ELEMENTS], plan[col.SIDES] = len(finite), len(members)
     plan[col.PROFILE], plan[col.PROFILE_PARAMETERS] = case.profile, sum(b.size for b in blocks)
     blocks.append(case.reference_parameters)
-    law = case.plant.model.law if case.plant.model else None
-    plan[col.LITERAL] = 1 if law and law.chosen.get("slip_rule", "signed") == "literal" else 0
     cells, kinks = feedforward(case) if case.numbers[SOURCE] == FROM_REFERENCE else (NO_CELLS, [])
     plan[col.CELLS], plan[col.GRID_ROWS], plan[col.ROWS] = (
         len(cells),
         case.grid.size,
         case.grid.size + EVENT_ROWS,
     )
+    plan[col.MOST_STEPS] = STEPS.of(case)
     plan[col.SPACING] = even_spacing(case.grid)
     damping = case.numbers[KD] + float(np.sum(sides[:, col.WEIGHT] * sides[:, col.VISCOUS]))
     inertia = case.axis.inertia

@@ -25,6 +25,7 @@ from stickslip.simulation._case import (
     DIVERGED,
     DONE,
     DURATION,
+    ENCODER,
     FROM_MEASUREMENT,
     GAIN,
     INERTIA,
@@ -80,7 +81,7 @@ from stickslip.simulation._meter import (
     new_meter,
     settle_band_of,
 )
-from stickslip.simulation._sampled import COMPENSATION, MEMORY, sampler
+from stickslip.simulation._sampled import COMPENSATION, FAULT, MEMORY, measured_position, sampler
 from stickslip.spec import Surroundings
 
 __all__ = ["can_run", "run"]
@@ -322,11 +323,14 @@ def reach(
 def act(loop: Loop, a: Any, memory: Any) -> None:
     """Let the sampled controller act on the state a and hold its output."""
     wanted = loop.motion[0] - NUDGE * loop.motion[1]
+    read = measured_position(a[POSITION], loop.numbers[ENCODER])
     a[MOTOR] = call_sample(
-        loop.sampler, a[POSITION], wanted, loop.motion[1], pointer(loop.settings, 0), pointer(memory, 0),
-        pointer(memory, MEMORY), pointer(loop.helper_parameters, 0), pointer(loop.surroundings, 0),
+        loop.sampler, read, wanted, loop.motion[1], loop.motion[2], pointer(loop.settings, 0),
+        pointer(memory, 0), pointer(memory, MEMORY), pointer(loop.helper_parameters, 0), pointer(loop.surroundings, 0),
     )  # fmt: skip
     a[HELP] = memory[COMPENSATION]
+    if memory[FAULT] != 0.0:
+        a[MOTOR] = math.nan
 
 
 @kernel()

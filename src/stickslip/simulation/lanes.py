@@ -40,7 +40,7 @@ from stickslip.simulation._case import (
 from stickslip.simulation._forcing import feedforward
 from stickslip.simulation._lanes_source import Curve, Numbers, Refused, source
 from stickslip.simulation.batch import Results, laid_out, refusal
-from stickslip.simulation.exact import curve_of
+from stickslip.simulation.exact import curve_of, is_literal
 
 __all__ = ["DEVICES", "LANES", "METRICS", "STEP", "Lanes", "check_gpu", "prepare"]
 
@@ -291,7 +291,7 @@ def curve_for(m: Member, kept: Numbers) -> Curve:
     """The sliding curve of a law, with its numbers kept."""
     model = m.side.model
     assert model is not None
-    if model.law.chosen.get("slip_rule", "signed") == "literal":
+    if is_literal(m.side):
         raise Refused("slip rule 'literal' needs its events")
     if not m.curve:
         return Curve(None, None, [kept.place(m.columns[:, col.BREAKAWAY])])

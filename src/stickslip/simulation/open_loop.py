@@ -11,7 +11,7 @@ from stickslip.errors import InputError, StepFailure, UnknownName
 from stickslip.jit import compiled_profile, flat
 from stickslip.model import Model, Reference
 from stickslip.record import Record
-from stickslip.simulation._case import Side
+from stickslip.simulation._case import Side, ruled, slip_rules
 from stickslip.simulation._open_loop import Motion, march
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout
@@ -28,7 +28,7 @@ def respond(
     reference: Reference,
     times: Sequence[float] | Array,
     *,
-    slip_rule: str = "signed",
+    slip_rule: str | None = None,
     method: str = "auto",
     tolerance: float = 1e-10,
     surroundings: Surroundings | None = None,
@@ -43,8 +43,8 @@ def respond(
         The motion: rad, rad/s.
     times : array, shape (n,)
         Ascending, s, none before 0.
-    slip_rule : {"signed", "literal"}
-        For laws that have one.
+    slip_rule : {"signed", "literal"}, optional
+        For a law that has one, in place of its own choice.
     method : {"auto", "step", "rate"}
         "rate" integrates the law's rates (Dormand-Prince, located switches), "step" its own steps, extrapolated;
         "auto" takes rates where the law gives them. A law without states is evaluated at the times.
@@ -77,7 +77,7 @@ def respond(
         raise UnknownName("method", method, METHODS)
     if method == "rate" and model.law.rate is None:
         raise InputError(f"law {model.law.name!r} gives no `rate`; use method 'step'")
-    bound = model.having(slip_rule=slip_rule)
+    bound = ruled(model, slip_rule)
     by_step = method == "step" or bound.law.rate is None
     motion = reference.sample(time)
     around = surroundings or Surroundings()
@@ -92,7 +92,12 @@ def respond(
         time[:reached],
         {"position": motion[:reached, 0], "velocity": motion[:reached, 1], "friction_torque": torque},
         {"position": "rad", "velocity": "rad/s", "friction_torque": "N·m"},
-        {"model": bound.as_dict(), "reference": reference.as_dict(), "tolerance": tolerance},
+        {
+            "model": bound.as_dict(),
+            "slip_rules": slip_rules(model=bound),
+            "reference": reference.as_dict(),
+            "tolerance": tolerance,
+        },
     )
     if reached < time.size:
         raise StepFailure(

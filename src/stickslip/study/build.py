@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from stickslip import plugins
-from stickslip.config import Table
+from stickslip.config import Table, refuse_endless
 from stickslip.control import compensators
 from stickslip.control.compensators._base import Compensator
 from stickslip.control.controller import Controller
-from stickslip.control.linear import LINEAR, Gains, place
+from stickslip.control.linear import LINEAR, Cascade, Gains, place
 from stickslip.errors import ConfigError, InputError, suggestion
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
@@ -78,7 +78,7 @@ def law_files(table: Table) -> dict[str, Law]:
     found: dict[str, Law] = {}
     for path in table.files("plugins"):
         with table.blamed():
-            law = plugins.law(str(path)) if path.suffix == ".py" else None
+            law = plugins.law(str(path), table.label("plugins")) if path.suffix == ".py" else None
             if law is None:
                 raise ConfigError(
                     f"{table.label('plugins')}: {path.name} is no law's file; its name ends in .py"
@@ -154,7 +154,9 @@ def model(table: Table, laws: Mapping[str, Law], base: Model | None = None) -> M
         values.update({k: v for k, v in given.items() if k not in choices})
         _refuse_unknown(table, values, variant, options)
         found = Model(law, choices, **values)
-        return found.scaled(**scale) if scale else found
+        found = found.scaled(**scale) if scale else found
+        # A model that a file holds has been remarked upon as it was read.
+        return found if base and found.parameters == base.parameters else found.warn(table.label())
 
 
 def _refuse_unknown(
@@ -171,7 +173,7 @@ def _refuse_unknown(
 def _law(table: Table, laws: Mapping[str, Law]) -> Law:
     name = table.text("law")
     if name.endswith(".py"):
-        return plugins.law(str(table.document.locate(name)))
+        return plugins.law(str(table.document.locate(name)), table.label("law"))
     if name in laws:
         return laws[name]
     return plugins.law(table.choice("law", (*plugins.law_names(), *laws)))
@@ -211,6 +213,7 @@ def reference(table: Table) -> Reference:
 def _points(table: Table, written: str) -> list[list[float]]:
     """Columns of a CSV file: time (s), position (rad) and perhaps velocity (rad/s); one line of names may lead."""
     path = table.document.locate(written)
+    refuse_endless(path)
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = [
@@ -263,9 +266,9 @@ def controller(
     Parameters
     ----------
     table : Table
-        ``linear`` and ``placement``, or ``gains``; ``compensator``, ``law``, ``gain``, ``filter_hz``, ``lead``,
-        ``deadband``;
-        ``torque_limit``, ``sample_time``, ``encoder_counts``.
+        ``linear`` and ``placement``, or ``gains``, or ``cascade``; ``compensator``, ``law``, ``gain``, ``filter_hz``,
+        ``lead``, ``deadband``, ``offset``, ``inertia_feedforward``, ``substeps``;
+        ``torque_limit``, ``sample_time``, ``encoder_counts``, ``velocity_filter``.
     inertia : float
         Of the axis, kg·m²: what pole placement reckons with.
     default : Placement or None
@@ -280,11 +283,23 @@ def controller(
             table.positive("torque_limit", "N·m") if table.has("torque_limit") else math.inf,
             table.number("sample_time", "s", 0.0, lower=0.0),
             table.number("encoder_counts", "counts per revolution", 0.0, lower=0.0),
+            table.number("velocity_filter", "Hz", 0.0, lower=0.0),
         )
 
 
-def _gains(table: Table, inertia: float, default: Placement | None) -> Gains:
+def _gains(table: Table, inertia: float, default: Placement | None) -> Gains | Cascade:
     own = placement(table)
+    if table.has("cascade"):
+        for other in ("gains", "linear", "placement"):
+            if table.has(other):
+                raise ConfigError(
+                    f"{table.label()}: cascade and {other} exclude each other; give one of them"
+                )
+        with table.table("cascade") as given:
+            return Cascade(
+                given.number("kv", "1/s", lower=0.0), given.number("kvp", "N·m·s/rad", lower=0.0),
+                given.number("kvi", "N·m/rad", 0.0, lower=0.0), given.number("feed", "", 1.0, lower=0.0),
+            )  # fmt: skip
     if table.has("gains"):
         if table.has("linear") or own:
             raise ConfigError(f"{table.label()}: gains and linear exclude each other; give one of them")
@@ -305,7 +320,16 @@ def _gains(table: Table, inertia: float, default: Placement | None) -> Gains:
 def _compensator(table: Table, laws: Mapping[str, Model]) -> Compensator | None:
     kinds = {kind.name: kind for kind in Compensator.__subclasses__()}
     if not table.has("compensator"):
-        for key in ("law", "gain", "filter_hz", "lead", "deadband"):
+        for key in (
+            "law",
+            "gain",
+            "filter_hz",
+            "lead",
+            "deadband",
+            "offset",
+            "inertia_feedforward",
+            "substeps",
+        ):
             if key in table.values:
                 table.choice("compensator", kinds)
         return None
@@ -313,4 +337,11 @@ def _compensator(table: Table, laws: Mapping[str, Model]) -> Compensator | None:
     law = laws[table.choice("law", laws, family="laws")]
     gain = table.number("gain", "", 1.0)
     corner = table.positive("filter_hz", "Hz") if table.has("filter_hz") else None
-    return kind(law, gain, corner, table.number("lead", "s", 0.0), table.number("deadband", "rad/s", 0.0))
+    parts = table.number("substeps", "", 1.0, lower=1.0)
+    if not parts.is_integer():
+        raise table.error("substeps", "must be a whole number")
+    return kind(
+        law, gain, corner, table.number("lead", "s", 0.0), table.number("deadband", "rad/s", 0.0),
+        table.number("offset", "N·m", 0.0), table.number("inertia_feedforward", "kg·m²", 0.0),
+        int(parts),
+    )  # fmt: skip

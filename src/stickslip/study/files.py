@@ -110,8 +110,13 @@ def find_run(folder: Path, planned: PlannedRun) -> Run | None:
         return None  # Missing, cut off or written by something else: it is run again.
     return Run(
         planned.slip_rule, planned.reference, planned.friction, planned.controller,
-        meta.get("metrics", {}), path, about["failure"], about["seconds"],
+        meta.get("metrics", {}), path, about["failure"], about["seconds"], depends_on_start(meta),
     )  # fmt: skip
+
+
+def depends_on_start(meta: Mapping[str, Any]) -> bool:
+    """Whether a record's meta says that the run depends on its start."""
+    return bool(meta.get("accuracy", {}).get("depends_on_start", False))
 
 
 # ---- tables -----------------------------------------------------------------------------------------------

@@ -24,6 +24,8 @@ from stickslip.study.result import Run
 __all__ = ["SLIP_RULES", "Drive", "PlannedRun", "Response", "Study", "load", "load_run", "select"]
 
 SLIP_RULES = ("signed", "literal")
+OWN = "own"
+"""What stands for the slip rule in the name of a run whose laws keep rules of their own."""
 BUILT_IN = ("thesis",)
 FAMILIES = ("slip_rule", "reference", "friction", "controller")
 
@@ -47,11 +49,21 @@ class PlannedRun:
         """`slip_rule/reference/friction/controller`."""
         return f"{self.slip_rule}/{self.reference}/{self.friction}/{self.controller}"
 
+    @property
+    def rule(self) -> str | None:
+        """The slip rule that the file gives for the whole run; None where each law keeps its own."""
+        return None if self.slip_rule == OWN else self.slip_rule
+
     @functools.cached_property
     def fingerprint(self) -> str:
         """A hash of everything that determines the run's numbers."""
         helper = self.control.compensator
-        sampled = [helper.lead, helper.deadband] if helper and (helper.lead or helper.deadband) else []
+        sampled = [helper.lead, helper.deadband] if helper and helper.sampled else []
+        if helper and (helper.offset or helper.inertia_feedforward):
+            sampled += [helper.offset, helper.inertia_feedforward]
+        if helper and helper.substeps != 1:
+            sampled += ["substeps", helper.substeps]
+        filtered = [self.control.velocity_filter] if self.control.velocity_filter else []
         content = {
             "slip_rule": self.slip_rule,
             "inertia": self.axis.inertia,
@@ -59,7 +71,12 @@ class PlannedRun:
             "gains": self.control.gains._asdict(),
             "compensator": helper
             and [helper.name, helper.gain, helper.filter_hz, helper.model.as_dict(), *sampled],
-            "control": [self.control.torque_limit, self.control.sample_time, self.control.encoder_counts],
+            "control": [
+                self.control.torque_limit,
+                self.control.sample_time,
+                self.control.encoder_counts,
+                *filtered,
+            ],
             "reference": self.motion.as_dict(),
             "duration": self.duration,
             "numerics": asdict(self.numerics),
@@ -83,7 +100,7 @@ class PlannedRun:
         try:
             case = prepare(
                 self.axis, self.control, self.motion, self.duration,
-                tolerance=n.tolerance, slip_rule=self.slip_rule, output=n.output,
+                tolerance=n.tolerance, slip_rule=self.rule, output=n.output,
             )  # fmt: skip
             integrator_for(case, n.integrator)
         except InputError as error:
@@ -177,7 +194,7 @@ def load(study: str | Path, moved: Mapping[str, Path] | None = None) -> Study:
 def _study(name: str, path: Path, table: Table) -> Study:
     with table:
         title = table.text("title", name)
-        rules = table.texts("slip_rules", SLIP_RULES) if table.has("slip_rules") else ["signed"]
+        rules = table.texts("slip_rules", SLIP_RULES) if table.has("slip_rules") else [None]
         parts = _Parts.read(table)
         runs = parts.runs(rules, parts.motions, parts.frictions, parts.controllers)
         compared = [r for t in table.tables("comparisons").values() for r in _comparison(t, parts, rules[0])]
@@ -216,7 +233,7 @@ def load_run(path: Path) -> PlannedRun:
                 "table [friction] (`stickslip simulate --help` shows one)"
             )
         numerics = build.numerics(table, Numerics())
-        rule = table.choice("slip_rule", SLIP_RULES, "signed")
+        rule = table.choice("slip_rule", SLIP_RULES) if table.has("slip_rule") else None
         files = build.law_files(table)
         laws = build.models(table.tables("laws"), files)
         with table.table("friction") as t:
@@ -227,9 +244,18 @@ def load_run(path: Path) -> PlannedRun:
             numerics = build.numerics(t, numerics)
             control = build.controller(t, axis.inertia, motion.placement, laws)
     return PlannedRun(
-        rule, motion.reference.kind.name, axis.friction.law.name, "controller",
+        named_rule(rule, axis, control), motion.reference.kind.name, axis.friction.law.name, "controller",
         axis, control, motion.reference, motion.duration, numerics,
     )  # fmt: skip
+
+
+def named_rule(rule: str | None, axis: RigidAxis, control: Controller) -> str:
+    """The rule by which a run's name calls it: what its file gives; where it gives none, "own" if one of its laws
+    brings another one than the default."""
+    helper = control.compensator
+    models = (axis.friction, helper.model if helper else None)
+    kept = {m.law.option_of("slip_rule") for m in models if m is not None} - {""}
+    return rule or (OWN if kept - {SLIP_RULES[0]} else SLIP_RULES[0])
 
 
 @dataclass(frozen=True)
@@ -278,7 +304,7 @@ class _Parts:
 
     def runs(
         self,
-        rules: Iterable[str],
+        rules: Iterable[str | None],
         motions: Iterable[str],
         frictions: Iterable[str],
         controllers: Iterable[str],
@@ -295,13 +321,13 @@ class _Parts:
                         numerics,
                     )
         return [
-            PlannedRun(rule, m, f, c, self.frictions[f], made[c, m][0], self.motions[m].reference,
-                       self.motions[m].duration, made[c, m][1])
+            PlannedRun(named_rule(rule, self.frictions[f], made[c, m][0]), m, f, c, self.frictions[f], made[c, m][0],
+                       self.motions[m].reference, self.motions[m].duration, made[c, m][1])
             for rule in rules for m in motions for f in frictions for c in controllers
         ]  # fmt: skip
 
 
-def _comparison(table: Table, parts: _Parts, rule: str) -> list[PlannedRun]:
+def _comparison(table: Table, parts: _Parts, rule: str | None) -> list[PlannedRun]:
     with table:
         table.text("title", "")
         table.has("figures")

@@ -26,6 +26,9 @@ class Run:
         Why the run ended early, or the empty string.
     seconds : float
         CPU time of the run, s.
+    depends_on_start : bool
+        Whether a start 1e-9 rad beside takes another branch of the motion (`stickslip.simulation.accuracy`), so that
+        its metrics are those of one branch; False where another integrator than the exact one ran it.
     """
 
     slip_rule: str
@@ -36,6 +39,7 @@ class Run:
     path: Path
     failure: str = ""
     seconds: float = 0.0
+    depends_on_start: bool = False
 
     @property
     def case(self) -> str:

@@ -158,7 +158,7 @@ def run_case(plant: Machine, case: Case) -> tuple[Record, str]:
     rig, stopped = VirtualRig(plant), ""
     count = round(case.duration / plant.sample_time)
     path = case.reference.sample(np.arange(count) * plant.sample_time)
-    wanted = setpoints(count, position=path[:, 0], velocity=path[:, 1], closed=1.0)
+    wanted = setpoints(count, position=path[:, 0], velocity=path[:, 1], acceleration=path[:, 2], closed=1.0)
     with Loop(rig, meta={"run": case.key, "machine": plant.as_dict()}) as loop:
         try:
             loop.run(wanted, case.control)

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from stickslip.errors import InputError, SimulationError
+from stickslip.capacity import insist_on_jobs
+from stickslip.errors import SimulationError
 from stickslip.record import Record
-from stickslip.simulation.closed_loop import simulate
+from stickslip.simulation.closed_loop import prepare, run_case
 from stickslip.study import files
 from stickslip.study.plan import PlannedRun, Study, load, load_run, select
 from stickslip.study.result import Run, StudyResult
@@ -43,16 +44,17 @@ class Executed:
 def execute(planned: PlannedRun, check: bool = False) -> Executed:
     """Simulate one `planned` run that its `check` passes; one that ends early gives what was computed until then.
 
-    With `check` the record's meta has the estimate of its error (`stickslip.simulate`).
+    With `check` the record's meta has the estimate of its error (`stickslip.simulate`); whether the run depends on its
+    start it has anyway where the exact integrator runs it.
     """
     n = planned.numerics
     start, failure = time.thread_time(), ""
     try:
-        record = simulate(
-            planned.axis, planned.control, planned.motion, planned.duration, integrator=n.integrator,
-            tolerance=n.tolerance, time_step=n.time_step, slip_rule=planned.slip_rule, output=n.output,
-            check=check,
+        case = prepare(
+            planned.axis, planned.control, planned.motion, planned.duration,
+            tolerance=n.tolerance, slip_rule=planned.rule, output=n.output,
         )  # fmt: skip
+        record = run_case(case, n.integrator, n.time_step, planned.rule, check=check, start=True)
     except SimulationError as error:
         if error.record is None:
             raise
@@ -90,8 +92,7 @@ def run(
     InputError
         If a part of a name is unknown, a run cannot be run, or the folder cannot be written.
     """
-    if jobs < 1:
-        raise InputError(f"jobs = {jobs} must be at least 1")
+    insist_on_jobs(jobs)
     everything = [*study.runs, *study.extras]
     wanted = select(everything, only or ())
     folder = files.claim_folder(Path(out), study)
@@ -190,5 +191,5 @@ def _run_and_keep(planned: PlannedRun, folder: Path) -> Run:
     path = files.keep_record(folder, planned, record)
     return Run(
         planned.slip_rule, planned.reference, planned.friction, planned.controller,
-        executed.metrics, path, executed.failure, executed.seconds,
+        executed.metrics, path, executed.failure, executed.seconds, files.depends_on_start(record.meta),
     )  # fmt: skip

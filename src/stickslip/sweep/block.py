@@ -19,7 +19,7 @@ from stickslip.study.plan import PlannedRun
 from stickslip.sweep.numbers import as_columns, varied
 from stickslip.sweep.plan import BLOCK, Sweep
 
-__all__ = ["FLOORS", "Block", "Measured", "compute", "differ", "integrator_of", "measured"]
+__all__ = ["FLOORS", "Block", "Measured", "compute", "compute_cases", "differ", "integrator_of", "measured"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TIGHTER, FINEST = (0.1, 0.01, 0.001), 1e-10
@@ -75,7 +75,11 @@ class Measured(NamedTuple):
 
 def compute(sweep: Sweep, run: int, start: int) -> Block:
     """Run the block of cases that begins with `start`."""
-    numbers = sweep.drawn.block(start, min(start + BLOCK, sweep.drawn.cases))
+    return compute_cases(sweep, run, start, sweep.drawn.block(start, min(start + BLOCK, sweep.drawn.cases)))
+
+
+def compute_cases(sweep: Sweep, run: int, start: int, numbers: Array) -> Block:
+    """Run these cases, shape (n, names), of which `start` is the first one's place."""
     planned = sweep.runs[run]
     values = sweep.values(planned, numbers)
     flagged = np.zeros(len(numbers), dtype=np.bool_)
@@ -229,7 +233,7 @@ def _laid_out(planned: PlannedRun) -> _case.Case:
     n = planned.numerics
     return prepare(
         planned.axis, planned.control, planned.motion, planned.duration,
-        tolerance=n.tolerance, slip_rule=planned.slip_rule, output=planned.duration,
+        tolerance=n.tolerance, slip_rule=planned.rule, output=planned.duration,
     )  # fmt: skip
 
 

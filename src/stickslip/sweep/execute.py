@@ -21,6 +21,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from stickslip.approval import allow_code
+from stickslip.capacity import insist_on_jobs, insist_on_memory
 from stickslip.errors import InputError
 from stickslip.simulation import lanes
 from stickslip.study.files import copy_inputs, prepared_folder, unwritable
@@ -80,12 +82,12 @@ def run(
         If the folder or the scheduler cannot be used, there is no GPU and one is asked for, or workers are killed
         again and again.
     """
-    if jobs < 0:
-        raise InputError(f"jobs = {jobs} must be at least 1")
+    if jobs:
+        insist_on_jobs(jobs)
     ready(sweep, scheduler)
+    dataset.room_for(Path(out), sweep)
     folder = claim(Path(out), sweep)
     dataset.refuse_strays(folder, sweep)
-    dataset.room_for(folder, sweep)
     integrators = [integrator_of(sweep, i) for i in range(len(sweep.runs))]
     if say:
         for line in departures(sweep, integrators):
@@ -113,6 +115,10 @@ def run(
     return write_manifest(folder, sweep, timings, integrators)
 
 
+BOOKED = 1000
+"""Bytes that a block takes in the books of a sweep"""
+
+
 def ready(sweep: Sweep, scheduler: str = "") -> None:
     """Refuse what cannot run here.
 
@@ -127,6 +133,8 @@ def ready(sweep: Sweep, scheduler: str = "") -> None:
         )
     if sweep.device == "gpu" and not scheduler:
         lanes.check_gpu()
+    loops = len(sweep.runs) * sweep.drawn.cases
+    insist_on_memory(loops / BLOCK * BOOKED, f"{loops:.3g} closed loops in blocks of {BLOCK}", "run fewer")
     for planned in sweep.runs:
         planned.check()
 
@@ -302,7 +310,8 @@ class Parcel:
         for _, name, content in self.files:
             (folder / name).write_bytes(content)
         moved = {written: folder / name for written, name, _ in self.files[1:]}
-        sweep = replace(load(folder / self.files[0][1], moved), **pickle.loads(self.changed))
+        with allow_code():  # Who packed it has read it, code and all.
+            sweep = replace(load(folder / self.files[0][1], moved), **pickle.loads(self.changed))
         if fingerprints(sweep) != self.fingerprints:
             raise InputError(
                 f"a worker on {platform.node()} would compute other numbers: install the same version of stickslip "

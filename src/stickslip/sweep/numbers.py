@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.control.linear import Gains, place
+from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import UnknownName
 from stickslip.model import Model, Reference
 from stickslip.study.plan import PlannedRun
@@ -55,7 +55,7 @@ def known(run: PlannedRun) -> dict[str, Any]:
         found |= {f"law.{k}": v for k, v in helper.model.parameters._asdict().items()}
         found["controller.gain"] = helper.gain
         found["controller.filter_hz"] = helper.filter_hz or math.inf
-    if gains.kp > 0.0:
+    if isinstance(gains, Gains) and gains.kp > 0.0:
         _, found["controller.bandwidth_hz"], found["controller.damping"] = poles(gains, run.axis.inertia)
     found |= {f"controller.{k}": v for k, v in gains._asdict().items()}
     found["controller.torque_limit"] = run.control.torque_limit
@@ -140,14 +140,14 @@ def _control(run: PlannedRun, settings: Mapping[str, Any], law: Mapping[str, Any
     )  # fmt: skip
 
 
-def _gains(run: PlannedRun, settings: Mapping[str, float]) -> Gains:
+def _gains(run: PlannedRun, settings: Mapping[str, float]) -> Gains | Cascade:
     gains = run.control.gains
-    if any(name in settings for name in POLES):
+    if isinstance(gains, Gains) and any(name in settings for name in POLES):
         kind, bandwidth, damping = poles(gains, run.axis.inertia)
         gains = place(
             kind, run.axis.inertia, settings.get("bandwidth_hz", bandwidth), settings.get("damping", damping)
         )
-    return gains._replace(**{k: v for k, v in settings.items() if k in Gains._fields})
+    return gains._replace(**{k: v for k, v in settings.items() if k in gains._fields})
 
 
 # ---- columns of a batch ------------------------------------------------------------------------------------

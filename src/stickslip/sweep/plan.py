@@ -31,6 +31,8 @@ BLOCK = 256
 """Cases in a file of the data set."""
 USUAL = ("position_rms_rad", "position_peak_rad", "velocity_rms_rad_s", "torque_rms_Nm")
 MOST_CASES = 1_000_000_000
+MOST_SEED = 2**63
+"""What files that hold it can say as a number"""
 
 
 @dataclass(frozen=True)
@@ -220,6 +222,8 @@ def _drawn(table: Table, laws: set[str]) -> tuple[Drawn, tuple[str, ...]]:
     if cases > MOST_CASES:
         raise ConfigError(f"{table.label()}: {cases} cases are too many; keep below {MOST_CASES}")
     seed = _whole(table, "seed", 1, least=0)
+    if seed >= MOST_SEED:
+        raise ConfigError(f"{table.label('seed')} = {seed} has more than 63 bits; give a number below 2**63")
     nested = table.choice("nested", ("yes", "no"), "no") == "yes"
     if nested and (method == "grid" or not spreads):
         raise table.error("nested", "needs ranges and the method sobol or latin")

@@ -9,7 +9,9 @@ from typing import ClassVar
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
-__all__ = ["Compensator"]
+__all__ = ["MOST_SUBSTEPS", "Compensator"]
+
+MOST_SUBSTEPS = 1000
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,15 @@ class Compensator:
     deadband : float
         The law sees velocities below it, rad/s, as rest, so that a count of the encoder does not compensate a friction
         that is not there. Only with a sample time.
+    offset : float
+        Constant torque that acts against positive motion beside friction, N·m: it is given whole, whatever the gain.
+        Only with a sample time.
+    inertia_feedforward : float
+        Inertia whose torque along the reference is given, kg·m² times the reference's acceleration. Only with a sample
+        time.
+    substeps : int
+        Steps of the law into which a sample is divided, the velocity linear in between, 1 to 1000: the error of a step
+        falls with them. Only with a sample time.
     """
 
     model: Model
@@ -37,6 +48,9 @@ class Compensator:
     filter_hz: float | None = None
     lead: float = 0.0
     deadband: float = 0.0
+    offset: float = 0.0
+    inertia_feedforward: float = 0.0
+    substeps: int = 1
 
     name: ClassVar[str] = ""
     prefix: ClassVar[str] = ""
@@ -50,10 +64,26 @@ class Compensator:
             )
         if self.filter_hz is not None and not (self.filter_hz > 0.0 and math.isfinite(self.filter_hz)):
             raise ParameterError(f"{self.name}: filter_hz = {self.filter_hz:g} Hz must be greater than 0")
-        for name, value, unit in (("lead", self.lead, "s"), ("deadband", self.deadband, "rad/s")):
+        if not math.isfinite(self.offset):
+            raise ParameterError(f"{self.name}: offset = {self.offset:g} N·m must be a finite number")
+        for name, value, unit in (
+            ("lead", self.lead, "s"), ("deadband", self.deadband, "rad/s"),
+            ("inertia_feedforward", self.inertia_feedforward, "kg·m²"),
+        ):  # fmt: skip
             if not (value >= 0.0 and math.isfinite(value)):
                 raise ParameterError(f"{self.name}: {name} = {value:g} {unit} must be at least 0")
+        if not (1 <= self.substeps <= MOST_SUBSTEPS and self.substeps == int(self.substeps)):
+            raise ParameterError(
+                f"{self.name}: substeps = {self.substeps:g} must be a whole number from 1 to {MOST_SUBSTEPS}"
+            )
         if self.lead > 0.0 and self.velocity != "reference":
             raise ParameterError(
                 f"{self.name}: lead = {self.lead:g} s, but only a reference can be led; leave it out"
             )
+
+    @property
+    def sampled(self) -> tuple[str, ...]:
+        """The names of what is set and acts on samples only."""
+        names = ("lead", "deadband", "offset", "inertia_feedforward")
+        set_here = [name for name in names if getattr(self, name) != 0.0]
+        return (*set_here, *(["substeps"] if self.substeps != 1 else []))

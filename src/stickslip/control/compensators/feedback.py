@@ -30,6 +30,15 @@ class Feedback(Compensator):
     deadband : float
         The law sees velocities below it, rad/s, as rest, so that a count of the encoder does not compensate a friction
         that is not there. Only with a sample time.
+    offset : float
+        Constant torque that acts against positive motion beside friction, N·m: it is given whole, whatever the gain.
+        Only with a sample time.
+    inertia_feedforward : float
+        Inertia whose torque along the reference is given, kg·m² times the reference's acceleration. Only with a sample
+        time.
+    substeps : int
+        Steps of the law into which a sample is divided, the velocity linear in between, 1 to 1000: the error of a step
+        falls with them. Only with a sample time.
     """
 
     name: ClassVar[str] = "feedback"

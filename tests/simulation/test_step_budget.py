@@ -1,0 +1,45 @@
+"""No integrator takes far more steps than its motion is long: it ends in one line with the remedy."""
+
+from __future__ import annotations
+
+import pytest
+
+import stickslip as ss
+from stickslip.errors import StepFailure
+from stickslip.simulation import adaptive, exact
+from stickslip.simulation._case import StepBudget
+from stickslip.simulation.closed_loop import prepare
+
+LUGRE = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}
+PD = ss.Controller(ss.place("PD", 4e-4, 10.0, 1.0))
+
+
+def loop(inertia: float, frequency: float):
+    return (
+        ss.RigidAxis(inertia, ss.Model("lugre", **LUGRE)),
+        PD,
+        ss.Reference("sine", amplitude=0.1, frequency=frequency),
+    )
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "inertia", "frequency"),
+    [(exact, "exact", 1e-12, 1.0), (adaptive, "adaptive", 4e-4, 1e3)],
+)
+def test_too_many_steps_end_the_run_with_the_remedy(module, name, inertia, frequency, monkeypatch):
+    monkeypatch.setattr(module, "STEPS", StepBudget(2000.0, 0.0, 0.0))
+    with pytest.raises(
+        StepFailure, match=r"far more steps than a motion of its length takes.*use the fixed"
+    ) as caught:
+        ss.simulate(*loop(inertia, frequency), 0.5, integrator=name)
+    assert "\n" not in str(caught.value)
+    assert caught.value.record.meta["counts"]["steps"] <= 2010
+
+
+def test_the_budget_grows_with_the_motion_and_holds_what_the_thesis_takes():
+    """Of its runs, the step with LuGre feedback takes most: 265,000 steps of the exact integrator in 3 s."""
+    short, long = (prepare(*loop(4e-4, 4.0), duration) for duration in (3.0, 60.0))
+    assert exact.STEPS.of(short) > 4 * 265_000
+    for module in (exact, adaptive):
+        assert module.STEPS.of(long) > 10 * module.STEPS.of(short) - 10 * module.STEPS.base
+        assert module.STEPS.of(long) <= 50_000_000
