@@ -17,7 +17,7 @@ from stickslip.readers._table import Array, Column, Table
 from stickslip.readers._units import SI, Unit, parse_unit
 from stickslip.record import Record
 
-__all__ = ["Drive", "convert"]
+__all__ = ["Drive", "convert", "times_of"]
 
 LINEAR = {
     "angle": "length",
@@ -34,6 +34,8 @@ MOTION = (
     "acceleration",
 )
 EFFORT = ("motor_torque", "friction_torque", "sensor_torque", "compensation_torque")
+NUMBERS = ("counts_per_rev", "rated_torque", "rated_current", "torque_constant", "gear_ratio", "lead")
+"""What a drive's data sheet says, each a positive number."""
 PERIODS = (
     "dt",
     "ts",
@@ -77,6 +79,9 @@ class Drive:
         Revolutions of the motor for one of the load.
     side : {"motor", "load"}
         The side of the gear that the record is about: what was measured on the other one is converted.
+    lead : float
+        m that a linear axis moves for one revolution: a screw's lead, a pinion's or pulley's circumference. Where a
+        record has both lengths and torques (angles and forces), all becomes lengths and forces.
     """
 
     counts_per_rev: float = math.nan
@@ -85,9 +90,10 @@ class Drive:
     torque_constant: float = math.nan
     gear_ratio: float = math.nan
     side: str = "motor"
+    lead: float = math.nan
 
     def __post_init__(self) -> None:
-        for name in ("counts_per_rev", "rated_torque", "rated_current", "torque_constant", "gear_ratio"):
+        for name in NUMBERS:
             value = getattr(self, name)
             if not math.isnan(value) and not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"{name} = {value:g} must be greater than 0")
@@ -148,7 +154,9 @@ def convert(
             "source": choice.source,
         }
         listed.append({**entry, "factor": scale, "side": choice.side or "motor", "steps": steps})
-    derived = _torque_from_current(channels, units, drive, linear)
+    said += _one_kind(channels, units, listed, drive)
+    derived, more = _torque_from_current(channels, units, drive, linear)
+    said += more
     reading = {
         "format": table.format,
         "columns": listed,
@@ -193,7 +201,7 @@ def _scale(choice: Choice, unit: Unit, drive: Drive, linear: bool) -> tuple[floa
         steps.append(f"2π / {per_rev:g} counts")
     elif kind == "share" and choice.role in ("motor_torque", "compensation_torque"):
         rated = _needed(drive.rated_torque, choice, "a share of the rated torque", "--rated-torque")
-        factor, kind = factor * rated, "force" if linear else "torque"
+        factor, kind = factor * rated, "force" if linear and math.isnan(drive.lead) else "torque"
         steps.append(f"rated torque {rated:g}")
     elif kind == "share" and choice.role in ("current", "current_reference"):
         rated = _needed(drive.rated_current, choice, "a share of the rated current", "--rated-current")
@@ -220,25 +228,65 @@ def _needed(value: float, choice: Choice, what: str, option: str, other: str = "
     return value
 
 
+def _one_kind(
+    channels: dict[str, Array], units: dict[str, str], listed: list[dict[str, Any]], drive: Drive
+) -> list[Finding]:
+    """Lengths and torques (angles and forces) in one record: with the lead all is made lengths and forces in place."""
+    turning = [
+        c for c in channels if (c in MOTION and "rad" in units[c]) or (c in EFFORT and units[c] == "N·m")
+    ]
+    along = [c for c in channels if c in (*MOTION, *EFFORT) and c not in turning]
+    if not turning or not along:
+        return []
+    if math.isnan(drive.lead):
+        columns = {e["channel"]: f"{e['channel']} {e['column']!r} in {e['unit']}" for e in listed}
+        level = "error" if "motor_torque" in (*turning, *along) else "warning"
+        message = f"the record mixes {columns[along[0]]} with {columns[turning[0]]}: lengths and torques"
+        remedy = (
+            "give --lead MM, what the axis moves for one revolution (a screw's lead, a pulley's circumference), and "
+            "--gear-ratio N where a gear lies between"
+        )
+        return [Finding(level, "mixed-units", message, remedy=remedy)]
+    # What turns is on the motor's side, unless its gear has been allowed for.
+    geared = any("gear ratio" in step for entry in listed for step in entry.get("steps", []))
+    way = drive.lead / (1.0 if geared else _ratio_or_one(drive)) / (2.0 * math.pi)
+    for entry in listed:
+        channel = entry["channel"]
+        if channel in turning:
+            factor = way if channel in MOTION else 1.0 / way
+            channels[channel] = factor * channels[channel]
+            units[channel] = units[channel].replace("rad", "m").replace("N·m", "N")
+            entry["factor"] *= factor
+            entry["steps"].append(f"{2e3 * math.pi * way:g} mm a revolution")
+    return []
+
+
 def _torque_from_current(
     channels: dict[str, Array], units: dict[str, str], drive: Drive, linear: bool
-) -> dict[str, str]:
+) -> tuple[dict[str, str], list[Finding]]:
     """Torque = current x torque constant, where a current and a constant are given and no torque."""
     if "motor_torque" in channels or "current" not in channels or math.isnan(drive.torque_constant):
-        return {}
-    factor = drive.torque_constant
-    if drive.side == "load":
-        factor *= _ratio_or_one(drive)
+        return {}, []
+    factor, gear = drive.torque_constant, ""
+    if drive.side == "load" and not math.isnan(drive.gear_ratio):
+        factor *= drive.gear_ratio
+        gear = f" x gear ratio {drive.gear_ratio:g}"
+    said: list[Finding] = []
+    along = linear or any(units[c].startswith("m") for c in channels if c in MOTION)
+    unit = SI["force" if along else "torque"]
+    constant = f"{drive.torque_constant:g} {unit}/A"
+    if along and not math.isnan(drive.lead):
+        way = drive.lead / (1.0 if gear else _ratio_or_one(drive))
+        factor *= 2.0 * math.pi / way
+        constant, gear = f"{drive.torque_constant:g} N·m/A", f" x 2π / {1e3 * way:g} mm"
+    elif along:
+        message = f"the axis moves along a line: --torque-constant {drive.torque_constant:g} was taken in N/A"
+        said.append(
+            Finding("warning", "mixed-units", message, remedy="if it is in N·m/A, give the screw's --lead MM")
+        )
     channels["motor_torque"] = factor * channels["current"]
-    units["motor_torque"] = SI["force" if linear else "torque"]
-    gear = (
-        f" x gear ratio {drive.gear_ratio:g}"
-        if drive.side == "load" and not math.isnan(drive.gear_ratio)
-        else ""
-    )
-    return {
-        "motor_torque": f"current x torque constant {drive.torque_constant:g} {units['motor_torque']}/A{gear}"
-    }
+    units["motor_torque"] = unit
+    return {"motor_torque": f"current x torque constant {constant}{gear}"}, said
 
 
 def _ratio_or_one(drive: Drive) -> float:
@@ -305,6 +353,23 @@ def _time(
     raise InputError(
         f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give --sample-time SECONDS"
     )
+
+
+def times_of(table: Table, choices: Sequence[Choice], sample_time: float | None) -> tuple[Array, float]:
+    """A table's times in s from their origin, and that origin in s.
+
+    Raises
+    ------
+    InputError
+        If it has none.
+    """
+    columns = {c.name: c for c in table.columns}
+    # Any column tells how many samples there are, whatever it holds.
+    by_role = {c.role: c for c in choices} or {
+        "position": Choice("position", table.columns[0].name, "", "assumed")
+    }
+    time, origin, _ = _time(table, by_role, columns, sample_time)
+    return time, origin
 
 
 def _some(table: Table) -> str:

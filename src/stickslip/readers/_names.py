@@ -28,6 +28,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "current": ("current", "share"),
     "current_reference": ("current", "share"),
     "voltage": ("voltage",),
+    "supply": ("voltage",),
     "load": ("force", "torque", "share"),
     "temperature": ("temperature",),
 }
@@ -80,6 +81,8 @@ WORDS = _table(
     friction_torque: friction reibung reibmoment reibkraft reibungsmoment reibungskraft
     current: current currents strom iq amps iqist stromistwert iststrom motorstrom cur amperage
     voltage: voltage volts spannung volt uq motorspannung vir
+    supply: supply vbus vdc udc ubat vbat battery dclink vsupply versorgung versorgungsspannung zwischenkreis
+        zwischenkreisspannung
     load: normal normalforce normalkraft preload vorspannung fn load last
     temperature: temperature temp temperatur motortemp tmp
     position_error: schleppfehler schleppabstand followingerror lag poserror posdiff regelabweichung
@@ -98,7 +101,8 @@ WHOLE = _table(
     friction_torque: tf t_f ff f_f tau_f m_r mr
     sensor_torque: sensor_torque torque_sensor
     current: i i_q iq_measured iq_act 6078 il.fb r0078 r78 i_act im i_m ia
-    voltage: u vm u_q u_m v_motor ua input_volts 6079
+    voltage: u vm u_q u_m v_motor ua
+    supply: input_volts input_voltage vin v_in vbus v_bus u_bus bus_voltage udc u_dc vdc v_dc u_zk ubat vbat 6079
     acceleration: a ddq qddot ddx a_act
     temperature: r0035 r35
     position_reference: qg q_d qd qr q_r q_ref q_des xd x_d 607a 6062 pl.cmd s-0-0047 input_pos r ref w_pos
@@ -280,8 +284,9 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
     found = [role for role, known in WORDS.items() if not set(known).isdisjoint(parts)]
     if "load" in found and len(found) > 1:
         found.remove("load")  # "load position" is a position on the load's side
-    if "friction_torque" in found:
-        found = ["friction_torque"]
+    for one in ("friction_torque", "supply"):
+        if one in found:
+            found = [one]
     if (
         {"following", "error"} <= set(parts)
         or "position_error" in found

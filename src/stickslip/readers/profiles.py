@@ -11,17 +11,40 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from stickslip.config import read_toml
 from stickslip.errors import InputError
+from stickslip.finding import Finding
 from stickslip.readers._choose import parse_mapping
 from stickslip.readers._convert import Drive
 from stickslip.readers._table import Table
+from stickslip.record import Record
 
-__all__ = ["Profile", "alike", "fingerprint", "folder", "load", "merged", "remembered", "save"]
+__all__ = [
+    "Profile",
+    "alike",
+    "fingerprint",
+    "folder",
+    "load",
+    "merged",
+    "misfits",
+    "remembered",
+    "save",
+    "sizes",
+]
+
+NUMBERS_BEHIND = {
+    "speed": ("counts_per_rev", "gear_ratio", "lead"),
+    "torque": ("torque_constant", "rated_torque", "rated_current", "gear_ratio", "lead"),
+}
+"""Numbers of the drive on which the size of a signal depends."""
+OTHER = 4.0
+"""Times as large, or as small, from which on it is asked whether they hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +58,53 @@ class Profile:
     drive : Drive
     sample_time : float or None
         s, for files without times.
+    seen : mapping of str to float
+        Size of speed and torque in the record that it was written for, as `sizes` gives it.
     """
 
     mapping: Mapping[str, str]
     drive: Drive
     sample_time: float | None = None
+    seen: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 def alike(first: Profile, second: Profile) -> bool:
     """Whether both say the same; a number that nobody gave (not a number) is equal to another."""
     said = [(dict(p.mapping), p.drive.known(), p.sample_time) for p in (first, second)]
     return said[0] == said[1]
+
+
+def sizes(record: Record) -> dict[str, float]:
+    """Size of speed and torque that 95 % of the rows keep, in the record's units."""
+    out: dict[str, float] = {}
+    if "position" in record.channels and len(record) > 100:
+        step = max(1, len(record) // 1000)
+        way, time = record["position"][::step], record.time[::step]
+        with np.errstate(all="ignore"):
+            out["speed"] = float(np.nanpercentile(np.abs(np.diff(way) / np.diff(time)), 95))
+    if "motor_torque" in record.channels and np.any(np.isfinite(record["motor_torque"])):
+        out["torque"] = float(np.nanpercentile(np.abs(record["motor_torque"]), 95))
+    return {key: value for key, value in out.items() if math.isfinite(value) and value > 0.0}
+
+
+def misfits(profile: Profile, record: Record, overruled: Mapping[str, Any]) -> list[Finding]:
+    """What asks whether a profile's numbers hold for this record: of another size than the one it was written for."""
+    out: list[Finding] = []
+    now, known = sizes(record), profile.drive.known()
+    for key, before in profile.seen.items():
+        brought = [n for n in NUMBERS_BEHIND[key] if n in known and n not in overruled]
+        if key not in now or not brought or 1.0 / OTHER < now[key] / before < OTHER:
+            continue
+        unit = record.units["motor_torque"] if key == "torque" else f"{record.units['position']}/s"
+        said = " and ".join(f"{name} = {known[name]:g}" for name in brought)
+        message = (
+            f"the saved profile was written for a record of {before:.3g} {unit} of {key}, this one has {now[key]:.3g}: "
+            f"does {said} hold for this machine?"
+        )
+        options = " or ".join(f"--{name.replace('_', '-')}" for name in brought)
+        remedy = f"if not, give {options}; with --profile FILE.toml a machine has a profile of its own"
+        out.append(Finding("warning", "profile-misfit", message, remedy=remedy))
+    return out
 
 
 def fingerprint(table: Table) -> str:
@@ -89,7 +148,11 @@ def load(path: Path) -> Profile:
                 numbers = [f.name for f in fields(Drive) if f.name != "side" and table.has(f.name)]
                 values = {name: table.positive(name, "") for name in numbers}
                 values["side"] = table.choice("side", ("motor", "load"), "motor")
-        return Profile(mapping, Drive(**values), sample_time)
+        seen: dict[str, float] = {}
+        if top.has("seen"):
+            with top.table("seen") as table, table.blamed():
+                seen = {key: table.positive(key, "") for key in NUMBERS_BEHIND if table.has(key)}
+        return Profile(mapping, Drive(**values), sample_time, seen)
 
 
 def merged(mapping: Sequence[str], drive: Drive, sample_time: float | None, kept: Profile | None) -> Profile:
@@ -117,6 +180,12 @@ def save(profile: Profile, table: Table, path: Path | None = None) -> Path:
     if profile.sample_time is not None:
         lines.append(f"sample_time = {profile.sample_time!r}")
     lines += ["", "[columns]", *(f"{role} = {_quoted(text)}" for role, text in profile.mapping.items())]
+    lines += [
+        "",
+        "# Sizes that 95 % of that record's rows keep, in SI units: others are asked about.",
+        "[seen]",
+    ]
+    lines += [f"{key} = {value:.4g}" for key, value in profile.seen.items()]
     lines += ["", "[drive]", *(f"{key} = {_quoted(value)}" for key, value in profile.drive.known().items())]
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -6,19 +6,21 @@ import hashlib
 import importlib
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
+from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.readers import profiles
 from stickslip.readers._choose import Choice, choose, parse_mapping
-from stickslip.readers._convert import Drive, convert
-from stickslip.readers._table import Format, Table
+from stickslip.readers._convert import Drive, convert, times_of
+from stickslip.readers._table import Column, Format, Table
 from stickslip.record import Record
 
-__all__ = ["FORMATS", "formats", "open_table", "read", "record_of"]
+__all__ = ["FORMATS", "formats", "joined", "open_table", "read", "record_of"]
 
 FORMATS = (
     "record_file",
@@ -49,6 +51,7 @@ def open_table(path: str | os.PathLike[str]) -> Table:
         If the file cannot be read, or its format is not known.
     """
     source = Path(path)
+    refuse_endless(source)
     try:
         head = b"" if source.is_dir() else _head(source)
         if not head and not source.is_dir():
@@ -149,6 +152,53 @@ def record_of(
     # Damaged files hold numbers that overflow: they are infinite then, and the doctor finds them.
     with np.errstate(all="ignore"):
         return convert(table, choices, settings, period, [*table.findings, *findings])
+
+
+def joined(
+    table: Table, path: str | os.PathLike[str], mapping: Sequence[str] = (), sample_time: float | None = None
+) -> Table:
+    """A table with the columns of a second file of the same motion, which keep their own times.
+
+    Both count from the same instant. Columns whose name the table has already get the file's name behind theirs.
+
+    Parameters
+    ----------
+    table : Table
+    path : path
+        Of the second file.
+    mapping : sequence of str
+        As in `read`; what names other columns than the second file's is the table's.
+    sample_time : float
+        s, for files without times.
+
+    Raises
+    ------
+    InputError
+        If the second file cannot be read, or has no times.
+    """
+    source, other = Path(path), open_table(path)
+    own = {c.name.lower() for c in other.columns}
+    mine = [m for m in mapping if m.partition("=")[2].partition("@")[0].rpartition(":")[0].lower() in own
+            or m.partition("=")[2].lower() in own]  # fmt: skip
+    try:
+        # Only its times are wanted; what its columns mean is found out among all.
+        choices, _ = choose(other, parse_mapping(mine))
+        named = next((c.column for c in choices if c.role == "time"), "")
+        clock, origin = times_of(other, choices, sample_time)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+    taken = {c.name for c in table.columns}
+    columns = [
+        Column(
+            c.name if c.name not in taken else f"{c.name} ({source.name})",
+            c.values,
+            c.unit,
+            c.clock if c.clock is not None else clock + origin,
+        )
+        for c in other.columns
+        if c.name != named and (c.clock is not None or c.values.size == clock.size)
+    ]
+    return replace(table, columns=(*table.columns, *columns), findings=(*table.findings, *other.findings))
 
 
 def with_source(record: Record, path: Path) -> Record:

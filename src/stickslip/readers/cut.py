@@ -1,0 +1,233 @@
+"""Which part of a record is looked at: from a time to a time, rows, rows left out; and positions counted on.
+
+Rows count the samples of the file from 1. What was kept is in ``record.meta["reading"]["kept_rows"]``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.finding import Finding
+from stickslip.record import Record
+
+__all__ = ["BRIDGED", "Cut", "cut", "file_rows", "parse_rows", "pieces", "range_words", "taken", "unwrapped"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+BRIDGED = 4
+"""Rows that may be left out without cutting the record in two: what filters is interpolated across them."""
+FEWEST = 50
+"""Rows of a piece that is worth looking at."""
+JUMP = 20.0
+"""Times the usual step from row to row that a position jumps where its counter starts anew."""
+SNAP = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """Which rows are looked at: all that lie in the times, in the rows, and in none of what is left out.
+
+    Attributes
+    ----------
+    start, end : float
+        s, in the record's time; both included.
+    rows : (int, int)
+        First and last row, from 1; both included.
+    leave_out : tuple of (int, int)
+        Rows left out, first and last.
+    """
+
+    start: float = -math.inf
+    end: float = math.inf
+    rows: tuple[float, float] = (1, math.inf)
+    leave_out: tuple[tuple[float, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        for option, value in (("--from", self.start), ("--to", self.end)):
+            if math.isnan(value):
+                raise InputError(f"{option} {value} must be a time in s")
+        if not self.start < self.end:
+            raise InputError(f"--from {self.start:g} s must lie before --to {self.end:g} s")
+
+
+def parse_rows(option: str, text: str) -> tuple[float, float]:
+    """Read ``A:B``, ``A:``, ``:B`` or ``A``: rows from 1, both ends included.
+
+    Raises
+    ------
+    InputError
+        If the text is none of these, or the rows run backwards.
+    """
+    first, colon, last = text.partition(":")
+    try:
+        low = int(first) if first.strip() else 1
+        high = (int(last) if last.strip() else math.inf) if colon else low
+    except ValueError:
+        low, high = 0, 0
+    if not text.strip(" :") or low < 1 or high < low:
+        raise InputError(f"{option} {text!r} must be rows A:B counted from 1, such as {option} 2001:8000")
+    return low, high
+
+
+def cut(record: Record, asked: Cut) -> Record:
+    """The rows asked for, in one record.
+
+    Raises
+    ------
+    InputError
+        If none or fewer than 20 rows are left, or rows are named that the record does not have.
+    """
+    if asked == Cut():
+        return record
+    count = len(record)
+    number = np.arange(1, count + 1)
+    for option, (low, _) in [("--rows", asked.rows), *(("--leave-out", r) for r in asked.leave_out)]:
+        if low > count:
+            raise InputError(f"{option} begins at row {low:g}, but the record has {count} rows")
+    keep = (number >= asked.rows[0]) & (number <= asked.rows[1])
+    for low, high in asked.leave_out:
+        keep &= (number < low) | (number > high)
+    if math.isfinite(asked.start) or math.isfinite(asked.end):
+        with np.errstate(invalid="ignore"):
+            keep &= (record.time >= asked.start) & (record.time <= asked.end)
+    left = int(np.count_nonzero(keep))
+    if left < 20:
+        known = record.time[np.isfinite(record.time)]
+        span = f" from t = {known[0]:.6g} to {known[-1]:.6g} s" if known.size else ""
+        raise InputError(
+            f"{left} of {count} rows are left, too few to look at; the record has rows 1:{count}{span}"
+        )
+    return record if left == count else taken(record, keep)
+
+
+def pieces(record: Record) -> tuple[list[Record], list[Finding]]:
+    """The record cut in two wherever more than `BRIDGED` rows were left out; and what became of short pieces.
+
+    Raises
+    ------
+    InputError
+        If no piece is long enough.
+    """
+    rows = file_rows(record)
+    holes = np.flatnonzero(np.diff(rows) > BRIDGED + 1) + 1
+    if not holes.size:
+        return [record], []
+    index = np.arange(len(record))
+    parts = np.split(index, holes)
+    whole = [p for p in parts if p.size >= FEWEST]
+    if not whole:
+        raise InputError(f"no piece of {FEWEST} rows or more is left between the rows that were left out")
+    said: list[Finding] = []
+    for p in parts:
+        if p.size < FEWEST:
+            message = (
+                f"rows {rows[p[0]]}:{rows[p[-1]]} are too few between what was left out; they are not used"
+            )
+            said.append(Finding("note", "short-piece", message))
+    return [taken(record, np.isin(index, p)) for p in whole], said
+
+
+def file_rows(record: Record) -> Any:
+    """The number in the file of every row, from 1."""
+    kept: list[list[int]] = record.meta.get("reading", {}).get("kept_rows", [])
+    if not kept:
+        return np.arange(1, len(record) + 1)
+    ranges: list[Any] = [np.arange(a, b + 1) for a, b in kept]
+    return np.concatenate(ranges)
+
+
+def range_words(rows: Any, most: int = 20) -> str:
+    """Row numbers as A:B, comma between; beyond `most` runs their number."""
+    runs = _runs(rows)
+    shown = [f"{a}" if a == b else f"{a}:{b}" for a, b in runs[:most]]
+    return ", ".join(shown) + (f" and {len(runs) - most} more runs" if len(runs) > most else "")
+
+
+def _runs(rows: Any) -> list[list[int]]:
+    """Runs of consecutive numbers, first and last."""
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    return [[int(r[0]), int(r[-1])] for r in runs if r.size]
+
+
+def taken(record: Record, keep: Any) -> Record:
+    """The rows of a mask, their numbers in the file kept."""
+    rows = file_rows(record)[keep]
+    meta = dict(record.meta)
+    meta["reading"] = {**meta.get("reading", {}), "kept_rows": _runs(rows)}
+    channels = {name: values[keep] for name, values in record.channels.items()}
+    return Record(record.time[keep], channels, record.units, meta)
+
+
+# ---- positions that start anew -------------------------------------------------------------------------------
+
+
+def unwrapped(record: Record) -> Record:
+    """The record with its position counted on where it jumps by a turn or by the range of its counter.
+
+    The reference is counted on alike. ``record.meta["derived"]`` says by how much.
+
+    Raises
+    ------
+    InputError
+        Without a position, or where it nowhere jumps.
+    """
+    if "position" not in record.channels:
+        raise InputError("--unwrap needs a position; say which column it is with --map position=COLUMN")
+    period = _period(record)
+    if period == 0.0:
+        raise InputError(
+            "--unwrap: the position nowhere jumps by a turn or the range of its counter; leave it out"
+        )
+    channels, unit = dict(record.channels), record.units["position"]
+    for name in ("position", "position_reference"):
+        if name in channels and record.units[name] == unit:
+            channels[name] = _counted_on(channels[name], period)
+    said = {
+        **record.meta.get("derived", {}),
+        "position": f"counted on where it jumps by {period:.6g} {unit}",
+    }
+    return replace(record, channels=channels, meta={**record.meta, "derived": said})
+
+
+def _period(record: Record) -> float:
+    """After which the position starts anew, in its unit; 0 where it does not."""
+    values = record["position"][np.isfinite(record["position"])]
+    steps = np.diff(values)
+    if steps.size < 20:
+        return 0.0
+    usual = float(np.percentile(np.abs(steps), 95))
+    jumps = np.flatnonzero(np.abs(steps) > max(JUMP * usual, 1e-12))
+    if not jumps.size:
+        return 0.0
+    # What the axis moved within the jumping row is what it moved in the rows beside.
+    beside = 0.5 * (steps[np.maximum(jumps - 1, 0)] + steps[np.minimum(jumps + 1, steps.size - 1)])
+    size = float(np.median(np.abs(steps[jumps] - beside)))
+    return next((known for known in _known_periods(record) if abs(size / known - 1.0) < SNAP), size)
+
+
+def _known_periods(record: Record) -> list[float]:
+    """Turns of either side of the gear, and counters of so many bits."""
+    reading: dict[str, Any] = record.meta.get("reading", {})
+    drive: dict[str, Any] = reading.get("drive", {})
+    column: dict[str, Any] = next(
+        (c for c in reading.get("columns", []) if c["channel"] == "position"), {"factor": 1.0}
+    )
+    counters = [float(column["factor"]) * 2.0**bits for bits in (8, 10, 12, 14, 16, 18, 20, 24, 32)]
+    if record.units["position"] != "rad":
+        return counters
+    ratio = float(drive.get("gear_ratio", 1.0))
+    turns = [2.0 * math.pi * f for f in dict.fromkeys((1.0, ratio, 1.0 / ratio))]
+    return [*turns, *(counters if "counts_per_rev" in drive else [])]
+
+
+def _counted_on(values: Array, period: float) -> Array:
+    out = values.copy()
+    good = np.isfinite(values)
+    steps = np.diff(values[good])
+    out[good] = values[good] - np.concatenate(([0.0], np.cumsum(period * np.round(steps / period))))
+    return out

@@ -1,0 +1,82 @@
+"""Lengths beside torques: the reader asks for the lead, and with it makes forces of torques."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip.cli import main
+from stickslip.errors import InputError
+from stickslip.readers import Drive, read
+
+LEAD = 0.005
+T = np.arange(200) * 1e-3
+Q, V, TORQUE = 1e-2 * np.sin(9.0 * T), 9e-2 * np.cos(9.0 * T), 0.7 * np.cos(9.0 * T)
+
+
+def written(path: Path, head: str, *columns: np.ndarray) -> Path:
+    np.savetxt(path, np.stack([T, *columns], axis=1), "%.12g", ",", header=head, comments="")
+    return path
+
+
+def test_a_length_beside_a_torque_asks_for_the_lead(tmp_path, capsys):
+    path = written(tmp_path / "log.csv", "time [s],position [mm],motor_torque [Nm]", 1e3 * Q, TORQUE)
+    with pytest.raises(
+        InputError, match=r"position 'position .mm.' in mm with motor_torque .* give --lead MM"
+    ):
+        read(path)
+    for verb in ("doctor", "identify"):
+        assert main([verb, str(path)]) == 2
+        streams = capsys.readouterr()
+        assert "give --lead MM" in streams.out + streams.err
+    assert main(["doctor", str(path), "--lead", "5"]) == 0
+    assert "5 mm a revolution" in capsys.readouterr().out
+    assert main(["doctor", str(path)]) == 0, "the lead is kept in the profile"
+
+
+def test_the_lead_makes_forces_of_torques(tmp_path):
+    path = written(tmp_path / "log.csv", "time [s],position [mm],motor_torque [Nm]", 1e3 * Q, TORQUE)
+    for drive, way in ((Drive(lead=LEAD), LEAD), (Drive(lead=LEAD, gear_ratio=4.0), LEAD / 4.0)):
+        record = read(path, drive=drive)
+        assert record.units == {"position": "m", "motor_torque": "N"}
+        assert record["position"] == pytest.approx(Q)
+        assert record["motor_torque"] == pytest.approx(TORQUE * 2.0 * math.pi / way)
+
+
+def test_turns_become_ways_where_the_force_is_known(tmp_path):
+    angle, rpm = Q * 360.0 / LEAD, V * 60.0 / LEAD
+    head = "time [s],position [deg],velocity [rpm],motor_torque [N]"
+    path = written(tmp_path / "log.csv", head, angle, rpm, TORQUE)
+    record = read(path, drive=Drive(lead=LEAD))
+    assert record.units == {"position": "m", "velocity": "m/s", "motor_torque": "N"}
+    assert record["position"] == pytest.approx(Q)
+    assert record["velocity"] == pytest.approx(V)
+    assert record["motor_torque"] == pytest.approx(TORQUE)
+
+
+def test_the_torque_constant_of_a_screw_drive(tmp_path):
+    path = written(tmp_path / "log.csv", "time [s],position [mm],current [A]", 1e3 * Q, TORQUE)
+    linear = read(path, drive=Drive(torque_constant=2.0))
+    assert "N/A" in linear.meta["derived"]["motor_torque"]
+    said = [f["message"] for f in linear.meta["reading"]["findings"] if f["code"] == "mixed-units"]
+    assert said == ["the axis moves along a line: --torque-constant 2 was taken in N/A"]
+    screw = read(path, drive=Drive(torque_constant=2.0, lead=LEAD))
+    assert screw["motor_torque"] == pytest.approx(2.0 * TORQUE * 2.0 * math.pi / LEAD)
+    assert screw.units["motor_torque"] == "N"
+    assert not [f for f in screw.meta["reading"]["findings"] if f["code"] == "mixed-units"]
+
+
+def test_a_share_of_the_rated_torque_of_a_screw_drive(tmp_path):
+    path = written(tmp_path / "log.csv", "time [s],position [mm],torque [%]", 1e3 * Q, 100.0 * TORQUE)
+    record = read(path, drive=Drive(rated_torque=3.0, lead=LEAD))
+    assert record["motor_torque"] == pytest.approx(3.0 * TORQUE * 2.0 * math.pi / LEAD)
+
+
+@pytest.mark.parametrize("lead", ["0", "-3", "nan", "inf"])
+def test_a_lead_that_is_none(tmp_path, capsys, lead):
+    path = written(tmp_path / "log.csv", "time [s],position [mm],motor_torque [Nm]", 1e3 * Q, TORQUE)
+    assert main(["doctor", str(path), "--lead", lead]) == 2
+    assert "lead" in capsys.readouterr().err
