@@ -5,7 +5,7 @@ import pytest
 
 from stickslip import Model, Record
 from stickslip.errors import InputError
-from stickslip.identify.breakaway import find_breaks, identify_breakaway
+from stickslip.identify.breakaway import find_breaks, identify_breakaway, mean_estimate
 from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
 
 
@@ -117,3 +117,59 @@ def test_an_axis_that_never_moves_is_one_clear_error() -> None:
     )
     with pytest.raises(InputError, match="never breaks away"):
         identify_breakaway(still)
+
+
+def stick_slip_ramps(levels: list[tuple[float, ...]], step: float = 0.0) -> Record:
+    """Torque ramps at 2 N·m/s that go on rising while the axis slips at each of the levels, then sticks again."""
+    row, position, torque, angle = 2e-3, [0.0] * 100, [0.0] * 100, 0.0
+    for number, breaks in enumerate(levels):
+        side = 1.0 if number % 2 == 0 else -1.0
+        load = np.arange(0.0, breaks[-1] + 0.5, 2.0 * row)
+        moved = np.zeros(load.size)
+        for level in breaks:
+            moved += np.clip((load - level) / 0.2, 0.0, 1.0) * 0.05
+        position += (angle + side * moved).tolist()
+        torque += (side * load).tolist()
+        angle += side * moved[-1]
+        position += [angle] * 100
+        torque += [0.0] * 100
+    load = np.array(torque)
+    load = step * np.round(load / step) if step else load
+    channels = {"position": np.array(position), "motor_torque": load}
+    return Record(row * np.arange(load.size), channels, {"position": "rad", "motor_torque": "N·m"})
+
+
+def test_later_stick_slips_of_a_ramp_are_no_break_away() -> None:
+    """The mean over all of them was 12.2 for first breaks at 10.4."""
+    ramp = [(10.43, 12.0, 13.1, 14.2), (9.8, 11.5, 13.0)]
+    shifted = [tuple(x + 0.1 for x in one) for one in ramp]
+    found = identify_breakaway(stick_slip_ramps([*ramp, *shifted, *ramp]))
+    assert [b.torque for b in found.details["breaks"]] == pytest.approx(
+        [10.43, 9.8, 10.53, 9.9, 10.43, 9.8], abs=0.03
+    )
+    assert len(found.details["later"]) == 15
+    assert found["fs_positive"].value == pytest.approx(10.463, abs=0.03)
+    assert found["fs_positive"].identified
+    assert any("15 more, where the axis stuck again" in note for note in found.notes)
+
+
+def test_what_no_torque_brought_about_is_not_identified() -> None:
+    """It printed fs_positive 0 [0, 0] identified."""
+    record = stick_slip_ramps([(1.0,), (1.0,), (1.1,), (1.1,)])
+    silent = Record(record.time, {**record.channels, "motor_torque": 0.0 * record.time}, record.units)
+    turned = Record(record.time, {**record.channels, "motor_torque": -record["motor_torque"]}, record.units)
+    for moved in (silent, turned):
+        found = identify_breakaway(moved)
+        for e in found.estimates:
+            assert not e.identified
+            assert e.value == e.lower == 0.0
+    assert "does not act in its direction" in mean_estimate("fs_positive", np.zeros(4)).verdict
+
+
+def test_an_interval_holds_what_rows_and_counts_hide() -> None:
+    """Six ramps that read alike by a count of 0.1 N·m: repeats say nothing of the 0.05 that it may be off."""
+    found = identify_breakaway(stick_slip_ramps([(1.04,), (1.04,)] * 3, step=0.1))
+    assert len({round(b.torque, 6) for b in found.details["breaks"] if b.direction > 0}) == 1
+    for name in ("fs_positive", "fs_negative"):
+        assert found[name].lower <= 1.04 <= found[name].upper
+        assert found[name].upper - found[name].lower > 0.1

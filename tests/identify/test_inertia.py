@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip import Model
-from stickslip.cli.identify import show
+from stickslip.cli._identified import show
 from stickslip.errors import InputError
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification

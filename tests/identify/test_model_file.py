@@ -37,6 +37,10 @@ def test_what_is_written_is_read_back(law, tmp_path):
     assert written["estimates"][0]["verdict"] == ESTIMATE.verdict
     assert written["estimates"][0]["upper"] == math.inf
     assert written["data"][0]["rows"] == 12
+    assert "k[0]" not in written["assumed"]
+    for f in law.fields:
+        if not f.per_element:
+            assert written["assumed"][f.name] == pytest.approx(getattr(model.parameters, f.name))
 
 
 def test_a_person_writes_law_and_parameters(tmp_path):

@@ -16,7 +16,7 @@ from stickslip.errors import InputError
 from stickslip.identify.axis_inverse import inverse_dynamics
 from stickslip.identify.axis_prediction import axis_prediction, held_torque, motion_of
 from stickslip.identify.axis_trial import trial_of
-from stickslip.identify.contact import contact_frequency, unseen_refused
+from stickslip.identify.contact import contact_frequency, of_slow_motion, unseen_refused
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.jackknife import leave_blocks_out
 from stickslip.identify.observer import GRASP, prepare
@@ -176,3 +176,62 @@ def test_slow_motion_is_not_judged_where_the_contact_rings_faster_than_the_sampl
     assert refused(stiff, 1e-3) == set()
     assert refused(lugre, 2e-4) == set()
     assert refused(gms, 1e-3) == set()
+
+
+RESET = '''
+"""The reset integrator of Haessig and Friedland (1991): a spring that ends at a displacement."""
+
+import math
+from typing import Annotated, NamedTuple
+
+from stickslip.spec import Law, Par
+
+
+class Params(NamedTuple):
+    sigma0: Annotated[float, Par("N·m/rad", "sigma_0", "stiffness at rest", positive=True)]
+    z0: Annotated[float, Par("rad", "z_0", "displacement at which it slides", positive=True)]
+    sigma2: Annotated[float, Par("N·m·s/rad", "sigma_2", "viscous friction coefficient", lower=0.0)]
+
+
+class State(NamedTuple):
+    z: Annotated[float, Par("rad", "z", "displacement")]
+
+
+def step(v0, v1, dt, z, p, u):
+    """Torque at the end of the step, N·m."""
+    z.z = min(max(z.z + 0.5 * (v0 + v1) * dt, -p.z0), p.z0)
+    return p.sigma0 * z.z + p.sigma2 * v1
+
+
+def steady(v, p):
+    """Torque at constant velocity, N·m."""
+    if v == 0.0:
+        return 0.0
+    return math.copysign(p.sigma0 * p.z0, v) + p.sigma2 * v
+
+
+LAW = Law(
+    "reset", Params, step, title="Reset integrator", equation=r"\\dot z = v, |z| \\le z_0", source=("haessig1991",),
+    example={"sigma0": 2.5e4, "z0": 4e-5, "sigma2": 0.02}, State=State, steady=steady,
+)
+'''
+
+
+def test_a_level_that_is_a_product_does_not_tell_its_factors(tmp_path: Path) -> None:
+    """sigma0 was 15,561 [15,339, 15,785], identified, for 25,000: sliding tells sigma0 z0 alone."""
+    file = tmp_path / "reset.py"
+    file.write_text(RESET, encoding="utf-8")
+    model = Model(str(file), sigma0=2.5e4, z0=4e-5, sigma2=0.02)
+    names = ("inertia", "sigma0", "z0", "sigma2")
+    sure = [Estimate(name, "", name, 1.0, 0.01, 0.98, 1.02, identified=True) for name in names]
+    judged = unseen_refused(sure, model.law, model.parameters, 5e-3, 6.0, 1e-3)
+    assert {e.name for e in judged if not e.identified} == {"sigma0", "z0"}
+    # With z0 known, the level tells the stiffness.
+    judged = unseen_refused([e for e in sure if e.name != "z0"], model.law, model.parameters, 5e-3, 6.0, 1e-3)
+    assert all(e.identified for e in judged)
+    assert of_slow_motion(model.law, model.parameters, "sigma0", 6.0)
+    assert not of_slow_motion(model.law, model.parameters, "sigma2", 6.0)
+    # Shares that add up to 1 take nothing of a level.
+    gms = Model("gms", fs=0.6, fc=0.4, vs=0.05, k=[2000.0, 1000.0], alpha=[0.5, 0.5], c=10.0, sigma2=0.02)
+    assert not of_slow_motion(gms.law, gms.parameters, "fc", 6.0)
+    assert of_slow_motion(gms.law, gms.parameters, "k[1]", 6.0)

@@ -1,13 +1,15 @@
 """A whole axis from any record: inertia, gravity or offset, and friction jointly.
 
-First the inverse dynamics (`stickslip.identify.axis_inverse`). Of several laws the error on held-out data chooses
-(`stickslip.identify.axis_choice`). Values and intervals are the prediction error's
-(`stickslip.identify.axis_prediction`) or, where records lack the drive's signal, the output error's
-(`stickslip.identify.axis_output`).
+First what certain sliding tells in several bands (`stickslip.identify.regression`), and when the torque acted; its
+hold and delay are taken out of the record before anything is simulated. What only slow motion and reversals tell
+comes from the prediction error (`stickslip.identify.axis_prediction`); `stickslip.identify.axis_agreed` says which
+number is whose. Of several laws the error on held-out data chooses (`stickslip.identify.axis_choice`). Records
+without the drive's signal are fitted by the output error (`stickslip.identify.axis_output`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,6 +18,7 @@ import numpy as np
 
 from stickslip import plugins
 from stickslip.errors import InputError, UnknownName
+from stickslip.identify.axis_agreed import TOLD_BY_SLIDING, agreed, aligned, on_timing, regressed
 from stickslip.identify.axis_choice import (
     Candidate,
     chosen_of,
@@ -24,20 +27,20 @@ from stickslip.identify.axis_choice import (
     options_of,
     sentence_on,
 )  # fmt: skip
-from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics
-from stickslip.identify.axis_output import OutputError, output_error
+from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
+from stickslip.identify.axis_output import laid_out, output_error, starting_models
 from stickslip.identify.axis_prediction import axis_prediction
 from stickslip.identify.axis_problem import Problem
-from stickslip.identify.axis_search import Extras, FittedAxis, errors_of, require_start
+from stickslip.identify.axis_result import assembled, evident, narrow_note, noted, untold_by_reversals
+from stickslip.identify.axis_search import Extras, FittedAxis, require_start
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification, silent
-from stickslip.identify.load_check import ADVICE, judged_load
-from stickslip.identify.loop_check import doubted_loops
+from stickslip.identify.regression import Regression
+from stickslip.identify.vector import Vector
 from stickslip.machines.servo import ServoAxis
-from stickslip.model import Model
 from stickslip.spec import Law
 
-__all__ = ["AUTOMATIC", "Candidate", "identify_axis", "inverse_identification"]
+__all__ = ["AUTOMATIC", "Candidate", "identify_axis"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -45,8 +48,10 @@ AUTOMATIC = ("coulomb", "stribeck", "lugre")
 """Laws among which the held-out error chooses where none is named."""
 NO_PREDICTION = "The prediction error cannot be had from these records:"
 INTERVALS = ("prediction", "covariance")
-LOOP_OFF = 0.3
-"""Relative error of the simulated loop's drive signal from which on its gains are doubted."""
+HELD = 0.1
+"""Rows by which a torque may act beside its row for reversals to tell stiffness."""
+FALLS = 0.95
+"""Probability from which on friction is taken to fall with velocity."""
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
 
@@ -65,6 +70,7 @@ def identify_axis(
     robust: bool = False,
     profiles: bool = False,
     intervals: str = "prediction",
+    skew: float | None = None,
     progress: Callable[[str], None] = silent,
 ) -> Identification:
     """Identify an axis: which law it has, its values, and how sure they are.
@@ -85,18 +91,22 @@ def identify_axis(
     robust, profiles
         As there, for the output error alone; the prediction error weighs outliers anyway.
     per_direction : bool
-        Whether the inverse dynamics reported beside it has friction of its own for each direction.
+        Whether friction has parameters of its own for each direction, in every law that allows it and in the inverse
+        dynamics reported beside it. A constant torque cannot be told from that: `offset` is kept at 0 unless it is
+        free or given.
     intervals : {"prediction", "covariance"}
         Values and intervals from the prediction error (`stickslip.identify.axis_prediction`), where the records allow
         it; or from the covariance of the output error, which is too narrow where noise is coloured.
+    skew : float, optional
+        s by which the column of the torque lies behind the torque that acted, where it is known; found otherwise.
     progress : callable
         Is told what begins, in a few words.
 
     Returns
     -------
     Identification
-        ``details`` holds ``mechanics``, ``inverse`` (`InverseDynamics` or None), ``output`` (`FittedAxis`) and
-        ``candidates``.
+        ``details`` holds ``mechanics``, ``inverse`` (`InverseDynamics` or None), ``regression`` (`Regression` or None),
+        ``output`` (`FittedAxis`) and ``candidates``.
 
     Raises
     ------
@@ -108,12 +118,24 @@ def identify_axis(
     if intervals not in INTERVALS:
         raise UnknownName("source of intervals", intervals, INTERVALS)
     tried = [plugins.law(x) if isinstance(x, str) else x for x in laws]
+    if per_direction:
+        tried = [each_way(law) for law in tried]
+        if "offset" not in (*free, *(values or {})):
+            frozen, values = (*frozen, "offset"), {"offset": 0.0, **(values or {})}
     options: dict[str, Any] = {
         "free": free, "frozen": frozen, "values": values, "extras": extras, "robust": robust
     }  # fmt: skip
-    inverse, notes = first_look(trials, axis, extras, per_direction)
+    refuse_harmonics(trials, extras.harmonics + extras.friction_harmonics, simulated=True)
+    sliding, notes = regressed(trials, axis, skew, extras.harmonic_period)
+    trials, validation = aligned(trials, sliding), aligned(validation, sliding)
+    inverse, more = first_look(trials, axis, extras, per_direction)
+    notes = [*(on_timing(sliding) if skew is None else []), *notes, *more]
     if inverse is None:
         require_start(trials, axis, tried, dict(values or {}), extras)
+    if per_direction or not plain_axis(extras, free, values):
+        sliding = None
+    if laws is AUTOMATIC or tuple(laws) == AUTOMATIC:
+        tried = shortlist(tried, sliding)
     candidates: list[Candidate] = []
     chosen = tried[0]
     own = options_of(chosen, options, tried)
@@ -129,7 +151,11 @@ def identify_axis(
     lacking = ""
     if intervals == "prediction":
         try:
-            return predicted(trials, axis, chosen, inverse, own, validation, candidates, notes)
+            if sliding is not None and inverse is not None and told_whole(chosen):
+                found = by_sliding(trials, axis, chosen, inverse, sliding, own, validation, candidates, notes)
+                if all(e.identified for e in found.estimates) or not sliding.held_for(HELD):
+                    return found
+            return predicted(trials, axis, chosen, inverse, sliding, own, validation, candidates, notes)
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."
     result = output_error(trials, axis, chosen, inverse, profiles=profiles, **own)
@@ -137,6 +163,64 @@ def identify_axis(
         result, result.estimates, result.fit.correlation, inverse, validation, candidates, notes
     )
     return noted(found, narrow_note(result, ask=not lacking), *filter(None, [lacking]))
+
+
+def shortlist(laws: Sequence[Law], sliding: Regression | None) -> list[Law]:
+    """The laws worth a comparison where none was named: only those with a fall of friction where one shows.
+
+    Where none shows it may lie below the speeds of certain sliding.
+    """
+    if sliding is None or sliding.falls < FALLS:
+        return list(laws)
+    return [law for law in laws if "fs" in {f.name for f in law.fields}] or list(laws)
+
+
+def told_whole(law: Law) -> bool:
+    """Whether certain sliding tells every parameter of a law."""
+    return {f.name for f in law.fields} <= set(TOLD_BY_SLIDING)
+
+
+def by_sliding(
+    trials: Sequence[Trial], axis: ServoAxis, law: Law, inverse: InverseDynamics, sliding: Regression,
+    options: Mapping[str, Any], validation: Sequence[Trial], candidates: Sequence[Candidate], notes: Sequence[str],
+) -> Identification:  # fmt: skip
+    """An axis whose law certain sliding tells whole: nothing is left for a search."""
+    given = dict(options["values"] or {})
+    model = starting_models(trials, law, inverse, given)[0]
+    extras: Extras = options["extras"]
+    vector, _ = laid_out(trials, axis, law, inverse, model, given, options["free"], options["frozen"], extras)
+    level = abs(sliding.numbers["fc"].value)
+    scale = {p.name: 1.0 if p.par.unit == "rad" else level for p in vector.free}
+    start = vector.values(vector.start)
+    first = [
+        Estimate(
+            p.name, p.par.unit, p.par.symbol, float(x), math.inf, -math.inf, math.inf, False, "not fitted"
+        )
+        for p, x in zip(vector.free, start, strict=True)
+    ]
+    estimates, said = agreed(first, sliding, vector, inverse, scale, fine=False)
+    u = vector.coordinates(vector.named(vector.start) | {e.name: e.value for e in estimates})
+    estimates = evident(estimates, vector, u, trials, axis)
+    found = with_values(trials, axis, law, vector, u, extras)
+    shown = [replace(e, unit=axis.unit(e.unit)) for e in estimates]
+    names, told = [e.name for e in shown], list(sliding.numbers)[:4]
+    correlation = np.eye(len(names))
+    for i, a in enumerate(names):
+        for j, b in enumerate(names):
+            if a in told and b in told:
+                correlation[i, j] = sliding.bands[0].correlation[told.index(a), told.index(b)]
+    result = assembled(found, shown, correlation, inverse, validation, candidates, [*notes, *said], sliding)
+    return noted(result)
+
+
+def with_values(
+    trials: Sequence[Trial], axis: ServoAxis, law: Law, vector: Vector, u: Array, extras: Extras
+) -> FittedAxis:
+    """The axis with these values, ready to be simulated."""
+    problem = Problem.of(
+        trials, axis, law, vector, inertia=vector.named(u)["inertia"], harmonic_period=extras.harmonic_period
+    )
+    return FittedAxis(problem.weighted(u).resolved(u), u)
 
 
 def judged_laws(
@@ -156,20 +240,38 @@ def judged_laws(
 
 
 def predicted(
-    trials: Sequence[Trial], axis: ServoAxis, law: Law, inverse: InverseDynamics | None, options: Mapping[str, Any],
-    validation: Sequence[Trial], candidates: Sequence[Candidate], notes: Sequence[str],
+    trials: Sequence[Trial], axis: ServoAxis, law: Law, inverse: InverseDynamics | None, sliding: Regression | None,
+    options: Mapping[str, Any], validation: Sequence[Trial], candidates: Sequence[Candidate], notes: Sequence[str],
 ) -> Identification:  # fmt: skip
-    """Values and intervals of the prediction error, misfits of the simulation with these values."""
+    """Each number from the estimator that shows it, misfits of the simulation with these values."""
     given = {k: v for k, v in options.items() if k != "robust"}
     result = axis_prediction(trials, axis, law, first=inverse, **given)
-    problem = Problem.of(
-        trials, axis, law, result.vector, inertia=result.mechanics.inertia,
-        harmonic_period=options["extras"].harmonic_period,
-    )  # fmt: skip
-    fitted = FittedAxis(problem.weighted(result.u).resolved(result.u), result.u)
-    estimates = tuple(replace(e, unit=axis.unit(e.unit)) for e in result.estimates)
-    found = assembled(fitted, estimates, result.correlation(), inverse, validation, candidates, notes)
+    estimates, u, said = result.estimates, result.u, list[str]()
+    if sliding is not None:
+        level = abs(sliding.numbers["fc"].value)
+        scale = {p.name: 1.0 if p.par.unit == "rad" else level for p in result.vector.free}
+        estimates, said = agreed(estimates, sliding, result.vector, inverse, scale)
+        if not sliding.held_for(HELD):
+            estimates = untold_by_reversals(estimates, result.model, sliding)
+        u = result.vector.coordinates(
+            result.vector.named(u) | {e.name: e.value for e in estimates if e.name in TOLD_BY_SLIDING}
+        )
+    estimates = evident(estimates, result.vector, u, trials, axis)
+    u = result.vector.coordinates(
+        result.vector.named(u) | {e.name: e.value for e in estimates if e.name == "fs"}
+    )
+    fitted = with_values(trials, axis, law, result.vector, u, options["extras"])
+    estimates = tuple(replace(e, unit=axis.unit(e.unit)) for e in estimates)
+    found = assembled(
+        fitted, estimates, result.correlation(), inverse, validation, candidates, [*notes, *said], sliding
+    )
     return noted(replace(found, details={**found.details, "prediction": result}))
+
+
+def plain_axis(extras: Extras, free: Sequence[str], values: Mapping[str, Any] | None) -> bool:
+    """Whether the axis is no more than inertia, friction, offset or gravity, and a torque over the position."""
+    more = {"drive_gain", "back_emf", "backlash", "controller_gain", "load_motor", "load_external"}
+    return not (extras.load or extras.friction_harmonics or more & {*free, *(values or {})})
 
 
 def held_out(trials: Sequence[Trial], validation: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
@@ -198,123 +300,13 @@ def first_look(
             f"{each['fv_minus']:.4g}; relative error {100 * each.relative_error:.2f} % instead of "
             f"{100 * found.relative_error:.2f} %."
         )
+        notes.append(
+            "A constant torque beside friction cannot be told from friction that differs by direction."
+        )
     return found, notes
 
 
-# ---- the result ------------------------------------------------------------------------------------------------
-
-
-def assembled(
-    result: FittedAxis, estimates: Sequence[Estimate], correlation: Array, inverse: InverseDynamics | None,
-    validation: Sequence[Trial], candidates: Sequence[Candidate], notes: Sequence[str],
-) -> Identification:  # fmt: skip
-    """Everything in one `Identification`, but for what is to be said of its intervals."""
-    trials, judged = result.problem.trials, judged_load(estimates, inverse, result.mechanics)
-    misfit = errors_of(trials, result.problem.signals, result.misfits(trials))
-    if inverse is not None:
-        misfit["inverse_dynamics_relative"] = inverse.relative_error
-    if validation:
-        misfit |= {f"held_out_{k}": v for k, v in result.held_out(validation).items()}
-    return Identification(
-        "axis",
-        result.model,
-        judged,
-        correlation,
-        misfit,
-        tuple(notes),
-        measure_next=advice(judged, result.problem.law),
-        details={
-            "mechanics": result.mechanics, "inverse": inverse, "output": result, "candidates": tuple(candidates),
-            "axis": result.problem.axis, "units": result.problem.units,
-        },
-    )  # fmt: skip
-
-
-def noted(found: Identification, *more: str) -> Identification:
-    """The same with these notes, and which parameters are not identified."""
-    missing = [e.name for e in found.estimates if not e.identified]
-    last = (
-        [f"Not identified: {', '.join(missing)}; the model's values of them are one choice among many."]
-        if missing
-        else []
-    )
-    return replace(found, notes=(*found.notes, *more, *strange_loop(found), *rising(found.estimates), *last))
-
-
-def strange_loop(found: Identification) -> list[str]:
-    """That the loop does not make the drive's signal that was recorded; nothing where it does, or there is none."""
-    fitted: FittedAxis = found.details["output"]
-    named = fitted.problem.vector.named(fitted.u)
-    if others := doubted_loops(fitted.problem.trials, named["controller_gain"]):
-        return others
-    off = found.misfit.get("drive_relative", 0.0)
-    if off <= LOOP_OFF:
-        return []
-    return [
-        f"The loop simulated makes a drive signal that is {off:.0%} off the recorded one: check its gains and limit."
-    ]
-
-
-def rising(estimates: Sequence[Estimate]) -> list[str]:
-    """That friction rises with the speed where a Stribeck effect would let it fall; empty where the data do not say."""
-    by_name = {e.name: e for e in estimates}
-    if not {"fs", "fc"} <= by_name.keys() or not by_name["fs"].upper < by_name["fc"].lower:
-        return []
-    return ["fs lies below fc: friction rises from rest to vs; these records show no Stribeck effect."]
-
-
-def narrow_note(result: OutputError, ask: bool = True) -> str:
-    """That the intervals are too narrow where noise is coloured; where friction has a velocity of its own, by far."""
-    said = "Intervals come from the covariance of the output error: too narrow where noise is coloured"
-    if result.problem.law.velocity_scale:
-        said += ", most of all for what slow motion and break-away tell"
-    if ask and all(t.drive is not None for t in result.problem.trials):
-        said += ". --intervals prediction gives honest ones"
-    return said + "."
-
-
-def advice(estimates: Sequence[Estimate], law: Law) -> tuple[str, ...]:
-    """What to measure to settle what is not identified."""
-    missing = {e.name.partition("[")[0] for e in estimates if not e.identified}
-    out: list[str] = []
-    units = {f.name: f.par.unit for f in law.fields}
-    if any(units.get(n) == "rad/s" for n in missing):
-        out.append(
-            "Record constant velocities below and around the Stribeck velocity, at least three of them."
-        )
-    stiff = {n for n in missing if units.get(n) == "N·m/rad" or n in ("sigma1", "k")}
-    if stiff:
-        out.append(
-            "Record slow reversals with a finer position sensor: the pre-sliding range was hardly seen."
-        )
-    if "load_motor" in missing:
-        out.append(ADVICE)
-    elif "inertia" in missing:
-        out.append("Record stronger accelerations.")
-    return tuple(out)
-
-
-def inverse_identification(found: InverseDynamics, axis: ServoAxis) -> Identification:
-    """The inverse dynamics as an `Identification`, its friction as the law ``coulomb``.
-
-    Per direction the law has the mean of both, and the estimates say what each is.
-    """
-    estimates: list[Estimate] = []
-    for name, unit, value, std in zip(found.names, found.units, found.values, found.robust_std, strict=True):
-        low, high = float(value - 1.96 * std), float(value + 1.96 * std)
-        signed = not name.startswith(("inertia", "fc", "fv"))
-        if signed:
-            good = bool(1.96 * std <= 0.05 * abs(found.coulomb))
-        else:
-            good = low > 0.0 and high <= 2.0 * low
-        why = "" if good else "its interval is too wide"
-        estimates.append(Estimate(name, unit, name, float(value), float(std), low, high, good, why))
-    std = np.sqrt(np.diag(found.covariance))
-    model = Model("coulomb", fc=max(found.coulomb, 0.0), sigma2=max(found.viscous, 0.0))
-    return Identification(
-        "inverse dynamics", model, tuple(estimates), found.covariance / np.outer(std, std),
-        {"inverse_dynamics_relative": found.relative_error},
-        (f"Position filtered at {found.cutoff:.4g} Hz, decimated to {found.band:.4g} Hz; intervals allow for the "
-         "correlation of the residuals.",),
-        details={"inverse": found, "axis": axis, "classic_std": dict(zip(found.names, found.std.tolist()))},
-    )  # fmt: skip
+def each_way(law: Law) -> Law:
+    """The law with parameters of its own for v < 0, where it may have them."""
+    known = {choice.name for choice in law.choices}
+    return law.having(symmetry="asymmetric") if "symmetry" in known else law

@@ -23,7 +23,7 @@ from stickslip.identify.filters import decimated, low_pass, spectrum
 from stickslip.identify.profile import inverse_information, long_run
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["InverseDynamics", "inverse_dynamics"]
+__all__ = ["InverseDynamics", "inverse_dynamics", "refuse_harmonics"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -32,7 +32,12 @@ CUTOFF_PER_RATE = 0.1
 BAND_PER_CUTOFF = 0.4  # of the cutoff: the band that is kept after decimation
 TAPER = 10.0  # periods of the cutoff left out at both ends, where the filters have not settled
 NOISE_SHARE = 0.01  # largest share of noise in the acceleration's power
+SPARSE = 100.0  # times as many rows on a regular grid as there are samples, at most
 DEAD_ZONE = 3.0  # standard deviations of the velocity's noise, below which its sign means nothing
+OTHERS = 7  # parameters beside those of harmonics, about
+SECONDS = 6e-6  # s, that a fit by simulation takes a sample and square of the number of parameters
+MOST_HOURS = 24.0
+MOST_BYTES = 8e9  # of the equations
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +144,7 @@ def inverse_dynamics(
     """
     if not trials:
         raise InputError("no record; give at least one")
+    refuse_harmonics(trials, harmonics)
     if cutoff is not None and not cutoff > 0.0:
         raise InputError(f"cutoff = {cutoff:g} Hz must be greater than 0")
     corner = min(suitable_cutoff(t) for t in trials) if cutoff is None else cutoff
@@ -174,6 +180,43 @@ def inverse_dynamics(
     )  # fmt: skip
 
 
+def refuse_harmonics(trials: Sequence[Trial], harmonics: int, *, simulated: bool = False) -> None:
+    """Refuse more harmonics than the samples can tell apart, before a column is made for each.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+    harmonics : int
+        Each has two parameters.
+    simulated : bool
+        Whether simulations are fitted: their time goes with the square of the number of parameters.
+
+    Raises
+    ------
+    InputError
+        With the number of parameters, the memory or the time, and how many harmonics may be given.
+    """
+    samples, count = sum(t.time.size for t in trials), OTHERS + 2 * harmonics
+    if harmonics and samples < 3 * count:
+        raise InputError(
+            f"{harmonics} harmonics make {count} parameters, too many for {samples} samples, which tell at most "
+            f"{max(0, (samples // 3 - OTHERS) // 2)} apart; give fewer"
+        )
+    size = 16.0 * samples * count
+    if harmonics and size > MOST_BYTES:
+        raise InputError(
+            f"{harmonics} harmonics over {samples} samples would take {size / 1e9:.3g} GB; give at most "
+            f"{max(0, math.floor(0.5 * (MOST_BYTES / 16.0 / samples - OTHERS)))}"
+        )
+    hours = SECONDS * samples * count**2 / 3600.0
+    if harmonics and simulated and hours > MOST_HOURS:
+        most = (math.sqrt(3600.0 * MOST_HOURS / SECONDS / samples) - OTHERS) / 2.0
+        raise InputError(
+            f"{harmonics} harmonics over {samples} samples would take about {hours:.2g} h; give at most "
+            f"{max(0, math.floor(most))} (a day), or --inverse, which simulates nothing"
+        )
+
+
 def correlation_lags(residual: Array) -> int:
     """Samples over which a residual is correlated: four times its integral time, at most a fifth of it."""
     n = residual.size
@@ -199,6 +242,12 @@ def uniform(trial: Trial) -> tuple[Array, Array, Array, float]:
     signal = trial.signal()
     if np.max(np.abs(steps - period)) <= 1e-3 * period + 1e-9:
         return trial.time, trial.position, signal, 1.0 / period
+    rows = float(trial.time[-1] - trial.time[0]) / period
+    if not rows <= SPARSE * trial.time.size:
+        raise InputError(
+            f"{trial.name}: {trial.time.size} samples mostly {period:.3g} s apart lie over {rows * period:.3g} s; cut "
+            "the record where it has gaps (--from, --to)"
+        )
     t = np.arange(trial.time[0], trial.time[-1], period)
     return t, np.interp(t, trial.time, trial.position), np.interp(t, trial.time, signal), 1.0 / period
 

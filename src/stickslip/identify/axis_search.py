@@ -19,6 +19,7 @@ from stickslip.identify.axis_inverse import InverseDynamics, inverse_dynamics
 from stickslip.identify.axis_problem import Problem, measured, mechanics_parameters
 from stickslip.identify.axis_start import frozen_by_default, starts
 from stickslip.identify.axis_trial import Trial
+from stickslip.identify.gravity import hanging
 from stickslip.identify.load_check import tells_external
 from stickslip.identify.secant import descend_by_secants
 from stickslip.identify.vector import Parameter, Vector
@@ -272,7 +273,8 @@ def laid_out(
         values = {"inertia": first_inertia(first), "offset": first.offset}
         if first.has("gravity_sin"):
             sine, cosine = first["gravity_sin"], first["gravity_cos"]
-            values |= {"gravity": math.hypot(sine, cosine), "gravity_angle": math.atan2(-cosine, sine)}
+            size, angle = hanging(sine, cosine, first.position)
+            values |= {"gravity": size, "gravity_angle": angle}
         for i in range(extras.harmonics):
             if first.has(f"cos[{i}]"):
                 values |= {f"cos[{i}]": first[f"cos[{i}]"], f"sin[{i}]": first[f"sin[{i}]"]}

@@ -178,7 +178,7 @@ class Trial:
 
 def trial_of(
     record: Record, axis: ServoAxis, *, loop: Loop | None = None, gain: float = 1.0, name: str = "",
-    channels: Sequence[str] = tuple(DRIVES),
+    channels: Sequence[str] = tuple(DRIVES), output: str = "torque",
 ) -> Trial:  # fmt: skip
     """Take a trial from a record.
 
@@ -192,6 +192,9 @@ def trial_of(
         As in `Trial`.
     channels : sequence of str
         Channels that may hold the drive's signal, in the order of preference.
+    output : str
+        What the loop's output is where no drive signal is recorded: one of `DRIVE_QUANTITIES`. Times the channel
+        ``supply`` where the record has one: of a voltage the loop then gives the duty cycle.
 
     Raises
     ------
@@ -214,7 +217,7 @@ def trial_of(
         np.ascontiguousarray(record.time[keep], dtype=np.float64),
         factor * column("position"),
         column(found) if found else None,
-        DRIVES.get(found, "torque") if found else "torque",
+        DRIVES.get(found, "torque") if found else output,
         factor * column(wanted) if wanted else None,
         loop,
         column("supply") if "supply" in record.channels else None,

@@ -1,7 +1,8 @@
 """Break-away torque from slow torque ramps: thesis 4.3.1.1.1 and 4.3.2.1.1.
 
 The torque at which the velocity first exceeds a threshold, by angle and direction; its mean and spread; and whether it
-depends on the ramp rate (thesis 2.1.1: break-away falls as the torque rises faster).
+depends on the ramp rate (thesis 2.1.1: break-away falls as the torque rises faster). Where the axis sticks and slips on
+while the torque rises, only the first break of a ramp counts: what breaks later had been moving just before.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
-from stickslip.identify.segments import slope_of
+from stickslip.identify.levels import slope_of
 from stickslip.record import Record, encoder_step
 
 __all__ = ["Break", "find_breaks", "identify_breakaway"]
@@ -27,6 +28,9 @@ RAMP = 0.7
 """Part of its torque by which the torque must have risen at rest before a break-away that a ramp surely brought about.
 Where an axis that follows a reference sticks and slips, it rises by up to a half; after a ramp from a torque that is
 held, against gravity say, by as little: such a record is not told from one of a motion, so that neither is refused."""
+RETURNED = 0.7
+"""Part of its torque below which the torque must have come after a break-away for the next one in its direction to be
+the first of a ramp of its own."""
 COUNTS = 3.0
 """Counts of the encoder, within `WINDOW`, that are motion rather than creep or noise."""
 
@@ -35,8 +39,9 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 @dataclass(frozen=True, slots=True)
 class Break:
-    """One break-away: time (s), angle (rad), direction (+1, -1), torque (N·m, its size), ramp rate (N·m/s), and by
-    which part of it the torque had risen in its direction since the axis came to rest."""
+    """One break-away: time (s), angle (rad), direction (+1, -1), torque (N·m, in its direction), ramp rate (N·m/s), by
+    which part of it the torque had risen in its direction since the axis came to rest, by how much it may be wrong as
+    rows and threshold go (N·m), and whether it is the first of its ramp."""
 
     time: float
     angle: float
@@ -44,6 +49,8 @@ class Break:
     torque: float
     rate: float
     risen: float = math.inf
+    doubt: float = 0.0
+    first: bool = True
 
     @property
     def ramped(self) -> bool:
@@ -85,20 +92,36 @@ def find_breaks(
                 rows = np.flatnonzero((time <= time[i]) & (time >= time[i] - rest))
                 width = float(time[rows[-1]] - time[rows[0]])
                 rate = float(load[rows[-1]] - load[rows[0]]) / width if width > 0.0 else math.nan
-                found.append(broken(time, position, load, first, i, int(np.sign(v[i])), abs(rate)))
+                # Between two rows, and while the motion was not seen yet, the torque went on.
+                doubt = abs(float(load[k] - load[i])) + abs(rate) * float(time[i] - time[max(i - 1, 0)])
+                found.append(broken(time, position, load, first, i, int(np.sign(v[k])), abs(rate), doubt))
             quiet_since, ready = math.nan, False
         else:
             quiet_since = math.nan
-    return tuple(found)
+    return firsts_marked(found, time, load)
 
 
 def broken(
-    time: Array, position: Array, load: Array, first: int, at: int, direction: int, rate: float
+    time: Array, position: Array, load: Array, first: int, at: int, direction: int, rate: float, doubt: float
 ) -> Break:
     """The break-away at a row, after a rest that began at `first`."""
-    size, since = abs(float(load[at])), direction * load[min(first, at) : at + 1]
-    risen = float(since[-1] - np.min(since)) / size if size > 0.0 else math.inf
-    return Break(float(time[at]), float(position[at]), direction, size, rate, risen)
+    since = direction * load[min(first, at) : at + 1]
+    size = float(since[-1])
+    risen = float(since[-1] - np.min(since)) / size if size > 0.0 else 0.0
+    return Break(float(time[at]), float(position[at]), direction, size, rate, risen, doubt)
+
+
+def firsts_marked(breaks: Sequence[Break], time: Array, load: Array) -> tuple[Break, ...]:
+    """The same, those marked before which the torque had not come back since an earlier one in their direction."""
+    out: list[Break] = []
+    for b in breaks:
+        before = next((a for a in reversed(out) if a.first), None)
+        first = before is None or before.direction != b.direction
+        if before is not None and not first:
+            between = b.direction * load[(time >= before.time) & (time <= b.time)]
+            first = float(np.min(between)) <= RETURNED * before.torque
+        out.append(replace(b, first=first))
+    return tuple(out)
 
 
 def departure(time: Array, position: Array, seen: int, threshold: float) -> int:
@@ -133,11 +156,13 @@ def identify_breakaway(
 
     Notes
     -----
-    Where fewer than half of the break-aways follow a torque ramp from rest (`Break.ramped`), nothing counts as
-    identified and a note says so: most likely that is the record of a motion.
+    The first break-away of every ramp counts. Where fewer than half of these follow a torque ramp from rest
+    (`Break.ramped`), nothing counts as identified and a note says so: most likely that is the record of a motion.
     """
     several = [records] if isinstance(records, Record) else list(records)
-    breaks = [b for r in several for b in find_breaks(r, torque=torque, threshold=threshold, rest=rest)]
+    every = [b for r in several for b in find_breaks(r, torque=torque, threshold=threshold, rest=rest)]
+    breaks = [b for b in every if b.first]
+    step = max(encoder_step(r[torque]) for r in several)
     if not breaks:
         raise InputError(
             f"the axis never breaks away: its velocity does not pass {threshold:g} rad/s from rest; ramp the "
@@ -147,14 +172,21 @@ def identify_breakaway(
     estimates: list[Estimate] = []
     misfit: dict[str, float] = {}
     for direction, word in ((1, "positive"), (-1, "negative")):
-        values = np.array([b.torque for b in breaks if b.direction == direction])
+        own = [b for b in breaks if b.direction == direction]
+        values = np.array([b.torque for b in own])
         if values.size:
-            estimates.append(mean_estimate(f"fs_{word}", values))
+            systematic = math.hypot(float(np.mean([b.doubt for b in own])), step)
+            estimates.append(mean_estimate(f"fs_{word}", values, systematic))
             misfit[f"spread_{word}_Nm"] = float(np.std(values, ddof=1)) if values.size > 1 else math.nan
     rate = rate_effect(breaks)
     if rate is not None:
         estimates.append(rate)
     notes = [f"{len(breaks)} break-aways from channel {torque!r}, velocity threshold {threshold:g} rad/s."]
+    if len(every) > len(breaks):
+        notes.append(
+            f"{len(every) - len(breaks)} more, where the axis stuck again and slipped while the torque rose on, are "
+            "left out: the first of a ramp is break-away."
+        )
     if 2 * ramps < len(breaks):
         estimates = [replace(e, identified=False, verdict="few torque ramps from rest") for e in estimates]
     elif rate is not None and (rate.lower > 0.0 or rate.upper < 0.0):
@@ -163,7 +195,7 @@ def identify_breakaway(
     few = tuple(["Repeat the ramp at other angles; one break-away has no spread."] if len(breaks) < 3 else [])
     return Identification(
         "breakaway", None, tuple(estimates), np.eye(len(estimates)), misfit, tuple(notes), few,
-        (angle_picture(breaks, estimates),), {"breaks": breaks},
+        (angle_picture(breaks, estimates),), {"breaks": breaks, "later": [b for b in every if not b.first]},
     )  # fmt: skip
 
 
@@ -199,18 +231,24 @@ def student(dof: int) -> float:
     return float(special.stdtrit(dof, 0.975))
 
 
-def mean_estimate(name: str, values: Array) -> Estimate:
-    """A mean with its Student interval."""
+def mean_estimate(name: str, values: Array, systematic: float = 0.0) -> Estimate:
+    """A mean with its Student interval, and half an interval (N·m) that repeats do not show; none below 0."""
     mean = float(np.mean(values))
     if values.size < 2:
         return Estimate(
-            name, "N·m", "F_S", mean, math.nan, 0.0, math.inf, False, "one break-away has no spread"
+            name, "N·m", "F_S", max(mean, 0.0), math.nan, 0.0, math.inf, False, "one break-away has no spread"
         )
     std = float(np.std(values, ddof=1)) / math.sqrt(values.size)
-    half = student(values.size - 1) * std
-    low, high = max(mean - half, 0.0), mean + half
+    half = math.hypot(student(values.size - 1) * std, systematic)
+    low, high = max(mean - half, 0.0), max(mean + half, 0.0)
     why = "" if high <= 2.0 * low else "the break-aways scatter too much for their number"
-    return Estimate(name, "N·m", "F_S", mean, std, low, high, not why, why)
+    if not mean > 0.0:
+        why = (
+            "the torque at the break-away does not act in its direction: something else (gravity, a hand) moved the "
+            "axis, or this is not the torque that did"
+        )
+    std = math.hypot(std, systematic / 1.96)
+    return Estimate(name, "N·m", "F_S", max(mean, 0.0), std, low, high, not why, why)
 
 
 def rate_effect(breaks: Sequence[Break]) -> Estimate | None:

@@ -12,41 +12,16 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.draws import curve_band, sliding_torque
+from stickslip.identify.drift_levels import Change, common_speeds, levels_of, said_of, unseen
 from stickslip.identify.estimate import Estimate, Picture, Trace
 from stickslip.identify.identified_file import Identified, covariance
+from stickslip.identify.sides import on_one_side
 
 __all__ = ["Change", "Comparison", "compare_models"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 DRAWS = 400
-
-
-@dataclass(frozen=True)
-class Change:
-    """One parameter in both models; ``p`` is the chance of such a difference without a change, after Holm.
-
-    It does not decide (``decides``) where other parameters of the law are not identified: the two may trade places.
-    """
-
-    name: str
-    unit: str
-    first: float
-    second: float
-    lower: float
-    upper: float
-    p: float
-    decides: bool = True
-
-    @property
-    def changed(self) -> bool:
-        """At the 5 % level of all parameters together."""
-        return self.decides and self.p < 0.05
-
-    @property
-    def percent(self) -> float:
-        """Change in per cent of the first value; not a number where that is 0, or the two differ in sign."""
-        return 100.0 * (self.second / self.first - 1.0) if self.first * self.second > 0.0 else math.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +31,7 @@ class Comparison:
     Attributes
     ----------
     changes : tuple of Change
-        Parameters that both models identified.
+        Parameters that both models identified; of different laws inertia, offset and the like alone.
     p : float
         Of the joint test on those of the law (chi-square); not a number where the law has some that are not identified.
     velocity, difference, band : array, shape (n,)
@@ -68,6 +43,10 @@ class Comparison:
         Either test says so; the curves' alone where there is no other.
     notes : tuple of str
     picture : Picture
+    levels : tuple of Change
+        Torques at break-away and at speeds that both records have, whatever the laws are.
+    summary : str
+        The verdict, by how much.
     """
 
     changes: tuple[Change, ...]
@@ -79,6 +58,8 @@ class Comparison:
     changed: bool
     notes: tuple[str, ...]
     picture: Picture
+    levels: tuple[Change, ...] = ()
+    summary: str = ""
 
     @property
     def largest(self) -> float:
@@ -89,12 +70,18 @@ class Comparison:
         """Plain data."""
         return {
             "changed": self.changed, "p": self.p, "curve_difference_over_band": self.largest, "curve_p": self.curve_p,
-            "parameters": [{**asdict(c), "percent": c.percent, "changed": c.changed} for c in self.changes],
+            "summary": self.summary,
+            "parameters": [_row(c) for c in self.changes], "levels": [_row(c) for c in self.levels],
             "curve": {
                 "velocity": self.velocity.tolist(), "difference": self.difference.tolist(), "band": self.band.tolist()
             },
             "notes": list(self.notes),
         }  # fmt: skip
+
+
+def _row(c: Change) -> dict[str, Any]:
+    """Plain data."""
+    return {**asdict(c), "percent": c.percent, "percent_span": list(c.percent_span), "changed": c.changed}
 
 
 def compare_models(
@@ -105,9 +92,11 @@ def compare_models(
     Parameters
     ----------
     first, second : Identified
-        The curves are compared whatever the laws are; parameters only of one law.
+        Curves, levels, inertia and offset are compared whatever the laws are; parameters of the law only of one law. Of
+        two sides of a gear, the second is brought to the first one's.
     top : float, optional
-        Highest velocity of the curves, rad/s; otherwise 30 times the law's own velocity, or 1 rad/s.
+        Highest velocity of the curves, rad/s; otherwise the highest that both records have or, where a file does not
+        say, 30 times the law's own velocity, or 1 rad/s.
     level : float
         Of both tests together: each has half of it.
 
@@ -128,32 +117,47 @@ def compare_models(
             )
     if first.motion != second.motion:
         raise InputError(f"{first.path} is a {first.motion} axis and {second.path} a {second.motion} one")
+    second, moved = on_one_side(first, second)
     changes, p, notes = compared_parameters(first, second)
+    notes = [moved, *notes] if moved else notes
     hashes = {str(d.get("sha256", "")) for d in first.data} & {str(d.get("sha256", "")) for d in second.data}
     if hashes - {""}:
         notes.append(
             "Both come from a record in common: their errors are not independent, and the test is too mild."
         )
-    velocity = grid_of(first, second, top)
+    velocity, low, said = grid_of(first, second, top)
+    levels = levels_of(first, second, low, float(velocity[-1]))
     difference, band, curve_p, sides = compared_curves(first, second, velocity, 1.0 - 0.5 * level)
     changed = bool(np.any(np.abs(difference) > band)) or p < 0.5 * level
-    return Comparison(changes, p, velocity, difference, band, curve_p, changed, tuple(notes),
-                      picture_of(first, velocity, sides, changed, (first, second)))  # fmt: skip
+    own = {f.name for m in (first, second) for f in m.model.law.fields}
+    summary = said_of(changes, levels, own, changed)
+    return Comparison(
+        changes, p, velocity, difference, band, curve_p, changed, (*notes, *unseen(changes, levels), said),
+        picture_of(first, velocity, sides, summary, (first, second)), levels, summary,
+    )  # fmt: skip
 
 
 def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Change, ...], float, list[str]]:
     """Each difference with its interval and chance, and the joint chance."""
     special: Any = importlib.import_module("scipy.special")
-    if first.model.law.name != second.model.law.name:
-        words = f"The laws differ ({first.model.law.name}, {second.model.law.name}): only the curves are compared."
-        return (), math.nan, [words]
+    laws = first.model.law.name, second.model.law.name
+    own = {f.name for m in (first, second) for f in m.model.law.fields}
     names = [
         e.name
         for e in first.estimates
-        if e.identified and e.name in {x.name for x in second.estimates if x.identified}
+        if e.identified
+        and e.name in {x.name for x in second.estimates if x.identified}
+        and (laws[0] == laws[1] or e.name.partition("[")[0] not in own)
     ]
+    words = (
+        [
+            f"The laws differ ({laws[0]}, {laws[1]}): only the curves, levels and what is beside friction are compared."
+        ]
+        if laws[0] != laws[1]
+        else []
+    )
     if not names:
-        return (), math.nan, ["No parameter is identified in both models."]
+        return (), math.nan, words or ["No parameter is identified in both models."]
     a, ca = chosen(first, names)
     b, cb = chosen(second, names)
     logs = [min(x.lower, y.lower, x.value, y.value) > 0.0 for x, y in zip(a, b, strict=True)]
@@ -164,11 +168,10 @@ def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Ch
     std = np.sqrt(np.diag(total))
     chance = np.array([math.erfc(abs(s) / d / math.sqrt(2.0)) for s, d in zip(step, std, strict=True)])
     chance = holm(chance)
-    # Inertia and offset are no friction: they are shown, but do not decide.
-    own = {f.name for f in first.model.law.fields}
+    # Inertia and offset are no friction: their change is told beside it.
     rows = [i for i, n in enumerate(names) if n.partition("[")[0] in own]
     joint = math.nan
-    if rows:
+    if rows and not words:
         part = total[np.ix_(rows, rows)]
         statistic = float(step[rows] @ np.linalg.pinv(part, hermitian=True) @ step[rows])
         joint = float(special.gammaincc(0.5 * len(rows), 0.5 * statistic))
@@ -183,12 +186,13 @@ def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Ch
     open_ones = sorted({e.name for m in (first, second) for e in m.law_estimates[0] if not e.identified})
     left = sorted({e.name for e in (*first.estimates, *second.estimates)} - set(names))
     notes = [f"Not compared, since not identified in both: {', '.join(left)}."] if left else []
-    if open_ones:
+    if open_ones and not words:
         notes.append(
             "As parameters of the law are not identified, the curves alone decide: others may have changed in exchange."
         )
-        joint, changes = math.nan, [replace(c, decides=False) for c in changes]
-    return tuple(changes), joint, notes
+        joint = math.nan
+        changes = [replace(c, decides=c.name.partition("[")[0] not in own) for c in changes]
+    return tuple(changes), joint, [*words, *notes]
 
 
 def chosen(model: Identified, names: Sequence[str]) -> tuple[tuple[Estimate, ...], Array]:
@@ -206,19 +210,26 @@ def holm(p: Array) -> Array:
     return out
 
 
-def grid_of(first: Identified, second: Identified, top: float | None) -> Array:
-    """Velocities of both directions."""
-    if top is None:
+def grid_of(first: Identified, second: Identified, top: float | None) -> tuple[Array, float, str]:
+    """Velocities of both directions, the least of them, and what is said of them."""
+    unit, common = first.unit("rad/s"), common_speeds(first, second)
+    if top is not None and not (math.isfinite(top) and top > 0.0):
+        raise InputError(f"the highest velocity {top:g} must be greater than 0")
+    if common is not None and (top is None or top > common[0]):
+        low, high = common[0], min(common[1], top or common[1])
+        low = max(low, 0.003 * high)
+        said = f"Compared from {low:.3g} to {high:.3g} {unit}, the speeds that both records have."
+    else:
         own = [
             float(m.model.law.velocity_scale(m.model.parameters))
             for m in (first, second)
             if m.model.law.velocity_scale
         ]
-        top = 30.0 * max(own) if own else 1.0
-    if not (math.isfinite(top) and top > 0.0):
-        raise InputError(f"the highest velocity {top:g} must be greater than 0")
-    half = np.geomspace(0.003 * top, top, 60)
-    return np.concatenate([-half[::-1], half])
+        high = top or (30.0 * max(own) if own else 1.0)
+        low = 0.003 * high
+        said = f"Compared up to {high:.3g} {unit}, whether such speeds were recorded or not: the files do not say."
+    half = np.geomspace(low, high, 60)
+    return np.concatenate([-half[::-1], half]), low, said
 
 
 def compared_curves(
@@ -253,19 +264,29 @@ def compared_curves(
 
 
 def picture_of(
-    model: Identified, velocity: Array, sides: Sequence[tuple[Array, Array]], changed: bool,
+    model: Identified, velocity: Array, sides: Sequence[tuple[Array, Array]], message: str,
     both: tuple[Identified, Identified],
 ) -> Picture:  # fmt: skip
-    """Both curves with their bands, motion in the positive direction."""
+    """Both curves with their bands and the recorded speeds, motion in the positive direction."""
     rows = velocity > 0.0
     names = [m.path.name for m in both]
     labels = names if names[0] != names[1] else [str(m.path) for m in both]
     traces: list[Trace] = []
-    for (best, drawn), label in zip(sides, labels, strict=True):
+    for (best, drawn), label, model_ in zip(sides, labels, both, strict=True):
         low, high = np.percentile(drawn[:, rows], [2.5, 97.5], axis=0)
         traces += [Trace("", velocity[rows], low, "own band", high)]
         traces += [Trace(f"{label}, 95 % band", velocity[rows], best[rows])]
-    message = "The friction has changed." if changed else "No change that the intervals do not explain."
+        seen = model_.speeds.get("positive", np.zeros(0))
+        if seen.size:
+            points = np.clip(seen, velocity[rows][0], velocity[rows][-1])
+            traces += [
+                Trace(
+                    f"tenths of the speeds of {label}",
+                    points,
+                    np.interp(points, velocity[rows], best[rows]),
+                    "points",
+                )
+            ]
     return Picture(
         "comparison", "Friction at constant velocity", message, f"velocity ({model.unit('rad/s')})",
         f"friction torque ({model.unit('N·m')})", tuple(traces), "log",

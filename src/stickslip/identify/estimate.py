@@ -77,8 +77,9 @@ class Trace:
         Empty for none in the legend.
     x, y : array, shape (n,)
     kind : str
-        "line", "points", "open points", "faint" (one of many), "band" (between `y` and `y2`), "own band" (the same
-        in the colour of the line that follows), or "vertical" (a line at every x).
+        "line", "points", "open points", "cloud" (many small points), "faint" (one of many), "wide" (for another line
+        to lie on), "band" (between `y` and `y2`), "own band" (the same in the colour of the line that follows),
+        "vertical" (a line at every x), or "rug" (a mark at the foot at every x; `y` is not looked at).
     y2 : array, shape (n,), optional
     """
 
@@ -172,6 +173,27 @@ class Identification:
         """Names of the estimates that the data do not determine."""
         return tuple(e.name for e in self.estimates if not e.identified)
 
+    @property
+    def assumed(self) -> Mapping[str, float]:
+        """Values of the law's parameters that were not fitted, by name (``k[1]``): its defaults, or what was given.
+
+        Empty for the inverse dynamics, whose numbers have names of their own.
+        """
+        if self.model is None or self.method == "inverse dynamics":
+            return {}
+        fitted, out = {e.name for e in self.estimates}, dict[str, float]()
+        for f in self.model.law.fields:
+            if f.per_element and f.par.per != "element":
+                continue  # where the points of a table lie is no assumption
+            value: Any = getattr(self.model.parameters, f.name)
+            each = (
+                {f"{f.name}[{i}]": float(x) for i, x in enumerate(value)}
+                if f.per_element
+                else {f.name: float(value)}
+            )
+            out |= {name: x for name, x in each.items() if name not in fitted}
+        return out
+
     def as_dict(self) -> dict[str, Any]:
         """Law, estimates, correlation, misfit and sentences as plain data for JSON; no pictures."""
         correlation = [[c if math.isfinite(c) else None for c in row] for row in self.correlation.tolist()]
@@ -179,6 +201,7 @@ class Identification:
             "method": self.method,
             "model": self.model.as_dict() if self.model else None,
             "estimates": [e.as_dict() for e in self.estimates],
+            "assumed": dict(self.assumed),
             "correlation": correlation,
             "misfit": {k: float(v) for k, v in self.misfit.items()},
             "notes": list(self.notes),

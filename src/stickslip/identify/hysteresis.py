@@ -112,6 +112,11 @@ def fit_loop(
         extra += (Parameter("damping", par, 0.0, scale=damping),)
     vector = Vector(template, frozen=frozen, extra=extra)
     idle = idle_parameters(along, vector, rows)
+    if len(idle) == vector.size - len(extra):
+        raise InputError(
+            f"along this motion, of {np.ptp(loop.position):.3g} {loop.unit[0]}, no parameter of {template.law.name!r} "
+            f"acts where the search starts, at {level:.3g} {loop.unit[1]} of friction; check the values and units given"
+        )
     if idle:
         vector = Vector(template, frozen=[*frozen, *idle], extra=extra)
     target = loop.torque[rows]

@@ -14,6 +14,7 @@ import numpy as np
 from stickslip.config import read_toml
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate
+from stickslip.identify.motion import Motion, motion_in
 from stickslip.model import Model
 
 __all__ = ["Identified", "read_identified"]
@@ -38,6 +39,11 @@ class Identified:
         "rotary" or "linear".
     data : tuple of mapping
         ``file``, ``sha256``, ``rows`` of every record.
+    misfit : mapping of str to float
+    trajectory : Motion or None
+        The motion of the record that it was identified on.
+    speeds : mapping of str to array
+        Quantiles (0, 0.1, ..., 1) of the recorded speeds, rad/s: "positive" and "negative"; empty where not known.
     """
 
     path: Path
@@ -47,6 +53,9 @@ class Identified:
     axis: Mapping[str, Any] = field(default_factory=dict[str, Any])
     motion: str = "rotary"
     data: tuple[Mapping[str, Any], ...] = ()
+    misfit: Mapping[str, float] = field(default_factory=dict[str, float])
+    trajectory: Motion | None = None
+    speeds: Mapping[str, Array] = field(default_factory=dict[str, Array])
 
     def unit(self, angular: str) -> str:
         """A unit of the angular system in the axis's own."""
@@ -93,6 +102,9 @@ def read_identified(path: str | os.PathLike[str]) -> Identified:
     return Identified(
         file, model, estimates, np.where(np.isfinite(matrix), matrix, np.eye(len(estimates))),
         axis, str(content.get("motion", "rotary")), tuple(content.get("data", [])),
+        {k: float(v) for k, v in dict(content.get("misfit", {})).items() if isinstance(v, (int, float))},
+        motion_in(content, str(file)),
+        {k: np.abs(np.array(v, dtype=np.float64)) for k, v in dict(content.get("speeds", {})).items()},
     )  # fmt: skip
 
 

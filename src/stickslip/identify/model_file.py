@@ -45,7 +45,7 @@ def write_model(
     law : str
         How the law is found again if not by its name: the path of its file.
     more : mapping, optional
-        Further tables.
+        Further tables; what they say of the axis goes to its table.
 
     Raises
     ------
@@ -58,11 +58,17 @@ def write_model(
     draft = target.with_name(target.name + ".part")
     try:
         with draft.open("wb") as file:
-            tomli_w.dump(model_data(found, data, _relative(law, target)) | dict(more or {}), file)
+            tomli_w.dump(_beside(model_data(found, data, _relative(law, target)), more or {}), file)
         os.replace(draft, target)
     except OSError as error:
         raise InputError(f"{target} cannot be written ({error.strerror}); give another path") from None
     return target
+
+
+def _beside(content: dict[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """The content with further tables."""
+    axis = content.get("axis", {}) | dict(more.get("axis", {}))
+    return content | dict(more) | ({"axis": axis} if axis else {})
 
 
 def _relative(law: str, target: Path) -> str:
@@ -105,6 +111,7 @@ def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: st
         out["angle"] = angle.as_dict()
     out["misfit"] = {k: float(v) for k, v in found.misfit.items() if math.isfinite(v)}
     out["estimates"] = [_estimate(e) for e in found.estimates]
+    out["assumed"] = dict(found.assumed)
     out["correlation"] = {
         "names": [e.name for e in found.estimates],
         "matrix": np.where(np.isfinite(found.correlation), found.correlation, math.nan).round(6).tolist(),

@@ -189,7 +189,7 @@ def prediction_error(
     accepted, named = feasible(law, vector.law_parameters(u)), vector.named(u)
     assert accepted is not None
     highest = max(float(np.max(np.abs(m.seen.velocity))) for m in motions)
-    slow = {p.name for p in vector.free if of_slow_motion(law, accepted, p.name, highest)}
+    slow = {p.name for p in vector.free if of_slow_motion(law, accepted, p.name, highest, vector.names)}
     estimates = estimates_of(vector, u, spread, shaken, beside, signed_scale, slow)
     estimates = unseen_refused(
         estimates, law, accepted, named["inertia"], highest, max(m.period for m in motions)

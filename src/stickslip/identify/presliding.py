@@ -29,6 +29,7 @@ from stickslip.identify.hysteresis import (
     relative_error,
     turning_points,
 )
+from stickslip.identify.loop_doubt import doubted
 from stickslip.identify.noise import Noise, as_noise
 from stickslip.identify.uncertainty import Fit
 from stickslip.identify.vector import Vector
@@ -144,7 +145,8 @@ def identify_presliding(
     c : float
         Attraction parameter, N·m/s: in pre-sliding it hardly acts.
     noise : Noise or float, optional
-        Standard deviation of a sample, N·m; else from the residual, with its correlation.
+        Standard deviation of a sample, N·m; else from the residual, with its correlation. Cycles that differ, a half
+        row of lag, counts and the torque's scale widen the intervals beside it.
     offset : bool
         Whether a constant torque is fitted along.
     inertia : float
@@ -159,10 +161,12 @@ def identify_presliding(
     Raises
     ------
     InputError
-        If there is no cycle, or `shares` is neither word.
+        If there is no cycle, `shares` is neither word, or there are too many elements.
     """
     if shares not in ("free", "equal"):
         raise InputError(f"shares = {shares!r} must be 'free' or 'equal'")
+    if elements > GRID:
+        raise InputError(f"elements = {elements} must be at most {GRID}: a loop tells no more apart")
     straight, notes = loop.righted()
     straight = straight.without_inertia(inertia) if inertia > 0.0 else straight
     found = cycles(loop.position)
@@ -195,8 +199,9 @@ def identify_presliding(
         )
     curve = curve_of(along, fitted.vector, fitted.u)
     model = fitted.vector.model(fitted.u)
+    estimates = doubted(straight, fitted, found, frozen_of(model, equal), {"noise": known, **along_with})
     return Identification(
-        "presliding", model, fitted.estimates, fitted.correlation,
+        "presliding", model, estimates, fitted.correlation,
         loop_misfit(straight, curve, rows, rest, fitted), (*notes, *loop_notes(straight, model, rows, rest)), (),
         (loop_picture(straight, curve, rows, rest, model),),
         {"elements": elements, "loop_errors": errors, "curve": curve, "rows": rows},

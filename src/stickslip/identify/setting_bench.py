@@ -12,13 +12,13 @@ import numpy as np
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
-from stickslip.control.linear import place
+from stickslip.control.linear import Cascade, Gains, place
 from stickslip.identify.draws import sliding_torque
-from stickslip.identify.setting_trial import AT_REST, Drive, Trial, dangers, rings, run
+from stickslip.identify.setting_trial import Drive, Trial, dangers, rings, run
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 
-__all__ = ["Bench", "Candidate", "Setting", "on_both", "resistance", "rings_alone"]
+__all__ = ["Account", "Bench", "Candidate", "Setting", "on_both", "resistance", "rings_alone"]
 
 LOOKED_AT = 16
 """Axes on which the linear controller alone is judged: the best estimate and some drawn ones."""
@@ -40,6 +40,10 @@ class Setting:
         s, by which a feedforward looks ahead of the reference.
     deadband : float
         rad/s, velocities below which a feedback's law sees rest.
+    inertia_feedforward : float
+        kg·m², times the reference's acceleration: torque that is given too.
+    offset : float
+        N·m, constant torque that is given too.
     """
 
     law: str
@@ -47,10 +51,15 @@ class Setting:
     gain: float
     lead: float = 0.0
     deadband: float = 0.0
+    inertia_feedforward: float = 0.0
+    offset: float = 0.0
 
     def on(self, linear: Controller, model: Model) -> Controller:
         """The linear controller with this compensator."""
-        helper = KINDS[self.kind](model, self.gain, lead=self.lead, deadband=self.deadband)
+        helper = KINDS[self.kind](
+            model, self.gain, lead=self.lead, deadband=self.deadband,
+            inertia_feedforward=self.inertia_feedforward, offset=self.offset,
+        )  # fmt: skip
         return replace(linear, compensator=helper)
 
 
@@ -62,7 +71,7 @@ class Candidate:
     ----------
     setting : Setting
     errors : tuple of float
-        RMS position error along the sinusoid over that of the linear controller alone, one per axis; the best
+        RMS position error along the motion over that of the linear controller alone, one per axis; the best
         estimate first. The first axis on which it is not safe is the last.
     unsafe : tuple of str
         Why it is not safe to switch on; empty where it is.
@@ -89,6 +98,31 @@ class Candidate:
         """Plain data."""
         return {**asdict(self.setting), "errors": list(self.errors), "unsafe": list(self.unsafe),
                 "useless": self.useless}  # fmt: skip
+
+
+class Account:
+    """How many axes are simulated, of how many at most; what is unsafe is left early, and the rest of it counted."""
+
+    def __init__(self, progress: Callable[[int, int], None], settings: int, axes: int, more: int) -> None:
+        self.progress, self.axes, self.done = progress, axes, 0
+        self.total = axes * settings + more
+        progress(0, self.total)
+
+    def one(self) -> None:
+        """Another axis is simulated."""
+        self._reach(self.done + 1)
+
+    def tried(self, settings: int) -> None:
+        """So many settings have been judged on the first axes."""
+        self._reach(max(self.done, self.axes * settings))
+
+    def end(self) -> None:
+        """Nothing is left."""
+        self._reach(self.total)
+
+    def _reach(self, done: int) -> None:
+        self.done = min(done, self.total)
+        self.progress(self.done, self.total)
 
 
 class Bench:
@@ -118,10 +152,7 @@ class Bench:
                 yield plant, where
 
     def judged(self, setting: Setting) -> Candidate:
-        """The setting on every axis, up to the first on which it is not safe.
-
-        At rest a feedforward's torque is constant, so that what rings there is the linear controller alone.
-        """
+        """The setting on every axis, up to the first on which it is not safe."""
         controller = setting.on(self.linear, self.laws[setting.law])
         errors: list[float] = []
         for i, plant in enumerate(self.plants):
@@ -131,8 +162,7 @@ class Bench:
                 why = after if isinstance(after, str) else "the linear controller alone fails"
                 return Candidate(setting, (*errors, math.inf), (why,))
             errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
-            found = dangers(before, after, self.drive)
-            if unsafe := tuple(d for d in found if not (setting.kind == "feedforward" and d == AT_REST)):
+            if unsafe := tuple(dangers(before, after, self.drive, setting.kind == "feedforward")):
                 return Candidate(setting, tuple(errors), unsafe)
         return Candidate(setting, tuple(errors), ())
 
@@ -145,16 +175,19 @@ def on_both(setting: Setting, bench: Bench, others: Bench) -> Candidate:
 
 
 def breakaway(model: Model) -> float:
-    """The torque that the contact withstands at rest, N·m; 0 where the law does not tell it."""
-    return float(np.abs(sliding_torque(model, np.zeros(1)))[0]) if model.law.steady else 0.0
+    """The torque that the contact withstands at rest, of both directions the greater, N·m; 0 where the law does not
+    tell it."""
+    if not model.law.steady:
+        return 0.0
+    # The least velocity there is stands for rest on the negative side.
+    return float(np.max(np.abs(sliding_torque(model, np.array([0.0, -np.finfo(float).tiny])))))
 
 
 def resistance(model: Model, drive: Drive) -> float:
-    """The greatest friction along the slow sinusoid, break-away among it, N·m; 0 where the law does not tell it."""
+    """The greatest friction along the motion, break-away among it, N·m; 0 where the law does not tell it."""
     if not model.law.steady:
         return 0.0
-    fastest = 2.0 * math.pi * drive.amplitude * drive.frequency
-    v = fastest * np.concatenate([np.linspace(0.0, 1.0, 200), -np.linspace(1e-9, 1.0, 200)])
+    v = drive.path.top_speed * np.concatenate([np.linspace(0.0, 1.0, 200), -np.linspace(1e-9, 1.0, 200)])
     return float(np.max(np.abs(sliding_torque(model, v))))
 
 
@@ -166,16 +199,23 @@ def rings_alone(bench: Bench, inertia: float, torque: str) -> str:
     drive, count = bench.drive, len(bench.plants[:LOOKED_AT])
     where = " and ".join(sorted({where for _, where in ringing}))
     on = f"on {len(ringing)} of {count} axes" if count > 1 else "on the best estimate"
-    kick = bench.linear.gains.kd * drive.deadband(1.0)
+    kick = bench.linear.linear.kd * drive.deadband(1.0)
     why = f": a count of the encoder makes it push {kick:.2g} {torque} for a sample" if kick else ""
     plants = [plant for plant, _ in ringing]
+    finer = ", or take a finer encoder" if kick else ", or a shorter sample time"
+    if drive.gains is not None:
+        return f"{where} {on}{why}; lower the gain on the velocity ({velocity_gain(drive.gains):.4g}){finer}"
     for share in SLOWER:
         slower = replace(drive, bandwidth=share * drive.bandwidth)
-        linear = replace(bench.linear, gains=place("PD", inertia, slower.bandwidth, drive.damping))
+        linear = replace(bench.linear, gains=place(drive.linear, inertia, slower.bandwidth, drive.damping))
         if not any(Bench(plants, linear, slower, {}).ringing()):
             calm = f"lower the bandwidth ({slower.bandwidth:.3g} Hz is calm)"
             break
     else:
         calm = f"no bandwidth down to {SLOWER[-1] * drive.bandwidth:.3g} Hz is calm"
-    finer = ", or take a finer encoder" if kick else ", or a shorter sample time"
     return f"{where} {on}{why}; {calm}{finer}"
+
+
+def velocity_gain(gains: Gains | Cascade) -> float:
+    """On the measured velocity, N·m·s/rad."""
+    return gains.kvp if isinstance(gains, Cascade) else gains.kd

@@ -38,9 +38,11 @@ def write_setting(path: str | os.PathLike[str], found: Identified, advice: Recom
     if advice.chosen is None or advice.model is None:
         raise InputError(f"no compensator is recommended, so that there is nothing to write to {target}")
     setting, drive = advice.chosen.setting, advice.drive
+    own = drive.gains is not None or drive.linear != "PD"
     table = Recommended(
         setting.kind, setting.gain, drive.bandwidth, drive.damping, advice.inertia, setting.lead, setting.deadband,
-        sample_time=drive.sample_time,
+        sample_time=drive.sample_time, offset=setting.offset, inertia_feedforward=setting.inertia_feedforward,
+        gains=drive.loop(advice.inertia).gains if own else None, velocity_filter=drive.velocity_filter,
     ).table()  # fmt: skip
     motion = ServoAxis(motion="linear") if found.motion == "linear" else ServoAxis()
     result = Identification(
@@ -48,8 +50,8 @@ def write_setting(path: str | os.PathLike[str], found: Identified, advice: Recom
         details={"axis": motion},
     )  # fmt: skip
     written = str(read_toml(found.path).values["law"])
-    own = written.endswith(".py") and advice.model.law.name == found.model.law.name
+    kept = written.endswith(".py") and advice.model.law.name == found.model.law.name
     return write_model(
-        target, result, data=found.data, law=str(found.path.parent / written) if own else "",
+        target, result, data=found.data, law=str(found.path.parent / written) if kept else "",
         more={"axis": {**found.axis, "inertia": advice.inertia}, "recommended": table},
     )  # fmt: skip

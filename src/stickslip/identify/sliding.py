@@ -16,6 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError, ParameterError
 from stickslip.identify.estimate import Identification, Picture, Trace
+from stickslip.identify.evidence import bend_limits, bounded_verdicts, torque_limits, within_speeds
 from stickslip.identify.noise import Noise, as_noise, noise_of_repeats
 from stickslip.identify.selection import Indices, criteria
 from stickslip.identify.starts import separable_starts
@@ -32,6 +33,10 @@ SAME_VELOCITY = 0.005
 """Velocities within this part of each other are repeats of one."""
 BELOW, ABOVE = 0.5, 2.0
 """Times the lowest and the highest velocity measured: in between one more point is looked for."""
+OWN = "spread within each segment"
+"""Source of a noise level that comes from the points themselves."""
+BEYOND = 10.0
+"""Of the largest torque of the points, up to which a level of friction may lie where the record's own is not known."""
 FAMILY = 40
 """How many of the equally good curves are drawn."""
 
@@ -48,14 +53,20 @@ class SlidingPoints:
         N·m, positive against positive velocity.
     std : array, shape (n,), optional
         Standard deviations relative to each other; equal where not given.
+    absolute : bool
+        Whether they are known in N·m: then no point is said to be better than that.
     unit : (str, str)
         Of velocity and torque.
+    largest : float
+        The largest torque recorded, which no level of friction exceeds, N·m; infinite where it is not known.
     """
 
     velocity: Array
     torque: Array
     std: Array | None = None
     unit: tuple[str, str] = ("rad/s", "N·m")
+    largest: float = math.inf
+    absolute: bool = False
 
     def __post_init__(self) -> None:
         v, t = np.asarray(self.velocity, np.float64), np.asarray(self.torque, np.float64)
@@ -84,7 +95,8 @@ class SlidingPoints:
             else np.concatenate([b.std for b in both if b.std is not None])
         )
         return SlidingPoints(
-            np.concatenate([self.velocity, other.velocity]), np.concatenate([self.torque, other.torque]), std, self.unit
+            np.concatenate([self.velocity, other.velocity]), np.concatenate([self.torque, other.torque]), std,
+            self.unit, max(self.largest, other.largest), self.absolute and other.absolute,
         )  # fmt: skip
 
     def only(self, rows: Any) -> SlidingPoints:
@@ -128,8 +140,14 @@ class SlidingPoints:
 
 
 def default_noise(points: SlidingPoints, noise: Noise | float | None) -> Noise | None:
-    """The noise given, else that of the repeats."""
-    return as_noise(noise) or noise_of_repeats(points.repeats())
+    """The noise given, else that of the repeats or of the points themselves, whichever is greater."""
+    if noise is not None:
+        return as_noise(noise)
+    repeats = noise_of_repeats(points.repeats())
+    if not points.absolute or points.std is None:
+        return repeats
+    own = Noise(1.0 / math.sqrt(float(np.mean(points.std**-2.0))), OWN)
+    return own if repeats is None or own.std > repeats.std else repeats
 
 
 def steady_vector(points: SlidingPoints, template: Model, frozen: Iterable[str]) -> Vector:
@@ -160,8 +178,11 @@ def fit_sliding(
 ) -> Fit:  # fmt: skip
     """Weighted least squares of the law's torque at constant velocity, from many starts, perhaps within limits."""
     vector = steady_vector(points, template, frozen)
-    if limits:
-        vector = Vector(template, free=vector.names, limits=limits)
+    # A table of points is fitted as it stands; of a record's levels the slow ones may be in doubt.
+    bends = bend_limits(vector, np.abs(points.velocity)) if points.absolute else {}
+    vector = Vector(
+        template, free=vector.names, limits={**levels_of(points, vector), **bends, **(limits or {})}
+    )
     if not vector.free:
         raise InputError(f"{template.law.name}: no free parameter acts at constant velocity")
     steady, weight = Steady(template.law, points.velocity, points.side), points.weight
@@ -179,10 +200,20 @@ def fit_sliding(
     scales = {
         p.name: fc if p.par.unit == "N·m" else fc / fast if "s/rad" in p.par.unit else fc for p in vector.free
     }
-    return fit(
+    found = fit(
         residuals, vector, noise=noise, size=float(np.max(np.abs(points.torque))), signed_scale=scales,
         starts=first, profiles=profiles,
     )  # fmt: skip
+    bounded = bounded_verdicts(found.estimates, levels_of(points, vector), "the largest torque recorded")
+    bounded = bounded_verdicts(bounded, bends, "the range that was searched")
+    judged = within_speeds(bounded, vector, found.u, np.abs(points.velocity), points.unit[0])
+    return replace(found, estimates=judged)
+
+
+def levels_of(points: SlidingPoints, vector: Vector) -> dict[str, tuple[float, float]]:
+    """Bounds of the levels of friction: the largest torque recorded."""
+    largest = min(points.largest, BEYOND * float(np.max(np.abs(points.torque))))
+    return torque_limits(vector, largest)
 
 
 def identify_sliding(
@@ -217,6 +248,7 @@ def identify_sliding(
     Identification
         ``details["family"]``: parameters of equally good curves, shape (m, free parameters);
         ``details["next_velocity"]``: where one more point would tell them apart best, rad/s (None: all is told);
+        ``details["speeds"]``: the slowest and the fastest speed, rad/s;
         ``details["untouched"]``: parameters that do not act at these velocities, whose values in `model` are those of
         the template.
 
@@ -232,6 +264,8 @@ def identify_sliding(
             f"{template.law.name}: {count} parameters need at least {count} points, there are {len(points)}; "
             "measure at more velocities or freeze parameters"
         )
+    if len(points) == count and level is not None and level.source == OWN:
+        level = None  # a curve through every point is held against nothing
     found = fit_sliding(points, template, level, frozen, starts, profiles=True)
     unknown = [e.name for e in found.estimates if not e.identified]
     settling = next_velocity(points, found, fastest) if unknown and found.noise.known else None
@@ -245,10 +279,16 @@ def identify_sliding(
         {
             "free": found.vector.names,
             "family": np.array([found.vector.values(u) for u in found.family]),
-            "untouched": untouched, "next_velocity": settling,
+            "untouched": untouched, "next_velocity": settling, "speeds": span_of(points),
             "noise_Nm": found.noise.std, "noise_source": found.noise.source,
         },
     )  # fmt: skip
+
+
+def span_of(points: SlidingPoints) -> tuple[float, float]:
+    """The slowest and the fastest speed of the points, rad/s."""
+    moving = np.abs(points.velocity[points.velocity != 0.0])
+    return (float(np.min(moving)), float(np.max(moving))) if moving.size else (math.nan, math.nan)
 
 
 def next_velocity(points: SlidingPoints, found: Fit, fastest: float = math.inf) -> float | None:

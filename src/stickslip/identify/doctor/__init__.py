@@ -6,24 +6,38 @@ file of its family and add it to the tuple.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding, sorted_findings
-from stickslip.identify.doctor import excitation, physics, signals, timing, units
+from stickslip.identify.doctor import change, excitation, physics, signals, spikes, timing, units
 from stickslip.identify.doctor._view import View
+from stickslip.readers.cut import range_words, taken
 from stickslip.record import Record
 
 __all__ = ["CHECKS", "Diagnosis", "examine"]
 
+FINAL = ("too-short", "no-clock")
+"""Errors after which nothing can be computed."""
+ERRORS = (
+    *FINAL, "ambiguous-column", "backward-time", "duplicate-time", "missing-column", "mixed-units", "nan",
+    "never-moved", "no-torque", "position-reference-unit", "position-unit", "position-wrap", "time-unit", "torque-sign",
+    "torque-unit", "velocity-mismatch", "velocity-sign", "velocity-unit",
+)  # fmt: skip
+"""Codes of what may make a record unusable, those of its reading among them."""
+FIRST: tuple[Callable[[View], Iterator[Finding]], ...] = (
+    excitation.channels, signals.missing, timing.ascending, timing.sampling,
+)  # fmt: skip
+"""What may be asked of any record; the other checks need enough usable rows."""
 CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
-    excitation.channels, signals.missing, timing.ascending, timing.sampling, timing.scale, units.assumed, units.counted,
-    units.degrees, units.reference_scale, units.velocity_scale, units.too_fast, units.torque_scale, signals.wrapped,
-    signals.saturated, signals.quantised, physics.sign, physics.skew, physics.gravity, excitation.moved,
+    *FIRST, timing.scale, units.assumed, units.counted,
+    units.degrees, units.reference_scale, units.velocity_scale, units.too_fast, units.torque_scale, spikes.spikes,
+    signals.wrapped, signals.saturated, signals.supply, signals.quantised, physics.sign, physics.skew, physics.gravity,
+    change.changes, change.temperature, excitation.moved,
 )  # fmt: skip
 
 
@@ -66,7 +80,9 @@ class Diagnosis:
             raise InputError(f"{name}: {first.line()}{more}")
 
 
-def examine(record: Record, *, stribeck_velocity: float | None = None) -> Diagnosis:
+def examine(
+    record: Record, *, stribeck_velocity: float | None = None, accept: Sequence[str] = ()
+) -> Diagnosis:
     """Check a record for everything that would spoil an identification.
 
     Parameters
@@ -75,15 +91,26 @@ def examine(record: Record, *, stribeck_velocity: float | None = None) -> Diagno
         Measured or simulated; what was found while it was read (``meta["reading"]``) is taken over.
     stribeck_velocity : float
         rad/s (or m/s): whether the record has speeds near it. Without it, near a twentieth of the usual speed.
+    accept : sequence of str
+        Codes of errors that count as warnings, since the caller knows better; those of `FINAL` stay errors.
+
+    Raises
+    ------
+    UnknownName
+        If a code of `accept` is none of `ERRORS`.
     """
+    for code in accept:
+        if code not in ERRORS:
+            raise UnknownName("error of the doctor", code, ERRORS)
     view = View(record)
     reading = cast("Mapping[str, Any]", record.meta.get("reading", {}))
     findings = [Finding.from_data(f) for f in reading.get("findings", [])]
     # Absurd numbers overflow; whatever comes of them compares as false.
     with np.errstate(all="ignore"):
-        for check in CHECKS:
+        enough = view.time.size >= timing.FEWEST
+        for check in CHECKS if enough else FIRST:
             findings += check(view)
-        if not any(f.code == "never-moved" for f in findings):
+        if enough and not any(f.code == "never-moved" for f in findings):
             findings += excitation.reversed_and_slow(view, stribeck_velocity)
         else:
             # Noise has no sign, no delay and no speed.
@@ -95,8 +122,13 @@ def examine(record: Record, *, stribeck_velocity: float | None = None) -> Diagno
                 "gravity",
                 "position-jump",
                 "offset",
+                "change",
             )
             findings = [f for f in findings if f.code not in vain]
+    findings = [
+        replace(f, level="warning") if f.level == "error" and f.code in accept and f.code not in FINAL else f
+        for f in findings
+    ]
     kept, trimmed = _usable_rows(view)
     return Diagnosis(tuple(sorted_findings([*findings, *trimmed])), kept)
 
@@ -109,14 +141,7 @@ def _usable_rows(view: View) -> tuple[Record, list[Finding]]:
     out = np.flatnonzero(~keep)
     if not out.size:
         return record, []
-    listed = _ranges(out)
+    listed = range_words(view.file_rows[out])
     finding = Finding("warning", "trimmed", f"{out.size} of {len(record)} rows are left out: rows {listed}")
-    channels = {name: values[keep] for name, values in record.channels.items()}
-    return Record(record.time[keep], channels, record.units, {**record.meta, "trimmed": listed}), [finding]
-
-
-def _ranges(rows: Any) -> str:
-    """Row numbers from 1, runs as a-b."""
-    pieces = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
-    shown = [f"{p[0] + 1}" if p.size == 1 else f"{p[0] + 1}-{p[-1] + 1}" for p in pieces[:20]]
-    return ", ".join(shown) + (f" and {len(pieces) - 20} more runs" if len(pieces) > 20 else "")
+    kept = taken(record, keep)
+    return replace(kept, meta={**kept.meta, "trimmed": listed}), [finding]

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.filters import ZeroPhase, butterworth_poles
+from stickslip.readers.cut import file_rows
 from stickslip.record import Record, encoder_step
 
 __all__ = ["Array", "Column", "Smooth", "View", "is_number", "row"]
@@ -97,6 +98,11 @@ class View:
             )
         return "--map " + shlex.quote(f"{channel}={self.name(channel)}:{unit}")
 
+    @cached_property
+    def file_rows(self) -> Any:
+        """The number in the file of every row, from 1."""
+        return file_rows(self.record)
+
     def has(self, channel: str) -> bool:
         """Whether the record has the channel."""
         return channel in self.record.channels
@@ -169,8 +175,9 @@ class View:
         return out if all(np.isfinite(values).all() for values in every) else None
 
 
-def row(index: int, view: View | None = None) -> str:
-    """Where a row is, counted from 1, with its time if that is known."""
-    if view is not None and math.isfinite(view.record.time[index]):
-        return f"row {index + 1}, t = {view.record.time[index]:.6g} s"
-    return f"row {index + 1}"
+def row(index: int, view: View) -> str:
+    """Where a row of the record is: its number in the file, from 1, and its time if that is known."""
+    number = view.file_rows[index]
+    if math.isfinite(view.record.time[index]):
+        return f"row {number}, t = {view.record.time[index]:.6g} s"
+    return f"row {number}"

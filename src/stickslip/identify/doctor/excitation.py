@@ -64,7 +64,8 @@ def _standing(view: View, channel: str) -> Finding | None:
     span, unit = float(np.ptp(values)), view.record.units[channel]
     remedy = "check the enable signal, the brake and the torque limit; break-away needs a larger torque"
     steps = np.unique(np.abs(np.diff(values)))
-    smallest = float(steps[steps > 1e-12 * max(span, 1e-300)][0]) if np.any(steps > 0.0) else 0.0
+    steps = steps[steps > 1e-12 * max(span, 1e-300)]
+    smallest = float(steps[0]) if steps.size else 0.0
     if span == 0.0 or (span <= 2.01 * smallest and np.unique(values).size <= 3):
         return Finding(
             "error",

@@ -10,12 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
+from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.identify.axis_trial import Trial
 from stickslip.identify.doctor._view import Array, Smooth, View
+from stickslip.identify.regression import regress_axis
+from stickslip.machines.servo import ServoAxis
 
 __all__ = ["gravity", "sign", "skew"]
 
@@ -23,8 +27,16 @@ ROWS = 20_000
 """Rows of a regression: more tell no more."""
 QUARTER = 90.0
 """Of a turn, in degrees, that a pendulum must swing over to be told from a spring."""
+BOTH = 0.05
+"""Share of the moving rows in either direction below which friction is not told from a constant torque."""
+STRETCHES, SURE = 12, 3.0
+"""Stretches of the jackknife of friction's work, and its standard deviations below zero that make an error."""
 HARM = 5e-6
 """Of the torque's variance, that a delay must leave unexplained to be told: less spoils nothing."""
+TENTH, STRANGE, STRANGE_TIME = 0.1, 1.5, 1.5e-3
+"""Rows by which a torque acts beside its row that are worth a word; rows and s from which on no hold explains it."""
+MANY = 10.0
+"""Rows from which on a delay that reversals alone show is told: play, wind-up and stick-slip shift them by fewer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,58 +54,121 @@ def sign(view: View) -> Iterator[Finding]:
     if smooth is None:
         return
     measured = view.torque_channel == "friction_torque"
-    fit = _fit(smooth, 0, measured=measured)
-    inertia, coulomb, viscous = (float(value) for value in fit.values[:3])
-    moving: Array = np.abs(smooth.velocity[smooth.moving])
-    braked = float(np.mean(coulomb * moving + viscous * moving**2))
-    exchanged = float(np.mean(np.abs(smooth.torque * smooth.velocity)))
-    if exchanged <= 0.0 or fit.explained < 0.2:
+    turned = view.mapped(view.torque_channel, "-")
+    forth = float(np.mean(smooth.velocity[smooth.moving] > 0.0))
+    if not BOTH < forth < 1.0 - BOTH and not measured:
+        yield from _one_way(smooth, view, turned)
         return
-    if braked < -0.1 * exchanged:
-        also = " and the inertia would be negative" if inertia < 0.0 and not measured else ""
-        message = f"friction would drive the axis: its work over the record is negative{also}"
-        channel = view.torque_channel
-        turned = view.mapped(channel, "-")
-        if measured:
-            message = (
-                "friction is negative where the velocity is positive: it is the force on the moving body"
-            )
-            yield Finding(
-                "warning",
-                "torque-sign",
-                message,
-                remedy=f"say {turned}: here friction opposes positive velocity",
-            )
-        else:
-            yield Finding(
-                "error", "torque-sign", message, remedy=f"say {turned}, if positive torque drives backwards"
-            )
+    fit = _fit(smooth, 0, measured=measured)
+    braked, doubt = _braking(smooth, measured=measured)
+    exchanged = float(np.mean(np.abs(smooth.torque * smooth.velocity)))
+    if not exchanged > 0.0 or fit.explained < 0.2 or not braked + SURE * doubt < -0.1 * exchanged:
+        return
+    if measured:
+        message = "friction is negative where the velocity is positive: it is the force on the moving body"
+        remedy = f"say {turned}: here friction opposes positive velocity"
+        yield Finding("warning", "torque-sign", message, remedy=remedy)
+        return
+    also = " and the inertia would be negative" if fit.values[0] < 0.0 else ""
+    message = f"friction would drive the axis: its work over the record is negative{also}"
+    remedy = (
+        f"say {turned}, if positive torque drives backwards, or --accept torque-sign if you know it is right"
+    )
+    yield Finding("error", "torque-sign", message, remedy=remedy)
+
+
+def _one_way(smooth: Smooth, view: View, turned: str) -> Iterator[Finding]:
+    """Where the axis moves one way only, friction and a load that drives it are one constant: no more than doubts."""
+    power = smooth.torque * smooth.velocity
+    stops = abs(smooth.velocity[-1]) < 0.5 * abs(smooth.velocity[0])
+    if float(np.mean(power)) < -0.5 * float(np.mean(np.abs(power))) and not stops:
+        message = (
+            "the axis moves one way only, and the torque brakes it: a load drives it, or the sign is wrong"
+        )
+        yield Finding(
+            "warning", "torque-sign", message, remedy=f"say {turned}, if positive torque drives backwards"
+        )
+
+
+def _braking(smooth: Smooth, *, measured: bool) -> tuple[float, float]:
+    """Mean power that friction takes over the moving rows, and its standard deviation: a jackknife over stretches."""
+    rows = _rows(smooth)
+    v = smooth.velocity[rows]
+    matrix = _matrix(smooth, rows, measured=measured)
+    weights = np.zeros(matrix.shape[1])
+    weights[1:3] = np.mean(np.abs(v)), np.mean(v * v)
+    torque = smooth.torque[rows]
+
+    def power(without: int) -> float:
+        """Without one of the stretches; with all where that is negative."""
+        kept = stretch != without
+        x: Array = matrix[kept]
+        values: Array = np.linalg.pinv(x.T @ x) @ (x.T @ torque[kept])
+        return float(weights @ values)
+
+    stretch = np.arange(v.size) * STRETCHES // v.size
+    spread = math.sqrt((STRETCHES - 1) * float(np.var([power(k) for k in range(STRETCHES)])))
+    return power(-1), spread
 
 
 def skew(view: View) -> Iterator[Finding]:
-    """The delay between torque and motion at which they fit best."""
+    """When the torque acted: a note from a tenth of a row on, a warning from where no drive does so."""
     smooth = _usable(view)
     if smooth is None or view.torque_channel != "motor_torque":
         return
+    record = view.record
+    linear = record.units.get("position") == "m"
+    position, torque = (record[n][view.usable] for n in ("position", "motor_torque"))
+    axis = ServoAxis(motion="linear" if linear else "rotary", drive_side="load")
+    try:
+        found = regress_axis([Trial("record", view.time, position, torque)], axis)
+    except (InputError, np.linalg.LinAlgError):
+        return
+    low, high = found.interval("skew")
+    late, half, row = 0.5 * (low + high), 0.5 * (high - low), found.period
+    stiff = found.numbers["inertia"].value > 0.0 and max(b.relative for b in found.bands) <= 0.5
+    if not (stiff and half <= 0.5 * row):
+        # Sliding alone does not tell it: only a delay of many rows at reversals, which sliding does not contradict.
+        at_reversals = _skew_at_reversals(view, smooth)
+        if at_reversals is None or abs(at_reversals) < MANY * row:
+            return
+        if stiff and half <= row and abs(at_reversals - late) > half:
+            return
+        late, half = at_reversals, 0.0
+    if abs(late) - half > max(STRANGE * row, STRANGE_TIME):
+        words = (
+            "torque comes after the motion it causes" if late > 0.0
+            else "motion comes later than the torque that causes it"
+        )  # fmt: skip
+        known = f" (±{half * 1e3:.2g})" if half > 0.0 else ""
+        message = f"torque and motion fit best when shifted by {abs(late) * 1e3:.3g} ms{known}: {words}"
+        remedy = "identify allows for it where sliding shows it; better log both from one clock, or say --delay SECONDS"
+        yield Finding("warning", "time-skew", message, remedy=remedy)
+    elif half > 0.0 and abs(late) > half and abs(late) >= TENTH * row:
+        where = "after" if late < 0.0 else "before"
+        message = (
+            f"the torque acted {abs(late) * 1e3:.3g} ms (±{half * 1e3:.2g}) {where} its row on average, "
+            f"{abs(late) / row:.2g} of a row"
+        )
+        yield Finding("note", "torque-timing", message, remedy="identify allows for it")
+
+
+def _skew_at_reversals(view: View, smooth: Smooth) -> float | None:
+    """The delay at which reversals of torque and motion fit best, s, where that leaves clearly less; None otherwise.
+
+    Play, wind-up and a feedforward shift reversals too: it is asked only where sliding does not tell.
+    """
     reach = int(min(max(0.03 / smooth.period, 10), 60, smooth.velocity.size // 8))
-    shifts = range(-reach, reach + 1)
-    rests = np.array([_fit(smooth, k).rest for k in shifts])
+    rests = np.array([_fit(smooth, k).rest for k in range(-reach, reach + 1)])
     best = int(np.argmin(rests))
     shift = best - reach
-    fit = _fit(smooth, shift)
     known = abs(shift) >= 2 and abs(shift) * smooth.period >= _edge(smooth, view.step)
     spoils = rests[reach] >= 1.25 * rests[best] and rests[reach] - rests[best] >= HARM * float(
         np.var(smooth.torque)
     )
-    if not (known and spoils) or best in (0, 2 * reach) or fit.explained < 0.8:
-        return
-    late = (
-        "torque comes after the motion it causes"
-        if shift > 0
-        else "motion comes later than the torque that causes it"
-    )
-    message = f"torque and motion fit best when shifted by {abs(shift) * smooth.period * 1e3:.3g} ms: {late}"
-    yield Finding("warning", "time-skew", message, remedy="shift the torque, or log both from one clock")
+    if not (known and spoils) or best in (0, 2 * reach) or _fit(smooth, shift).explained < 0.8:
+        return None
+    return shift * smooth.period
 
 
 def gravity(view: View) -> Iterator[Finding]:
@@ -112,7 +187,7 @@ def gravity(view: View) -> Iterator[Finding]:
                 f"the mean torque depends on the angle: {amplitude:.3g} {unit} once a turn, as gravity does"
             )
             yield Finding(
-                "warning", "gravity", message, remedy="identify with gravity, or turn the axis upright"
+                "warning", "gravity", message, remedy="identify with --pendulum, or turn the axis upright"
             )
             return
         if _hangs_in_degrees(smooth, min(plain.rest, full.rest)):
@@ -155,29 +230,16 @@ def _hangs_in_degrees(smooth: Smooth, rest: float) -> bool:
     return fit.rest < 0.2 * rest and fit.explained > 0.9 and 0.1 * size < amplitude < 20.0 * size
 
 
-def _edge(smooth: Smooth, step: float) -> float:
-    """The time within which the axis turns round inside one step of its encoder, s: no edge is known better."""
-    slow = smooth.moving & (np.abs(smooth.velocity) < 0.5 * smooth.fast)
-    turning = float(np.sqrt(np.mean(smooth.acceleration[slow] ** 2))) if np.any(slow) else 0.0
-    return math.sqrt(step / turning) if turning > 0.0 else 0.0
-
-
 def _fit(
     smooth: Smooth, shift: int, *, periodic: bool = False, measured: bool = False, turn: float = 2.0 * math.pi
 ) -> Fit:
     """Least squares over the rows that move, with the torque taken `shift` samples later; `turn` is one of the position
     in its unit."""
-    count = smooth.velocity.size
-    edge = min(60, count // 8)
-    rows = np.flatnonzero(smooth.moving[edge : count - edge]) + edge
-    rows = rows[:: max(1, rows.size // ROWS)]
-    v = smooth.velocity[rows]
-    inertia = np.zeros_like(v) if measured else smooth.acceleration[rows]
-    parts = [inertia, np.sign(v), v, np.ones_like(v)]
+    rows = _rows(smooth)
+    matrix = _matrix(smooth, rows, measured=measured)
     if periodic:
         angle = 2.0 * math.pi / turn * smooth.position[rows]
-        parts += [np.sin(angle), np.cos(angle)]
-    matrix: Array = np.stack(parts, axis=1)
+        matrix = np.column_stack([matrix, np.sin(angle), np.cos(angle)])
     size: Array = np.sqrt(np.mean(matrix**2, axis=0))
     size[size == 0.0] = 1.0
     torque = smooth.torque[rows + shift]
@@ -186,3 +248,25 @@ def _fit(
     rest = float(np.mean((torque - matrix @ (values / size)) ** 2))
     spread = float(np.var(torque))
     return Fit(values / size, 1.0 - rest / spread if spread > 0.0 else 0.0, rest)
+
+
+def _rows(smooth: Smooth) -> Any:
+    """Rows that move, away from the ends, no more than are needed."""
+    count = smooth.velocity.size
+    edge = min(60, count // 8)
+    rows = np.flatnonzero(smooth.moving[edge : count - edge]) + edge
+    return rows[:: max(1, rows.size // ROWS)]
+
+
+def _matrix(smooth: Smooth, rows: Any, *, measured: bool) -> Array:
+    """Acceleration, direction, velocity, one."""
+    v = smooth.velocity[rows]
+    inertia = np.zeros_like(v) if measured else smooth.acceleration[rows]
+    return np.stack([inertia, np.sign(v), v, np.ones_like(v)], axis=1)
+
+
+def _edge(smooth: Smooth, step: float) -> float:
+    """The time within which the axis turns round inside one step of its encoder, s: no edge is known better."""
+    slow = smooth.moving & (np.abs(smooth.velocity) < 0.5 * smooth.fast)
+    turning = float(np.sqrt(np.mean(smooth.acceleration[slow] ** 2))) if np.any(slow) else 0.0
+    return math.sqrt(step / turning) if turning > 0.0 else 0.0

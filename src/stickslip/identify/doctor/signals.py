@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator
 from typing import Any
 
@@ -10,12 +11,15 @@ import numpy as np
 
 from stickslip.finding import Finding
 from stickslip.identify.doctor._view import Array, View, is_number, row
+from stickslip.identify.doctor.spikes import sticking_out
 
-__all__ = ["missing", "quantised", "saturated", "wrapped"]
+__all__ = ["missing", "quantised", "saturated", "supply", "wrapped"]
 
 WINDOW = 0.1
 """s: the window over which a slow speed is told from the counts it gives."""
 SLOW_ERROR = 0.05
+PILED = 5
+"""Times as often as values beside it that an extreme occurs where peaks are cut off; a rounded sine's: 2.4 times."""
 WORTH_A_WORD = 1e-4
 """Part of the fast speed below which that speed is of no interest: the step is the file's rounding, no encoder's."""
 
@@ -40,7 +44,7 @@ def missing(view: View) -> Iterator[Finding]:
 
 def saturated(view: View) -> Iterator[Finding]:
     """Flat tops: a limit of the drive or of the converter is reached."""
-    for channel in ("motor_torque", "current", "voltage", "velocity"):
+    for channel in ("motor_torque", "friction_torque", "sensor_torque", "current", "voltage", "velocity"):
         if not view.has(channel):
             continue
         values = view.values(channel)
@@ -55,7 +59,7 @@ def saturated(view: View) -> Iterator[Finding]:
             "saturation",
             f"{channel} sits at its limit of {limits} {unit} in {100 * share:.3g} % of the rows",
             row(index, view),
-            "reduce the demand, or leave these rows out: what was cut off is lost",
+            "reduce the demand, or leave these rows out with --leave-out A:B: what was cut off is lost",
         )
 
 
@@ -65,22 +69,55 @@ def _flat_tops(values: Array) -> tuple[float, int, str] | None:
     if values.size < 50 or size <= 0.0:
         return None
     still = np.abs(np.diff(values)) <= 1e-9 * size
+    held = _held(values, still)
     at_any = np.zeros(values.size, dtype=bool)
     limits: list[float] = []
     for extreme in (float(np.max(values)), float(np.min(values))):
         at = np.abs(values - extreme) <= 1e-9 * size
-        runs = at[1:] & still
-        if _longest(runs) >= 4 and abs(extreme) > 0.2 * size and np.count_nonzero(at) >= 8:
+        often = np.count_nonzero(at) >= 8 * held
+        flat = _longest(at[1:] & still) >= 5 * held - 1
+        if often and abs(extreme) > 0.2 * size and (flat or _piled_up(values, at, extreme)):
             at_any |= at
             limits.append(extreme)
     if not limits:
         return None
     # A commanded staircase or a coarse encoder stands still elsewhere, too.
     elsewhere = still & ~at_any[1:]
-    if np.count_nonzero(elsewhere) > 0.2 * max(1, np.count_nonzero(~at_any)):
+    if held == 1 and np.count_nonzero(elsewhere) > 0.2 * max(1, np.count_nonzero(~at_any)):
         return None
     said = " and ".join(f"{limit:.4g}" for limit in sorted(limits))
     return float(np.mean(at_any)), int(np.flatnonzero(at_any)[0]), said
+
+
+def _held(values: Array, still: Any) -> int:
+    """Rows for which every value stands, where a slower clock wrote the column; 1 where there is no such clock."""
+    starts = np.concatenate(([0], np.flatnonzero(~still) + 1))
+    lengths = np.diff(starts)
+    usual = int(np.median(lengths)) if lengths.size > 20 else 1
+    return usual if usual > 1 and float(np.mean(np.abs(lengths - usual) <= 1)) > 0.8 else 1
+
+
+def _piled_up(values: Array, at: Any, extreme: float) -> bool:
+    """Whether the extreme occurs far more often than any value near it: short peaks that were cut off."""
+    near = values[(np.abs(values - extreme) < 0.05 * float(np.ptp(values))) & ~at]
+    _, counts = np.unique(near, return_counts=True)
+    return bool(near.size >= PILED and np.count_nonzero(at) >= PILED * int(np.max(counts, initial=1)))
+
+
+def supply(view: View) -> Iterator[Finding]:
+    """A voltage that stays as it is while the axis turns to and fro: the supply's, not the drive's."""
+    smooth = view.smooth
+    if smooth is None or not view.has("voltage"):
+        return
+    values, moving = view.values("voltage"), smooth.velocity[smooth.moving]
+    low, high = np.percentile(values, [1.0, 99.0])
+    forth = float(np.mean(moving > 0.0)) if moving.size else 0.0
+    if 0.1 < forth < 0.9 and low > 0.0 and high - low < 0.2 * high:
+        message = (
+            f"voltage stays between {low:.3g} and {high:.3g} V while the axis turns to and fro: the supply's"
+        )
+        name = shlex.quote(f"supply={view.name('voltage')}")
+        yield Finding("warning", "supply-voltage", message, remedy=f"say --map {name} --map voltage=none")
 
 
 def _longest(mask: Any) -> int:
@@ -118,22 +155,27 @@ def wrapped(view: View) -> Iterator[Finding]:
     """Jumps by a whole turn."""
     if not view.has("position") or view.time.size < 30:
         return
-    steps = np.diff(view.values("position"))
+    values = view.values("position")
+    spiky = sticking_out(values, position=True)
+    if spiky.size:  # a jump that comes back at once is a spike
+        values = np.delete(values, spiky)
+    rows = np.delete(np.flatnonzero(view.usable), spiky)
+    steps = np.diff(values)
     usual = float(np.percentile(np.abs(steps), 95))
     jumps = np.flatnonzero(np.abs(steps) > max(20.0 * usual, 1e-12))
     if not jumps.size:
         return
-    index = int(np.flatnonzero(view.usable)[jumps[0] + 1])
+    index = int(rows[jumps[0] + 1])
     size = float(np.median(np.abs(steps[jumps])))
     unit = view.record.units["position"]
     turn = next((t for t in (2.0 * math.pi, 360.0, 1.0, math.pi) if abs(size / t - 1.0) < 0.05), None)
-    if turn is not None or size > 0.8 * float(np.ptp(view.values("position"))):
+    if turn is not None or size > 0.8 * float(np.ptp(values)):
         yield Finding(
             "error",
             "position-wrap",
             f"position jumps {jumps.size} times by {size:.4g} {unit}: it is counted within one turn",
             row(index, view),
-            "log the position without overflow, or unwrap it",
+            "say --unwrap to count it on, or log the position without overflow",
         )
     else:
         yield Finding(
@@ -141,5 +183,5 @@ def wrapped(view: View) -> Iterator[Finding]:
             "position-jump",
             f"position jumps {jumps.size} times by about {size:.4g} {unit}",
             row(index, view),
-            "leave these rows out, or check the encoder",
+            f"leave these rows out, such as --leave-out {view.file_rows[index]}, or check the encoder",
         )

@@ -13,6 +13,10 @@ __all__ = ["ascending", "sampling", "scale"]
 
 GAP = 5.0
 """A gap is this many times the usual distance of samples."""
+FEWEST = 20
+"""Usable rows without which nothing can be said."""
+SHORTEST = 1e-9
+"""s between two samples: no drive is faster, so that the unit must be another."""
 UNEVEN = 0.2
 """A distance is uneven when it differs from the usual one by this share."""
 JITTER = 0.02
@@ -38,7 +42,7 @@ def ascending(view: View) -> Iterator[Finding]:
             "backward-time",
             f"time goes back {back.size} times; {piece}",
             row(int(back[0]), view),
-            "cut the file there, or sort it by time",
+            f"take a part, such as --rows 1:{view.file_rows[back[0] - 1]}, or sort the file by time",
         )
     same = known[1:][steps == 0.0]
     if same.size:
@@ -62,18 +66,20 @@ def ascending(view: View) -> Iterator[Finding]:
 def sampling(view: View) -> Iterator[Finding]:
     """Gaps, and uneven distances."""
     time = view.time
-    if time.size < 20:
-        yield Finding(
-            "error", "too-short", f"the record has {time.size} usable rows", remedy="give at least 20"
-        )
+    if time.size < FEWEST:
+        message = f"the record has {time.size} usable rows"
+        yield Finding("error", "too-short", message, remedy=f"give at least {FEWEST}")
         return
-    steps = np.diff(time)
+    rows = np.flatnonzero(view.usable)
+    # Where the user left rows out is no fault of the record.
+    as_logged = np.diff(np.cumsum(np.diff(view.file_rows, prepend=view.file_rows[0] - 1) > 1)[rows]) == 0
+    steps, rows = np.diff(time)[as_logged], rows[:-1][as_logged]
     usual = view.period
     gaps = np.flatnonzero(steps > GAP * usual)
-    rows = np.flatnonzero(view.usable)
     if gaps.size and gaps.size < 0.05 * steps.size:
         longest = int(gaps[np.argmax(steps[gaps])])
         lost = float(np.sum(steps[gaps] - usual))
+        end, begin = view.record.time[rows[longest]], view.record.time[rows[longest] + 1]
         message = (
             f"{gaps.size} gaps of more than {GAP:g} samples, {lost:.3g} s in all, "
             f"the longest {steps[longest]:.3g} s"
@@ -83,7 +89,7 @@ def sampling(view: View) -> Iterator[Finding]:
             "gap",
             message,
             row(int(rows[longest]), view),
-            "filters run across gaps: cut the record there",
+            f"filters run across gaps: identify with --to {end:.6g}, or --from {begin:.6g}",
         )
     # A run may end between two samples.
     whole = steps[:-1] if steps[-1] < usual else steps
@@ -100,7 +106,7 @@ def sampling(view: View) -> Iterator[Finding]:
             "warning",
             "irregular-sampling",
             message,
-            row(int(rows[off[0] + 1]), view),
+            row(int(rows[off[0]]) + 1, view),
             "it is resampled evenly where a method filters; log with a fixed cycle if you can",
         )
     elif width > JITTER:
@@ -129,6 +135,13 @@ def scale(view: View) -> Iterator[Finding]:
             "slow-sampling",
             f"samples are {period:g} s apart; friction changes faster",
             remedy=f"log faster, or say {view.mapped('time', 'ms')} if the unit is wrong",
+        )
+    elif period < SHORTEST:
+        yield Finding(
+            "error",
+            "no-clock",
+            f"samples are {period:.3g} s apart: no drive is that fast",
+            remedy=f"say in which unit times are, such as {view.mapped('time', 's')}",
         )
     elif period < 5e-6:
         yield Finding(

@@ -1,0 +1,243 @@
+"""What several estimators say of one axis, and which of them a number is taken from.
+
+Inertia, offset, gravity and the level and slope of friction are those of the regression on certain sliding
+(`stickslip.identify.regression`), which assumes nothing about the hold of the torque or about reversals; the
+prediction error (`stickslip.identify.axis_prediction`) tells what only slow motion and reversals show. Where both
+contradict each other, what it alone says is not called identified, and the reason is given.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.axis_inverse import InverseDynamics
+from stickslip.identify.axis_trial import Trial
+from stickslip.identify.band_fit import stacked
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.gravity import hanging
+from stickslip.identify.noise import Noise
+from stickslip.identify.regression import QUANTILE, Regression, regress_axis
+from stickslip.identify.uncertainty import verdict_on
+from stickslip.identify.vector import Parameter, Vector
+from stickslip.machines.servo import ServoAxis
+
+__all__ = ["SAME", "TOLD_BY_SLIDING", "agreed", "aligned", "on_timing", "regressed", "sliding_values"]
+
+ALIGNED = 0.1
+"""Rows by which a torque that acts from row to row must be off its row to be moved."""
+KNOWN = 0.5
+"""Rows: the skew's half-width up to which it says anything about the hold of the torque."""
+SAME = 0.05
+"""Relative difference of two numbers that is none."""
+AS_GOOD = 1.5
+"""Times as much as the regression leaves of the torque in certain sliding, that other values may leave and still
+stand."""
+TOLD_BY_SLIDING = ("inertia", "offset", "gravity", "gravity_angle", "fc", "sigma2")
+DOUBT = (
+    "the prediction error, which alone tells it, contradicts certain sliding on {name}: {other} against {own}"
+)
+
+
+def regressed(
+    trials: Sequence[Trial], axis: ServoAxis, skew: float | None, harmonic_period: float | None = None
+) -> tuple[Regression | None, list[str]]:
+    """The regression on certain sliding, where the records allow it; else why they do not."""
+    if any(t.drive is None for t in trials):
+        return None, []
+    try:
+        return regress_axis(trials, axis, skew=skew, harmonic_period=harmonic_period), []
+    except InputError as error:
+        return None, [f"No regression on certain sliding: {error}."]
+
+
+def aligned(trials: Sequence[Trial], found: Regression | None) -> list[Trial]:
+    """The trials, their drive's signal moved so that it acts from its row to the next, as simulations take it."""
+    if found is None:
+        return list(trials)
+    skew = found.numbers["skew"]
+    out: list[Trial] = []
+    for t in trials:
+        late = skew.value + 0.5 * t.period
+        if t.drive is None or abs(late) <= ALIGNED * t.period or QUANTILE * skew.std > KNOWN * t.period:
+            out.append(t)
+            continue
+        out.append(replace(t, drive=np.interp(t.time + late, t.time, t.drive)))
+    return out
+
+
+def on_timing(found: Regression | None) -> list[str]:
+    """When the torque acted, in a sentence; nothing where the record does not tell."""
+    if found is None:
+        return []
+    low, high = found.interval("skew")
+    half, row = 0.5 * (high - low), found.period
+    if half > KNOWN * row:
+        return []
+    value = found.numbers["skew"].value
+    where = "after" if value < 0.0 else "before"
+    share = -value / row
+    kind = (
+        "as a command held from row to row" if abs(share - 0.5) <= max(ALIGNED, half / row)
+        else "as a value sampled at the row" if abs(share) <= max(ALIGNED, half / row)
+        else "as a mean over the row before" if abs(share + 0.5) <= max(ALIGNED, half / row)
+        else "a hold and a delay together"
+    )  # fmt: skip
+    return [
+        f"The torque acted {1e3 * abs(value):.3g} ms (±{1e3 * half:.2g}) {where} its row on average, {abs(share):.2g} "
+        f"of a row: {kind}; this is allowed for."
+    ]
+
+
+# ---- numbers --------------------------------------------------------------------------------------------------
+
+
+def sliding_values(found: Regression) -> dict[str, tuple[float, float, float]]:
+    """Value and ends of the 95 % interval of every number that certain sliding tells, by the names of estimates."""
+    out: dict[str, tuple[float, float, float]] = {}
+    for name in ("inertia", "offset", "fc", "sigma2"):
+        out[name] = (found.numbers[name].value, *found.interval(name))
+    if "gravity_sin" in found.numbers:
+        sine, cosine = found.numbers["gravity_sin"], found.numbers["gravity_cos"]
+        size, angle = hanging(sine.value, cosine.value, stacked(found.rows, "position"))
+        along = math.hypot(sine.value * sine.std, cosine.value * cosine.std) / size
+        across = math.hypot(cosine.value * sine.std, sine.value * cosine.std) / size**2
+        out["gravity"] = (size, size - QUANTILE * along, size + QUANTILE * along)
+        out["gravity_angle"] = (angle, angle - QUANTILE * across, angle + QUANTILE * across)
+    return out
+
+
+def agreed(
+    estimates: Iterable[Estimate], found: Regression, vector: Vector, inverse: InverseDynamics | None,
+    scale: Mapping[str, float], fine: bool = True,
+) -> tuple[tuple[Estimate, ...], list[str]]:  # fmt: skip
+    """Every number from the estimator that shows it, and what is to be said.
+
+    Parameters
+    ----------
+    estimates : iterable of Estimate
+        Those of the prediction error (or the starting values, where `fine` is False).
+    found : Regression
+    vector : Vector
+        Whose parameters they are.
+    inverse : InverseDynamics or None
+        The plain inverse dynamics: an interval is widened to hold what it says.
+    scale : mapping
+        What the half-width of a signed parameter is compared with, by name.
+    fine : bool
+        Whether the prediction error was asked.
+    """
+    sliding, parameters = sliding_values(found), {p.name: p for p in vector.free}
+    taken: dict[str, Estimate] = {}
+    notes: list[str] = []
+    doubts = ""
+    held = found.held_for(ALIGNED) and not found.orders
+    estimates, stands = list(estimates), inverse is not None and as_good(inverse, found)
+    for e in estimates:
+        if e.name not in sliding or e.name not in parameters:
+            continue
+        size = scale.get(e.name, math.nan)
+        own = told(e, parameters[e.name], *sliding[e.name], size)
+        apart = abs(e.value - own.value) > math.hypot(e.upper - e.lower, own.upper - own.lower) / 2.0
+        if fine and not apart:
+            # Its intervals are narrow, and hold where the torque acted as simulations take it.
+            taken[e.name] = e if held and e.identified and not own.identified else own
+            continue
+        if fine and abs(e.value - own.value) > SAME * abs(own.value) and e.name in ("inertia", "fc"):
+            doubts = DOUBT.format(name=e.name, other=f"{e.value:.4g}", own=f"{own.value:.4g} {e.unit}")
+        if stands:
+            own, said = held_together(own, plain_value(e.name, inverse), parameters[e.name], size)
+            notes += said
+        taken[e.name] = own
+    if doubts:
+        # Where both disagree on what both can tell, neither value nor interval of the fine one is to be trusted.
+        taken |= {
+            e.name: told(e, parameters[e.name], *sliding[e.name], scale.get(e.name, math.nan))
+            for e in estimates if taken.get(e.name) is e
+        }  # fmt: skip
+        notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
+    if inverse is not None:
+        # A number that is one choice among many: the one that goes best with the others.
+        best = completed(inverse, {n: e.value for n, e in taken.items() if e.identified})
+        taken |= {
+            n: told(e, parameters[n], best[n], min(e.lower, best[n]), max(e.upper, best[n]), scale.get(n, math.nan))
+            for n, e in taken.items() if n in best
+        }  # fmt: skip
+    out = tuple(
+        taken[e.name] if e.name in sliding and e.name in taken
+        else replace(e, identified=False, verdict=doubts) if doubts and e.identified else e
+        for e in estimates
+    )  # fmt: skip
+    return out, notes
+
+
+def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale: float) -> Estimate:
+    """An estimate with another value and interval, judged by the same rules, within the parameter's bounds."""
+    std = (high - low) / (2.0 * QUANTILE)
+    least = p.par.lower if not p.par.positive else max(p.par.lower, 1e-12 * abs(high))
+    value, low, high = (min(max(x, least), p.par.upper) for x in (value, low, high))
+    why = verdict_on(p, value, low, high, Noise(1.0, "residual", math.inf), scale)
+    return replace(e, value=value, std=std, lower=low, upper=high, identified=not why, verdict=why)
+
+
+PLAIN = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}
+"""Names of the plain inverse dynamics."""
+
+
+def completed(inverse: InverseDynamics, known: Mapping[str, float]) -> dict[str, float]:
+    """What plain least squares gives the numbers that are not known, with those that are."""
+    if not all(inverse.has(n) for n in PLAIN.values()):
+        return {}
+    fixed = [inverse.names.index(PLAIN[n]) for n in known if n in PLAIN]
+    values = np.array([known[n] for n in known if n in PLAIN])
+    free = [i for i in range(len(inverse.names)) if i not in fixed]
+    left = inverse.torque - inverse.matrix[:, fixed] @ values
+    columns = inverse.matrix[:, free]
+    size = np.linalg.norm(columns, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    found = np.asarray(np.linalg.lstsq(columns / size, left, rcond=1e-9)[0] / size, dtype=np.float64)
+    own = {inverse.names[i]: float(x) for i, x in zip(free, found, strict=True)}
+    return {n: own[p] for n, p in PLAIN.items() if p in own}
+
+
+def plain_value(name: str, inverse: InverseDynamics | None) -> tuple[float, float] | None:
+    """Value and half-width of the plain inverse dynamics, where it has that number."""
+    own = PLAIN.get(name, "")
+    if inverse is None or not inverse.has(own):
+        return None
+    return inverse[own], QUANTILE * float(inverse.robust_std[inverse.names.index(own)])
+
+
+def as_good(inverse: InverseDynamics, found: Regression) -> bool:
+    """Whether the plain inverse dynamics explains certain sliding as well as the regression: else that refutes it."""
+    values = {
+        "inertia": inverse["inertia"],
+        "sigma2": inverse.viscous,
+        "fc": inverse.coulomb,
+        "offset": inverse.offset,
+    }
+    gravity = {n: inverse[n] for n in ("gravity_sin", "gravity_cos") if inverse.has(n)}
+    own = {n: v.value for n, v in found.numbers.items()}
+    return found.left_by(values | gravity) <= AS_GOOD * found.left_by(own)
+
+
+def held_together(
+    e: Estimate, other: tuple[float, float] | None, p: Parameter, scale: float
+) -> tuple[Estimate, list[str]]:
+    """The estimate, its interval widened to hold what the plain inverse dynamics says where both contradict each
+    other."""
+    if other is None:
+        return e, []
+    value, half = other
+    apart = abs(value - e.value) > math.hypot(0.5 * (e.upper - e.lower), half)
+    if not apart or abs(value - e.value) <= SAME * max(abs(e.value), scale if math.isfinite(scale) else 0.0):
+        return e, []
+    wide = told(e, p, e.value, min(e.lower, value), max(e.upper, value), scale)
+    return wide, [
+        f"{e.name}: the plain inverse dynamics, reversals included, says {value:.4g}, certain sliding {e.value:.4g} "
+        f"{e.unit}; the interval holds both."
+    ]

@@ -1,0 +1,245 @@
+"""The motion that a setting is tried along: that of a log, one of a file, or a slow sinusoid.
+
+`identify` keeps the motion of its first record in ``[trajectory]`` of model.toml: up to `POINTS` points of the
+reference (of the position, where the log has none), joined by cubics, of the `LONGEST` seconds with the most motion and
+reversals. A setting can then be tried without the log.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.record import Record
+
+__all__ = ["LONGEST", "Motion", "motion_in", "motion_of", "sinusoid", "speeds_of"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+LONGEST = 8.0
+"""s of a log that are kept."""
+POINTS = 800
+"""At most so many are kept."""
+RUN_UP = 0.1
+"""s, in which a motion that begins (or ends) under way is brought from (or to) rest."""
+HOLD = 1.0
+"""s at rest after the motion, of which the second half is judged."""
+REST = 0.01
+"""Of the greatest speed, below which a motion's end is at rest."""
+WINDOW = 0.02
+"""s over which a recorded speed is taken."""
+REFERENCES = ("position_reference", "reference")
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Points of a motion, joined by cubic Hermite pieces.
+
+    Attributes
+    ----------
+    time, position, velocity : array, shape (n,)
+        s, ascending; rad; rad/s.
+    source : str
+        For people: where it comes from.
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        sizes = {self.time.size, self.position.size, self.velocity.size}
+        if len(sizes) != 1 or self.time.size < 2:
+            raise InputError(
+                f"the motion {self.source!r} has {self.time.size} times, {self.position.size} positions and "
+                f"{self.velocity.size} velocities; give as many of each, at least 2"
+            )
+        if not all(np.all(np.isfinite(x)) for x in (self.time, self.position, self.velocity)):
+            raise InputError(
+                f"the motion {self.source!r} has values that are not finite; leave those points out"
+            )
+        if np.any(np.diff(self.time) <= 0.0):
+            raise InputError(f"the times of the motion {self.source!r} do not ascend; sort its points")
+        if not np.ptp(self.position) > 0.0:
+            raise InputError(f"the motion {self.source!r} stands still; give one that moves the axis")
+
+    @property
+    def duration(self) -> float:
+        """s"""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def amplitude(self) -> float:
+        """Half the way between its outermost positions, rad."""
+        return 0.5 * float(np.ptp(self.position))
+
+    @property
+    def top_speed(self) -> float:
+        """rad/s"""
+        return float(np.max(np.abs(self.velocity)))
+
+    def sampled(self, sample_time: float) -> Array:
+        """Position, velocity and acceleration at every sample, shape (n, 3): from rest at 0, and `HOLD` at rest
+        after it."""
+        interpolate: Any = importlib.import_module("scipy.interpolate")
+        time, position, velocity = self._from_rest_to_rest()
+        curve = interpolate.CubicHermiteSpline(time - time[0], position - position[0], velocity)
+        t = sample_time * np.arange(math.ceil((time[-1] - time[0] + HOLD) / sample_time))
+        held = np.minimum(t, time[-1] - time[0])
+        out = np.stack([np.asarray(curve(held, order), dtype=np.float64) for order in range(3)], axis=1)
+        out[t >= time[-1] - time[0], 1:] = 0.0
+        return out
+
+    def _from_rest_to_rest(self) -> tuple[Array, Array, Array]:
+        """The points, with a ramp of the velocity before and behind where the motion does not begin or end at rest."""
+        t, x, v = self.time, self.position, self.velocity.copy()
+        for end in (0, -1):
+            v[end] = v[end] if abs(v[end]) > REST * self.top_speed else 0.0
+        if v[0] != 0.0:
+            t = np.concatenate([[t[0] - RUN_UP], t])
+            x, v = np.concatenate([[x[0] - 0.5 * RUN_UP * v[0]], x]), np.concatenate([[0.0], v])
+        if v[-1] != 0.0:
+            t = np.concatenate([t, [t[-1] + RUN_UP]])
+            x, v = np.concatenate([x, [x[-1] + 0.5 * RUN_UP * v[-1]]]), np.concatenate([v, [0.0]])
+        return t, x, v
+
+    def table(self) -> dict[str, Any]:
+        """Plain data for a file."""
+        span, top = float(np.ptp(self.position)), self.top_speed or 1.0
+        return {
+            "source": self.source,
+            "time": [float(f"{t:.7g}") for t in self.time - self.time[0]],
+            "position": _rounded(self.position, 1e-7 * span),
+            "velocity": _rounded(self.velocity, 1e-5 * top),
+        }
+
+
+def _rounded(values: Array, step: float) -> list[float]:
+    """Without digits below a power of ten near `step`."""
+    digits = -math.floor(math.log10(step))
+    return [float(x) for x in np.round(values, digits)]
+
+
+def motion_in(content: Mapping[str, Any], file: str) -> Motion | None:
+    """The motion that a model's file holds; None where it has none.
+
+    Raises
+    ------
+    InputError
+        If its table is damaged.
+    """
+    table: Any = content.get("trajectory")
+    if table is None:
+        return None
+    try:
+        columns = [
+            np.array(table[name], dtype=np.float64).ravel() for name in ("time", "position", "velocity")
+        ]
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{file}: its table [trajectory] cannot be read ({error}); identify the axis again"
+        ) from None
+    return Motion(*columns, source=str(table.get("source", file)))
+
+
+def motion_of(record: Record, source: str = "") -> Motion:
+    """The motion of a record: its reference, or where it has none its position, smoothed over some rows.
+
+    Raises
+    ------
+    InputError
+        If it does not move.
+    """
+    name = next((n for n in REFERENCES if n in record.channels), "position")
+    time, position = record.time, np.asarray(record[name], dtype=np.float64)
+    known = np.isfinite(position) & np.isfinite(time)
+    time, position = time[known], position[known]
+    begin, end = _telling(time, position)
+    rows = (time >= begin) & (time <= end)
+    time, position = time[rows], position[rows]
+    if time.size < 2:
+        raise InputError(
+            f"{source or 'the record'} has too few rows for a motion; give --motion or --amplitude"
+        )
+    every = max((time[-1] - time[0]) / (POINTS - 1), float(np.median(np.diff(time))))
+    count = max(2, 1 + round((time[-1] - time[0]) / every))
+    at: Array = np.linspace(float(time[0]), float(time[-1]), count)
+    if name == "position":
+        position = _smoothed(position, max(1, round(every / float(np.median(np.diff(time))))))
+    step = 0.5 * float(at[1] - at[0])
+    before, here, behind = (np.interp(at + shift, time, position) for shift in (-step, 0.0, step))
+    velocity = (behind - before) / (np.minimum(at + step, time[-1]) - np.maximum(at - step, time[0]))
+    where = {"position": "position"}.get(name, "reference")
+    return Motion(at, here, velocity, f"{where} of {source}, {begin:.4g} to {end:.4g} s" if source else where)
+
+
+def speeds_of(records: Sequence[Record]) -> dict[str, list[float]]:
+    """Quantiles (0, 0.1, ..., 1) of the recorded speeds in either direction, rad/s, over a fiftieth of a second each.
+
+    What is below a thousandth of the greatest speed is rest.
+    """
+    found: list[Array] = []
+    for record in records:
+        known = np.isfinite(record["position"]) & np.isfinite(record.time)
+        time, position = record.time[known], record["position"][known]
+        if time.size < 2:
+            continue
+        begin, end = float(time[0]), float(time[-1])
+        grid: Array = np.linspace(begin, end, max(2, 1 + round((end - begin) / WINDOW)))
+        found.append(np.diff(np.interp(grid, time, position)) / (grid[1] - grid[0]))
+    velocity = np.concatenate(found) if found else np.zeros(0)
+    rest = 1e-3 * float(np.max(np.abs(velocity), initial=0.0))
+    out: dict[str, list[float]] = {}
+    for side, name in ((1.0, "positive"), (-1.0, "negative")):
+        moving = side * velocity[side * velocity > rest]
+        if moving.size >= 10:
+            out[name] = [float(f"{v:.4g}") for v in np.quantile(moving, np.linspace(0.0, 1.0, 11))]
+    return out
+
+
+def _telling(time: Array, position: Array) -> tuple[float, float]:
+    """Begin and end of the `LONGEST` seconds with the most way and reversals, from a time of rest if there is one."""
+    if time.size < 2 or time[-1] - time[0] <= LONGEST:
+        return float(time[0]) if time.size else 0.0, float(time[-1]) if time.size else 0.0
+    grid = np.arange(time[0], time[-1], 0.02)
+    steps = np.diff(np.interp(grid, time, position))
+    still = np.abs(steps) < 0.01 * np.max(np.abs(steps))
+    moving = np.sign(np.where(still, 0.0, steps))
+    last = moving[moving != 0.0]
+    turns = np.zeros(steps.size)
+    turns[np.flatnonzero(moving)[1:][np.diff(last) != 0.0]] = 1.0
+    way = np.concatenate(
+        [[0.0], np.cumsum(np.abs(steps) / (np.sum(np.abs(steps)) or 1.0) + turns / (turns.sum() or 1.0))]
+    )
+    width = round(LONGEST / 0.02)
+    score = way[width:] - way[:-width]
+    resting = still[: score.size] if np.any(still[: score.size]) else np.ones(score.size, dtype=bool)
+    best = int(np.argmax(np.where(resting, score, -1.0)))
+    return float(grid[best]), float(min(grid[best] + LONGEST, time[-1]))
+
+
+def _smoothed(values: Array, rows: int) -> Array:
+    """Running mean over about twice `rows`, shorter at the ends."""
+    width = 2 * rows + 1
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    index = np.arange(values.size)
+    half = np.minimum(np.minimum(index, values.size - 1 - index), width // 2)
+    return (total[index + half + 1] - total[index - half]) / (2 * half + 1)
+
+
+def sinusoid(amplitude: float, frequency: float) -> Motion:
+    """Two periods of a slow sinusoid that starts at rest at its turning point, rad and Hz."""
+    t = np.linspace(0.0, 2.0 / frequency, 401)
+    w = 2.0 * math.pi * frequency
+    velocity = amplitude * w * np.sin(w * t)
+    velocity[[0, -1]] = 0.0
+    return Motion(
+        t, amplitude * (1.0 - np.cos(w * t)), velocity, f"sinusoid, {amplitude:g} at {frequency:g} Hz"
+    )

@@ -1,0 +1,103 @@
+"""Spikes and clipped values are found; peaks that a motion has are not taken for them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip import Record
+from stickslip.cli import main
+from stickslip.identify.doctor import examine
+from stickslip.identify.doctor.spikes import spike_rows
+
+FC, J, SIZE = 2.0, 0.01, 20_000
+UNITS = {"position": "rad", "motor_torque": "N·m"}
+
+
+def motion(seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time, position and torque of an axis moved to and fro, its torque up to 2.5 N·m."""
+    t = np.arange(SIZE) * 1e-3
+    v = 9.0 * np.sin(2.0 * np.pi * 0.9 * t) + 5.0 * np.sin(2.0 * np.pi * 0.23 * t)
+    noise = 0.05 * np.random.default_rng(seed).standard_normal(SIZE)
+    return t, np.cumsum(v) * 1e-3, J * np.gradient(v, t) + FC * np.tanh(v / 0.05) + noise
+
+
+def record(torque: np.ndarray, position: np.ndarray | None = None) -> Record:
+    t, q, _ = motion()
+    return Record(t, {"position": q if position is None else position, "motor_torque": torque}, UNITS)
+
+
+def codes(r: Record) -> dict[str, str]:
+    return {f.code: f.line() for f in examine(r).findings}
+
+
+def test_spikes_in_the_torque_are_counted_with_their_rows():
+    _, _, torque = motion()
+    rows = np.random.default_rng(2).choice(np.arange(10, SIZE - 10), 30, replace=False)
+    torque[rows] = 50.0 * np.where(rows % 2, 1.0, -1.0)
+    found = codes(record(torque))
+    assert "30 spikes of up to" in found["spikes"]
+    assert "50 N·m" in found["spikes"]
+    assert "--leave-out spikes" in found["spikes"]
+    assert np.array_equal(spike_rows(record(torque)), np.sort(rows) + 1)
+
+
+def test_a_single_row_within_the_range_is_a_spike_and_named():
+    _, _, torque = motion()
+    torque[5000] += 3.0
+    assert "by their rows: 5001" in codes(record(torque))["spikes"]
+
+
+def test_a_spike_of_the_position_is_no_wrap():
+    _, q, torque = motion()
+    q[7000] += 2.0 * np.pi
+    found = codes(record(torque, q))
+    assert "row 7001" in found["spikes"]
+    assert "position-wrap" not in found
+
+
+@pytest.mark.parametrize("kind", ["noise", "pulses", "steps", "still"])
+def test_what_a_motion_has_is_no_spike(kind):
+    t, q, torque = motion()
+    if kind == "noise":
+        torque += np.random.default_rng(3).standard_t(5, SIZE)
+    if kind == "pulses":  # impacts that ring
+        for k in range(500, SIZE - 200, 1700):
+            torque[k : k + 80] += 8.0 * np.exp(-np.arange(80) / 6.0) * np.sin(np.arange(80) / 2.0)
+    if kind == "steps":
+        torque = 2.5 * np.sign(torque)
+    if kind == "still":
+        q, torque = np.where(t < 18.0, q[0], q - q[18_000]), np.where(t < 18.0, 0.0, torque)
+        q = np.round(q / 1e-4) * 1e-4
+    assert "spikes" not in codes(record(torque, q))
+
+
+def test_identify_without_spikes_gives_the_friction(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    t, q, torque = motion()
+    torque[np.random.default_rng(2).choice(np.arange(10, SIZE - 10), 30, replace=False)] = 50.0
+    path = tmp_path / "log.csv"
+    head = "time [s],position [rad],motor_torque [N·m]"
+    np.savetxt(path, np.stack([t, q, torque], axis=1), "%.9f", ",", header=head, comments="")
+    given = ["identify", str(path), "--inverse", "--no-report", "--json", "--out", str(tmp_path / "m.toml")]
+    error = []
+    for options in ([], ["--leave-out", "spikes"]):
+        assert main([*given, *options]) == 0
+        found = {e["name"]: e["value"] for e in json.loads(capsys.readouterr().out)["estimates"]}
+        error.append(abs(found["fc"] / FC - 1.0))
+    assert error[1] < 0.02 < error[0]
+
+
+@pytest.mark.parametrize("kind", ["plain", "held", "brief", "rounded"])
+def test_clipped_torques_are_found(kind):
+    _, _, torque = motion()
+    if kind == "held":  # the drive writes its torque every fourth row
+        torque = np.repeat(torque[::4], 4)
+    if kind == "rounded":
+        torque = 0.01 * np.round(torque / 0.01)
+    level = 2.45 if kind == "brief" else 2.2
+    clipped = np.clip(torque, -level, level)
+    assert "saturation" not in codes(record(torque))
+    assert f"{level:g}" in codes(record(clipped))["saturation"]

@@ -1,0 +1,100 @@
+"""Two identified models: by how much, on which side of the gear, and what could not have been seen."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip.errors import InputError
+from stickslip.identify.drift import compare_models
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.identified_file import Identified
+from stickslip.identify.sides import on_one_side
+from stickslip.model import Model
+
+UNITS = {"fs": "N·m", "fc": "N·m", "vs": "rad/s", "sigma2": "N·m·s/rad", "k": "N·m·s/rad", "inertia": "kg·m²"}
+TRUE = {"k": 50.0, "fs": 0.335, "fc": 0.285, "vs": 0.1, "sigma2": 0.018, "inertia": 4e-4}
+SPEEDS = {"positive": np.linspace(0.05, 5.0, 11), "negative": np.linspace(0.05, 4.0, 11)}
+
+
+def found(name: str, law: str = "stribeck", spread: float = 0.01, **other: float) -> Identified:
+    values = {**TRUE, **other}
+    own = {f.name for f in Model(law, **{k: v for k, v in values.items() if k in PARAMETERS[law]}).law.fields}
+    values = {k: v for k, v in values.items() if k in own or k == "inertia"}
+    estimates = tuple(
+        Estimate(n, UNITS[n], n, v, spread * v, v * math.exp(-1.96 * spread), v * math.exp(1.96 * spread), True)
+        for n, v in values.items()
+    )  # fmt: skip
+    model = Model(law, **{k: v for k, v in values.items() if k in own})
+    axis = {"inertia": values["inertia"], "offset": 0.0}
+    return Identified(Path(name), model, estimates, np.eye(len(estimates)), axis, speeds=SPEEDS)
+
+
+PARAMETERS = {"stribeck": ("k", "fs", "fc", "vs", "sigma2"), "coulomb": ("fc", "sigma2")}
+
+
+def test_it_says_by_how_much() -> None:
+    result = compare_models(found("a"), found("b", fc=0.82 * 0.285, fs=0.82 * 0.335))
+    assert result.changed
+    fc = next(c for c in result.changes if c.name == "fc")
+    assert fc.words() == "fc -18 % [-20, -16]"
+    assert "fc -18 % [-20, -16]" in result.summary
+    assert fc.percent_span == pytest.approx((-20.2, -15.7), abs=0.1)
+    slow = next(c for c in result.levels if c.name == "friction at 0.05 rad/s")
+    assert slow.told
+    assert -22.0 < slow.percent_span[0] < -18.0 < slow.percent_span[1] < -14.0
+
+
+def test_inertia_is_told_beside_the_friction_whatever_the_laws() -> None:
+    for law in ("stribeck", "coulomb"):
+        result = compare_models(found("a"), found("b", law, inertia=1.6 * 4e-4, fc=0.3))
+        assert "Beside it has changed: inertia +60 % [+56, +64]." in result.summary
+        names = {c.name for c in result.changes}
+        assert ("fc" in names) == (law == "stribeck")
+        assert [c.name for c in result.levels if "friction at" in c.name]
+    assert any("The laws differ (stribeck, coulomb)" in note for note in result.notes)
+
+
+def test_it_says_what_it_could_not_have_seen() -> None:
+    result = compare_models(found("a"), found("b"))
+    assert not result.changed
+    assert result.summary == "No change of the friction that the intervals do not explain."
+    assert any("Smaller changes than these would not have been seen: k by 2.8 %" in n for n in result.notes)
+    assert any("from 0.05 to 5 rad/s, the speeds that both records have" in note for note in result.notes)
+    assert (result.velocity[-1], -result.velocity[0]) == (5.0, 5.0)
+    blind = compare_models(replace(found("a"), speeds={}), found("b"))
+    assert any("the files do not say" in note for note in blind.notes)
+
+
+def test_the_picture_shows_the_recorded_speeds() -> None:
+    traces = compare_models(found("a"), found("b", fc=0.3)).picture.traces
+    points = [t for t in traces if t.kind == "points"]
+    assert [t.label for t in points] == ["tenths of the speeds of a", "tenths of the speeds of b"]
+    np.testing.assert_allclose(points[0].x, SPEEDS["positive"])
+
+
+def test_one_axis_seen_from_both_sides_of_its_gear_has_not_changed() -> None:
+    """At the motor of a gear of 50 torques are a fiftieth, speeds 50 times, inertia and viscous friction 1/2500."""
+    load, n = found("load.toml"), 50.0
+    power = {"fs": -1, "fc": -1, "vs": 1, "sigma2": -2, "k": -2, "inertia": -2}
+    motor = found("motor.toml", **{k: v * n ** power[k] for k, v in TRUE.items()})
+    sides = ("load", "motor")
+    load, motor = (
+        replace(m, axis={**m.axis, "seen_from": s, "gear_ratio": n})
+        for m, s in zip((load, motor), sides, strict=True)
+    )
+    motor = replace(motor, speeds={k: n * v for k, v in SPEEDS.items()})
+    for a, b in ((load, motor), (motor, load)):
+        result = compare_models(a, b)
+        assert not result.changed
+        assert [c.percent for c in result.changes] == pytest.approx([0.0] * len(result.changes), abs=1e-9)
+        assert any("side of the gear of 50" in note for note in result.notes)
+        assert result.velocity[-1] == pytest.approx(float(a.speeds["positive"][-1]))
+    assert compare_models(found("load.toml"), replace(motor, axis={})).changed
+    other = replace(motor, axis={**motor.axis, "gear_ratio": 49.0})
+    with pytest.raises(InputError, match=r"gear ratio of 50 and motor\.toml one of 49"):
+        on_one_side(load, other)

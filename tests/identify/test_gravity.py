@@ -1,0 +1,56 @@
+"""The angle at which a pendulum hangs: near where it moved, whatever the record counts from."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from stickslip import Model
+from stickslip.identify.axis import identify_axis
+from stickslip.identify.axis_trial import Trial
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.gravity import hanging, nearest, within_a_turn
+from stickslip.machines.servo import ServoAxis
+from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
+
+SWING = np.linspace(-1.2, 1.2, 50)
+
+
+@pytest.mark.parametrize("middle", [0.0, math.pi, -math.pi, 2.0 * math.pi, 11.0])
+@pytest.mark.parametrize("off", [-0.05, 0.05])
+def test_the_angle_does_not_jump_where_atan2_does(middle, off):
+    wanted = middle + off
+    size, angle = hanging(2.0 * math.cos(wanted), -2.0 * math.sin(wanted), middle + SWING)
+    assert size == pytest.approx(2.0)
+    assert angle == pytest.approx(wanted)
+
+
+def test_an_axis_that_turns_many_times_has_an_angle_of_the_first_turn():
+    assert abs(nearest(5.0, np.linspace(0.0, 100.0, 9))) <= math.pi
+
+
+def test_an_interval_wider_than_a_turn_tells_nothing():
+    e = Estimate("gravity_angle", "rad", "q_0", 0.3, 1e6, -2e6, 2e6, False, "too wide")
+    (told,) = within_a_turn([e], SWING)
+    assert (told.lower, told.upper) == pytest.approx((0.3 - math.pi, 0.3 + math.pi))
+    assert not told.identified
+    other = Estimate("offset", "N·m", "T_0", 0.3, 1e6, -2e6, 2e6, False, "too wide")
+    assert within_a_turn([other], SWING) == (other,)
+
+
+def test_an_arm_that_hangs_at_half_a_turn():
+    """Hanging at pi + 0.04 is -pi + 0.04 to atan2; the interval belongs to the value said."""
+    time = np.arange(0.0, 3.0, 2e-3)
+    reference = math.pi + np.sin(3.0 * time) + 0.4 * np.sin(11.0 * time)
+    drive = Drive(time, reference, "feedback", Loop(kp=8.0, kd=0.08), start=(math.pi, 0.0), max_step=5e-4)
+    mechanics = Mechanics(2e-3, gravity=0.3, gravity_angle=math.pi + 0.04)
+    out = drive_axis(mechanics, Model("coulomb", fc=0.2, sigma2=0.02), drive)
+    noisy = out[:, 2] + 1e-3 * np.random.default_rng(0).standard_normal(time.size)
+    trial = Trial("arm", time, out[:, 0], noisy)
+    found = identify_axis([trial], ServoAxis(drive_side="load", gravity="pendulum"), ["coulomb"])
+    angle = next(e for e in found.estimates if e.name == "gravity_angle")
+    assert angle.value == pytest.approx(math.pi + 0.04, abs=0.03)
+    assert angle.lower < angle.value < angle.upper
+    assert found.details["mechanics"].gravity_angle == pytest.approx(angle.value)
