@@ -15,6 +15,7 @@ from stickslip import report
 from stickslip.report._tables import MetricsTable, metrics_tables
 from stickslip.report._view import StudyView
 from stickslip.report.captions import case_caption, case_message
+from stickslip.report.conclusions import helped, rig_conclusion
 from stickslip.report.figures import drawn_style, off_scale
 from stickslip.report.plots import envelope, scaled, style_of
 from stickslip.study.result import Run, StudyResult
@@ -208,3 +209,38 @@ def test_an_unwritable_folder_is_one_line(result: StudyResult, tmp_path: Path) -
     (tmp_path / "figures").write_text("in the way")
     with pytest.raises(InputError, match="choose another place with --out"):
         report.write(replace(result, folder=tmp_path))
+
+
+def test_the_report_begins_with_a_conclusion_and_its_tables_have_one_set_of_columns(
+    result: StudyResult,
+) -> None:
+    twice = [*result.runs, *(replace(r, slip_rule="literal") for r in result.runs)]
+    both = replace(result, runs=twice)
+    page = report.write(both).read_text(encoding="utf-8")
+    begin = page.index('<section id="summary">')
+    first = page[begin : page.index("</p>", begin)]
+    assert "<h2>Conclusion</h2>" in first
+    assert re.search(
+        r"smaller error than the best linear controller in \d of 2\s", first.replace("\u00a0", " ")
+    )
+    (table,) = metrics_tables(StudyView(both))
+    assert {len(row.cells) for row in table.rows} == {len(table.columns)}
+    assert [row.rule for row in table.rows] == ["signed", "signed", "literal", "literal"]
+    assert page.count(f'<th class="rule" colspan="{len(table.columns) + 1}">') == 2
+    report.write(result)
+
+
+def test_a_conclusion_says_by_how_much() -> None:
+    said = helped([(1.0, 0.5), (1.0, 2.0), (8.0, 1.0)], "cases")
+    assert said == (
+        "The best friction compensator has a smaller error than the best linear controller in 2 of 3 cases: 2 times "
+        "smaller in the middle one (0.5 to 8 over all; below 1 it is larger)."
+    )
+    assert "more than 1000 times smaller." in helped([(1.0, 1e-14)], "cases")
+    lines = rig_conclusion(
+        [{"count": 3, "words": "statements hold"}], {"a": (2, 2), "b": (1, 3)}, [(2.0, 1.0)]
+    )
+    assert lines[0] == "Of the thesis's statements 3 hold."
+    assert "hold wherever they were tried: a." in lines[1]
+    assert "do not hold everywhere: b (1 of 3 parts)." in lines[2]
+    assert "2 times smaller" in lines[3]

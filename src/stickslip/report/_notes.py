@@ -62,5 +62,15 @@ READING = Note(
 def notes(view: StudyView) -> list[Note]:
     """The notes that apply to a study."""
     if is_thesis(view.result):
-        return [SLIP, STEP, SIGN, NUMERICS, READING, MISSING]
-    return [READING] if view.rules == ["signed"] else [SLIP, READING]
+        return [SLIP, STEP, SIGN, *starts(view), NUMERICS, READING, MISSING]
+    return [*([] if view.rules == ["signed"] else [SLIP]), *starts(view), READING]
+
+
+def starts(view: StudyView) -> list[Note]:
+    """Which runs depend on their start, if any do."""
+    named = [run.key for run in view.runs.values() if run.depends_on_start]
+    text = (
+        "From a start 1e-9 rad beside, these runs take another branch of the motion, and their metrics are those of "
+        f"one branch: {', '.join(named)}."
+    )
+    return [Note("Runs that depend on their start", text)] if named else []

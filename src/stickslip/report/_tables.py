@@ -1,4 +1,4 @@
-"""The report's table of metrics: one for each reference and friction, the slip rules side by side."""
+"""The report's table of metrics: one for each reference and friction, the slip rules one below the other."""
 
 from __future__ import annotations
 
@@ -66,9 +66,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """A controller and its cells under every slip rule."""
+    """A controller and its cells under one slip rule."""
 
     controller: str
+    rule: str
     cells: Sequence[Cell]
 
 
@@ -95,7 +96,8 @@ def metrics_tables(view: StudyView) -> list[MetricsTable]:
                 continue
             names = [c for c in view.controllers if any(r.controller == c for r in runs)]
             rows = [
-                Row(name, [cell for group in groups.values() for cell in _cells(name, group, columns)])
+                Row(name, rule, _cells(name, group, columns))
+                for rule, group in groups.items()
                 for name in names
             ]
             tables.append(
@@ -112,15 +114,10 @@ def _cells(controller: str, group: Sequence[Run], columns: Sequence[Column]) -> 
     """The cells of a controller in a group of runs."""
     run = next((r for r in group if r.controller == controller), None)
     if run is None:
-        return [Cell("not run", "split soft", len(columns))]
+        return [Cell("not run", "soft", len(columns))]
     if run.failure:
-        return [Cell(f"failed: {run.failure}", "split failed", len(columns))]
-    cells: list[Cell] = []
-    for i, column in enumerate(columns):
-        best = run in _best(group, column)
-        classes = " ".join(word for word, there in (("split", i == 0), ("best", best)) if there)
-        cells.append(Cell(_text(run, column), classes))
-    return cells
+        return [Cell(f"failed: {run.failure}", "failed", len(columns))]
+    return [Cell(_text(run, c), "best" if run in _best(group, c) else "") for c in columns]
 
 
 def _best(group: Sequence[Run], column: Column) -> list[Run]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.record import Record
 from stickslip.report.axis_evidence import measured_friction, slow_rows
 from stickslip.report.plots import envelope, quantity
+from stickslip.report.sliding_torque import Sliding, over_all_rows, sliding_of
+from stickslip.report.torque_pictures import friction_points, over_velocity, stretch, whole_record
 from stickslip.simulation.driven import Mechanics
 
 __all__ = ["data_pictures", "pictures_of"]
@@ -72,18 +74,50 @@ def over_time(label: str, time: Array, signal: Array) -> Trace:
     return Trace(label, x, y)
 
 
-def pictures_of(found: Identification) -> tuple[Picture, ...]:
-    """The method's own pictures, and what the report adds for a whole axis and for a law with intervals."""
+def pictures_of(
+    found: Identification, speeds: Mapping[str, Sequence[float]] | None = None
+) -> tuple[Picture, ...]:
+    """The method's own pictures, and what the report adds for a whole axis and for a law with intervals.
+
+    `speeds` are tenths of the recorded ones in either direction, marked beside the curve.
+    """
     output, inverse = found.details.get("output"), found.details.get("inverse")
     out = list(found.pictures)
-    if isinstance(output, FittedAxis):
-        out += [*fits(output), *output_residuals(output)]
-    elif isinstance(inverse, InverseDynamics):
-        out += inverse_pictures(inverse, str(getattr(found.details.get("axis"), "motion", "rotary")))
+    sliding = sliding_of(found) or over_all_rows(found)
     if found.model is not None and found.model.law.steady and "axis" in found.details:
-        band = curve_picture(found, fastest(output, inverse))
+        band = curve_picture(found, fastest(output, inverse), sliding, speeds or {})
         out += [band] if band else []
+    if sliding is not None:
+        out += torque_pictures(found, sliding)
+    if isinstance(output, FittedAxis) and tells(found, output, sliding):
+        out += [*fits(output), *output_residuals(output)]
     return tuple(out)
+
+
+def tells(found: Identification, output: FittedAxis, sliding: Sliding | None) -> bool:
+    """Whether the simulation's position says how good the model is: driven by the recorded torque alone it drifts."""
+    minimised = "prediction" not in found.details and not (sliding is not None and sliding.certain)
+    return minimised or all(t.closed_loop for t in output.problem.trials)
+
+
+def torque_pictures(found: Identification, sliding: Sliding) -> list[Picture]:
+    """Torque, measured and of the model, over time and velocity, and what it leaves."""
+    motion = motion_of(found)
+    unit, angle, speed = ("N", "m", "m/s") if motion == "linear" else ("N·m", "rad", "rad/s")
+    curve = over_velocity(sliding, found, motion)
+    several = len(sliding.whole) > 1
+    out = [stretch(sliding, motion), *([curve] if curve else [])]
+    for number in range(min(len(sliding.whole), SHOWN)):
+        out.append(whole_record(sliding, motion, number, f"record {number + 1}" if several else ""))
+    wanted = f"model minus measured {'force' if motion == 'linear' else 'torque'} ({unit})"
+    return [*out, *residuals(
+        "torque", wanted, sliding.residual, sliding.position, sliding.velocity, sliding.time, angle, speed
+    )]  # fmt: skip
+
+
+def motion_of(found: Identification) -> str:
+    """Rotary or linear."""
+    return str(getattr(found.details.get("axis"), "motion", "rotary"))
 
 
 def fastest(output: Any, inverse: Any) -> float:
@@ -156,24 +190,6 @@ def output_residuals(output: FittedAxis) -> list[Picture]:
     return out
 
 
-def inverse_pictures(inverse: InverseDynamics, motion: str) -> list[Picture]:
-    """Torque, measured and explained, and what it leaves."""
-    unit, angle, speed = ("N", "m", "m/s") if motion == "linear" else ("N·m", "rad", "rad/s")
-    told = inverse.torque - inverse.residual
-    # Several records follow each other, each with times of its own.
-    row = np.arange(inverse.time.size, dtype=np.float64)
-    steady = bool(np.all(np.diff(inverse.time) > 0.0))
-    x, label = (inverse.time, "time (s)") if steady else (row, "sample (-)")
-    first = Picture(
-        "inverse-torque", "Inverse dynamics: torque, measured and explained",
-        f"Relative error {100.0 * inverse.relative_error:.3g} %, below {inverse.band:.3g} Hz", label,
-        f"torque ({unit})", (over_time("measured", x, inverse.torque), over_time("explained", x, told)),
-    )  # fmt: skip
-    wanted = f"explained minus measured torque ({unit})"
-    return [first, *residuals("torque", wanted, -inverse.residual, inverse.position, inverse.velocity, inverse.time,
-                              angle, speed)]  # fmt: skip
-
-
 # ---- residuals ----------------------------------------------------------------------------------------------------
 
 
@@ -225,8 +241,11 @@ def binned(x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
 # ---- the law ------------------------------------------------------------------------------------------------------
 
 
-def curve_picture(found: Identification, top: float) -> Picture | None:
-    """The law at constant velocity with its 95 % band."""
+def curve_picture(
+    found: Identification, top: float, sliding: Sliding | None = None,
+    speeds: Mapping[str, Sequence[float]] | None = None,
+) -> Picture | None:  # fmt: skip
+    """The law at constant velocity with its 95 % band, measured friction, and where speeds were recorded."""
     assert found.model is not None
     if not (math.isfinite(top) and top > 0.0):
         return None
@@ -245,27 +264,42 @@ def curve_picture(found: Identification, top: float) -> Picture | None:
             side * curve_band(found.model, own, known, side * grid), [2.5, 97.5], axis=0
         )
         traces += [Trace(f"95 % band{word}", grid, low, "band", high), Trace(f"best fit{word}", grid, curve)]
-    points = points_of(found)
-    traces += points
+    points = points_of(found, sliding)
+    traces += [*points, *marks(speeds or {}, float(grid[0]), float(grid[-1]))]
     unit = getattr(found.details["axis"], "unit", str)
     unsure = ", ".join(e.name for e in own if not e.identified)
     message = f"Not identified: {unsure}." if unsure else "Every parameter of the law is identified."
     return Picture(
         "sliding-curve", f"Friction at constant velocity: {found.model.law.title or found.model.law.name}",
         f"{message} The band holds 95 % of the laws that the data allow."
-        f"{' Points: where the torque is steady.' if points else ''}", f"velocity ({unit('rad/s')})",
+        f"{' Points: as measured.' if points else ''}", f"velocity ({unit('rad/s')})",
         f"friction torque ({unit('N·m')})",
         tuple(traces), "log",
     )  # fmt: skip
 
 
-def points_of(found: Identification) -> list[Trace]:
+def marks(speeds: Mapping[str, Sequence[float]], low: float, high: float) -> list[Trace]:
+    """Fiftieths of the recorded speeds, where the curve is drawn; tenths are given, and what lies between is even."""
+    if not speeds:
+        return []
+    x = np.concatenate(
+        [np.interp(np.linspace(0.0, 10.0, 51), np.arange(11), each) for each in speeds.values()]
+    )
+    x = np.sort(x[(x >= low) & (x <= high)])
+    return [Trace("recorded speeds", x, np.zeros(x.size), "rug")]
+
+
+def points_of(found: Identification, sliding: Sliding | None = None) -> list[Trace]:
     """Friction as the records show it, beside the curve; none where it depends on more than the speed."""
     inverse, mechanics = found.details.get("inverse"), found.details.get("mechanics")
     if not isinstance(inverse, InverseDynamics) or (
         isinstance(mechanics, Mechanics) and mechanics.load_motor > 0.0
     ):
         return []
-    sides = measured_friction(inverse, mechanics if isinstance(mechanics, Mechanics) else None)
+    known = mechanics if isinstance(mechanics, Mechanics) else None
+    if sliding is not None and sliding.certain and known is not None:
+        sides = friction_points(sliding, float(known.offset))
+    else:
+        sides = measured_friction(inverse, known)
     kinds = (("measured, v > 0", "points"), ("measured, v < 0", "open points"))
     return [Trace(label, x, y, kind) for (label, kind), (x, y) in zip(kinds, sides, strict=True) if x.size]

@@ -10,6 +10,7 @@ from typing import Any
 
 import stickslip
 from stickslip import plugins
+from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.record import Record
 from stickslip.spec import Law
@@ -102,6 +103,7 @@ def _of_law(law: Law) -> Iterator[str]:
 
 
 def _of_toml(path: Path) -> Iterator[str]:
+    refuse_endless(path)
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:

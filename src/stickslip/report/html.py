@@ -12,6 +12,7 @@ from stickslip.report._notes import notes
 from stickslip.report._tables import metrics_tables
 from stickslip.report._view import StudyView, is_thesis
 from stickslip.report.captions import case_message, figure_of_merit, ranking
+from stickslip.report.conclusions import study_conclusion
 from stickslip.report.figures import COMMON, Figure
 from stickslip.report.page import filled
 from stickslip.report.plots import embedded
@@ -25,13 +26,15 @@ def render(view: StudyView, figures: Sequence[Figure]) -> str:
     """The report's HTML."""
     verdicts = {rule: judge(view, rule) for rule in view.rules} if is_thesis(view.result) else {}
     manifest = view.result.manifest
+    counted = _tally(verdicts)
     return filled(
         "study.html",
         title=manifest.get("title")
         or view.result.config.get("title")
         or f"Study {manifest.get('study', '')}".strip(),
         ran=_ran(view),
-        tally=_tally(verdicts),
+        conclusion=study_conclusion(view, counted),
+        tally=counted,
         summary=_summary(view),
         overview=_overview(view),
         tables=metrics_tables(view),

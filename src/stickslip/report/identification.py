@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.report import plots
 
@@ -47,10 +46,7 @@ def draw_picture_to(picture: Picture, target: Path) -> Path:
     InputError
         If the file cannot be written.
     """
-    try:
-        plots.save([target], picture.title, picture.message, [_panel(picture)], 2.7)
-    except OSError as error:
-        raise InputError(f"{target} cannot be written ({error.strerror}); give another path") from None
+    plots.save([target], picture.title, picture.message, [_panel(picture)], 2.7, option="--plot")
     return target
 
 
@@ -59,7 +55,9 @@ def _panel(picture: Picture) -> plots.Panel:
     x_factor, x_label = _readable(picture.x_label, [t.x for t in picture.traces])
     if picture.x_scale == "log":
         x_factor, x_label = 1.0, picture.x_label
-    y_factor, y_label = _readable(picture.y_label, [t.y for t in picture.traces if t.kind != "vertical"])
+    y_factor, y_label = _readable(
+        picture.y_label, [t.y for t in picture.traces if t.kind not in ("vertical", "rug")]
+    )
     curves: list[plots.Curve] = []
     below: Trace | None = None
     for trace in picture.traces:
@@ -93,6 +91,12 @@ def _curve(trace: Trace, x_factor: float, y_factor: float, styles: Iterator[tupl
         style = plots.Style("#000000", "", 1.1)
     elif trace.kind == "open points":
         style = plots.Style("#D55E00", "", 1.1)
+    elif trace.kind == "wide":
+        style = plots.Style("#E69F00", "-", 3.2)
+    elif trace.kind == "cloud":
+        style = plots.Style("#000000", "", 1.0)
+    elif trace.kind == "rug":
+        style = plots.Style("#555555", "", 0.8)
     elif trace.kind == "faint":
         style = plots.Style("#E69F00", "-", 0.5)
     elif trace.kind in ("band", "dense"):

@@ -12,13 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.finding import Finding
+from stickslip.identify.axis_search import FittedAxis
 from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.record import Record
+from stickslip.report.answers import answers_of, meaning_of, one_number_each, speeds_in
 from stickslip.report.axis_evidence import judgements
 from stickslip.report.axis_pictures import data_pictures, pictures_of
 from stickslip.report.identification import draw_picture_to
 from stickslip.report.page import filled, replaced
 from stickslip.report.plots import embedded
+from stickslip.report.sliding_torque import sliding_of
 
 __all__ = ["Source", "comparison_of", "number", "write_identification"]
 
@@ -27,10 +30,22 @@ DENSE = 3000
 TABLE = 15
 """Estimates beyond which a table of all correlations is too wide to read."""
 STRONG = 0.9
+GREEK = {
+    "sigma": "σ",
+    "alpha": "α",
+    "beta": "β",
+    "gamma": "γ",
+    "delta": "δ",
+    "tau": "τ",
+    "phi": "φ",
+    "kappa": "κ",
+}
 LABELS = {
     "parameters": ("free parameters", "", 1.0),
     "held_out": ("held-out misfit", "standard deviations", 1.0),
     "rms_Nm": ("residual", "N·m, RMS", 1.0),
+    "relative": ("residual over the torque", "", 1.0),
+    "cross_validated": ("left-out error over the torque", "", 1.0),
     "cross_validated_Nm": ("left-out error", "N·m, RMS", 1.0),
     "aicc": ("AICc", "", 1.0),
     "bic": ("BIC", "", 1.0),
@@ -50,7 +65,8 @@ class Source:
 
 def write_identification(
     path: str | os.PathLike[str], found: Identification, sources: Sequence[Source], *, title: str = "",
-    versions: Mapping[str, str] | None = None,
+    versions: Mapping[str, str] | None = None, headline: Sequence[tuple[str, str]] = (),
+    model_file: str | os.PathLike[str] | None = None,
 ) -> Path:  # fmt: skip
     """Write the report of an identification.
 
@@ -64,6 +80,10 @@ def write_identification(
     title : str
     versions : mapping
         Of what took part.
+    headline : sequence of (str, str)
+        What stands first: a word and a line each.
+    model_file : path, optional
+        Of the model, as the next command names it; beside the report unless given.
 
     Returns
     -------
@@ -74,15 +94,27 @@ def write_identification(
     InputError
         If the file cannot be written.
     """
-    return replaced(Path(path), rendered(found, sources, title, versions or {}))
+    model = Path(model_file) if model_file is not None else Path(path).with_name("model.toml")
+    return replaced(Path(path), rendered(found, sources, title, versions or {}, headline, model))
 
 
 def rendered(
-    found: Identification, sources: Sequence[Source], title: str, versions: Mapping[str, str]
+    found: Identification,
+    sources: Sequence[Source],
+    title: str,
+    versions: Mapping[str, str],
+    headline: Sequence[tuple[str, str]] = (),
+    model_file: str | os.PathLike[str] = "model.toml",
 ) -> str:
     """The HTML."""
-    pictures = pictures_of(found)
+    fitted = [s for s in sources if not s.held_out]
+    records = [s.record for s in fitted]
+    answers = answers_of(found, records, Path(model_file), files_of(fitted))
+    pictures = pictures_of(found, speeds_in(records))
     rest = [p for p in pictures if p.name.startswith("residual-") or p.name.endswith("-residuals")]
+    law_picture, torque = headed(pictures, rest)
+    shown_first = {p.name for p in (*law_picture, *torque)}
+    rest = [p for p in rest if p.name not in shown_first]
     law = found.model.law if found.model else None
     method = found.method.replace("_", " ")
     columns, rows = comparison_of(found)
@@ -91,19 +123,24 @@ def rendered(
             "data": figures(
                 data_pictures([s.record for s in sources], [s.name for s in sources]), Path(folder)
             ),
-            "fits": figures([p for p in pictures if p not in rest], Path(folder)),
+            "friction": figures(law_picture, Path(folder)),
+            "trust": figures(torque, Path(folder)),
+            "fits": figures(
+                [p for p in pictures if p not in rest and p.name not in shown_first], Path(folder)
+            ),
             "residuals": figures(rest, Path(folder)),
         }
     return filled(
-        "identification.html",
+        "commission.html" if headline else "identification.html",
+        headline=headline,
         title=title or f"Friction identified: {sources[0].name if sources else method}",
         ran=ran(found, sources, versions),
         law=f"{law.title or law.name}" if law else "",
+        answers=answers, open_loop=open_loop(found),
         tally=tally(found, sources),
-        estimates=[shown(e) for e in found.estimates],
-        missing=[e for e in found.estimates if not e.identified],
-        measure_next=found.measure_next,
-        notes=found.notes,
+        estimates=[shown(e, meaning) for e, meaning in zip(found.estimates, meaning_of(found).values(), strict=True)],
+        missing=one_number_each(found.estimates),
+        notes=[n for n in found.notes if n not in answers.told],
         misfit=[
             {"name": k.replace("_", " "), "value": number(float(v)), "unit": found.misfit_unit(k)}
             for k, v in found.misfit.items()
@@ -125,6 +162,25 @@ def ran(found: Identification, sources: Sequence[Source], versions: Mapping[str,
     return f"{words} with {rows} samples. {named}".strip()
 
 
+def files_of(sources: Sequence[Source]) -> list[str]:
+    """The files of the records, each once."""
+    return [f for f in dict.fromkeys(str(s.about.get("file", "")) for s in sources) if f]
+
+
+def headed(pictures: Sequence[Picture], rest: Sequence[Picture]) -> tuple[list[Picture], list[Picture]]:
+    """What stands at the head: the curve of friction, and the torque measured beside that of the model."""
+    curve = [p for p in pictures if p.name == "sliding-curve"][:1]
+    torque = [p for p in pictures if p.name in ("torque-stretch", "torque-velocity")]
+    others = [p for p in pictures if p not in rest and p not in torque]
+    return curve or others[:1], torque or list(rest[:1])
+
+
+def open_loop(found: Identification) -> bool:
+    """Whether misfits of a position are those of a simulation that the recorded torque alone drives."""
+    output = found.details.get("output")
+    return isinstance(output, FittedAxis) and not all(t.closed_loop for t in output.problem.trials)
+
+
 def tally(found: Identification, sources: Sequence[Source]) -> list[dict[str, Any]]:
     """Numbers that say at a glance how it went."""
     good = sum(e.identified for e in found.estimates)
@@ -133,13 +189,26 @@ def tally(found: Identification, sources: Sequence[Source]) -> list[dict[str, An
         {"count": f"{good} of {len(found.estimates)}", "words": "numbers identified"},
         {"count": str(warnings), "words": "warnings about the records"},
     ]
-    judged = judgements(found)
+    if (sliding := sliding_of(found)) is not None:
+        out.append(
+            {
+                "count": f"{100.0 * sliding.relative:.3g} %",
+                "words": "torque error where it slides for certain",
+            }
+        )
+    for name, words in (
+        ("force_relative", "force error over the whole record"),
+        ("inverse_dynamics_relative", "force error of plain least squares"),
+        ("held_out_force_relative", "force error held out"),
+    ):  # fmt: skip
+        if math.isfinite(float(found.misfit.get(name, math.nan))):
+            out.append({"count": f"{100.0 * float(found.misfit[name]):.3g} %", "words": words})
+    judged = judgements(found) if not open_loop(found) else {}
     for name, words in (
         ("position_relative", "position error of the simulation"),
         ("drive_relative", "drive error of the simulation"),
-        ("inverse_dynamics_relative", "torque error of the inverse dynamics"),
-    ):
-        if name in found.misfit:
+    ):  # fmt: skip
+        if name in found.misfit and not open_loop(found):
             told = judged.get(name, "")
             count = f"{100.0 * float(found.misfit[name]):.3g} %"
             out.append({"count": count, "words": words, "judged": told, "good": told.startswith("good")})
@@ -160,16 +229,23 @@ def interval(e: Estimate) -> str:
     return "-" if e.undetermined else f"{number(e.lower)} to {number(e.upper)}"
 
 
-def shown(e: Estimate) -> dict[str, Any]:
+def shown(e: Estimate, meaning: str = "") -> dict[str, Any]:
     """An estimate as a row; where the interval tells nothing, the value does not either."""
-    value, verdict = number(e.value), e.verdict
+    value, verdict, chosen = number(e.value), e.verdict, ""
     if e.undetermined:
         value, chosen = "not determined", f"the model's {value} is one choice among many"
         verdict = f"{verdict}; {chosen}" if verdict else chosen
     return {
-        "name": e.name, "unit": e.unit, "value": value, "interval": interval(e), "good": e.identified,
-        "verdict": verdict,
+        "name": e.name, "meaning": meaning, "unit": e.unit, "value": value, "interval": interval(e),
+        "good": e.identified, "verdict": verdict, "chosen": chosen,
+        "symbol": symbol(e.symbol if meaning and e.symbol != e.name else ""),
     }  # fmt: skip
+
+
+def symbol(text: str) -> tuple[str, str]:
+    """A symbol in letters of the field, and its index: sigma_2 as σ and 2."""
+    base, _, index = text.partition("_")
+    return GREEK.get(base, base), index
 
 
 def source(s: Source) -> dict[str, Any]:

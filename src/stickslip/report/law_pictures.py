@@ -188,12 +188,7 @@ def draw_law(model: Model, *targets: Path) -> None:
         _steps_panel(model, velocity_steps(model, scales), (word, torque), f"{length}/s"),
     ]
     title = model.law.title + (f", {chosen}" if chosen else "")
-    try:
-        save(targets, title, _described(model), panels, 2.0)
-    except OSError as error:
-        raise InputError(
-            f"cannot write {error.filename or targets[0]} ({error.strerror}); choose another place"
-        ) from None
+    save(targets, title, _described(model), panels, 2.0, option="--plot")
 
 
 def draw_gallery(models: Sequence[Model], path: Path) -> None:

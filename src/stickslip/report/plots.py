@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.errors import InputError
+
 __all__ = [
     "Curve",
     "Panel",
@@ -105,8 +107,9 @@ def style_of(name: str, others: Sequence[str] = ()) -> Style:
 class Curve:
     """One line: its points, shape (n,), label (empty for none in the legend) and style.
 
-    ``kind`` is "line" (as is any word not named here), "points", "open points", "vertical" (a line across the panel
-    at every x), "band" (filled between y and y2) or "area" (filled where y2, shape (len(y), len(x)), is above 0).
+    ``kind`` is "line" (as is any word not named here), "points", "open points", "cloud" (many small points), "vertical"
+    (a line across the panel at every x), "rug" (a mark at the foot of the panel at every x), "band" (filled between
+    y and y2) or "area" (filled where y2, shape (len(y), len(x)), is above 0).
     """
 
     x: Array
@@ -202,8 +205,9 @@ def draw(path: Path, title: str, message: str, panels: Sequence[Panel], height: 
 
 
 def save(
-    targets: Sequence[Path], title: str, message: str, panels: Sequence[Panel], height: float = 2.0
-) -> None:
+    targets: Sequence[Path], title: str, message: str, panels: Sequence[Panel], height: float = 2.0,
+    option: str = "--out",
+) -> None:  # fmt: skip
     """Draw panels as `draw` does and save them in the formats that the suffixes name.
 
     Parameters
@@ -212,15 +216,28 @@ def save(
         Files that end in one of `FORMATS`; their folders are made.
     title, message, panels, height
         As for `draw`.
+    option : str
+        Of the command line, that chooses where they are written.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
     """
     settings: Any = importlib.import_module("matplotlib").rc_context(RC)
     with settings:
         figure = _figure(title, message, panels, height)
         for target in targets:
-            target.parent.mkdir(parents=True, exist_ok=True)
             # No date in the file: the same study gives the same bytes.
             undated = {"metadata": {DATES[target.suffix]: None}} if target.suffix in DATES else {}
-            figure.savefig(target, format=target.suffix[1:], dpi=DPI, **undated)
+            try:
+                target.parent.mkdir(parents=True, exist_ok=True)
+                figure.savefig(target, format=target.suffix[1:], dpi=DPI, **undated)
+            except OSError as error:
+                why = error.strerror or error
+                raise InputError(
+                    f"cannot write {target} ({why}); choose another place with {option}"
+                ) from None
 
 
 def embedded(file: Path) -> dict[str, Any]:
@@ -288,6 +305,16 @@ def _line(axes: Any, curve: Curve) -> None:
         colour = style.colour
         axes.contourf(curve.x, curve.y, curve.y2, levels=[0.0, np.inf], colors=[colour], alpha=0.45)
         axes.plot([], [], color=colour, linewidth=6.0, alpha=0.45, label=label)
+    elif curve.kind == "rug":
+        axes.plot(
+            curve.x, np.full(curve.x.size, 0.03), color=style.colour, linestyle="", marker="|", markersize=7.0,
+            markeredgewidth=0.7, label=label, transform=axes.get_xaxis_transform(), clip_on=True,
+        )  # fmt: skip
+    elif curve.kind == "cloud":
+        axes.plot(
+            curve.x, curve.y, color=style.colour, linestyle="", marker="o", markersize=1.8, markeredgewidth=0.0,
+            label=label,
+        )  # fmt: skip
     elif curve.kind in ("points", "open points"):
         fill = style.colour if curve.kind == "points" else "none"
         axes.plot(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyse.rig_verdicts import Judged, judged_over, main_share
+from stickslip.report.conclusions import rig_conclusion
 from stickslip.report.html import image
 from stickslip.report.page import filled, replaced, unwritable
 from stickslip.report.plots import REFERENCE, Curve, Panel, draw, envelope, style_of
@@ -118,6 +119,19 @@ def _tally(judged: Sequence[Judged]) -> Iterator[dict[str, Any]]:
             yield {"count": count, "words": words}
 
 
+def best_pairs(result: RigResult) -> list[tuple[float, float]]:
+    """RMS error of the best linear controller and of the best compensator of every group that has both."""
+    pairs: list[tuple[float, float]] = []
+    for group in GROUPS:
+        errors: dict[bool, list[float]] = {False: [], True: []}
+        for run in result.runs:
+            if run.variant == NOMINAL and run.key.startswith(group.name + "/") and not run.stopped:
+                errors["-" in run.key.rpartition("/")[2]].append(run.metrics["position_rms_rad"])
+        if errors[False] and errors[True]:
+            pairs.append((min(errors[False]), min(errors[True])))
+    return pairs
+
+
 def write_rig_report(result: RigResult) -> Path:
     """Draw the figures and write ``report.html``; returns it.
 
@@ -132,12 +146,14 @@ def write_rig_report(result: RigResult) -> Path:
         figures = draw_groups(result, result.folder / "figures")
     except OSError as error:
         raise unwritable(target, error) from None
+    counted, mains = list(_tally(judged)), main_share(judged)
     html = filled(
         "rig.html",
         title="Chapter 4 of the thesis on a virtual machine",
         ran=f"{len(result.runs)} runs, {len(result.variants)} variants, {result.manifest['wall_s']:.0f} s",
-        tally=list(_tally(judged)),
-        mains=[{"text": t, "held": a, "of": b} for t, (a, b) in main_share(judged).items()],
+        conclusion=rig_conclusion(counted, mains, best_pairs(result)),
+        tally=counted,
+        mains=[{"text": t, "held": a, "of": b} for t, (a, b) in mains.items()],
         rows=verdict_table(judged),
         seeds=result.manifest["seeds"],
         ablation=_ablation(result),

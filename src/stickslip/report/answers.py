@@ -1,0 +1,427 @@
+"""What an identification answers, in words: what the friction is, whether it can be trusted, and what to do now.
+
+The head of the report and what `stickslip identify` prints are made of these sentences.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.axis_agreed import on_timing
+from stickslip.identify.axis_problem import mechanics_parameters
+from stickslip.identify.draws import sliding_torque
+from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.motion import speeds_of
+from stickslip.identify.regression import Regression
+from stickslip.machines.servo import ServoAxis
+from stickslip.record import Record, encoder_step
+from stickslip.report.plots import quantity
+from stickslip.report.sliding_torque import Sliding, sliding_of
+
+__all__ = ["Answers", "Step", "answers_of", "meaning_of", "next_steps", "one_number_each", "speeds_in"]
+
+WORSE = 1.05
+"""Times plain least squares' force error, from which on a model's counts as larger."""
+SMALL = 0.01
+"""Of the torque where the axis slides: a model that misses less is not beaten by another."""
+ELSEWHERE = 1.5
+"""Times the force error of the fitted records, from which on that of held-out ones is one of another machine."""
+ROUGH = 0.1
+"""Of the torque where the axis slides for certain: what a model misses at most for its form to be taken as right."""
+OWN_WORDS = {
+    "fv": "viscous friction", "fc_plus": "Coulomb torque, v > 0", "fc_minus": "Coulomb torque, v < 0",
+    "fv_plus": "viscous friction, v > 0", "fv_minus": "viscous friction, v < 0",
+    "gravity_sin": "gravity, over the sine of the position", "gravity_cos": "gravity, over its cosine",
+    "fc": "Coulomb torque", "fs": "static (break-away) torque", "fs_positive": "break-away torque, v > 0",
+    "stiffness": "stiffness at rest", "fs_negative": "break-away torque, v < 0",
+    "rate_effect": "change per tenfold ramp rate",
+}  # fmt: skip
+"""Of numbers that no law and no axis describes."""
+OPTIONS = "  # with the options of this run"
+EXPERIMENTS = {
+    "inertia": "inertia", "fs": "breakaway", "sigma0": "presliding", "k": "presliding", "alpha": "presliding",
+    "fc": "sliding", "vs": "sliding", "sigma2": "sliding", "delta_s": "sliding",
+    "sigma1": "stickslip", "c": "stickslip",
+}  # fmt: skip
+"""The procedure that a rig runs for a number."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A command, or an advice where there is none: what it is for, and the line to copy (empty for none)."""
+
+    what: str
+    command: str = ""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """The three answers, a sentence each line.
+
+    Attributes
+    ----------
+    friction : tuple of str
+        What the friction is, at the recorded speeds.
+    trust : str
+        Whether the numbers can be trusted, in a line.
+    evidence : tuple of str
+        Why.
+    steps : tuple of Step
+        What to do now, the first first.
+    told : tuple of str
+        Notes of the result that these say already.
+    """
+
+    friction: tuple[str, ...]
+    trust: str
+    evidence: tuple[str, ...]
+    steps: tuple[Step, ...]
+    told: tuple[str, ...]
+
+
+def answers_of(
+    found: Identification, records: Sequence[Record], model_file: str | Path = "model.toml", files: Sequence[str] = ()
+) -> Answers:  # fmt: skip
+    """The answers of a result.
+
+    Parameters
+    ----------
+    found : Identification
+    records : sequence of Record
+        What it was fitted to.
+    model_file : path
+        Where the model lies, for commands.
+    files : sequence of str
+        The records' files, for commands.
+    """
+    sliding = sliding_of(found)
+    timing = [s for s in timing_of(found) if s in found.notes]
+    missing = tuple(s for s in found.notes if s.startswith("Not identified: "))
+    return Answers(
+        tuple(friction_in(found, records)), trusted(found, sliding), (*evidence(found, sliding), *timing),
+        tuple(next_steps(found, records, model_file, files)), (*timing, *missing),
+    )  # fmt: skip
+
+
+# ---- what is my friction ------------------------------------------------------------------------------------------
+
+
+def linear(found: Identification) -> bool:
+    """Whether the axis moves along a line."""
+    return getattr(found.details.get("axis"), "motion", "rotary") == "linear"
+
+
+def unit_in(found: Identification, unit: str) -> str:
+    """A unit of a rotary axis as that of the identified one."""
+    axis = found.details.get("axis")
+    return axis.unit(unit) if isinstance(axis, ServoAxis) else unit
+
+
+def meaning_of(found: Identification) -> dict[str, str]:
+    """What every estimate is, in words, by its name; empty for one that nothing describes."""
+    described = {p.name: p.par.meaning for p in mechanics_parameters(ServoAxis(), "torque", {}, 0, 0)}
+    law = {f.name: f.par.meaning for f in found.model.law.fields} if found.model else {}
+    words = OWN_WORDS | described | law
+    out: dict[str, str] = {}
+    for e in found.estimates:
+        said = words.get(e.name.partition("[")[0].rpartition(".")[2], "")
+        if linear(found):
+            said = said.replace("torque", "force").replace("inertia", "mass")
+        out[e.name] = said
+    return out
+
+
+def speeds_in(records: Iterable[Record]) -> dict[str, list[float]]:
+    """Tenths of the recorded speeds in either direction; empty where no position is recorded."""
+    moving = [r for r in records if "position" in r.channels and r.time.size > 1]
+    return speeds_of(moving) if moving else {}
+
+
+def friction_in(found: Identification, records: Sequence[Record]) -> list[str]:
+    """Friction at three recorded speeds; nothing where the law has no torque at constant velocity."""
+    model, speeds = found.model, speeds_in(records)
+    if model is None or model.law.steady is None or not speeds:
+        return []
+    torque, speed = unit_in(found, "N·m"), unit_in(found, "rad/s")
+    sides = {
+        name: sign * sliding_torque(model, sign * np.array([tenths[1], tenths[5], tenths[-1]]))
+        for (name, tenths), sign in zip(speeds.items(), (1.0 if n == "positive" else -1.0 for n in speeds), strict=True)
+    }  # fmt: skip
+    same = len(sides) == 2 and np.allclose(*(at_same(found, speeds, s) for s in (1.0, -1.0)), rtol=1e-3)
+    out: list[str] = []
+    for name, values in list(sides.items())[: 1 if same else 2]:
+        at = [speeds[name][i] for i in (1, 5, 10)]
+        listed = ", ".join(
+            f"{quantity(float(y), torque)} at {x:.3g} {speed}" for x, y in zip(at, values, strict=True)
+        )
+        where = "" if same else f" in the {name} direction"
+        out.append(f"At constant velocity it takes {listed}{where}.")
+    low, high = min(s[0] for s in speeds.values()), max(s[-1] for s in speeds.values())
+    out.append(
+        f"Recorded speeds: {low:.3g} to {high:.3g} {speed}; what the curve says beyond them is extrapolated."
+    )
+    return out
+
+
+def at_same(found: Identification, speeds: Mapping[str, Sequence[float]], side: float) -> Any:
+    """Friction in one direction at the speeds of the other."""
+    assert found.model is not None
+    return side * sliding_torque(found.model, side * np.array(speeds["positive"]))
+
+
+def one_number_each(estimates: Iterable[Estimate]) -> list[str]:
+    """Why numbers are not identified, those with the same reason in one line."""
+    reasons: dict[str, list[str]] = {}
+    for e in estimates:
+        if not e.identified:
+            reasons.setdefault(e.verdict, []).append(e.name)
+    return [
+        f"{', '.join(names)} not identified: {why or 'the data do not determine it'}"
+        for why, names in reasons.items()
+    ]
+
+
+# ---- can I trust it -------------------------------------------------------------------------------------------------
+
+
+def timing_of(found: Identification) -> list[str]:
+    """When the torque acted, in a sentence."""
+    regression = found.details.get("regression")
+    return on_timing(regression) if isinstance(regression, Regression) else []
+
+
+def trusted(found: Identification, sliding: Sliding | None) -> str:
+    """Whether the numbers can be trusted, in a line."""
+    good = [e.name for e in found.estimates if e.identified]
+    bad = [e.name for e in found.estimates if not e.identified]
+    if not found.estimates:
+        return "Nothing was identified."
+    if not good:
+        return "No: none of the numbers is identified."
+    rest = f"; not {', '.join(bad)}" if bad else ""
+    reasons = doubts(found, sliding)
+    if reasons:
+        return f"With care: {'; '.join(reasons)}{rest}."
+    if bad:
+        return f"Yes, as far as identified: {', '.join(good)}{rest}."
+    return "Yes: every number is identified."
+
+
+def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
+    """What speaks against the numbers, in a few words each."""
+    out: list[str] = []
+    if sliding is not None and sliding.relative > ROUGH:
+        out.append(f"the model misses {percent(sliding.relative)} of the torque even where the axis slides")
+    if sliding is not None and beaten(sliding):
+        out.append("plain least squares (--inverse) explains the torque better where the axis slides")
+    plain = found.misfit.get("inverse_dynamics_relative", math.nan)
+    if sliding is None and found.misfit.get("force_relative", 0.0) > WORSE * plain:
+        out.append("the model's torque is farther from the measured one than plain least squares'")
+    held, own = (found.misfit.get(f"{p}force_relative", math.nan) for p in ("held_out_", ""))
+    if held > ELSEWHERE * own:
+        out.append(f"on records held out its force error is {percent(held)}, {percent(own)} on those fitted")
+    warned = [f for f in found.findings if getattr(f, "level", "") == "warning"]
+    if warned:
+        out.append(f"the doctor warns of the record{'s' if len(warned) > 1 else ''} ({codes(warned)})")
+    return out
+
+
+def codes(findings: Iterable[Any]) -> str:
+    """The names of findings, each once."""
+    return ", ".join(dict.fromkeys(f.code for f in findings))
+
+
+def percent(share: float) -> str:
+    """A share to three digits."""
+    return f"{100.0 * share:.3g} %"
+
+
+def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
+    """How far the model's torque is from the measured one, in sentences."""
+    out: list[str] = []
+    unit = unit_in(found, "N·m")
+    if sliding is not None:
+        out.append(
+            f"Where the axis slides for certain ({100.0 * sliding.share:.0f} % of the record) the model's torque is "
+            f"{percent(sliding.relative)} off the measured one, {quantity(sliding.rms, unit)} root mean square"
+            f"{plain_there(sliding)}."
+        )
+    out += force_errors(found.misfit, sliding is not None and not beaten(sliding))
+    regression = found.details.get("regression")
+    if isinstance(regression, Regression) and regression.orders:
+        turn = 1.0 if linear(found) else 2.0 * math.pi
+        per = "a metre" if linear(found) else "a revolution"
+        listed = ", ".join(
+            f"{quantity(float(a), unit)} at {turn * o:.3g} {per}"
+            for o, a in zip(regression.orders, regression.harmonics, strict=True)
+        )
+        out.append(
+            f"Torque over the position (cogging, unbalance), allowed for but not part of the law: {listed}."
+        )
+    if (rms := found.misfit.get("rms_Nm")) is not None:
+        out.append(f"What the curve leaves of the torque: {quantity(float(rms), 'N·m')} root mean square.")
+    return out
+
+
+def plain_there(sliding: Sliding) -> str:
+    """What plain least squares leaves in the same rows, as the end of a sentence."""
+    if not math.isfinite(sliding.plain):
+        return ""
+    return f"; plain least squares: {percent(sliding.plain * sliding.relative / max(sliding.rms, 1e-300))}"
+
+
+def beaten(sliding: Sliding) -> bool:
+    """Whether plain least squares explains the torque better even where the axis slides for certain."""
+    return sliding.relative > SMALL and sliding.rms > WORSE * sliding.plain
+
+
+def force_errors(misfit: Mapping[str, float], excused: bool = False) -> list[str]:
+    """Force error of training and held-out records beside plain least squares', in sentences.
+
+    `excused`: where the axis slides the model is as good, so that its excess comes from standstills and reversals.
+    """
+    out: list[str] = []
+    for prefix, where in (
+        ("", "Over the whole record, standstills and reversals included (where velocity does not tell the torque)"),
+        ("held_out_", "On the records held out, likewise"),
+    ):  # fmt: skip
+        own = float(misfit.get(f"{prefix}force_relative", math.nan))
+        plain = float(misfit.get(f"{prefix}inverse_dynamics_relative", math.nan))
+        if math.isfinite(own):
+            beside = f"; plain least squares: {percent(plain)}" if math.isfinite(plain) else ""
+            more = (
+                ", less at standstills and reversals alone"
+                if own > WORSE * plain and not prefix and excused
+                else ""
+            )
+            out.append(f"{where}: {percent(own)} force error{beside}{more}.")
+        elif math.isfinite(plain):
+            out.append(f"{where}: {percent(plain)} force error (plain least squares).")
+    return out
+
+
+# ---- what now -------------------------------------------------------------------------------------------------------
+
+
+def next_steps(
+    found: Identification, records: Sequence[Record], model_file: str | Path, files: Sequence[str]
+) -> list[Step]:  # fmt: skip
+    """The next commands: towards a setting where what matters is identified, towards another record where not."""
+    wanted = [Step(s) for s in found.measure_next]
+    if found.model is None:
+        # A procedure for one thing: the law is told by sliding.
+        command = f"stickslip identify sliding.npz --method sliding --out {shlex.quote(str(model_file))}"
+        return [*wanted, *rig_runs(["sliding"], "For the whole law"), Step("And identify it:", command)]
+    sliding = sliding_of(found)
+    if sliding is not None and beaten(sliding) and files:
+        plain = shlex.quote(str(Path(model_file).with_name("plain.toml")))
+        command = f"stickslip identify {quoted(files)} --inverse --out {plain}{OPTIONS}"
+        wanted = [
+            Step("Look at plain least squares, which explains the torque better here:", command),
+            *wanted,
+        ]
+    missing = lacking(found)
+    if not missing:
+        ahead = forward(found, records, str(model_file))
+        return [*wanted, *ahead] if wanted and wanted[0].command else [*ahead, *wanted]
+    return [*wanted, *another_record(found, missing, files, str(model_file))]
+
+
+def lacking(found: Identification) -> list[str]:
+    """Names of the numbers without which nothing can be built: inertia, a pendulum's gravity, and friction's level."""
+    names = {e.name.rpartition(".")[2]: e for e in found.estimates}
+    levels = [n for n in names if n in ("fc", "fc_negative", "fc_plus", "fc_minus")]
+    if not levels:
+        law = {f.name for f in found.model.law.fields} if found.model else set[str]()
+        levels = [n for n in names if n.partition("[")[0] in law]
+    needed = [*(n for n in ("inertia", "gravity") if n in names), *levels]
+    return [names[n].name for n in needed if not names[n].identified] if needed else list(names)
+
+
+def forward(found: Identification, records: Sequence[Record], model_file: str) -> list[Step]:
+    """From a model that holds what matters to a drive."""
+    model = shlex.quote(model_file)
+    if found.details.get("mechanics") is None and not any(e.name == "inertia" for e in found.estimates):
+        return [
+            Step("Identify the axis with this friction, or export the law:", f"stickslip export {model} --to c99")
+        ]  # fmt: skip
+    setting = shlex.quote(str(Path(model_file).with_name("recommended.toml")))
+    return [
+        Step(
+            "Find the compensator that is safe to switch on, with your drive's loop and sample time in place of these:",
+            f"stickslip recommend {model} {drive_in(records)} --out {setting}",
+        ),
+        Step(
+            "Write it for the drive:", f"stickslip export {setting} --to c99 --compensator recommended"
+        ),
+    ]  # fmt: skip
+
+
+def drive_in(records: Sequence[Record]) -> str:
+    """Options of `stickslip recommend` as far as the records tell them."""
+    loops = {str(r.meta.get("loop", "")) for r in records}
+    loop = loops.pop() if len(loops) == 1 else ""
+    kept = [p for p in loop.split(",") if p.partition("=")[0] in ("kp", "ki", "kd", "kr", "limit")]
+    out = [f"--loop {','.join(kept)}" if kept else "--bandwidth 10"]
+    periods = [float(np.median(np.diff(r.time))) for r in records if r.time.size > 1]
+    if periods:
+        out.append(f"--sample-time {min(periods):.3g}")
+    counts = [counts_of(r) for r in records]
+    if counts and min(counts) > 0:
+        out.append(f"--counts-per-rev {min(counts)}")
+    return " ".join(out)
+
+
+def counts_of(record: Record) -> int:
+    """Counts of the encoder a revolution, where its step shows and is a power of 2 or some thousands; else 0."""
+    if record.units.get("position") != "rad" or "position" not in record.channels:
+        return 0
+    try:
+        step = encoder_step(record["position"])
+    except InputError:
+        return 0
+    if not step > 0.0:
+        return 0
+    counts = 2.0 * math.pi / step
+    for near in (2 ** round(math.log2(counts)), 1000 * round(counts / 1000.0)):
+        if near and counts < 1e6 and abs(counts - near) < 2e-3 * near:
+            return int(near)
+    return 0
+
+
+def another_record(
+    found: Identification, missing: Sequence[str], files: Sequence[str], model_file: str
+) -> list[Step]:  # fmt: skip
+    """How to record and identify what is missing."""
+    kinds = [EXPERIMENTS.get(n.partition("[")[0].rpartition(".")[2], "sliding") for n in missing]
+    runs = list(dict.fromkeys(kinds))[:2]
+    steps = rig_runs(runs, f"To settle {', '.join(missing)}")
+    if not files or found.method not in ("axis", "inverse dynamics"):
+        return steps
+    logs = quoted([*files, *(f"{name}.npz" for name in runs)])
+    again = f"stickslip identify {logs} --out {shlex.quote(model_file)}{OPTIONS}"
+    return [*steps, Step("Identify all of it together:", again)]
+
+
+def quoted(files: Iterable[str]) -> str:
+    """Files as a shell takes them."""
+    return " ".join(shlex.quote(f) for f in files)
+
+
+def rig_runs(names: Sequence[str], why: str) -> list[Step]:
+    """Records to make."""
+    return [
+        Step(
+            f"{why}, record such a motion with your drive, or let a rig do it:" if number == 0 else "And:",
+            f"stickslip rig run {name} --rig machine.toml --out {name}.npz",
+        )
+        for number, name in enumerate(names)
+    ]

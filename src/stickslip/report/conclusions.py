@@ -1,0 +1,140 @@
+"""What a study says in a few sentences, which its report begins with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from stickslip.report._view import StudyView
+from stickslip.report.captions import figure_of_merit, oscillates, ranking
+from stickslip.study.result import Run
+
+__all__ = ["helped", "rig_conclusion", "study_conclusion"]
+
+MOST = 1000.0
+"""Times by which an error is said to be smaller."""
+
+
+def study_conclusion(view: StudyView, tally: Sequence[Mapping[str, Any]] = ()) -> list[str]:
+    """What compensation did to the error and the calm of the loop, and how the statements fared.
+
+    Parameters
+    ----------
+    view : StudyView
+    tally : sequence of mapping
+        ``count`` and ``words`` of the thesis's statements; empty for a study without any.
+    """
+    pairs: dict[str, list[tuple[float, float]]] = {}
+    winners: list[str] = []
+    runs: list[tuple[Run, bool]] = []
+    for rule in view.rules:
+        for reference in view.references:
+            at_rest = view.reference_kind(reference) == "step"
+            merit, _ = figure_of_merit(at_rest)
+            for friction in view.frictions:
+                group = view.group(rule, reference, friction)
+                ranked = ranking(group, merit)
+                winners += [r.controller for r in ranked[:1]]
+                runs += [(r, oscillates(r, at_rest)) for r in group if not r.failure]
+                best = [
+                    next((r for r in ranked if bool(view.compensation(r.controller)) is kind), None)
+                    for kind in (False, True)
+                ]
+                if best[0] is not None and best[1] is not None:
+                    both = (best[0].metrics[merit], best[1].metrics[merit])
+                    pairs.setdefault(friction, []).append(both)
+    cases = (
+        "cases (reference, friction and slip rule)"
+        if len(view.rules) > 1
+        else "cases (reference and friction)"
+    )
+    said = [helped([pair for own in pairs.values() for pair in own], cases)] if pairs else []
+    if len(pairs) > 1:
+        listed = ", ".join(f"{name} {number(middle_of(factors_of(own)))}" for name, own in pairs.items())
+        said.append(
+            f"By friction, the best linear controller's error over the best compensator's, middle case: {listed}."
+        )
+    if winners:
+        most = max(dict.fromkeys(winners), key=winners.count)
+        said.append(f"Least error most often: {most}, in {winners.count(most)} of {len(winners)} {cases}.")
+    said += _calm(view, runs)
+    if tally:
+        listed = ", ".join(f"{item['count']} {item['words'].removeprefix('statements ')}" for item in tally)
+        said.append(f"Of the thesis's statements {listed}.")
+    return said
+
+
+def helped(pairs: Sequence[tuple[float, float]], cases: str) -> str:
+    """By how much the best compensator's error is smaller than the best linear controller's.
+
+    Parameters
+    ----------
+    pairs : sequence of (float, float)
+        The errors of the best linear controller and of the best compensator, one pair a case.
+    cases : str
+        What they are.
+    """
+    factors = factors_of(pairs)
+    better = sum(f > 1.0 for f in factors)
+    said = (
+        f"The best friction compensator has a smaller error than the best linear controller in {better} of "
+    )
+    said += f"{len(factors)} {cases}: {number(middle_of(factors))} times smaller"
+    if len(factors) == 1:
+        return f"{said}."
+    larger = "; below 1 it is larger" if factors[0] < 1.0 else ""
+    return f"{said} in the middle one ({number(factors[0])} to {number(factors[-1])} over all{larger})."
+
+
+def factors_of(pairs: Sequence[tuple[float, float]]) -> list[float]:
+    """How many times smaller the second of each pair is, the least first."""
+    return sorted(a / b if b > 0.0 else math.inf for a, b in pairs)
+
+
+def middle_of(factors: Sequence[float]) -> float:
+    """Their median: between two, the geometric mean."""
+    n = len(factors)
+    return factors[n // 2] if n % 2 else math.sqrt(factors[n // 2 - 1] * factors[n // 2])
+
+
+def number(factor: float) -> str:
+    """A factor in words; an error that is all but nothing makes none to be printed."""
+    return f"{factor:.2g}" if factor <= MOST else f"more than {MOST:g}"
+
+
+def _calm(view: StudyView, runs: Sequence[tuple[Run, bool]]) -> list[str]:
+    """How many runs oscillate, with a compensator and without."""
+    out: list[str] = []
+    for kind, words in ((True, "with a compensator"), (False, "with a linear controller alone")):
+        own = [moving for run, moving in runs if bool(view.compensation(run.controller)) is kind]
+        if own:
+            out.append(f"{sum(own)} of {len(own)} {words}")
+    return [f"Runs that oscillate: {', '.join(out)}."] if out else []
+
+
+def rig_conclusion(
+    tally: Sequence[Mapping[str, Any]], mains: Mapping[str, tuple[int, int]], pairs: Sequence[tuple[float, float]]
+) -> list[str]:  # fmt: skip
+    """What the experiments on virtual machines say of the thesis.
+
+    Parameters
+    ----------
+    tally : sequence of mapping
+        ``count`` and ``words`` of its statements.
+    mains : mapping of str to (int, int)
+        In how many parts each main statement holds, and of how many.
+    pairs : sequence of (float, float)
+        As in `helped`, one pair a machine, reference and linear controller.
+    """
+    listed = ", ".join(f"{item['count']} {item['words'].removeprefix('statements ')}" for item in tally)
+    said = [f"Of the thesis's statements {listed}."] if tally else []
+    whole = [text for text, (held, of) in mains.items() if held == of]
+    part = [f"{text} ({held} of {of} parts)" for text, (held, of) in mains.items() if held < of]
+    if whole:
+        said.append(f"Main statements that hold wherever they were tried: {'; '.join(whole)}.")
+    if part:
+        said.append(f"Main statements that do not hold everywhere: {'; '.join(part)}.")
+    if pairs:
+        said.append(helped(pairs, "cases (machine, reference and linear controller)"))
+    return said

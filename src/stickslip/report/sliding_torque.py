@@ -1,0 +1,169 @@
+"""Torque, measured and of the model, where an axis slides for certain: what an identification rests on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.axis_inverse import InverseDynamics
+from stickslip.identify.draws import sliding_torque
+from stickslip.identify.estimate import Identification
+from stickslip.identify.force_error import model_torque
+from stickslip.identify.regression import Regression
+from stickslip.identify.sliding_rows import SlidingRows
+from stickslip.identify.smooth import seen
+from stickslip.simulation.driven import Mechanics
+
+__all__ = ["Sliding", "over_all_rows", "sliding_of"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+ACCELERATION, SPEED, DIRECTION = range(3)
+POINTS = 4000
+"""Rows of a record that are looked at, at most: every second, third ... of more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sliding:
+    """Torque over time and velocity, measured and of the model.
+
+    Attributes
+    ----------
+    time, velocity, position : array, shape (n,)
+        s, rad/s (m/s), rad (m).
+    measured, model : array, shape (n,)
+        The torque that acted and that of the model, N·m (N).
+    inertial : array, shape (n,)
+        What of the model's accelerates and lifts: all but friction and the constant torque, N·m (N).
+    record : array of int, shape (n,)
+        Which record a row belongs to.
+    certain : bool
+        Whether these are rows of certain sliding; else all of the inverse dynamics'.
+    share : float
+        Part of the records that they are.
+    whole : tuple of (array, array)
+        Time and torque that acted of every record, standstills and reversals included.
+    plain : float
+        Root mean square of what plain least squares leaves in these rows, N·m (N); not a number where not asked.
+    """
+
+    time: Array
+    velocity: Array
+    position: Array
+    measured: Array
+    model: Array
+    inertial: Array
+    record: np.ndarray[Any, np.dtype[np.int64]]
+    certain: bool
+    share: float
+    whole: tuple[tuple[Array, Array], ...]
+    plain: float = math.nan
+
+    @property
+    def residual(self) -> Array:
+        """Model less measured, N·m (N)."""
+        return self.model - self.measured
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of what the model leaves, N·m (N)."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def relative(self) -> float:
+        """The same over that of the torque."""
+        return self.rms / max(float(np.sqrt(np.mean(self.measured**2))), 1e-300)
+
+
+@lru_cache(maxsize=1)  # the head, its pictures and the command line ask for the same
+def sliding_of(found: Identification) -> Sliding | None:
+    """Torque where the axis slides for certain; None where that was not looked at, or the law says no torque."""
+    regression, mechanics = found.details.get("regression"), found.details.get("mechanics")
+    if not isinstance(regression, Regression) or not isinstance(mechanics, Mechanics):
+        return None
+    if found.model is None or found.model.law.steady is None:
+        return None
+    rows = regression.rows
+    skew = regression.numbers["skew"].value
+    parts = [part(r, skew, mechanics) for r in rows]
+    columns = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
+    velocity = columns["velocity"]
+    record = np.repeat(np.arange(len(parts)), [p["time"].size for p in parts])
+    steady = sliding_torque(found.model, velocity)
+    sizes = [
+        (r.signals.time.size, r.places.size * max(1, int(r.window.width / r.signals.period))) for r in rows
+    ]
+    return Sliding(
+        **columns, record=record, model=columns["inertial"] + steady + mechanics.offset, certain=True,
+        share=min(1.0, sum(s for _, s in sizes) / sum(n for n, _ in sizes)),
+        whole=tuple(acted(r, skew) for r in rows), plain=left_by_plain(regression, found.details.get("inverse")),
+    )  # fmt: skip
+
+
+def left_by_plain(regression: Regression, inverse: Any) -> float:
+    """What the plain inverse dynamics leaves of the torque where the axis slides for certain, N·m (N)."""
+    if not isinstance(inverse, InverseDynamics):
+        return math.nan
+    gravity = {n: inverse[n] for n in ("gravity_sin", "gravity_cos") if inverse.has(n)}
+    own = {
+        "inertia": inverse["inertia"],
+        "sigma2": inverse.viscous,
+        "fc": inverse.coulomb,
+        "offset": inverse.offset,
+    }
+    return regression.left_by(own | gravity)
+
+
+def part(rows: SlidingRows, skew: float, mechanics: Mechanics) -> dict[str, Array]:
+    """What one record says, by the names of `Sliding`."""
+    step = max(1, math.ceil(rows.time.size / POINTS))
+    some = slice(None, None, step)
+    inertial = mechanics.inertia * rows.fixed[some, ACCELERATION]
+    if mechanics.gravity:
+        inertial = inertial + mechanics.gravity * np.sin(rows.position[some] - mechanics.gravity_angle)
+    return {
+        "time": rows.time[some], "velocity": rows.speed[some], "position": rows.position[some],
+        "measured": rows.torque(skew)[some], "inertial": inertial,
+    }  # fmt: skip
+
+
+def acted(rows: SlidingRows, skew: float) -> tuple[Array, Array]:
+    """Time and torque that acted, of a whole record through the same window."""
+    signals = rows.signals
+    (drive,) = seen(signals.drive, rows.window.weights(0, late=skew))
+    reach = rows.window.reach
+    inside = slice(reach, max(drive.size - reach, reach + 1))
+    return signals.time[inside], drive[inside]
+
+
+def over_all_rows(found: Identification) -> Sliding | None:
+    """The same over all rows of the inverse dynamics, where sliding was not looked at on its own."""
+    inverse, mechanics = found.details.get("inverse"), found.details.get("mechanics")
+    if not isinstance(inverse, InverseDynamics):
+        return None
+    if found.method == "inverse dynamics":
+        told = inverse.torque - inverse.residual
+        inertia = inverse["inertia"]
+    elif isinstance(mechanics, Mechanics) and found.model and found.model.law.steady and inverse.has("fc"):
+        named: Mapping[str, float] = {
+            k: float(getattr(mechanics, k)) for k in ("inertia", "offset", "gravity", "gravity_angle")
+        }
+        told, inertia = model_torque(inverse, found.model, named), mechanics.inertia
+    else:
+        return None
+    inertial = inertia * inverse.matrix[:, inverse.names.index("inertia")]
+    gravity = [n for n in inverse.names if n.startswith("gravity")]
+    for name in gravity:
+        inertial = inertial + inverse[name] * inverse.matrix[:, inverse.names.index(name)]
+    record = np.concatenate([[0], np.cumsum(np.diff(inverse.time) <= 0.0)]).astype(np.int64)
+    whole = tuple(
+        (inverse.time[record == k], inverse.torque[record == k]) for k in range(int(record[-1]) + 1)
+    )
+    return Sliding(
+        inverse.time, inverse.velocity, inverse.position, inverse.torque, told, inertial, record, False, 1.0, whole
+    )  # fmt: skip

@@ -1,0 +1,154 @@
+"""Pictures of the torque, measured and of the model: over time, over velocity, and what is left."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.draws import sliding_torque
+from stickslip.identify.estimate import Identification, Picture, Trace
+from stickslip.report.plots import envelope, quantity
+from stickslip.report.sliding_torque import Sliding
+
+__all__ = ["friction_points", "over_velocity", "stretch", "whole_record"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+PART, BEGINS = 8, 40
+"""The telling stretch is one part in 8 of its record; as many are looked at."""
+CLOUD = 900
+"""Points of a picture over velocity."""
+BINS, FEWEST = 24, 8
+"""Of speed, for the medians beside the curve; rows that one needs."""
+GAP = 3.0
+"""Usual distances between rows, beyond which a line is not drawn on."""
+
+
+def units(motion: str) -> tuple[str, str, str]:
+    """Of torque, speed and way."""
+    return ("N", "m/s", "m") if motion == "linear" else ("N·m", "rad/s", "rad")
+
+
+def stretch(sliding: Sliding, motion: str) -> Picture:
+    """Measured and model over the stretch of the first record that moves both ways and strains the most."""
+    time, torque = sliding.whole[0]
+    own = sliding.record == 0
+    first, last = telling(sliding, time, torque)
+    inside, rows = (time >= first) & (time <= last), own & (sliding.time >= first) & (sliding.time <= last)
+    return over_time(
+        "torque-stretch", "Torque, measured and of the model: a stretch", sliding, motion,
+        (time[inside], torque[inside]), (sliding.time[rows], sliding.model[rows]),
+    )  # fmt: skip
+
+
+def whole_record(sliding: Sliding, motion: str, number: int = 0, name: str = "") -> Picture:
+    """The same over a whole record."""
+    own = sliding.record == number
+    which = f" ({name})" if name else ""
+    return over_time(
+        f"torque-whole-{number + 1}", f"Torque, measured and of the model: the whole record{which}", sliding, motion,
+        sliding.whole[number], (sliding.time[own], sliding.model[own]),
+    )  # fmt: skip
+
+
+def telling(sliding: Sliding, time: Array, torque: Array) -> tuple[float, float]:
+    """Begin and end of that stretch, s."""
+    length = float(time[-1] - time[0]) / PART
+    own = sliding.record == 0
+    at, side = sliding.time[own], np.sign(sliding.velocity[own])
+    best, where = -1.0, float(time[0])
+    for begin in np.linspace(float(time[0]), float(time[-1]) - length, BEGINS).tolist():
+        moving = side[(at >= begin) & (at <= begin + length)]
+        if moving.size == 0:
+            continue
+        ways = min(np.mean(moving > 0.0), np.mean(moving < 0.0))
+        strain = float(np.std(torque[(time >= begin) & (time <= begin + length)]))
+        score = strain * moving.size * (1.0 if ways > 0.1 else 0.3)
+        best, where = max((best, where), (score, begin))
+    return where, where + length
+
+
+def over_time(
+    name: str, title: str, sliding: Sliding, motion: str, measured: tuple[Array, Array], model: tuple[Array, Array]
+) -> Picture:  # fmt: skip
+    """Both lines; the model's only where it says a torque."""
+    unit = units(motion)[0]
+    off = f"{100.0 * sliding.relative:.3g} % ({quantity(sliding.rms, unit)} RMS) off"
+    message = (
+        f"The model is {off} where the axis slides for certain; its line stops at rest and around reversals."
+        if sliding.certain
+        else f"The model is {off}, standstills and reversals included."
+    )
+    word = "force" if motion == "linear" else "torque"
+    return Picture(
+        name, title.replace("Torque", word.capitalize()), message, "time (s)", f"{word} ({unit})",
+        (Trace("measured", *envelope(*measured), "wide"), Trace("model", *with_gaps(*model))),
+    )  # fmt: skip
+
+
+def with_gaps(time: Array, values: Array) -> tuple[Array, Array]:
+    """Thinned, with a missing value wherever rows are missing."""
+    if time.size < 3:
+        return time, values
+    steps = np.diff(time)
+    ends = time[:-1][steps > GAP * float(np.median(steps))]
+    x, y = envelope(time, values)
+    piece = np.searchsorted(ends, x, side="left")
+    cuts = np.flatnonzero(np.diff(piece)) + 1
+    return np.insert(x, cuts, np.nan), np.insert(y, cuts, np.nan)
+
+
+def over_velocity(sliding: Sliding, found: Identification, motion: str) -> Picture | None:
+    """The torque less what accelerates over the velocity, with the law's curve through it."""
+    model, mechanics = found.model, found.details.get("mechanics")
+    if model is None or model.law.steady is None or mechanics is None:
+        return None
+    torque, speed, _ = units(motion)
+    step = max(1, math.ceil(sliding.time.size / CLOUD))
+    x, y = sliding.velocity[::step], (sliding.measured - sliding.inertial)[::step]
+    grid = [np.linspace(low, high, 120) for low, high in sides_of(sliding.velocity)]
+    v = np.concatenate(grid)
+    curve = sliding_torque(model, v) + mechanics.offset
+    cuts = np.cumsum([g.size for g in grid])[:-1]
+    word = "force" if motion == "linear" else "torque"
+    mass = "mass" if motion == "linear" else "inertia"
+    spread = quantity(sliding.rms, torque)
+    lifts, less = (" and lifts", " and gravity") if mechanics.gravity else ("", "")
+    return Picture(
+        "torque-velocity", f"{word.capitalize()} over velocity, without what accelerates{lifts}",
+        f"Measured {word} less {mass} times acceleration{less} lies {spread} RMS off the law's curve.",
+        f"velocity ({speed})", f"{word} less {mass} part ({torque})",
+        (Trace("model", np.insert(v, cuts, np.nan), np.insert(curve, cuts, np.nan)), Trace("measured", x, y, "cloud")),
+    )  # fmt: skip
+
+
+def sides_of(velocity: Array) -> list[tuple[float, float]]:
+    """Least and greatest velocity in each direction that was moved in."""
+    out: list[tuple[float, float]] = []
+    for side in (-1.0, 1.0):
+        speed = side * velocity[side * velocity > 0.0]
+        if speed.size:
+            out.append((side * float(speed.min()), side * float(speed.max())))
+    return [(min(p), max(p)) for p in out]
+
+
+def friction_points(sliding: Sliding, offset: float) -> list[tuple[Array, Array]]:
+    """Medians of the friction torque over bins of speed, for motion in the positive and the negative direction."""
+    top = float(np.max(np.abs(sliding.velocity)))
+    slow = max(float(np.min(np.abs(sliding.velocity))), 1e-3 * top)
+    edges = np.geomspace(slow, top * (1.0 + 1e-9), BINS + 1)
+    out: list[tuple[Array, Array]] = []
+    for side in (1.0, -1.0):
+        speed = side * sliding.velocity
+        friction = side * (sliding.measured - sliding.inertial - offset)
+        points = [
+            (float(np.median(speed[inside])), float(np.median(friction[inside])))
+            for low, high in itertools.pairwise(edges.tolist())
+            if np.count_nonzero(inside := (speed >= low) & (speed < high)) >= FEWEST
+        ]
+        table = np.array(points).reshape(-1, 2)
+        out.append((table[:, 0], table[:, 1]))
+    return out
