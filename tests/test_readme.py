@@ -33,25 +33,49 @@ def test_python_examples_run_in_order(tmp_path, capsys):
     assert (tmp_path / "move.npz").exists()
 
 
-def test_commands_run(tmp_path):
-    commands = [line for line in blocks(README, "sh")[-1].splitlines() if line.strip()]
-    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+def run_as_printed(commands: list[str], folder: Path) -> None:
+    """Line by line, by a shell, in a folder of their own and without what the user had told earlier."""
+    environment = {
+        **os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        "XDG_CONFIG_HOME": str(folder / "settings"),
+    }  # fmt: skip
     for command in commands:
         out = subprocess.run(
-            shlex.split(command), cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+            command, shell=True, cwd=folder, env=environment, capture_output=True, text=True, check=False
         )
         assert out.returncode == 0, f"{command}: {out.stderr}"
+
+
+def of_the_verbs(block: str) -> list[str]:
+    return [line for line in block.splitlines() if line.startswith("stickslip ")]
+
+
+@pytest.mark.slow
+def test_commands_run_as_they_are_printed(tmp_path):
+    """From the first example, whose log ships, to the last, which takes up what the first found."""
+    _, _, first, _, last = blocks(README, "sh")
+    run_as_printed([*of_the_verbs(first), *of_the_verbs(last)], tmp_path)
+    assert (tmp_path / "axis" / "report.html").exists()
+    assert (tmp_path / "recommended-c99").is_dir()
     assert (tmp_path / "step-study" / "report.html").exists()
     assert (tmp_path / "c" / "model.c").exists()
 
 
-def test_the_other_commands_are_spelt_right(tmp_path):
-    """What takes a rig's time or a log of the user's own: every flag and name is one that the command knows."""
-    shown = [line for block in blocks(README, "sh")[2:-1] for line in block.splitlines()]
-    assert len(shown) >= 8
-    for line in shown:
+@pytest.mark.slow
+@pytest.mark.long
+def test_commands_on_a_machine_run_as_they_are_printed(tmp_path):
+    run_as_printed(of_the_verbs(blocks(README, "sh")[3]), tmp_path)
+    assert (tmp_path / "commissioned" / "recommended.toml").exists()
+    assert (tmp_path / "sweep-thesis-robustness" / "summary.csv").exists()
+
+
+def test_every_command_is_one_that_is_run():
+    """By one of the tests here; and every flag and name is one that the command knows."""
+    shown = blocks(README, "sh")
+    assert len(shown) == 5
+    for line in [line for block in shown[2:] for line in block.splitlines()]:
         name, *arguments = shlex.split(line, comments=True)
-        assert name == "stickslip"
+        assert name == "stickslip", f"{line!r} is run by no test"
         parser_of(arguments[:1]).parse_args(arguments)  # complains of what it does not know
 
 

@@ -20,7 +20,7 @@ def make() -> None:
         "a check failed; 2 bad input, said in one line; 130 interrupted."
     ]
     for name in VERBS:
-        module = importlib.import_module(f"stickslip.cli.{name}")
+        module = importlib.import_module(f"stickslip.cli.{name.replace('-', '_')}")
         verb = next(a for a in parser._actions if a.dest == "verb").choices[name]
         parts.append(
             f"## stickslip {name}\n\n{module.SUMMARY[0].upper()}{module.SUMMARY[1:]}.\n\n"

@@ -14,6 +14,7 @@ FOLDER = GENERATED / "references"
 LINE = Style("#0072B2", "-", 1.4)
 SHOWN = {
     "sine": ({"amplitude": 0.5, "frequency": 1.0}, 2.0),
+    "plain_sine": ({"amplitude": 0.5, "frequency": 1.0}, 2.0),
     "harmonic": ({"amplitude": 0.1, "frequency": 1.0, "velocity": 0.5}, 2.0),
     "step": ({"amplitude": 0.01, "tau": 0.02}, 0.3),
     "ramp": ({"velocity": 0.5, "end": 0.6}, 1.0),

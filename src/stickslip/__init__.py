@@ -9,10 +9,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from stickslip.approval import allow_code
     from stickslip.control.compensators.feedback import Feedback
     from stickslip.control.compensators.feedforward import Feedforward
     from stickslip.control.controller import Controller
-    from stickslip.control.linear import Gains, pd, pid, place, pr
+    from stickslip.control.linear import Cascade, Gains, pd, pid, place, pr
     from stickslip.errors import InputError, SimulationError, StickslipError
     from stickslip.machines.rigid import RigidAxis
     from stickslip.model import Model, Reference
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
+    "Cascade": "control.linear",
     "Controller": "control.controller",
     "Feedback": "control.compensators.feedback",
     "Feedforward": "control.compensators.feedforward",
@@ -39,6 +41,7 @@ _HOME = {
     "RigidAxis": "machines.rigid",
     "SimulationError": "errors",
     "StickslipError": "errors",
+    "allow_code": "approval",
     "law": "plugins",
     "law_names": "plugins",
     "pd": "control.linear",
@@ -50,6 +53,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Cascade",
     "Controller",
     "Feedback",
     "Feedforward",
@@ -64,6 +68,7 @@ __all__ = [
     "RigidAxis",
     "SimulationError",
     "StickslipError",
+    "allow_code",
     "law",
     "law_names",
     "pd",

@@ -17,7 +17,7 @@ from typing import Any, Self, cast
 
 from stickslip.errors import ConfigError, InputError, suggestion
 
-__all__ = ["Document", "Table", "read_toml"]
+__all__ = ["Document", "Table", "read_toml", "refuse_endless"]
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 RUN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,63}")
@@ -52,15 +52,27 @@ class Document:
         return self.files[written]
 
 
+def refuse_endless(path: Path) -> None:
+    """Refuse a pipe or device: reading it may wait for ever, or never come to an end.
+
+    Raises
+    ------
+    InputError
+    """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError(f"{path} is a pipe or device, not a file; save its content to a file and give that")
+
+
 def read_toml(path: Path, name: str = "", moved: Mapping[str, Path] | None = None) -> Table:
     """Read a TOML file.
 
     Raises
     ------
-    ConfigError
+    InputError
         If it cannot be read, or is not TOML; with line and column.
     """
     shown = name or str(path)
+    refuse_endless(path)
     try:
         values = tomllib.loads(path.read_bytes().decode())
     except FileNotFoundError:

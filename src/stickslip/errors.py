@@ -7,17 +7,21 @@ The tree of exceptions::
     │   ├── ParameterError            a parameter is missing, unknown or out of bounds
     │   ├── UnknownName               a law, compensator, reference, integrator, ... that is not registered
     │   ├── ConfigError               a key or value of a TOML file
+    │   │   └── CodeRefused           a file names code that nobody has approved
     │   └── LawError                  a law's file says something that cannot be run (outside the scalar subset, say)
     ├── RigError                      a run on a rig was stopped: when, why, and the record of what was measured
     │   ├── LimitCrossed              position, speed, torque, temperature or following error
     │   ├── MessageLost               a message to or from the rig did not arrive in time
     │   ├── DriveFault                the rig itself reported a fault
+    │   ├── Overrun                   a controller in Python took more than its time
     │   ├── RecordFault               the record could not be written: a full disk
     │   └── Interrupted               a signal asked for the end
     └── SimulationError               a run ended early: when, why, and the record of what was computed
         ├── Divergence                position or velocity left every reasonable bound, or is not a number
         ├── EventStorm                more switches than the limit in a short time
         └── StepFailure               no step that meets the tolerance was found
+
+and one warning: ``ModelRemark``, a model that runs as it is, but is seldom what was meant.
 """
 
 from __future__ import annotations
@@ -31,6 +35,7 @@ if TYPE_CHECKING:
     from stickslip.record import Record
 
 __all__ = [
+    "CodeRefused",
     "ConfigError",
     "Divergence",
     "DriveFault",
@@ -40,6 +45,8 @@ __all__ = [
     "LawError",
     "LimitCrossed",
     "MessageLost",
+    "ModelRemark",
+    "Overrun",
     "ParameterError",
     "RecordFault",
     "RigError",
@@ -71,8 +78,16 @@ class UnknownName(InputError):
         super().__init__(f"unknown {family} {name!r}; {suggestion(str(name), names)}")
 
 
+class ModelRemark(UserWarning):
+    """A model that runs as it is, but is seldom what was meant."""
+
+
 class ConfigError(InputError):
     """A key or value of a TOML file."""
+
+
+class CodeRefused(ConfigError):
+    """A TOML file names Python code that nobody has approved (`stickslip.allow_code`)."""
 
 
 class LawError(InputError):
@@ -106,6 +121,10 @@ class MessageLost(RigError):
 
 class DriveFault(RigError):
     """The rig itself reported a fault."""
+
+
+class Overrun(RigError):
+    """A controller written in Python took more time than its budget."""
 
 
 class RecordFault(RigError):

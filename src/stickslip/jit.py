@@ -29,8 +29,10 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import config, types
+from numba.core import event
 from numba.extending import intrinsic
 
+from stickslip import compiling
 from stickslip.spec import Law
 from stickslip.subset import Layout, law_layouts, lower
 
@@ -48,6 +50,7 @@ __all__ = [
     "compiled_guarded",
     "compiled_lanes",
     "compiled_law",
+    "compiled_notice",
     "compiled_profile",
     "compiled_sample",
     "kernel",
@@ -67,7 +70,7 @@ SIGNATURES = {
     "sliding": FLOAT(FLOAT, ARRAY),
     "holding": FLOAT(FLOAT, ARRAY, ARRAY, ARRAY),
     "profile": types.void(FLOAT, ARRAY, ARRAY),
-    "sample": FLOAT(FLOAT, FLOAT, FLOAT, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
+    "sample": FLOAT(FLOAT, FLOAT, FLOAT, FLOAT, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
     "guarded": FLOAT(ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
 }
 
@@ -99,6 +102,18 @@ def cache_folder() -> Path:
         pass
     return Path(tempfile.mkdtemp(prefix="stickslip-"))
 
+
+class _Told(event.Listener):
+    """Passes on that a function is compiled, other than read from the cache."""
+
+    def on_start(self, event: Any) -> None:
+        compiling.started()
+
+    def on_end(self, event: Any) -> None:
+        compiling.ended()
+
+
+event.register("numba:compile", _Told())
 
 _decorating = threading.RLock()
 
@@ -188,7 +203,7 @@ call_switch: Any = _caller("switch", 5, False)
 call_value: Any = _caller("steady", 2, True)
 call_holding: Any = _caller("holding", 4, True)
 call_profile: Any = _caller("profile", 3, False)
-call_sample: Any = _caller("sample", 8, True)
+call_sample: Any = _caller("sample", 9, True)
 call_guarded: Any = _caller("guarded", 9, True)
 
 
@@ -245,8 +260,7 @@ def compiled_profile(name: str, function: Callable[..., Any], layout: Layout) ->
 
 
 def compiled_sample(name: str, function: Callable[..., Any], layouts: Mapping[str, Layout]) -> int:
-    """Compile one sample of a controller, ``sample(position, wanted, wanted_velocity, n, m, z, p, u)``;
-    returns its address."""
+    """Compile one sample of a controller, `stickslip.control.sampled.sample`; returns its address."""
     return _compile(name, {"sample": function}, layouts)["sample"]
 
 
@@ -398,3 +412,17 @@ def flat(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Return a contiguous array with at least one element, so that its address exists."""
     array = np.ascontiguousarray(values, dtype=np.float64)
     return array if array.size else np.zeros(1)
+
+
+def compiled_notice(cell: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
+    """Compile ``void notice(int number)``, which stores its number in ``cell[0]`` and does nothing else.
+
+    A signal's handler may do no more, in whatever thread it is called. Returns what holds its ``address``; it and the
+    cell must outlive its use.
+    """
+    place = int(cell.ctypes.data)
+
+    def notice(number: Any) -> None:
+        pointer_at(place)[0] = number
+
+    return numba.cfunc(types.void(types.int32))(notice)

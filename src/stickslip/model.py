@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -11,13 +13,16 @@ import numpy as np
 
 from stickslip import plugins
 from stickslip.config import read_toml
-from stickslip.errors import InputError, ParameterError, suggestion
+from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
 from stickslip.spec import Law, ReferenceKind
 
 __all__ = ["MODEL_FORMAT", "Model", "Reference"]
 
 MODEL_FORMAT = "stickslip-model-1"
 """What a file that `stickslip identify` wrote says it is."""
+
+MOST_BREAKS = 200_000
+"""Turning points of a reference within a run"""
 
 
 class Model:
@@ -36,6 +41,11 @@ class Model:
     ------
     UnknownName, ParameterError
         One line that names the thing, its value and the remedy.
+
+    Warns
+    -----
+    ModelRemark
+        Where the parameters are allowed but seldom meant (`Law.remark`): F_S below F_C, say.
     """
 
     __slots__ = ("law", "parameters")
@@ -44,6 +54,15 @@ class Model:
         found = plugins.law(law) if isinstance(law, str) else plugins.completed(law)
         self.law: Law = found.having(**choices) if choices else found
         self.parameters: Any = self.law.parameters(parameters)
+        if (words := self.law.remark(self.parameters)) and not _called_from_within():
+            warnings.warn(words, ModelRemark, stacklevel=2)
+
+    def warn(self, origin: str = "") -> Model:
+        """This model, with a `ModelRemark` where its parameters are allowed but seldom meant; `origin` says where it
+        stands."""
+        if words := self.law.remark(self.parameters):
+            warnings.warn(f"{origin}: {words}" if origin else words, ModelRemark, stacklevel=3)
+        return self
 
     @classmethod
     def from_file(cls, path: str | os.PathLike[str]) -> Model:
@@ -52,7 +71,7 @@ class Model:
         Raises
         ------
         InputError
-            If there is no such file, or it is no such model.
+            If there is no such file, it is no such model, or its law is code that nobody has approved.
         """
         file = Path(path)
         table = read_toml(file)
@@ -68,21 +87,22 @@ class Model:
         name = table.text("law")
         if name.endswith(".py"):
             name = str(file.parent / name)
+        law = plugins.law(name, table.label("law"))
         choices = dict(table.table("choices").values) if table.has("choices") else dict[str, Any]()
         with table.blamed():
             parameters = table.table("parameters")
             values = parameters.rest()
-            known = {f.name for f in plugins.law(name).having(**choices).fields}
+            known = {f.name for f in law.having(**choices).fields}
             for key in values:
                 if key not in known:
                     raise parameters.error(key, f"is no parameter of this law; {suggestion(key, known)}")
-            return cls(name, choices, **values)
+            return cls(law, choices, **values).warn(str(file))
 
     def having(self, **choices: str) -> Model:
         """This model under other options of its law; options that the law does not have are left out."""
         known = {c.name for c in self.law.choices}
         wanted = {name: option for name, option in choices.items() if name in known}
-        same = all(self.law.chosen.get(n, _default(self.law, n)) == o for n, o in wanted.items())
+        same = all(self.law.option_of(n) == o for n, o in wanted.items())
         return self if same else Model(self.law, wanted, **self.parameters._asdict())
 
     def scaled(self, **factors: float) -> Model:
@@ -114,6 +134,13 @@ class Model:
         return f"Model({self.law.name!r}, {inside})"
 
 
+def _called_from_within() -> bool:
+    """Whether the package itself makes the model: a fit tries many that nobody has written."""
+    frame = inspect.currentframe()
+    maker = frame.f_back.f_back if frame and frame.f_back else None
+    return maker is not None and str(maker.f_globals.get("__name__", "")).startswith("stickslip.")
+
+
 def _times(factor: float, value: Any) -> Any:
     """A parameter, or each of its values, multiplied."""
     if isinstance(value, tuple):
@@ -127,17 +154,14 @@ def _plain(parameters: Any) -> dict[str, Any]:
     return {k: list(cast("tuple[float, ...]", v)) if isinstance(v, tuple) else v for k, v in values.items()}
 
 
-def _default(law: Law, choice: str) -> str:
-    return next(c.default for c in law.choices if c.name == choice)
-
-
 class Reference:
     """A reference motion: a kind with its parameters.
 
     Parameters
     ----------
     kind : str
-        A registered kind: sine, harmonic, step, ramp, staircase, scurve, table.
+        A registered kind: sine, plain_sine, harmonic, step, ramp, staircase, scurve, table. ``sine`` starts from rest,
+        A (1 - cos 2 pi f t), and spans from 0 to 2 A; ``plain_sine`` is A sin 2 pi f t.
     **parameters
         The kind's parameters in SI units.
     """
@@ -168,6 +192,12 @@ class Reference:
 
     def breaks(self, duration: float) -> list[float]:
         """Times inside (0, duration) that integrators step onto, s."""
+        per_second = 2.0 * float(getattr(self.parameters, "frequency", 0.0))
+        if not per_second * duration <= MOST_BREAKS:
+            raise InputError(
+                f"{self!r} turns {per_second * duration:.3g} times within {duration:g} s, {MOST_BREAKS:,} at most; "
+                "give a lower frequency or a shorter duration"
+            )
         return sorted(t for t in self.kind.breaks(self.parameters, duration) if 0.0 < t < duration)
 
     def sample(self, time: Sequence[float] | np.ndarray[Any, Any]) -> np.ndarray[Any, np.dtype[np.float64]]:

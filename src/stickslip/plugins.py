@@ -19,6 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from stickslip import approval, trial
 from stickslip.errors import InputError, LawError, UnknownName
 from stickslip.spec import Law, ReferenceKind
 from stickslip.subset import law_layouts, lower
@@ -35,21 +36,28 @@ def law_names() -> tuple[str, ...]:
     return (*builtin, *_installed("stickslip.laws"), *_from_files())
 
 
-def law(name: str) -> Law:
+def law(name: str, named_by: str = "") -> Law:
     """The law of that name, or of the file of that path.
+
+    Parameters
+    ----------
+    name : str
+    named_by : str
+        The file and key where the name stands; empty where the user himself names it. Code named by a file runs only
+        if it is allowed (`stickslip.approval`).
 
     Raises
     ------
-    UnknownName, LawError
+    UnknownName, LawError, CodeRefused
     """
     if name.endswith(".py"):
-        return _law_in(str(Path(name).resolve()))
+        return _law_in(*_code_at(str(Path(name).resolve()), named_by))
     if name in importlib.import_module("stickslip.laws").LAWS:
         return completed(importlib.import_module(f"stickslip.laws.{name}").LAW)
     if name in (files := _from_files()):
         return files[name]
     if name in (installed := _installed("stickslip.laws")):
-        return completed(installed[name].load())
+        return _tried(installed[name].load(), f"installed law {name!r}")
     raise UnknownName("law", name, law_names())
 
 
@@ -88,17 +96,17 @@ def rig_kind_names() -> tuple[str, ...]:
     return (*builtin, *_installed("stickslip.rigs"))
 
 
-def rig_kind(name: str) -> RigKind:
-    """The kind of rig of that name, or of the file of that path.
+def rig_kind(name: str, named_by: str = "") -> RigKind:
+    """The kind of rig of that name, or of the file of that path; `named_by` as in `law`.
 
     Raises
     ------
-    UnknownName, InputError
+    UnknownName, InputError, CodeRefused
     """
     if name.endswith(".py"):
         if not Path(name).is_file():
             raise InputError(f"no file {name}; give the path of the rig's file")
-        found = getattr(_module_at(str(Path(name).resolve())), "RIG", None)
+        found = getattr(_module_of(*_code_at(str(Path(name).resolve()), named_by)), "RIG", None)
         if found is None:
             raise InputError(f"{name} defines no rig; end it with `RIG = RigKind(...)`")
         return found
@@ -116,32 +124,53 @@ def _installed(group: str) -> Mapping[str, Any]:
 
 def _from_files() -> dict[str, Law]:
     paths = [p for p in os.environ.get("STICKSLIP_LAWS", "").split(os.pathsep) if p]
-    laws = [_law_in(str(Path(p).resolve())) for p in paths]
+    laws = [_law_in(*_code_at(str(Path(p).resolve()))) for p in paths]
     return {found.name: found for found in laws}
 
 
 @functools.cache
-def _law_in(path: str) -> Law:
-    module = _module_at(path)
+def _law_in(path: str, code: bytes) -> Law:
+    module = _module_of(path, code)
     found = getattr(module, "LAW", None)
     if not isinstance(found, Law):
         raise LawError(f"{path} defines no law; end it with `LAW = Law(...)`")
+    return _tried(found, path)
+
+
+@functools.cache
+def _tried(law: Law, origin: str) -> Law:
+    """A law from outside, with the choices that any law has: read in the scalar subset, and tried for some steps."""
     functions = ("step", "rate", "guards", "switch", "steady", "holding", "stored")
-    lower({n: getattr(found, n) for n in functions if getattr(found, n)}, law_layouts(found))
-    return completed(found)
+    lower({n: getattr(law, n) for n in functions if getattr(law, n)}, law_layouts(law))
+    if wrong := trial.complaint(law):
+        raise LawError(f"{origin}: law {law.name!r}: {wrong}; mend it (`stickslip law FILE.py --check`)")
+    return completed(law)
 
 
-def _module_at(path: str) -> ModuleType:
+def _code_at(path: str, named_by: str = "") -> tuple[str, bytes]:
+    """Path and content of a file that may run."""
     if not os.path.isfile(path):
         raise LawError(f"no file {path}; give the path of the law's file")
+    try:
+        code = Path(path).read_bytes()
+    except OSError as error:
+        raise LawError(f"{path} cannot be read ({error.strerror}); give the path of the law's file") from None
+    if named_by:
+        approval.demand(path, code, named_by)
+    else:
+        approval.asked_for(path, code)
+    return path, code
+
+
+def _module_of(path: str, code: bytes) -> ModuleType:
+    """Run these bytes: no other content of the file, and no compiled one that lies beside it."""
     name = f"stickslip_file_{Path(path).stem}_{abs(hash(path)):x}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
+        exec(compile(code, path, "exec", dont_inherit=True), module.__dict__)
     except InputError:
         raise
     except Exception as error:

@@ -154,6 +154,8 @@ class Option:
         The parameters it brings along, as a law's ``Params``; ``example`` gives values of them.
     check, velocity_scale : callable
         As a law's: a complaint about the parameters, the velocity over which the torque changes much.
+    remark : callable
+        ``remark(p)``: a sentence on parameters that are allowed but seldom meant, or "".
     passive : bool
         False where the law can give energy back with it.
     doubles : str
@@ -171,6 +173,7 @@ class Option:
     passive: bool = True
     example: Mapping[str, Any] = field(default_factory=dict[str, Any])
     check: Callable[[Any], str] | None = None
+    remark: Callable[[Any], str] | None = None
     velocity_scale: Callable[[Any], float] | None = None
     doubles: str = ""
     wraps: Mapping[str, Callable[..., Any]] = field(default_factory=dict[str, Any])
@@ -475,6 +478,16 @@ class Law(Described):
     def option(self, choice: Choice) -> Option:
         """The option in force for `choice`."""
         return choice.options[self.chosen.get(choice.name, choice.default)]
+
+    def option_of(self, choice: str) -> str:
+        """The name of the option in force for a choice; "" where the law has no choice of that name."""
+        defaults = {c.name: c.default for c in self.choices}
+        return self.chosen.get(choice, defaults.get(choice, ""))
+
+    def remark(self, p: Any) -> str:
+        """What is allowed in the parameters `p` but seldom meant, in a sentence; "" where there is nothing."""
+        said = [found for c in self.choices if (o := self.option(c)).remark and (found := o.remark(p))]
+        return f"{self.name}: {'; '.join(said)}" if said else ""
 
     @property
     def reads_surroundings(self) -> bool:

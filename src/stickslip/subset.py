@@ -21,6 +21,7 @@ from typing import Any
 
 from stickslip.binding import NEGATIVE, negative
 from stickslip.errors import LawError, suggestion
+from stickslip.returning import MUST, gives, missing_return
 from stickslip.spec import Field, Law, Surroundings
 
 __all__ = ["COUNT", "Layout", "law_layouts", "lower", "named"]
@@ -190,6 +191,11 @@ def _translate(
     tree, where = _parsed(function)
     if name in stack:
         raise LawError(f"{where.at(tree)}: {function.__name__} calls itself; use a `for` loop instead")
+    if found := missing_return(tree, must=not stack and name.strip("_") in MUST):
+        raise LawError(
+            f"{where.at(found)}: {function.__name__}() goes on here without returning a number; end every path with "
+            "`return` and a number"
+        )
     arguments = [a.arg for a in tree.args.args]
     translator = _Translator(where, layouts, arguments, function.__globals__, flat, names, target.negative)
     body = [s for s in (translator.visit(statement) for statement in tree.body) if s is not None]
@@ -198,6 +204,12 @@ def _translate(
         body[:0] = [translator.counted(per) for per in translator.counts]
     for callee, called in translator.calls.items():
         _translate(callee, called, layouts, done, names, (*stack, name), flat=flat)
+    for callee, node in translator.read.items():
+        if not gives(done[callee]):
+            what = translator.calls[callee].function.__name__
+            raise translator.refuse(
+                node, f"the value of {what}(), which returns none,", "let it return a number"
+            )
     arguments = ast.arguments([], [ast.arg(a.arg) for a in tree.args.args], None, [], [], None, [])
     if not flat:
         body = [*_docstring(tree), *body]
@@ -247,6 +259,8 @@ class _Translator(ast.NodeTransformer):
     calls: dict[str, _Target] = field(default_factory=dict[str, _Target])
     locals: set[str] = field(default_factory=set[str])
     counts: dict[str, None] = field(default_factory=dict[str, None])
+    read: dict[str, ast.Call] = field(default_factory=dict[str, ast.Call])
+    """Calls whose value is used, by callee."""
 
     def refuse(self, node: ast.AST, what: str, remedy: str) -> LawError:
         return LawError(f"{self.where.at(node)}: {what} is outside the scalar subset; {remedy}")
@@ -264,6 +278,8 @@ class _Translator(ast.NodeTransformer):
     def visit_Expr(self, node: ast.Expr) -> Any:
         if isinstance(node.value, ast.Constant):
             return None  # a docstring
+        if isinstance(node.value, ast.Call):
+            return ast.copy_location(ast.Expr(self.visit_Call(node.value, read=False)), node)
         return self.generic_visit(node)
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> Any:
@@ -334,7 +350,7 @@ class _Translator(ast.NodeTransformer):
             index = ast.BinOp(ast.Constant(first), ast.Add(), index)
         return self.element(name, index, node)
 
-    def visit_Call(self, node: ast.Call) -> Any:
+    def visit_Call(self, node: ast.Call, read: bool = True) -> Any:
         if node.keywords:
             raise self.refuse(node, "a keyword argument", "pass arguments by position")
         if isinstance(node.func, ast.Attribute):
@@ -356,6 +372,8 @@ class _Translator(ast.NodeTransformer):
         target = _Target(function, self.negative or any(map(self.is_negative, node.args)))
         callee = self.names.of("_" + name, target)
         self.calls[callee] = target
+        if read:
+            self.read[callee] = node
         node.func = ast.copy_location(ast.Name(callee, ast.Load()), node)
         node.args = [self.argument(a) for a in node.args]
         return node

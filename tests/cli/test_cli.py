@@ -277,3 +277,17 @@ def test_a_chance_that_there_is_not_is_a_dash() -> None:
     from stickslip.cli.compare import chance
 
     assert [chance(p) for p in (float("nan"), 0.25, 1e-9)] == ["-", "0.25", "< 1e-06"]
+
+
+def test_warnings_of_numpy_are_not_the_users(tmp_path: Path) -> None:
+    """`python -W` sees them; a terminal does not."""
+    code = (
+        "import sys, numpy as np, stickslip.cli as cli\n"
+        "cli._dispatch = lambda argv: int(np.isnan(np.array([0.0]) / 0.0)[0]) - 1\n"
+        "sys.argv = ['stickslip', 'doctor']\n"
+        "sys.exit(cli.main())\n"
+    )
+    for options, seen in (([], False), (["-W", "default"], True)):
+        done = subprocess.run([sys.executable, *options, "-c", code], capture_output=True, text=True)
+        assert done.returncode == 0
+        assert ("RuntimeWarning" in done.stderr) is seen

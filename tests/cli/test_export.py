@@ -69,6 +69,14 @@ def test_a_compensator_leaves_without_a_controllers_file(kind, model, tmp_path):
     assert "n->kp = 0.0;" in source
 
 
+def test_a_filter_above_half_the_sample_rate_is_refused(model, capsys):
+    call = ["export", model, "--to", "c99", "--compensator", "fb", "--filter-hz", "600"]
+    assert main(call) == 2
+    said = capsys.readouterr().err
+    assert "filter_hz = 600 Hz" in said
+    assert "at most 495 Hz" in said
+
+
 def test_the_inertia_comes_from_the_models_file(model, tmp_path):
     with open(model, "a") as file:
         file.write("[axis]\ninertia = 2e-3\n")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import re
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,9 @@ import pytest
 
 from stickslip import Model
 from stickslip.cli import main
+from stickslip.cli.identify import assumptions
 from stickslip.errors import InputError
+from stickslip.identify.estimate import Estimate, Identification
 from stickslip.plugins import law_names
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "identify"))
@@ -41,7 +45,24 @@ def test_a_log_becomes_a_model_that_is_read_back(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "model.toml"
-    assert main(["identify", str(log), "--law", "coulomb", "--loop", LOOP, "--out", str(out), "--json"]) == 0
+    assert (
+        main(
+            [
+                "identify",
+                str(log),
+                "--law",
+                "coulomb",
+                "--loop",
+                LOOP,
+                "--torque-is",
+                "commanded",
+                "--out",
+                str(out),
+                "--json",
+            ]
+        )
+        == 0
+    )
     printed = json.loads(capsys.readouterr().out)
     model = Model.from_file(out)
     assert model.parameters.fc == pytest.approx(cases.FC, rel=0.02)
@@ -336,3 +357,48 @@ def test_a_log_without_torque_gets_one_line(
         assert "torque" in line
         assert "--map torque=COLUMN:UNIT" in line
     assert kept == []
+
+
+def test_what_stays_at_a_laws_default_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    """delta_s, and the shares of elements, stayed at the law's example in silence."""
+    law = Model("gms", fs=0.3, fc=0.2, vs=0.1, sigma2=0.0, k=[200.0, 100.0], alpha=[0.5, 0.5], c=10.0)
+    names = ("fs", "fc", "vs", "sigma2", "k[0]", "k[1]", "c")
+    fitted = tuple(Estimate(n, "", n, 1.0, 0.1, 0.8, 1.2, identified=True) for n in names)
+    found = Identification("axis", law, fitted, np.eye(len(names)), {})
+    assert found.assumed == {"delta_s": 2.0, "alpha[0]": 0.5, "alpha[1]": 0.5}
+    assert found.as_dict()["assumed"] == found.assumed
+    args = argparse.Namespace(method="axis", set=[], freeze=[], model=None)
+    (said,) = assumptions(found, args)
+    assert said.startswith("Assumed, not fitted: ")
+    assert "delta_s = 2" in said
+    assert "alpha = 0.5, 0.5" in said
+    assert "--free NAME" in said
+    args.freeze, args.set = ["delta_s=2"], ["alpha[0]=0.5", "alpha[1]=0.5"]
+    assert assumptions(found, args) == []
+    assert replace(found, method="inverse dynamics").assumed == {}
+
+
+def test_the_numbers_of_a_saved_profile_are_shown_before_the_result_and_asked_about(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("STICKSLIP_CONFIG", str(tmp_path / "config"))
+    t = np.arange(1500) * 1e-3
+    q, current = 0.3 * np.sin(2.0 * np.pi * t), 2.0 * np.sign(np.cos(2.0 * np.pi * t))
+    for name, size in (("small.csv", 1.0), ("large.csv", 9.0)):
+        table, head = np.column_stack((t, q, size * current)), "time [s],q [rad],i [A]"
+        np.savetxt(name, table, "%.9g", ",", header=head, comments="")
+    calls = ["--inverse", "--no-report", "--force", "--out", "model.toml"]
+    assert main(["identify", "small.csv", *calls, "--torque-constant", "0.05"]) == 0
+    capsys.readouterr()
+    assert main(["identify", "small.csv", *calls]) == 0
+    streams = capsys.readouterr()
+    assert "which says torque_constant = 0.05; delete that file to forget it" in streams.err
+    assert "hold for this machine" not in streams.err
+    assert main(["identify", "large.csv", *calls]) == 0
+    assert (
+        "a record of 0.1 N·m of torque, this one has 0.9: does torque_constant = 0.05 hold"
+        in capsys.readouterr().err
+    )
+    assert main(["identify", "large.csv", *calls, "--torque-constant", "0.2"]) == 0
+    assert "hold for this machine" not in capsys.readouterr().err

@@ -18,11 +18,13 @@ import tomli_w
 from stickslip import Model
 from stickslip.cli import _output, main
 from stickslip.cli.recommend import parameters, percent
+from stickslip.control.linear import Cascade
 from stickslip.control.recommended import read_recommended
 from stickslip.identify.drift import compare_models
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
+from stickslip.identify.motion import sinusoid
 from stickslip.report.identification import _panel  # type: ignore[reportPrivateUsage]
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.virtual import virtual_rig
@@ -41,7 +43,8 @@ def written(path: Path, relative: float = 0.01, law: str = "stribeck", **values:
     result = Identification("axis", Model(law, **found), estimates, np.eye(len(estimates)), {})
     write_model(path, result, data=[{"file": path.name, "sha256": path.name, "rows": 9}])
     content = tomllib.loads(path.read_text(encoding="utf-8"))
-    content["axis"] = {"inertia": 4e-4}
+    content["axis"] = {"inertia": 4e-4, "offset": 0.03}
+    content["trajectory"] = sinusoid(0.1, 0.5).table()
     path.write_text(tomli_w.dumps(content), encoding="utf-8")
     return path
 
@@ -174,7 +177,7 @@ def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
     assert chosen["unsafe"] == []
     assert result["axes"] == 3
     assert len(chosen["errors"]) == 1 + result["axes_confirmed"] == 8
-    assert result["reduction"] == [1.0 - max(chosen["errors"]), 1.0 - min(chosen["errors"])]
+    assert result["reduction"] == [1.0 - 1.4 * max(chosen["errors"]), 1.0 - min(chosen["errors"]) / 2.0]
     assert result["reduction_confidence"] == 0.75
     assert result["reduction"][0] > 0.8
     assert chosen["gain"] <= 1.0
@@ -205,6 +208,7 @@ def test_the_margin_that_is_printed_is_what_the_table_says(
 ) -> None:
     monkeypatch.setattr("stickslip.identify.recommend.GAINS", (1.0,))
     monkeypatch.setattr("stickslip.identify.recommend.LEADS", (0.0,))
+    monkeypatch.setattr("stickslip.identify.recommend.BEYOND", (1.5, 2.5))
     model = written(tmp_path / "m.toml", law="coulomb")
     assert main(["recommend", str(model), "--bandwidth", "20", "--axes", "1", "--confirm", "0"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -250,6 +254,7 @@ def test_what_is_recommended_is_exported_and_run_by_the_commands_that_are_printe
         20.0,
         1e-3,
     )
+    assert (found.offset, found.inertia_feedforward) == (0.03, 4e-4)
     assert (
         Track(compensator="recommended", model=str(out)).controller(virtual_rig("ideal")).compensator.gain
         == 0.9
@@ -288,6 +293,7 @@ def test_where_the_model_is_unsure_less_is_promised(
                     "recommend",
                     str(model),
                     "--bandwidth=20",
+                    "--amplitude=0.1",
                     "--frequency=1",
                     "--axes=2",
                     "--confirm=3",
@@ -335,3 +341,62 @@ def test_bad_input_is_one_line(
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1
     assert message in lines[0]
+
+
+def test_the_loop_that_the_user_has_goes_all_the_way(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A cascade given by its gains: simulated, written, named by the export, run by a rig."""
+    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (0.8,))
+    monkeypatch.setattr("stickslip.identify.recommend.LEADS", (0.0,))
+    model, out = written(tmp_path / "m.toml"), tmp_path / "recommended.toml"
+    loop = "kv=30,kvp=0.08,kvi=1.2,feed=0.5,filter=200,limit=3"
+    asked = ["recommend", str(model), "--loop", loop, "--axes", "1", "--confirm", "2", "--out", str(out)]
+    assert main([*asked, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["gains"] == {"kv": 30.0, "kvp": 0.08, "kvi": 1.2, "feed": 0.5}
+    assert told["drive"]["torque_limit"] == 3.0
+    assert told["drive"]["motion"]["amplitude"] == pytest.approx(0.1)
+    found = read_recommended(out)
+    assert found.linear == Cascade(30.0, 0.08, 1.2, 0.5)
+    assert found.offset == 0.03
+    loop_run = Track(compensator="recommended", model=str(out)).controller(virtual_rig("ideal"))
+    assert loop_run.gains == found.linear
+    assert loop_run.velocity_filter == 200.0
+    export = ["export", str(out), "--to", "c99", "--compensator", "recommended", "--out", str(tmp_path / "c")]
+    assert main(export) == 0
+    assert "it was tried beside the loop of kv 30, kvp 0.08, kvi 1.2, feed 0.5" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--loop", "kv=30,kp=1"], "unknown number of --loop of a cascade 'kp'"),
+        (["--loop", "kv=30"], "give kvp, greater than 0"),
+        (["--loop", "kp=1,kd=-1"], "kd = -1 must be a number of 0 or more"),
+        (["--loop", "kp=1,limit=2", "--torque-limit", "3"], "--torque-limit 3 beside --loop's limit"),
+        (["--amplitude", "0.1", "--motion", "x.csv"], "two motions"),
+        (["--frequency", "2"], "--frequency 2 belongs to a sinusoid"),
+        (["--loop", "kp=1", "--linear", "PID"], "--linear PID beside --loop"),
+    ],
+)
+def test_a_loop_or_motion_that_cannot_be_is_refused(
+    tmp_path: Path, options: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["recommend", str(written(tmp_path / "m.toml")), *options]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_motion_of_another_log_is_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (0.8,))
+    t = np.linspace(0.0, 2.0, 2001)
+    lines = [f"{a:.4f},{b:.6f}" for a, b in zip(t, 0.3 - 0.3 * np.cos(np.pi * t), strict=True)]
+    log = tmp_path / "cycle.csv"
+    log.write_text("\n".join(["time [s],position [rad]", *lines]), encoding="utf-8")
+    model = written(tmp_path / "m.toml")
+    assert main(["recommend", str(model), "--motion", str(log), "--axes=1", "--confirm=0", "--json"]) == 0
+    motion = json.loads(capsys.readouterr().out)["drive"]["motion"]
+    assert motion["source"] == "position of cycle.csv, 0 to 2 s"
+    assert motion["amplitude"] == pytest.approx(0.3, rel=1e-3)

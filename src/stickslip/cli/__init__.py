@@ -11,18 +11,26 @@ import gc
 import importlib
 import os
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from typing import Any, NoReturn
 
+from stickslip import compiling
+from stickslip.approval import allow_code
 from stickslip.cli import _kinds
-from stickslip.errors import InputError, Interrupted, StickslipError
+from stickslip.errors import InputError, Interrupted, ModelRemark, StickslipError
 
-__all__ = ["VERBS", "main", "parser_of"]
+__all__ = ["VERBS", "allow_code_argument", "main", "parser_of"]
 
 VERBS = (
     "study", "sweep", "tune", "simulate", "identify", "doctor", "analyse", "compare", "recommend", "demo",
-    "rig", "laws", "law", "cite", "rerun", "export", "version"
+    "rig", "laws", "law", "cite", "rerun", "export", "warm-up", "version"
 )  # fmt: skip
+
+
+CODE = ("study", "sweep", "tune", "simulate", "identify", "compare", "recommend", "cite", "rerun", "export")
+"""Verbs that read TOML files in which laws may be named; `rig` and `analyse` have the option in their actions."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -37,8 +45,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line. Returns the exit code."""
     _tolerate_any_terminal()
     _one_thread_for_algebra()
+    notice = compiling.Notice(sys.stderr)
     if argv is None:
         _collect_seldom()
+        if not sys.warnoptions:
+            # NumPy's are of numbers that are looked at afterwards; tests and python -W see them.
+            warnings.filterwarnings("ignore", category=RuntimeWarning)
+        compiling.listen(notice)
     try:
         return _dispatch(list(sys.argv[1:] if argv is None else argv))
     except InputError as error:
@@ -53,6 +66,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader (`| head`) has gone; Python would complain once more when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
+    finally:
+        notice.close()
 
 
 def _one_thread_for_algebra() -> None:
@@ -76,12 +91,22 @@ def parser_of(names: Sequence[str] = VERBS) -> argparse.ArgumentParser:
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     verbs = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs")
     for name in names:
-        module = importlib.import_module(f"stickslip.cli.{name}")
+        module = importlib.import_module(f"stickslip.cli.{name.replace('-', '_')}")
         sub = verbs.add_parser(name, help=module.SUMMARY, description=module.__doc__,
                                formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
         module.arguments(sub)
+        if name in CODE:
+            allow_code_argument(sub)
         sub.set_defaults(run=module.run)
     return parser
+
+
+def allow_code_argument(parser: argparse.ArgumentParser) -> None:
+    """What lets code run that came with a file."""
+    parser.add_argument(
+        "--allow-code", action="store_true",
+        help="run the Python code (laws, rigs) that the given files name, and know it from now on by its SHA-256",
+    )  # fmt: skip
 
 
 def _dispatch(argv: list[str]) -> int:
@@ -99,9 +124,29 @@ def _dispatch(argv: list[str]) -> int:
     if args.verb is None:
         raise InputError(f"no verb; choose from {', '.join(VERBS)}; see `stickslip --help`")
     _kinds.check(args)
-    code: int = args.run(args)
+    with allow_code(getattr(args, "allow_code", False), remember=True), _remarks():
+        code: int = args.run(args)
     sys.stdout.flush()
     return code
+
+
+@contextmanager
+def _remarks() -> Generator[None]:
+    """Print remarks on models on stderr, each once and in one line."""
+    said: set[str] = set()
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", ModelRemark)
+        otherwise = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+            if not issubclass(category, ModelRemark):
+                otherwise(message, category, *rest)
+            elif str(message) not in said:
+                said.add(str(message))
+                print(f"stickslip: note: {message}", file=sys.stderr)
+
+        warnings.showwarning = show
+        yield
 
 
 def _complain(what: object, code: int) -> int:

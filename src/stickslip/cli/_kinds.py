@@ -59,7 +59,7 @@ def kind_of(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix in RECORDS | REPORTS:
         return "record" if suffix in RECORDS else "report"
-    if suffix != ".toml":
+    if suffix != ".toml" or not path.is_file():
         return ""
     try:
         return kind_of_toml(tomllib.loads(path.read_text(encoding="utf-8")))

@@ -177,6 +177,56 @@ def lugre(records: Sequence[Record], args: argparse.Namespace) -> Identification
     return identify_lugre_dynamics(response, given["inertia"], curve_values(args), noise=args.noise)
 
 
+HYSTERESIS_ROWS = 8000
+"""Rows that a loop is fitted to: of 25,000 the same values come in a tenth of the time."""
+
+
+def hysteresis(records: Sequence[Record], args: argparse.Namespace) -> Identification:
+    """A law along the measured motion, from a measured friction: Dahl, per direction, or Maxwell-slip."""
+    import numpy as np
+
+    from stickslip.errors import UnknownName
+    from stickslip.identify.hysteresis import Loop, choose_hysteresis, templates_for
+
+    whole = Loop.of(single(records, args), torque_channel(records, args))
+    every = max(1, whole.time.size // HYSTERESIS_ROWS)
+    loop = Loop(whole.time[::every], whole.position[::every], whole.torque[::every], whole.unit)
+    templates = templates_for(loop, np.arange(loop.time.size))
+    names = sorted({model.law.name for model in templates.values()})
+    for law in args.law:
+        if law not in names:
+            raise UnknownName("law of --method hysteresis", law, names)
+    wanted = {k: m for k, m in templates.items() if not args.law or m.law.name in args.law}
+    chosen, found, table = choose_hysteresis(loop, wanted)
+    said = [
+        f"Chosen: {chosen}. Error on blocks left out: "
+        + "; ".join(f"{name} {100.0 * row['cross_validated']:.2g} %" for name, row in table.items())
+        + "."
+    ]
+    if every > 1:
+        said.append(f"One row of {every} was fitted, {loop.time.size} in all.")
+    details = {**found.details, "chosen": chosen}
+    return replace(found, notes=(*said, *found.notes), details=details)
+
+
+def load_note(records: Sequence[Record], found: Identification) -> list[str]:
+    """What the recorded normal load means for the friction found; empty without one."""
+    import numpy as np
+
+    loads = [r["load"] for r in records if "load" in r.channels and r.units["load"] == "N"]
+    if not loads:
+        return []
+    values = np.abs(np.concatenate(loads))
+    low, mean, high = np.nanpercentile(values, 5), np.nanmean(values), np.nanpercentile(values, 95)
+    said = f"Normal load recorded: {mean:.4g} N ({low:.4g} to {high:.4g} in 90 % of the rows); friction holds at it"
+    levels = {e.name: e.value for e in found.estimates}
+    linear = all(r.units.get("position") == "m" for r in records)
+    if linear and mean > 0.0 and levels.get("fc", 0.0) > 0.0:
+        each = [levels["fc"], levels.get("fc_negative", levels["fc"])]
+        said += f", a coefficient of friction F_C / N of {0.5 * sum(each) / mean:.3g}"
+    return [f"{said}. No fit here follows the load: identify records of other loads alone."]
+
+
 def all_laws() -> tuple[list[str], list[str]]:
     """The registered laws for ``--law all``: those that say their torque at constant velocity, and the others."""
     from stickslip import plugins
@@ -187,6 +237,7 @@ def all_laws() -> tuple[list[str], list[str]]:
 
 METHODS: Mapping[str, Callable[[Sequence[Record], argparse.Namespace], Identification]] = {
     "sliding": sliding, "breakaway": breakaway, "presliding": presliding, "attraction": attraction, "lugre": lugre,
+    "hysteresis": hysteresis,
 }  # fmt: skip
 """Methods that need records alone; `axis` and `inertia` need the axis too."""
 

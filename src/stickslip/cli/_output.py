@@ -57,6 +57,13 @@ def warn(what: str) -> None:
     tqdm.write(f"stickslip: {what}", file=sys.stderr)
 
 
+def duration(seconds: float) -> str:
+    """A time for people: in s, min or h."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+
+
 def print_json(data: Any) -> None:
     """Print data as JSON that any reader takes: NaN becomes null."""
     print(json.dumps(_plain(data), indent=1, allow_nan=False, ensure_ascii=False))
@@ -83,8 +90,15 @@ def print_accuracy(meta: Mapping[str, Any]) -> None:
     found = meta.get("accuracy")
     if not found:
         return
+    if found.get("depends_on_start"):
+        print(
+            "start: this run depends on its start: 1e-9 rad beside, it takes another branch, "
+            f"{found['start_rad']:.2g} rad away; its metrics are those of one branch"
+        )
+    if "error_rad" not in found:
+        return
     tolerance, error = meta["tolerance"], found["error_rad"]
-    if found["well_conditioned"]:
+    if error <= 10.0 * tolerance:
         print(
             f"accuracy: position within about {max(error, tolerance):.1g} rad (tolerance {tolerance:g} rad)"
         )
@@ -121,6 +135,7 @@ def _run_as_data(run: Run) -> dict[str, Any]:
         "metrics": dict(run.metrics),
         "record": str(run.path),
         "failure": run.failure,
+        "depends_on_start": run.depends_on_start,
         "seconds": run.seconds,
     }
 
@@ -141,9 +156,20 @@ def print_study(result: StudyResult, report: Path | None, kept: int) -> None:
         f"position error in mrad, RMS and peak; * is the best of its column. {count}, "
         f"{result.manifest['timings']['wall_s']:.1f} s"
     )
+    print_starts(result.runs)
     for path in (result.folder / "metrics.csv", result.folder / "manifest.json", report):
         if path:
             print(path)
+
+
+def print_starts(runs: Sequence[Run]) -> None:
+    """The runs whose branch of the motion depends on their start."""
+    named = [run.key for run in runs if run.depends_on_start]
+    if named:
+        print(
+            "these depend on their start (1e-9 rad beside, another branch of the motion and other metrics): "
+            f"{', '.join(named)}"
+        )
 
 
 def _each(runs: Sequence[Run], part: str) -> list[str]:

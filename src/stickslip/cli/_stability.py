@@ -95,12 +95,19 @@ def reckoned(args: argparse.Namespace) -> Stability:
     from stickslip.analyse.machine_axis import axis_of
     from stickslip.analyse.presliding_loop import Drive
     from stickslip.analyse.stability import stability
+    from stickslip.control.controller import highest_corner
+    from stickslip.errors import InputError
 
     plant, gains, models = described(args)
     drive = Drive(
         gains, sample_time=plant.sample_time if args.sample_time is None else args.sample_time,
         delay=plant.delay if args.delay is None else args.delay,
     )  # fmt: skip
+    highest = highest_corner(drive.sample_time)
+    if any(corner > highest for corner in args.filter):
+        raise InputError(
+            f"--filter {max(args.filter):g}: samples of {drive.sample_time:g} s are filtered at {highest:g} Hz at most"
+        )
     return stability(axis_of(plant, args.amplitude), drive, models, args.filter or (0.0, 10.0))
 
 

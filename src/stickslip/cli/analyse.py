@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip.cli import _reading, _stability
+from stickslip.cli import _files, _reading, _stability
 
 if TYPE_CHECKING:
     from stickslip.record import Record
@@ -25,11 +25,15 @@ SUMMARY = "spectrum, repeatability, flexibility, both sides, dependence on posit
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """One analysis, its records and options."""
+    from stickslip.cli import allow_code_argument
+
     kinds = parser.add_subparsers(dest="analysis", metavar="ANALYSIS", title="analyses", required=True)
     for name, (summary, own, work) in ANALYSES.items():
         sub = kinds.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
         own(sub)
         sub.add_argument("--plot", type=Path, metavar="FILE", help="draw into FILE.png, .svg or .pdf")
+        _files.force_argument(sub)
+        allow_code_argument(sub)
         sub.add_argument("--json", action="store_true", help="print the result as JSON")
         sub.set_defaults(work=work)
 
@@ -41,6 +45,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.plot and args.plot.suffix not in FORMATS:
         raise InputError(f"--plot {args.plot} must end in one of {', '.join(FORMATS)}")
+    if args.plot:
+        _files.refuse_foreign([args.plot], args.force)
     args.work(args)
     return 0
 
@@ -96,6 +102,7 @@ def _show(args: argparse.Namespace, found: Sequence[Any], picture: Callable[[], 
         from stickslip.report.analysis_pictures import draw_analysis
 
         draw_analysis(picture(), args.plot)
+        _files.written([args.plot])
         if not args.json:
             print(f"picture: {args.plot}")
 

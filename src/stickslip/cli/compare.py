@@ -12,6 +12,12 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from stickslip.identify.drift_levels import Change
+
+from stickslip.cli import _files
 
 LEAST = 1e-6
 """A chance below it depends on how normal the estimates are, far out."""
@@ -24,6 +30,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("second", type=Path, metavar="B.toml")
     parser.add_argument("--top", type=float, metavar="RAD_PER_S", help="highest velocity of the curves")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw both curves with their bands")
+    _files.force_argument(parser)
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
@@ -36,25 +43,26 @@ def run(args: argparse.Namespace) -> int:
 
     if args.plot and args.plot.suffix not in (".png", ".svg"):
         raise InputError(f"--plot {args.plot} must end in .png or .svg")
+    if args.plot:
+        _files.refuse_foreign([args.plot], args.force)
     result = compare_models(read_identified(args.first), read_identified(args.second), top=args.top)
     if args.plot:
         from stickslip.report.identification import draw_picture_to
 
         draw_picture_to(result.picture, args.plot)
+        _files.written([args.plot])
     if args.json:
         _output.print_json({**result.as_dict(), "plot": str(args.plot) if args.plot else None})
         return 0
     if result.changes:
-        head = f"{'parameter':<14}{'first':>11}{'second':>11}{'change':>10}"
-        print(f"{head}  {'difference, 95 %':<26} {'unit':<11} p (Holm)")
+        print(f"{head('parameter')} p (Holm)")
     for c in result.changes:
-        span = f"[{c.lower:.4g}, {c.upper:.4g}]"
-        change = "-" if math.isnan(c.percent) else f"{c.percent:+.3g} %"
-        mark = "changed" if c.changed else ""
-        line = f"{c.name:<14}{c.first:>11.5g}{c.second:>11.5g}{change:>10}"
-        print(f"{line}  {span:<26} {c.unit:<11} {chance(c.p):<9}{mark}".rstrip())
-    if result.changes:
-        print()
+        print(f"{row(c)} {chance(c.p):<9}{'changed' if c.changed else ''}".rstrip())
+    if result.levels:
+        print(f"{'' if not result.changes else chr(10)}{head('torque')}")
+    for c in result.levels:
+        print(row(c))
+    print()
     if not math.isnan(result.p):
         print(f"friction parameters together: p {equal_to(result.p)}")
     print(
@@ -63,8 +71,19 @@ def run(args: argparse.Namespace) -> int:
     )
     for note in result.notes:
         print(note)
-    print("The friction has changed." if result.changed else "No change that the intervals do not explain.")
+    print(result.summary)
     return 0
+
+
+def head(what: str) -> str:
+    """Of a table of changes."""
+    return f"{what:<26}{'first':>11}{'second':>11}  {'unit':<11} {'change, 95 % interval':<34}"
+
+
+def row(c: Change) -> str:
+    """Both values, and the change in per cent or, where that has no meaning, in the unit."""
+    by = c.words()[len(c.name) + 1 :]
+    return f"{c.name:<26}{c.first:>11.5g}{c.second:>11.5g}  {c.unit:<11} {by:<34}"
 
 
 def chance(p: float) -> str:

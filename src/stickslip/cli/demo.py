@@ -11,6 +11,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from stickslip.cli import _files
+
 SUMMARY = "the whole way, from a log to a recommendation, on a simulated record that ships with the package"
 LOOP = "kp=8,kd=0.08,kr=0.08,limit=3"
 TRUTH = (
@@ -23,27 +25,24 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("stickslip-demo"), metavar="DIR", help="default stickslip-demo"
     )
+    parser.add_argument(
+        "--log", type=Path, metavar="FILE.csv", help="write the log alone, to try verbs on it"
+    )
+    _files.force_argument(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the three verbs, each with its command."""
-    import shutil
-    from importlib.resources import as_file, files
-
-    from stickslip.errors import InputError
     from stickslip.study.files import prepared_folder
 
-    prepared_folder(args.out)
-    log: Path = args.out / "demo.csv"
-    try:
-        with as_file(files("stickslip") / "demo.csv") as shipped:
-            shutil.copyfile(shipped, log)
-    except OSError as error:
-        raise InputError(
-            f"{log} cannot be written ({error.strerror}); give another folder with --out"
-        ) from None
+    log: Path = args.log or args.out / "demo.csv"
+    prepared_folder(log.parent)
+    copy_log(log, args.force)
     print("A simulated record: a servo axis with Stribeck friction, noise on its torque, a 16-bit encoder.")
     print(f"True are: {TRUTH}.")
+    if args.log:
+        print(log)
+        return 0
     model = str(args.out / "model.toml")
     for words in (
         ["doctor", str(log)],
@@ -58,6 +57,7 @@ def run(args: argparse.Namespace) -> int:
             LOOP,
             "--out",
             str(args.out),
+            *(["--force"] if args.force else []),
         ],
         ["recommend", model, "--bandwidth", "20", "--counts-per-rev", "65536", "--torque-limit", "3"],
     ):
@@ -65,6 +65,28 @@ def run(args: argparse.Namespace) -> int:
         if code := step(words):
             return code
     return 0
+
+
+def copy_log(log: Path, force: bool) -> None:
+    """Write the log that ships.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written, or would replace a file that is not stickslip's own.
+    """
+    import shutil
+    from importlib.resources import as_file, files
+
+    from stickslip.errors import InputError
+
+    _files.refuse_foreign([log], force)
+    try:
+        with as_file(files("stickslip") / "demo.csv") as shipped:
+            shutil.copyfile(shipped, log)
+    except OSError as error:
+        raise InputError(f"{log} cannot be written ({error.strerror}); choose another place") from None
+    _files.written([log])
 
 
 def step(words: list[str]) -> int:

@@ -18,16 +18,21 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from stickslip.cli import _files
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from stickslip.control.controller import Controller
+    from stickslip.control.recommended import Recommended
     from stickslip.export.job import Export, Job
     from stickslip.export.target import Target
     from stickslip.model import Model
 
 SLOW = 0.02
 """s: sample times above it are told; a tenth of a period of 5 Hz."""
+NUMBERS = ("gain", "lead", "deadband", "offset", "inertia_feedforward", "filter_hz")
+"""Of a compensator: what --compensator ff or fb is given, and a recommendation sets."""
 SUMMARY = "write a model as C, structured text, MATLAB, Python, ..."
 
 
@@ -67,8 +72,20 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         ("--gain", "G", "factor on the compensating torque (default: 1)"),
         ("--lead", "TIME", "by which feedforward looks ahead of the reference, s (default: 0)"),
         ("--deadband", "SPEED", "velocity below which the compensator's law sees rest, rad/s (default: 0)"),
+        ("--offset", "TORQUE", "constant torque that it gives beside friction's, N·m (default: the file's)"),
+        (
+            "--inertia-feedforward",
+            "INERTIA",
+            "times the reference's acceleration, kg·m² (default: the file's inertia)",
+        ),
     ):
         parser.add_argument(option, type=float, metavar=metavar, help=what)
+    parser.add_argument(
+        "--substeps",
+        type=int,
+        metavar="N",
+        help="steps of the compensator's law into which a sample is divided (default: 1); the README states the errors",
+    )
     parser.add_argument(
         "--nearest", action="store_true", help="where the target cannot hold the law, the nearest that it can"
     )
@@ -85,6 +102,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="a setting of the target; --list names them",
     )
     parser.add_argument("--check", action="store_true", help="try the export in its own tool")
+    _files.force_argument(parser)
     parser.add_argument("--json", action="store_true", help="print files, notes and check as JSON")
 
 
@@ -117,8 +135,8 @@ def run(args: argparse.Namespace) -> int:
     settings_of(chosen, job.settings)
     export = chosen.write(job)
     folder: Path = args.out or Path(f"{job.name}-{chosen.name}")
-    written = store(export, folder)
-    notes = [*export.notes, *notes_on(args, job)]
+    written = store(export, folder, args.force)
+    notes = [*export.notes, *around_of(chosen, job), *notes_on(args, job)]
     result = chosen.check(job, export) if args.check and chosen.check else None
     if args.check and result is None:
         print(f"check: {chosen.name} has no tool to run; its format is checked by our tests")
@@ -141,12 +159,30 @@ def described(target: Target) -> list[str]:
     return lines
 
 
-def axis_values(file: Path, chosen: Target) -> dict[str, str | float]:
-    """Settings of the target that an identified model's file holds of its axis (growth with the load, ...)."""
+def axis_of(file: Path) -> dict[str, float]:
+    """The numbers that a file holds of its axis: inertia, offset, gravity, ..."""
     from stickslip.config import read_toml
 
     axis: object = read_toml(file).values.get("axis", {})
-    known = cast("dict[str, float]", axis) if isinstance(axis, dict) else {}
+    known = cast("dict[str, Any]", axis) if isinstance(axis, dict) else {}
+    return {k: float(v) for k, v in known.items() if isinstance(v, (int, float)) and math.isfinite(v)}
+
+
+def mean_beside(file: Path) -> float:
+    """The constant torque beside friction that a file holds of its axis or, where it is a map of the angle, its mean
+    over a revolution, N·m."""
+    from stickslip.config import read_toml
+    from stickslip.machines.angle import AngleMap
+
+    whole = read_toml(file)
+    if whole.has("angle"):
+        return AngleMap.of(whole.table("angle").values).offset
+    return axis_of(file).get("offset", 0.0)
+
+
+def axis_values(file: Path, chosen: Target) -> dict[str, str | float]:
+    """Settings of the target that an identified model's file holds of its axis (growth with the load, ...)."""
+    known = axis_of(file)
     return {s.name: known[s.name] for s in chosen.settings if s.name in known}
 
 
@@ -164,7 +200,7 @@ def job_of(args: argparse.Namespace, chosen: Target) -> Job:
         "settings": settings_given(args, chosen),
     }  # fmt: skip
     if args.compensator is None:
-        for option in ("sample_time", "filter_hz", "gain", "lead", "deadband"):
+        for option in ("sample_time", "substeps", *NUMBERS):
             if getattr(args, option) is not None:
                 raise InputError(
                     f"--{option.replace('_', '-')} belongs to --compensator; give both or neither"
@@ -174,12 +210,15 @@ def job_of(args: argparse.Namespace, chosen: Target) -> Job:
     if not args.controller:
         model = Model.from_file(args.file)
         return Job(model, name, compensator_of(args, model), **options)
+    from stickslip.spec import Surroundings
     from stickslip.study.study import load_run
 
-    controller = load_run(args.file).control
+    run = load_run(args.file)
+    controller = run.control
     if controller.compensator is None:
         raise InputError(f"{args.file}: [controller] has no compensator; add one, or export the law alone")
-    return Job(controller.compensator.model, name, controller, **options)
+    around = Surroundings(load=run.axis.load, temperature=run.axis.temperature)
+    return Job(controller.compensator.model, name, controller, surroundings=around, **options)
 
 
 def settings_given(args: argparse.Namespace, chosen: Target) -> dict[str, str | float]:
@@ -196,7 +235,7 @@ def settings_given(args: argparse.Namespace, chosen: Target) -> dict[str, str | 
 
 
 def compensator_of(args: argparse.Namespace, model: Model) -> Controller | None:
-    """A sampled controller that has nothing but the compensator asked for."""
+    """A sampled controller that has nothing but the compensator asked for, with what the file knows of its axis."""
     from stickslip.control.compensators.feedback import Feedback
     from stickslip.control.compensators.feedforward import Feedforward
     from stickslip.control.controller import Controller
@@ -208,8 +247,12 @@ def compensator_of(args: argparse.Namespace, model: Model) -> Controller | None:
         return recommended_in(args, model)
     kind = {"ff": Feedforward, "fb": Feedback}[args.compensator]
     time = 1e-3 if args.sample_time is None else args.sample_time
-    given = {n: getattr(args, n) for n in ("gain", "lead", "deadband") if getattr(args, n) is not None}
-    return Controller(Gains(kp=0.0), kind(model, filter_hz=args.filter_hz, **given), sample_time=time)
+    axis = axis_of(args.file)
+    known: dict[str, Any] = {
+        "offset": axis.get("offset", 0.0), "inertia_feedforward": axis.get("inertia", 0.0)
+    }  # fmt: skip
+    given = {n: getattr(args, n) for n in ("substeps", *NUMBERS) if getattr(args, n) is not None}
+    return Controller(Gains(kp=0.0), kind(model, **{**known, **given}), sample_time=time)
 
 
 def recommended_in(args: argparse.Namespace, model: Model) -> Controller:
@@ -219,13 +262,15 @@ def recommended_in(args: argparse.Namespace, model: Model) -> Controller:
     ------
     InputError
     """
+    from dataclasses import replace
+
     from stickslip.control.controller import Controller
     from stickslip.control.linear import Gains
     from stickslip.control.recommended import read_recommended
     from stickslip.errors import InputError
 
     found = read_recommended(args.file)
-    for option in ("gain", "lead", "deadband", "filter_hz"):
+    for option in NUMBERS:
         if getattr(args, option) is not None:
             raise InputError(
                 f"--{option.replace('_', '-')} beside --compensator recommended, which sets it; leave it out, or give "
@@ -237,18 +282,30 @@ def recommended_in(args: argparse.Namespace, model: Model) -> Controller:
             f"--sample-time {asked:g}: {args.file} is recommended for {tried:g} s; leave the option out, or ask "
             "`stickslip recommend` with that sample time"
         )
-    return Controller(Gains(kp=0.0), found.on(model), sample_time=tried or asked or 1e-3)
+    if not found.offset:
+        found = replace(found, offset=mean_beside(args.file))
+    helper = replace(found.on(model), substeps=1 if args.substeps is None else args.substeps)
+    return Controller(Gains(kp=0.0), helper, sample_time=tried or asked or 1e-3)
 
 
 def notes_on(args: argparse.Namespace, job: Job) -> Iterator[str]:
-    """What the user must know of a compensator beside what the target says."""
+    """What the user must know of a compensator beside what the target says, and of what is not in the export."""
     from stickslip.config import read_toml
-    from stickslip.control.linear import place
     from stickslip.control.recommended import read_recommended
+    from stickslip.export._c_control import given_by
 
+    whole = read_toml(args.file)
+    if not args.controller and args.compensator != "recommended" and whole.has("recommended"):
+        yield (
+            f"{args.file} recommends {in_words(read_recommended(args.file))}: that is not in this export; "
+            "`--to c99 --compensator recommended` (or `--to arduino`) writes it"
+        )
+    if not args.controller:
+        yield from beside_friction(args.file, job)
     if job.controller is None or args.compensator is None:
         return
     time = job.controller.sample_time
+    yield f"it gives {given_by(job.controller)}"
     if time > SLOW:
         yield (
             f"a sample time of {time:g} s compensates a reversal up to {time:g} s late, and a loop bears it up to some "
@@ -256,20 +313,60 @@ def notes_on(args: argparse.Namespace, job: Job) -> Iterator[str]:
         )
     if args.compensator == "recommended":
         found = read_recommended(args.file)
-        gains = place("PD", found.inertia, found.bandwidth, found.damping)
+        what = "the loop of" if found.gains else f"a PD of {found.bandwidth:.4g} Hz:"
+        gains = ", ".join(f"{k} {v:.5g}" for k, v in found.linear._asdict().items() if v or k == "feed")
+        yield f"it was tried beside {what} {gains}; the linear controller is not in the export"
+        if whole.has("angle"):
+            yield (
+                "what the file knows of the angle ([angle]) is not in the export but for the mean of the torque beside "
+                "friction: `stickslip rig run track` runs it"
+            )
+
+
+def around_of(chosen: Target, job: Job) -> Iterator[str]:
+    """Where the target finds what the law depends on."""
+    from stickslip.export._nearest import read_by
+
+    if (read := read_by(job.model)) and chosen.around:
+        yield f"friction depends on {read}: {chosen.around}"
+
+
+def in_words(found: Recommended) -> str:
+    """What a file recommends, with its numbers."""
+    units = {
+        "lead": " s",
+        "deadband": " rad/s",
+        "filter": " Hz",
+        "offset": " N·m",
+        "inertia_feedforward": " kg·m²",
+    }
+    more = [
+        f", {k.replace('_', ' ')} {getattr(found, k):.4g}{u}" for k, u in units.items() if getattr(found, k)
+    ]
+    return f"{found.compensator} with gain {found.gain:.4g}{''.join(more)}"
+
+
+def beside_friction(file: Path, job: Job) -> Iterator[str]:
+    """Torques that the file holds beside friction's and that are not in the export."""
+    known = axis_of(file)
+    offset, gravity = mean_beside(file), known.get("gravity", 0.0)
+    helper = job.controller.compensator if job.controller else None
+    missing = helper.offset != offset if helper else "offset" not in job.settings
+    if offset and missing:
+        yield f"the constant torque of {offset:.4g} N·m that acts beside friction is not in the export"
+    if gravity and "gravity" not in job.settings:
         yield (
-            f"it was tried beside a PD of {found.bandwidth:.4g} Hz: kp {gains.kp:.5g}, kd {gains.kd:.5g}; the PD is "
-            "not in the export"
+            f"gravity, up to {gravity:.4g} N·m over the angle, acts beside friction and is not in the export: add "
+            "gravity sin(q - gravity_angle) of the file's [axis] to the drive's torque"
         )
-        if read_toml(args.file).has("angle"):
-            yield "what the file knows of the angle ([angle]) is not in the export: `stickslip rig run track` runs it"
 
 
-def store(export: Export, folder: Path) -> list[str]:
+def store(export: Export, folder: Path, force: bool = False) -> list[str]:
     """Write the files of an export; returns their paths."""
     from stickslip.study.files import prepared_folder, unwritable
 
     prepared_folder(folder)
+    _files.refuse_foreign([folder / name for name in export.files], force)
     written: list[str] = []
     for name, content in export.files.items():
         path = folder / name
@@ -279,6 +376,7 @@ def store(export: Export, folder: Path) -> list[str]:
         except OSError as error:
             raise unwritable(path, error) from None
         written.append(str(path))
+    _files.written(map(Path, written))
     return written
 
 

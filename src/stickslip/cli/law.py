@@ -4,6 +4,7 @@
     stickslip law lugre --plot                        draws law-lugre.png
     stickslip law gms --plot gms.svg --set slip_rule=literal --set k=[1e4,5e3] --set alpha=[0.5,0.5]
     stickslip law my_law.py --plot
+    stickslip law my_law.py --check                   holds a law of your own to the contract of laws
 
 The picture shows the torque along a slow sine, in pre-sliding, and after steps in velocity.
 """
@@ -15,6 +16,9 @@ import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from stickslip.cli import _files
+from stickslip.errors import InputError
 
 if TYPE_CHECKING:
     from stickslip.model import Model
@@ -35,14 +39,29 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], metavar="NAME=VALUE",
         help="another value of a parameter, or another option of a choice; may be repeated",
     )  # fmt: skip
+    _files.force_argument(parser)
+    parser.add_argument(
+        "--check", action="store_true",
+        help="try what engines, identification and exports rely on: subset, units, dissipation, step against rate, "
+        "modes, derivatives, single precision, every export (a minute)",
+    )  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the description of the law; draw it."""
+    """Print the description of the law; draw it; or check it."""
     from stickslip import plugins
 
     law = plugins.law(args.name)
-    model = with_values(law, args.set)
+    if args.check:
+        if args.plot is not None or args.set:
+            raise InputError(
+                "--check tries the law as its file has it; give --plot and --set in a call of their own"
+            )
+        return check(law)
+    model = with_values(law, args.set).warn()
+    picture = Path(f"law-{model.law.name}.png") if args.plot == DEFAULT else args.plot
+    if picture:
+        _files.refuse_foreign([picture], args.force)
     print(f"{law.name}: {law.title}\n\n  {law.equation}\n")
     table("parameters", model.law.fields)
     table("state", law.state_fields)
@@ -62,9 +81,26 @@ def run(args: argparse.Namespace) -> int:
         print(f'  {name} = "{option}"')
     for name, value in shown_values(model, args.set).items():
         print(f"  {name} = {value}")
-    if args.plot is not None:
-        draw(model, args.plot)
+    if picture:
+        from stickslip.report.law_pictures import draw_law
+
+        draw_law(model, picture)
+        _files.written([picture])
+        print(f"\npicture: {picture}")
     return 0
+
+
+def check(law: Law) -> int:
+    """Hold the law to its contract, a line a check; 1 where it fails one."""
+    from stickslip.contract import examine
+
+    failures = 0
+    for verdict in examine(law):
+        word = {True: "ok", False: "FAILED", None: "-"}[verdict.passed]
+        failures += verdict.passed is False
+        print(f"{word:<7} {verdict.name:<18} {verdict.text}", flush=True)
+    print(f"{law.name}: " + (f"{failures} checks failed" if failures else "passes what could be tried"))
+    return 1 if failures else 0
 
 
 def brought(law: Law) -> Iterator[tuple[str, tuple[Field, ...]]]:
@@ -93,8 +129,6 @@ def setting(text: str) -> tuple[str, Any]:
     """Name and value of NAME=VALUE; the value is as in a TOML file, a word needs no quotes."""
     import tomllib
 
-    from stickslip.errors import InputError
-
     name, equals, value = text.partition("=")
     if not equals or not name.strip() or not value.strip():
         raise InputError(f"--set {text!r} is no NAME=VALUE; write it like fs=0.3 or k=[1e4,5e3]")
@@ -113,15 +147,6 @@ def shown_values(model: Model, settings: Sequence[str]) -> dict[str, Any]:
         for f in model.law.fields
         if f.name in named
     }
-
-
-def draw(model: Model, path: Path) -> None:
-    """Draw the law and say where."""
-    from stickslip.report.law_pictures import draw_law
-
-    target = Path(f"law-{model.law.name}.png") if path == DEFAULT else path
-    draw_law(model, target)
-    print(f"\npicture: {target}")
 
 
 def table(title: str, fields: tuple[Field, ...]) -> None:

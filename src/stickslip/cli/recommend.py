@@ -4,10 +4,14 @@ stickslip recommend model.toml --bandwidth 15 --sample-time 0.001 --counts-per-r
 stickslip recommend model.toml --bandwidth 15 --out recommended.toml
 stickslip export recommended.toml --to c99 --compensator recommended
 
-Simulates the linear controller alone (PD by pole placement) and every candidate (law, feedforward or feedback, gain,
-deadband) on the best estimate and on axes drawn from the model's intervals, along a slow sinusoid and to a stop,
-sampled as in the drive. Recommended is what limit-cycles on none of them and leaves the least error on the worst. It is
-then simulated on other axes drawn from the intervals; the error reduction that is printed is what it did there.
+stickslip recommend model.toml --loop kv=40,kvp=0.8,kvi=25,feed=1,filter=300,limit=3 --counts-per-rev 262144
+stickslip recommend model.toml --loop kp=8,ki=60,kd=0.08,kr=0.08,limit=3 --motion cycle.csv
+
+Simulates the linear controller alone (the loop given, or PD, PID by pole placement) and every candidate (law,
+feedforward or feedback, gain, deadband) on the best estimate and on axes drawn from the model's intervals, along the
+motion of the log (or one given) and at rest behind it, sampled as in the drive. Recommended is what limit-cycles on
+none of them and leaves the least error on the worst. It is then simulated on other axes drawn from the intervals; the
+error reduction that is printed is what it did there.
 """
 
 from __future__ import annotations
@@ -18,11 +22,16 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from stickslip.cli import _files
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from stickslip.control.linear import Cascade, Gains
     from stickslip.identify.identified_file import Identified
+    from stickslip.identify.motion import Motion
     from stickslip.identify.recommend import Candidate, Recommendation
+    from stickslip.identify.setting_trial import Drive
     from stickslip.model import Model
 
 SUMMARY = "which compensator to switch on: law, structure, gain, lead, deadband, and what to expect"
@@ -37,12 +46,33 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         ("--sample-time", 1e-3, "S", "of the drive"),
         ("--counts-per-rev", 0.0, "N", "of the encoder; 0: exact"),
         ("--torque-limit", math.inf, "NM", "of the drive"),
-        ("--amplitude", 0.1, "RAD", "of the slow sinusoid and the way to the stop (m of a linear axis)"),
-        ("--frequency", 0.5, "HZ", "of the slow sinusoid"),
     ):
         parser.add_argument(
             option, type=float, default=default, metavar=unit, help=f"{what} (default {default:g})"
         )
+    parser.add_argument(
+        "--linear",
+        choices=("PD", "PID", "PR"),
+        default="PD",
+        help="what bandwidth and damping place (default PD)",
+    )
+    parser.add_argument(
+        "--loop", metavar="kp=..,kd=..",
+        help="the drive's own loop instead: kp (N·m/rad), ki, kd, kr of a PID, or kv (1/s), kvp (N·m·s/rad), kvi "
+        "(N·m/rad), feed (part of the reference velocity fed forward, default 1) of position P around velocity PI; "
+        "with filter (Hz, low-pass on its velocity) and limit (N·m)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--motion", type=Path, metavar="FILE",
+        help="log or CSV (time, position) of the motion that matters (default: that of the log, kept in MODEL.toml)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--amplitude",
+        type=float,
+        metavar="RAD",
+        help="of a slow sinusoid as the motion instead (m of a linear axis)",
+    )
+    parser.add_argument("--frequency", type=float, metavar="HZ", help="of that sinusoid (default 0.5)")
     parser.add_argument(
         "--inertia", type=float, metavar="KGM2", help="where the model has none, or another one"
     )
@@ -64,6 +94,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.toml",
         help="write what is recommended, as `stickslip export` takes it",
     )
+    _files.force_argument(parser)
     parser.add_argument("--json", action="store_true", help="print the result as JSON, all candidates too")
 
 
@@ -72,10 +103,11 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.cli import _output
     from stickslip.errors import InputError
     from stickslip.identify.identified_file import read_identified
-    from stickslip.identify.recommend import Drive, recommend
+    from stickslip.identify.recommend import recommend
 
     if args.out:
         writable(args.out, args.model)
+        _files.refuse_foreign([args.out], args.force)
     if args.axes < 1:
         raise InputError(
             f"--axes {args.axes} must be at least 1: what is safe on the best estimate alone need not be on the machine"
@@ -85,15 +117,14 @@ def run(args: argparse.Namespace) -> int:
             f"--confirm {args.confirm} must be at least 0, which confirms nothing; leave it out for 39"
         )
     found = read_identified(args.model)
-    drive = Drive(
-        args.bandwidth, args.damping, args.sample_time, args.counts_per_rev, args.torque_limit, args.amplitude,
-        args.frequency,
-    )  # fmt: skip
+    drive = drive_of(args)
     with _output.progress_bar("simulating") as progress:
         result = recommend(
             found, drive, inertia=args.inertia, axes=args.axes, confirm=args.confirm, progress=progress
         )
     written = args.out and store(args.out, found, result)
+    if written:
+        _files.written([written])
     if args.json:
         _output.print_json({**result.as_dict(), "file": str(written) if written else None})
         return 0
@@ -102,6 +133,69 @@ def run(args: argparse.Namespace) -> int:
         print(f"recommended: {written}")
         print(f"next: stickslip export {shlex.quote(str(written))} --to c99 --compensator recommended")
     return 0
+
+
+def drive_of(args: argparse.Namespace) -> Drive:
+    """The drive and the motion that the options describe."""
+    from stickslip.errors import InputError
+    from stickslip.identify.setting_trial import Drive
+
+    if args.motion and args.amplitude is not None:
+        raise InputError("--motion and --amplitude are two motions; give one of them")
+    if args.frequency is not None and args.amplitude is None:
+        raise InputError(f"--frequency {args.frequency:g} belongs to a sinusoid; give its --amplitude too")
+    if args.loop and args.linear != "PD":
+        raise InputError(
+            f"--linear {args.linear} beside --loop, which gives the gains themselves; leave it out"
+        )
+    gains, own = loop_of(args) if args.loop else (None, dict[str, float]())
+    limit = own["limit"] if "limit" in own else float(args.torque_limit)
+    return Drive(
+        args.bandwidth, args.damping, args.sample_time, args.counts_per_rev, limit,
+        args.amplitude, args.frequency or 0.5, args.linear, gains, own.get("filter", 0.0),
+        motion_from(args.motion) if args.motion else None,
+    )  # fmt: skip
+
+
+def loop_of(args: argparse.Namespace) -> tuple[Gains | Cascade, dict[str, float]]:
+    """Gains of ``--loop``, and its filter and limit.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, both kinds of loop are mixed, or a number is out of bounds.
+    """
+    from stickslip.cli._methods import values
+    from stickslip.control.linear import Cascade, Gains
+    from stickslip.errors import InputError, UnknownName
+
+    given = values(args.loop.split(","))
+    kind = Cascade if "kv" in given else Gains
+    names = (*kind._fields, "filter", "limit")
+    for name, value in given.items():
+        if name not in names:
+            raise UnknownName(f"number of --loop of a {'cascade' if kind is Cascade else 'PID'}", name, names)
+        if not (value >= 0.0 and (math.isfinite(value) or name == "limit")) or (
+            name == "limit" and value == 0.0
+        ):
+            raise InputError(
+                f"--loop: {name} = {value:g} must be a number of 0 or more, a limit greater than 0"
+            )
+    for name in ("kv", "kvp") if kind is Cascade else ("kp",):
+        if not given.get(name, 0.0) > 0.0:
+            raise InputError(f"--loop {args.loop}: give {name}, greater than 0")
+    if "limit" in given and math.isfinite(args.torque_limit):
+        raise InputError(f"--torque-limit {args.torque_limit:g} beside --loop's limit; give one of them")
+    own = {name: given.pop(name) for name in ("filter", "limit") if name in given}
+    return kind(**given), own
+
+
+def motion_from(path: Path) -> Motion:
+    """The motion of a log or of a table of points."""
+    from stickslip.identify.motion import motion_of
+    from stickslip.readers import read
+
+    return motion_of(read(path), path.name)
 
 
 def store(out: Path, found: Identified, result: Recommendation) -> Path | None:
@@ -144,8 +238,12 @@ def show(result: Recommendation, unit: Callable[[str], str]) -> None:
         print(f"{x.law:<16}{x.kind:<13}{x.gain:>5.3g}  {x.deadband:>8.3g}  {100 * c.errors[0]:>8.1f} %  "
               f"{100 * c.worst:>5.1f} %  {mark}{safety(c)}")  # fmt: skip
     print()
-    print(f"linear controller: kp {result.gains['kp']:.5g}, kd {result.gains['kd']:.5g}; RMS error alone "
-          f"{result.linear_error:.3g} {unit('rad')}")  # fmt: skip
+    path = result.drive.path
+    print(
+        f"motion:            {path.source}; {path.duration:.3g} s, up to {path.top_speed:.3g} {unit('rad/s')}"
+    )
+    gains = ", ".join(f"{k} {v:.5g}" for k, v in result.gains.items() if v)
+    print(f"linear controller: {gains}; RMS error alone {result.linear_error:.3g} {unit('rad')}")
     if result.rings:
         print(f"it rings alone:    {result.rings}")
     c = result.chosen
@@ -156,6 +254,9 @@ def show(result: Recommendation, unit: Callable[[str], str]) -> None:
         print(f"parameters:        {parameters(result.model, unit)}")
         print(f"lead:              {c.setting.lead:.4g} s")
         print(f"deadband:          {c.setting.deadband:.4g} {unit('rad/s')}")
+        print(
+            f"inertia:           {c.setting.inertia_feedforward:.4g} {unit('kg·m²')} times the acceleration"
+        )
         print(f"error reduction:   {reduction(result)}")
         print(f"margin of gain:    {margin(c, result)}")
     for note in result.notes:

@@ -23,6 +23,7 @@ def run(args: argparse.Namespace) -> int:
     """Print what differs; 1 if anything does."""
     if args.folder.name == "manifest.json" and args.folder.is_file():
         args.folder = args.folder.parent
+    from stickslip.capacity import insist_on_jobs
     from stickslip.cli import _output
     from stickslip.errors import InputError
     from stickslip.study.rerun import rerun as rerun_study
@@ -31,6 +32,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.jobs < 1:
         raise InputError(f"--jobs {args.jobs} must be at least 1; give how many may run at a time")
+    insist_on_jobs(args.jobs)
     sweep = is_sweep(args.folder)
     rerun = rerun_sweep if sweep else rerun_study
     with _output.progress_bar("rerun") as progress:

@@ -20,6 +20,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stickslip.cli import _files
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -34,6 +36,8 @@ SUMMARY = "run identification procedures on a virtual or real machine"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Actions and their options."""
+    from stickslip.cli import allow_code_argument
+
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     run_one = actions.add_parser("run", help="perform one procedure")
     run_one.add_argument("procedure", metavar="NAME", help="`stickslip rig list` names them")
@@ -43,6 +47,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--realtime", action="store_true", help="keep pace with the clock on a virtual rig too"
     )
     run_one.add_argument("--stream", type=Path, metavar="FILE", help="also write every sample as it comes")
+    _files.force_argument(run_one)
     whole = actions.add_parser("commission", help="every procedure in turn, to a model.toml and a report")
     whole.add_argument(
         "--out", type=Path, default=Path("commission"), metavar="DIR", help="folder (commission)"
@@ -66,6 +71,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         action.add_argument("--dry-run", action="store_true", help="say what would be done")
         action.add_argument("--no-watchdog", action="store_true", help="arm a rig that declares no watchdog")
         action.add_argument("--json", action="store_true", help="print the result as JSON")
+        allow_code_argument(action)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -120,7 +126,7 @@ def performed(args: argparse.Namespace) -> int:
     from stickslip.cli import _output
     from stickslip.errors import InputError
     from stickslip.rigs.procedures import procedure
-    from stickslip.rigs.procedures.base import perform
+    from stickslip.rigs.procedures.base import perform, planned
     from stickslip.study.files import prepared_folder, unwritable
 
     kind = procedure(args.procedure)
@@ -128,12 +134,15 @@ def performed(args: argparse.Namespace) -> int:
     sensible(chosen, pairs(args.set))
     rig = rig_of(args)
     out: Path = args.out or Path(f"{args.procedure}.npz")
-    plan = plan_of(chosen, rig, args.set)
+    plan = planned(chosen, rig)
     if args.dry_run:
         return told(plan, rig, args)
     if out.is_dir():
         raise InputError(f"--out {out} is a folder; give the name of a file")
+    if args.stream is not None and args.stream.resolve() == out.resolve():
+        raise InputError(f"--out and --stream are both {out}; give another name to one of them")
     prepared_folder(out.parent)
+    _files.refuse_foreign([out], args.force)
     result = perform(
         chosen, rig, path=args.stream, progress=_output.say, without_watchdog=args.no_watchdog,
         realtime=args.realtime or None,
@@ -142,6 +151,7 @@ def performed(args: argparse.Namespace) -> int:
         result.record.save(out)
     except OSError as error:
         raise unwritable(out, error) from None
+    _files.written([out])
     return shown(result, out, args)
 
 
@@ -159,24 +169,6 @@ def sensible(chosen: Procedure, given: Mapping[str, str]) -> None:
         values: list[Any] = list(value) if isinstance(value, tuple) else [value]  # type: ignore[reportUnknownArgumentType]
         if any(isinstance(v, (int, float)) and not math.isfinite(v) for v in values):
             raise InputError(f"{chosen.name}: {name} = {text} must be finite")
-
-
-def plan_of(chosen: Procedure, rig: Rig, given: list[str]) -> Plan:
-    """The plan of a procedure.
-
-    Raises
-    ------
-    InputError
-        If the options make none.
-    """
-    from stickslip.errors import InputError
-
-    try:
-        return chosen.plan(rig)
-    except (ZeroDivisionError, OverflowError, ValueError, MemoryError) as error:
-        raise InputError(
-            f"{chosen.name}: no plan can be made with {', '.join(given)} ({error}); give other numbers"
-        ) from None
 
 
 def told(plan: Plan, rig: Rig, args: argparse.Namespace) -> int:
@@ -201,6 +193,7 @@ def commissioned(args: argparse.Namespace) -> int:
     """`stickslip rig commission`."""
     from stickslip.cli import _output
     from stickslip.commission.commission import commission, planned
+    from stickslip.commission.headline import headline
     from stickslip.commission.kept import claimed
     from stickslip.commission.recommended import write_recommended
     from stickslip.errors import InputError
@@ -239,6 +232,11 @@ def commissioned(args: argparse.Namespace) -> int:
     advice = found.recommended
     if advice and advice.chosen:
         write_recommended(folder / "recommended.toml", advice)
+    lines = headline(
+        found,
+        f"stickslip rig run track --rig {args.rig} --set compensator=recommended "
+        f"--set model={folder / 'recommended.toml'}",
+    )
     sources = [Source(s.name, s.performed.record, findings_of(s.performed)) for s in stages]
     report = write_identification(
         folder / "report.html",
@@ -246,20 +244,18 @@ def commissioned(args: argparse.Namespace) -> int:
         sources,
         title=f"Commissioning of {rig.name}",
         versions=versions(),
+        headline=lines,
     )
     if args.json:
-        _output.print_json({**found.result.as_dict(), "folder": str(folder)})
+        said = {word.lower(): line for word, line in lines}
+        _output.print_json({**found.result.as_dict(), "headline": said, "folder": str(folder)})
         return 0
-    print(f"inertia    {found.inertia:.5g} kg·m²")
-    print(f"stiffness  {found.stiffness:.4g} N·m/rad before sliding, as the encoder sees it")
+    for word, line in lines:
+        print(f"{word:<13}{line}")
+    print()
     for note in found.result.notes:
         print(f"- {note}")
     print(f"model: {model}\nreport: {report}\nrecords: {folder}")
-    if advice and advice.chosen:
-        file = folder / "recommended.toml"
-        print(
-            f"recommended: stickslip rig run track --rig {args.rig} --set compensator=recommended --set model={file}"
-        )
     return 0
 
 

@@ -13,7 +13,7 @@ fs = 0.335
 fc = 0.285
 vs = 0.01
 [reference]
-kind = "sine"
+kind = "sine"                  # A (1 - cos 2 pi f t), from rest; "plain_sine" is A sin 2 pi f t
 amplitude = 0.01               # rad
 frequency = 0.4                # Hz
 duration = 5.0                 # s
@@ -37,6 +37,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from stickslip.cli import _files
+
 SUMMARY = "simulate one closed loop from a TOML file"
 
 
@@ -44,6 +46,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """File and output."""
     parser.add_argument("file", type=Path, metavar="FILE.toml")
     parser.add_argument("--out", type=Path, metavar="FILE.npz", help="the record (default: FILE.npz here)")
+    _files.force_argument(parser)
     parser.add_argument(
         "--json", action="store_true", help="print the record's meta (metrics, energy, ...) as JSON"
     )
@@ -60,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
     out: Path = args.out or Path(f"{args.file.stem}.npz")
     if out.is_dir():
         raise InputError(f"--out {out} is a folder; give the name of a file")
+    _files.refuse_foreign([out], args.force)
     planned.check()
     prepared_folder(out.parent)
     executed = execute(planned, check=True)
@@ -67,6 +71,7 @@ def run(args: argparse.Namespace) -> int:
         executed.record.save(out)
     except OSError as error:
         raise unwritable(out, error) from None
+    _files.written([out])
     if args.json:
         _output.print_json({**executed.record.meta, "record": str(out), "failure": executed.failure})
     else:

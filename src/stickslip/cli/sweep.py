@@ -10,8 +10,15 @@ interruption, whatever it was, the same command goes on.
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+if TYPE_CHECKING:
+    from stickslip.sweep.plan import Sweep
+
+MANY = 1000
+"""Closed loops from which it is told beforehand how long they take."""
 SUMMARY = "run a study over many cases: which compensator for how much uncertainty"
 
 
@@ -32,15 +39,32 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--print", action="store_true", help="print the sweep's TOML and run nothing")
 
 
+def announce(sweep: Sweep, jobs: int) -> None:
+    """Say before a long sweep starts how long it will take, from a few of its cases."""
+    from stickslip.cli import _output
+    from stickslip.sweep.forecast import seconds_of
+
+    if sweep.cases < MANY:
+        return
+    told = ""
+    if sweep.device == "cpu":  # What runs elsewhere is not timed here.
+        _output.say("timing some cases ...")
+        told = f", about {_output.duration(seconds_of(sweep) / jobs)} on {jobs} core{'s' if jobs > 1 else ''}"
+    _output.tell(
+        f"stickslip: {sweep.cases} closed loops{told}; fewer with --cases, and what is finished is kept"
+    )
+
+
 def run(args: argparse.Namespace) -> int:
     """Run, print the summary, draw the figures."""
     from dataclasses import replace
 
+    from stickslip.capacity import insist_on_jobs
     from stickslip.cli import _output
     from stickslip.errors import InputError
     from stickslip.sweep import execute
     from stickslip.sweep.gains import too_few
-    from stickslip.sweep.plan import load
+    from stickslip.sweep.plan import MOST_CASES, load
     from stickslip.sweep.summary import summarise, write_summary
 
     sweep = load(args.sweep)
@@ -57,12 +81,17 @@ def run(args: argparse.Namespace) -> int:
                 f"--cases {args.cases}: {args.sweep} is a grid, whose points make its {sweep.drawn.cases} cases; "
                 "change `points` or `values` in it, or its `method` to sobol"
             )
+        if args.cases > MOST_CASES:
+            raise InputError(f"--cases {args.cases} are too many; keep below {MOST_CASES}")
         sweep = replace(sweep, drawn=replace(sweep.drawn, cases=args.cases))
     if args.jobs is not None and args.jobs < 1:
         raise InputError(f"--jobs {args.jobs} must be at least 1; leave it out for one block a core")
+    insist_on_jobs(args.jobs or 1)
     if sweep.left_out:
         _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(sweep.left_out)}")
     out: Path = args.out or Path(f"sweep-{sweep.name}")
+    execute.ready(sweep, args.scheduler)
+    announce(sweep, args.jobs or os.cpu_count() or 1)
     try:
         with _output.progress_bar(sweep.name) as progress:
             backend = "processes" if args.processes else "threads"

@@ -40,7 +40,8 @@ def positive_everywhere(curve: Callable[[float, Any], float], p: Any, scale: flo
 class Stribeck(NamedTuple):
     """Parameters of the Stribeck curve, thesis eq. 2.10.
 
-    fs may lie below fc (thesis Table 9): friction then rises with the velocity.
+    fs may lie below fc (thesis Table 9): friction then rises with the velocity, without a Stribeck effect, and who
+    makes such a model is told (`rising`).
     """
 
     fs: Annotated[float, Par("N·m", "F_S", "static (break-away) torque", positive=True, directional=True)]
@@ -65,6 +66,18 @@ def stribeck(v: float, p: Any) -> float:
     if p.delta_s == 2.0:
         return p.fc + (p.fs - p.fc) * math.exp(-x * x)
     return p.fc + (p.fs - p.fc) * math.exp(-(x**p.delta_s))
+
+
+def rising(p: Any) -> str:
+    """A remark where the static torque lies below the Coulomb torque, in either direction."""
+    for end, where in (("", ""), ("_negative", " for v < 0")):
+        fs, fc = getattr(p, f"fs{end}", None), getattr(p, f"fc{end}", None)
+        if fs is not None and fc is not None and fs < fc:
+            return (
+                f"fs = {fs:g} N·m lies below fc = {fc:g} N·m{where}, so that friction rises with the velocity and "
+                "has no Stribeck effect; exchange them if that is not meant"
+            )
+    return ""
 
 
 # ---- eq. 4.4 -------------------------------------------------------------------------------------------------
@@ -197,7 +210,7 @@ CURVE = Choice(
     "curve",
     replaces="sliding",
     options={
-        "stribeck": Option(stribeck, Stribeck, velocity_scale=stribeck_scale),
+        "stribeck": Option(stribeck, Stribeck, remark=rising, velocity_scale=stribeck_scale),
         "double_exponential": Option(
             double_exponential,
             DoubleExponential,

@@ -1,0 +1,62 @@
+"""Compile everything beforehand, so that the first calls after an installation do not wait for it.
+
+stickslip warm-up
+
+Runs small pieces of the other verbs in a temporary folder; what they compile is kept in the user's cache folder (or
+STICKSLIP_CACHE). It takes a minute or two after an installation, and some seconds where nothing is left to compile.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import os
+import tempfile
+import time
+from collections.abc import Generator, Sequence
+
+SUMMARY = "compile everything beforehand, once after an installation"
+STEPS: dict[str, Sequence[str]] = {
+    "simulation": ("study", "thesis", "--only", "low,signed,nominal", "--no-report"),
+    "pictures": ("law", "lugre", "--plot"),
+    "identification and recommendation": ("demo",),
+    "rigs": ("rig", "run", "breakaway", "--rig", "thesis-dry"),
+    "sweeps": ("sweep", "thesis-robustness", "--cases", "1", "--jobs", "1", "--no-report"),
+}
+"""What is compiled, and the command that needs it."""
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """None."""
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the steps; say what each took. 1 if one failed."""
+    from stickslip import compiling
+    from stickslip.cli import main
+
+    compiling.silence()  # it is what this verb says itself
+    failed = 0
+    with tempfile.TemporaryDirectory(prefix="stickslip-warm-up-") as folder, inside(folder):
+        for i, (what, words) in enumerate(STEPS.items(), 1):
+            print(f"{i}/{len(STEPS)} {what} ...", end=" ", flush=True)
+            begin, heard = time.perf_counter(), io.StringIO()
+            with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(heard):
+                code = main(words)
+            print(
+                f"{time.perf_counter() - begin:.0f} s" if code == 0 else f"failed: {heard.getvalue().strip()}"
+            )
+            failed += code != 0
+    return 1 if failed else 0
+
+
+@contextlib.contextmanager
+def inside(folder: str) -> Generator[None]:
+    """Work in a folder."""
+    before = os.getcwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)

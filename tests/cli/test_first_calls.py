@@ -1,0 +1,127 @@
+"""First calls: compiling is said, once, and can be done beforehand; a long sweep says so before it starts."""
+
+from __future__ import annotations
+
+import io
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from stickslip import compiling, jit
+from stickslip.cli import main, parser_of, sweep, warm_up
+from stickslip.sweep import forecast
+
+
+class Clock:
+    """A timer that a test lets ring."""
+
+    def __init__(self, delay, ring):
+        self.ring, self.cancelled = ring, False
+        Clock.last = self
+
+    def start(self):
+        pass
+
+    def cancel(self):
+        self.cancelled = True
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """A notice that hears what is compiled."""
+    monkeypatch.setattr(compiling, "_listeners", [])
+    notice = compiling.Notice(io.StringIO(), Clock)
+    compiling.listen(notice)
+    return notice
+
+
+def test_a_long_compilation_is_said_once_and_a_short_one_not(told):
+    compiling.started()
+    short = Clock.last
+    compiling.ended()
+    assert short.cancelled
+    assert told.stream.getvalue() == ""
+    for _ in range(2):
+        compiling.started()
+        compiling.started()
+        Clock.last.ring()
+        compiling.ended()
+        compiling.ended()
+    said = told.stream.getvalue()
+    assert said.count("\n") == 1
+    assert "20 s" in said
+    assert "stickslip warm-up" in said
+
+
+def test_a_terminal_sees_how_far_it_is():
+    notice = compiling.Notice(Terminal(), Clock)
+    notice.started()
+    Clock.last.ring()
+    notice.ended()
+    notice.close()
+    assert notice.stream.getvalue().endswith("\rstickslip: 1 functions compiled \n")
+
+
+def test_what_is_compiled_is_told_and_what_is_kept_is_not(told):
+    @jit.compile_inner
+    def twice(x):
+        return 2.0 * x
+
+    assert twice(1.5) == 3.0
+    assert told.count == 1
+    assert twice(2.5) == 5.0
+    assert told.count == 1
+    assert told.depth == 0
+
+
+def test_warm_up_runs_small_pieces_of_the_verbs(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for words in warm_up.STEPS.values():
+        parser_of(words[:1]).parse_args(list(words))  # complains of what it does not know
+    monkeypatch.setattr(warm_up, "STEPS", {"laws": ("laws",), "nothing": ("law", "no-such-law")})
+    assert main(["warm-up"]) == 1
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].startswith("1/2 laws ... ")
+    assert "failed: stickslip: unknown law" in said[1]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_long_sweep_says_how_long_before_it_starts(monkeypatch, capsys):
+    monkeypatch.setattr("stickslip.sweep.forecast.seconds_of", lambda big: 36_000.0)
+    sweep.announce(SimpleNamespace(cases=20_000, device="cpu"), 2)
+    assert "20000 closed loops, about 5.0 h on 2 cores; fewer with --cases" in capsys.readouterr().err
+    sweep.announce(SimpleNamespace(cases=20_000, device="gpu"), 2)
+    assert "20000 closed loops; fewer with --cases" in capsys.readouterr().err
+    sweep.announce(SimpleNamespace(cases=10, device="cpu"), 2)
+    assert capsys.readouterr().err == ""
+
+
+def test_its_time_is_that_of_cases_drawn_and_of_their_checks_not_of_the_nominal_ones(monkeypatch):
+    """A processor whose clock counts closed loops: of 1,000 cases every tenth is checked at a tighter tolerance."""
+    clock, cases = 0.0, []
+
+    def ran(big, run, start, numbers):
+        nonlocal clock
+        cases.extend(numbers[:, 0])
+        clock += sum(30.0 if case >= 900 else 3.0 for case in numbers[:, 0]) * (1 if run == 0 else 2)
+        clock += 1e6 if len(numbers) == 1 else 0.0  # the first compiles
+
+    drawn = SimpleNamespace(cases=1000, block=lambda start, stop: np.arange(start, stop)[:, None])
+    monkeypatch.setattr(forecast, "compute_cases", ran)
+    monkeypatch.setattr(forecast, "integrator_of", lambda big, run: ("exact", ""))
+    monkeypatch.setattr(forecast, "PATIENCE", 1e9)
+    monkeypatch.setattr(forecast.time, "process_time", lambda: clock)
+    told = forecast.seconds_of(SimpleNamespace(runs=[1, 2], drawn=drawn))
+    assert told == pytest.approx(1000 * (0.9 * 3.0 + 0.1 * 30.0) * 3, rel=0.3)
+    assert len(cases) == 2 * (1 + forecast.MOST_TIMED)
+
+
+def test_the_log_that_ships_can_be_had_alone(tmp_path, capsys):
+    assert main(["demo", "--log", str(tmp_path / "log.csv")]) == 0
+    assert main(["doctor", str(tmp_path / "log.csv")]) == 0
