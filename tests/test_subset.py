@@ -10,7 +10,7 @@ import pytest
 
 from stickslip.errors import LawError
 from stickslip.spec import Field, Par
-from stickslip.subset import Layout, lower
+from stickslip.subset import Layout, lower, named
 
 LAYOUTS = {"p": Layout(("a", "b"), ("k", "m"), counted=True), "z": Layout(("x",), ("f", "h"))}
 
@@ -162,3 +162,90 @@ def test_layout_of_fields():
     del Params
     fields = (Field("k", Par("-", "k", "k"), True), Field("c", Par("-", "c", "c"), False))
     assert Layout.of(fields, counted=True) == Layout(("c",), ("k",), True)
+
+
+# ---- parts of structures -----------------------------------------------------------------------------------
+
+PARTS = {
+    "p": Layout(
+        ("gain", "one_a", "one_b", "two_a", "two_b"),
+        ("one_k", "one_m", "two_k", "two_m"),
+        counted=True,
+        pers=("one_element", "one_element", "two_element", "two_element"),
+        parts=("one_", "two_"),
+    ),
+    "z": Layout(
+        ("one_x", "two_x"),
+        ("one_f", "one_h", "two_f", "two_h"),
+        pers=("one_element", "one_element", "two_element", "two_element"),
+        parts=("one_", "two_"),
+    ),
+    "m": Layout(("x",)),
+}
+
+
+def both(v, m, z, p):
+    m.x = p.gain * good(v, z.one, p.one)
+    return m.x + good(2.0 * v, z.two, p.two) + z.two.x + moved(v, z.one, z.two) + taken(m, p.two)
+
+
+def moved(v, a, b):
+    """Two parts of one structure, and a number that is called as the structure is."""
+    z = v + a.x
+    a.x = z
+    return b.x - z
+
+
+def taken(y, q):
+    """Arguments that nothing else is called by; a number in the way of one."""
+    m = 3.0
+    return m * y.x + q.b
+
+
+class Bag:
+    def __init__(self, **values):
+        self.__dict__.update(values)
+
+
+def test_a_function_is_translated_for_each_part_that_it_is_called_with():
+    functions = lower({"both": both}, PARTS)
+    assert {"_one_good", "_two_good", "_one_scale", "_two_scale"} <= set(functions)
+    assert [a.arg for a in functions["_one_moved"].args.args] == ["v", "z"]
+    assert [a.arg for a in functions["_two_taken"].args.args] == ["m", "p"]
+    scope = {"math": math}
+    exec("\n".join(ast.unparse(f) for f in functions.values()), scope)
+    one, two = Bag(a=2.0, b=0.5, k=(1.0, 2.0), m=(3.0, 4.0)), Bag(a=-1.0, b=0.1, k=(5.0,), m=(6.0,))
+    p = Bag(gain=1.5, one=one, two=two)
+    z = Bag(one=Bag(x=0.3, f=[0.5, -1.0], h=[0.0, 0.0]), two=Bag(x=0.2, f=[0.7], h=[0.0]))
+    m = Bag(x=0.0)
+    flat_p = [1.5, 2.0, 0.5, -1.0, 0.1, 2.0, 1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    flat_z = [0.3, 0.2, 0.5, -1.0, 0.0, 0.0, 0.7, 0.0]
+    flat_m = [0.0]
+    assert both(0.7, m, z, p) == scope["both"](0.7, flat_m, flat_z, flat_p)
+    assert flat_z == [z.one.x, z.two.x, *z.one.f, *z.one.h, *z.two.f, *z.two.h]
+    assert flat_m == [m.x]
+
+
+def test_parts_keep_their_whole_names_for_export():
+    text = "\n".join(ast.unparse(f) for f in named({"both": both}, PARTS).values())
+    assert "p.one_k[i]" in text
+    assert "range(two_elements_)" in text
+    assert "z.two_x" in text
+    assert ".one." not in text
+
+
+def wrong_part(v, z, p):
+    return z.one.y
+
+
+def wrong_count(v, z, p):
+    return scale(v)
+
+
+@pytest.mark.parametrize(
+    ("function", "words"),
+    [(wrong_part, r"z\.one has no field 'y'; .*x"), (wrong_count, r"scale\(\) with 1 arguments .* takes 2")],
+)
+def test_what_is_wrong_with_a_part_is_said(function, words):
+    with pytest.raises(LawError, match=words):
+        lower({"f": function}, PARTS)

@@ -38,7 +38,7 @@ from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from dataclasses import fields as dataclass_fields
-from typing import Annotated, Any, NamedTuple, cast, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, cast, get_args, get_origin, get_type_hints
 
 from stickslip.binding import bound, distinct, first_complaint, least, wrapped
 from stickslip.errors import ParameterError, UnknownName, suggestion
@@ -46,6 +46,7 @@ from stickslip.errors import ParameterError, UnknownName, suggestion
 __all__ = [
     "Bristle",
     "Choice",
+    "Configurable",
     "Described",
     "Elements",
     "Field",
@@ -363,8 +364,112 @@ class ReferenceKind(Described):
         object.__setattr__(self, "Parameters", self.Params)
 
 
+class Configurable(Described):
+    """Something described that has choices and a state: a friction law, a control law."""
+
+    kind: ClassVar[str] = ""
+    """What it is called in messages."""
+    choices: tuple[Choice, ...]
+    chosen: Mapping[str, str]
+    variants: dict[tuple[tuple[str, str], ...], Any]
+    written: Mapping[str, Any]
+    state_fields: tuple[Field, ...]
+
+    def option_fields(self, own: type) -> dict[str, Field]:
+        """The fields of a ``Params`` class and of the chosen options, by name; the first of a name holds."""
+        fields: dict[str, Field] = {}
+        for part in (own, *(self.option(choice).params for choice in self.choices)):
+            for f in fields_of(part):
+                fields.setdefault(f.name, f)
+        return fields
+
+    def option_scope(self) -> dict[str, Any]:
+        """What the names that choices replace stand for under the chosen options."""
+        scope: dict[str, Any] = {}
+        for choice in self.choices:
+            option = self.option(choice)
+            if option.function:
+                scope |= {choice.replaces: option.function, f"{choice.replaces}_scale": option.velocity_scale}
+        return scope
+
+    def option_examples(self, own: Mapping[str, Any], fields: Mapping[str, Field]) -> dict[str, Any]:
+        """The example of the file with those of the chosen options, as far as they have such a field."""
+        examples: dict[str, Any] = {}
+        for choice in self.choices:
+            examples |= self.option(choice).example
+        return {k: v for k, v in {**examples, **own}.items() if k in fields}
+
+    # ---- choices -------------------------------------------------------------------------------------
+
+    def option(self, choice: Choice) -> Option:
+        """The option in force for `choice`."""
+        return choice.options[self.chosen.get(choice.name, choice.default)]
+
+    def option_of(self, choice: str) -> str:
+        """The name of the option in force for a choice; "" where the law has no choice of that name."""
+        defaults = {c.name: c.default for c in self.choices}
+        return self.chosen.get(choice, defaults.get(choice, ""))
+
+    def having(self, **names: str) -> Self:
+        """Return this with other options, ``law.having(slip_rule="literal")``.
+
+        Parameters
+        ----------
+        **names : str
+            Options by the names of the choices.
+
+        Raises
+        ------
+        UnknownName
+            If it has no such choice, or the choice no such option.
+        """
+        known = {choice.name: choice for choice in self.choices}
+        for name, option in names.items():
+            if name not in known:
+                raise UnknownName(f"choice of {self.kind} {self.name!r}", name, known)
+            if option not in known[name].options:
+                raise UnknownName(name.replace("_", " "), option, known[name].options)
+        key = tuple(sorted({**self.chosen, **names}.items()))
+        if key not in self.variants:
+            self.variants[key] = self._rewritten(chosen=dict(key))
+        return self.variants[key]
+
+    def offering(self, choices: Sequence[Choice]) -> Self:
+        """Return this with further choices; those that it has by name stay as they are."""
+        own = {choice.name for choice in self.choices}
+        more = tuple(choice for choice in choices if choice.name not in own)
+        return self._rewritten(choices=self.choices + more, variants={}) if more else self
+
+    def _rewritten(self, **changes: Any) -> Self:
+        """This as its file has it, but for `changes`."""
+        written: dict[str, Any] = {**self.written, **changes}
+        return type(self)(**written)
+
+    # ---- state ---------------------------------------------------------------------------------------
+
+    def state(self, p: Any) -> types.SimpleNamespace:
+        """Return the state at rest, everything zero and sticking, for the plain Python functions."""
+        n = self.elements_in(p)
+        return types.SimpleNamespace(
+            **{f.name: [0.0] * n if f.per_element else 0.0 for f in self.state_fields}
+        )
+
+    def state_size(self, p: Any) -> int:
+        """The length of the flat state."""
+        n = self.elements_in(p)
+        return sum(n if f.per_element else 1 for f in self.state_fields)
+
+    def pack_state(self, z: types.SimpleNamespace) -> list[float]:
+        """Return a state `z` as the flat list that compiled functions read."""
+        flat = [getattr(z, f.name) for f in self.state_fields if not f.per_element]
+        for f in self.state_fields:
+            if f.per_element:
+                flat.extend(getattr(z, f.name))
+        return flat
+
+
 @dataclass(frozen=True, eq=False)
-class Law(Described):
+class Law(Configurable):
     """A friction law (see the module's docstring for its functions and their arguments).
 
     Attributes
@@ -400,6 +505,7 @@ class Law(Described):
         ``velocity_scale(p)``: a velocity over which the torque changes much; steps near rest stay below it.
     """
 
+    kind: ClassVar[str] = "law"
     name: str
     Params: type
     step: Callable[..., float]
@@ -426,33 +532,25 @@ class Law(Described):
     non_local_memory: bool = False
     continuous: bool = True
     chosen: Mapping[str, str] = field(default_factory=dict[str, str])
-    variants: dict[tuple[tuple[str, str], ...], Law] = field(default_factory=dict[Any, Any], repr=False)
+    variants: dict[tuple[tuple[str, str], ...], Any] = field(default_factory=dict[Any, Any], repr=False)
     """Laws made from this one by `having`; shared with them, so that each exists (and is compiled) once."""
 
     def __post_init__(self) -> None:
         written = {f.name: getattr(self, f.name) for f in dataclass_fields(self) if f.init}
         chosen = [self.option(choice) for choice in self.choices]
-        fields: dict[str, Field] = {}
-        for part in (self.Params, *(o.params for o in chosen)):
-            for f in fields_of(part):
-                fields.setdefault(f.name, f)
+        fields = self.option_fields(self.Params)
         for ending in (o.doubles for o in chosen if o.doubles):
             fields.update(
                 {(twin := f.twin(ending)).name: twin for f in [*fields.values()] if f.par.directional}
             )
-        examples: dict[str, Any] = {k: v for o in chosen for k, v in o.example.items()}
-        examples.update(self.example)
         make: Any = namedtuple  # whose fields are not known to a type checker
-        scope: dict[str, Any] = {}
-        for choice, option in zip(self.choices, chosen):
-            if option.function:
-                scope |= {choice.replaces: option.function, f"{choice.replaces}_scale": option.velocity_scale}
+        scope = self.option_scope()
         parts: dict[str, Any] = {
             "written": written,
             "fields": tuple(fields.values()),
             "state_fields": fields_of(self.State),
             "Parameters": make(self.Params.__name__, list(fields)),
-            "example": {k: v for k, v in examples.items() if k in fields},
+            "example": self.option_examples(self.example, fields),
             **{name: bound(getattr(self, name), scope) for name in FUNCTIONS},
         }
         for name, joined in (("check", first_complaint), ("velocity_scale", least)):
@@ -473,16 +571,7 @@ class Law(Described):
     state_fields: tuple[Field, ...] = field(init=False)
     Parameters: Any = field(init=False)
 
-    # ---- choices -------------------------------------------------------------------------------------
-
-    def option(self, choice: Choice) -> Option:
-        """The option in force for `choice`."""
-        return choice.options[self.chosen.get(choice.name, choice.default)]
-
-    def option_of(self, choice: str) -> str:
-        """The name of the option in force for a choice; "" where the law has no choice of that name."""
-        defaults = {c.name: c.default for c in self.choices}
-        return self.chosen.get(choice, defaults.get(choice, ""))
+    # ---- declarations --------------------------------------------------------------------------------
 
     def remark(self, p: Any) -> str:
         """What is allowed in the parameters `p` but seldom meant, in a sentence; "" where there is nothing."""
@@ -494,68 +583,11 @@ class Law(Described):
         """Whether the torque depends on position, load, temperature or time."""
         return any(self.option(choice).reads_surroundings for choice in self.choices)
 
-    def having(self, **names: str) -> Law:
-        """Return this law with other options, ``law.having(slip_rule="literal")``.
-
-        Parameters
-        ----------
-        **names : str
-            Options by the names of the choices.
-
-        Raises
-        ------
-        UnknownName
-            If the law has no such choice, or the choice no such option.
-        """
-        known = {choice.name: choice for choice in self.choices}
-        for name, option in names.items():
-            if name not in known:
-                raise UnknownName(f"choice of law {self.name!r}", name, known)
-            if option not in known[name].options:
-                raise UnknownName(name.replace("_", " "), option, known[name].options)
-        key = tuple(sorted({**self.chosen, **names}.items()))
-        if key not in self.variants:
-            self.variants[key] = self._rewritten(chosen=dict(key))
-        return self.variants[key]
-
-    def offering(self, choices: Sequence[Choice]) -> Law:
-        """Return this law with further choices; those that it has by name stay as they are."""
-        own = {choice.name for choice in self.choices}
-        more = tuple(choice for choice in choices if choice.name not in own)
-        return self._rewritten(choices=self.choices + more, variants={}) if more else self
-
-    def _rewritten(self, **changes: Any) -> Law:
-        """The law as its file has it, but for `changes`."""
-        written: dict[str, Any] = {**self.written, **changes}
-        return Law(**written)
-
     def dissipates(self, p: Any) -> bool:
         """Whether the law, with its chosen options, is declared passive with the parameters `p`."""
         if self.passive in ("", "never") or not all(self.option(c).passive for c in self.choices):
             return False
         return self.is_passive is None or self.is_passive(p)
-
-    # ---- state ---------------------------------------------------------------------------------------
-
-    def state(self, p: Any) -> types.SimpleNamespace:
-        """Return the state at rest, everything zero and sticking, for the plain Python functions."""
-        n = self.elements_in(p)
-        return types.SimpleNamespace(
-            **{f.name: [0.0] * n if f.per_element else 0.0 for f in self.state_fields}
-        )
-
-    def state_size(self, p: Any) -> int:
-        """The length of the flat state."""
-        n = self.elements_in(p)
-        return sum(n if f.per_element else 1 for f in self.state_fields)
-
-    def pack_state(self, z: types.SimpleNamespace) -> list[float]:
-        """Return a state `z` as the flat list that compiled functions read."""
-        flat = [getattr(z, f.name) for f in self.state_fields if not f.per_element]
-        for f in self.state_fields:
-            if f.per_element:
-                flat.extend(getattr(z, f.name))
-        return flat
 
     def mode_mask(self, p: Any) -> list[bool]:
         """Which entries of the flat state are modes."""

@@ -5,6 +5,10 @@ local names, ``math`` functions, other functions of the subset, and the fields o
 (``p.fc``, ``z.force[i]``, ``len(p.k)``). It runs as it stands in Python. `lower` rewrites the fields into
 elements of flat arrays (``p[3]``), which is what numba compiles and what C export will read.
 
+A structure may hold parts (`Layout.parts`). A function that is called with one (``step(v, z.friction, p.friction)``) is
+translated once more for that part: its fields are those of the whole with the part's name before theirs
+(``z.friction_force``).
+
 A construct outside the subset is refused with file, line and what to write instead.
 """
 
@@ -73,9 +77,12 @@ class Layout:
     """The array holds its numbers of elements after its scalars (parameters do, states ask the parameters)."""
     pers: tuple[str, ...] = ()
     """What each block has a value per; empty: elements."""
+    parts: tuple[str, ...] = ()
+    """What the names of fields of each part begin with: ``z.law.force`` is the field ``law_force`` of the part
+    ``law_``."""
 
     @staticmethod
-    def of(fields: Sequence[Field], *, counted: bool) -> Layout:
+    def of(fields: Sequence[Field], *, counted: bool, parts: tuple[str, ...] = ()) -> Layout:
         """Scalars in order, then one block per field that has a value per element."""
         mixed = any(f.per_element and f.par.per != "element" for f in fields)
         return Layout(
@@ -83,6 +90,7 @@ class Layout:
             tuple(f.name for f in fields if f.per_element),
             counted,
             tuple(f.par.per for f in fields if f.per_element) if mixed else (),
+            parts,
         )
 
     def per(self, block: int) -> str:
@@ -152,23 +160,39 @@ def named(
     return done
 
 
+@dataclass(frozen=True, slots=True)
+class _View:
+    """What an argument stands for: the fields of the structure `base` whose names begin with `prefix`."""
+
+    base: str
+    prefix: str
+    layout: Layout
+
+
 @dataclass(frozen=True, eq=False)
 class _Target:
-    """A function to translate; one for v < 0 reads the parameters that hold there."""
+    """A function to translate; one for v < 0 reads the parameters that hold there.
+
+    ``views`` are the arguments that stand for another structure than their name says, or for a part of one;
+    ``part`` is the part for which the function, and what it calls, is translated.
+    """
 
     function: Callable[..., Any]
     negative: bool = False
+    views: tuple[tuple[str, _View], ...] = ()
+    part: str = ""
 
 
 @dataclass
 class _Names:
     """One name per function translated: files may use the same name for different functions."""
 
-    taken: dict[str, tuple[Any, bool]] = field(default_factory=dict[str, Any])
+    taken: dict[str, Any] = field(default_factory=dict[str, Any])
 
     def of(self, wanted: str, target: _Target) -> str:
         name, count = wanted + (NEGATIVE if target.negative else ""), 1
-        key = (getattr(target.function, "__code__", target.function), target.negative)
+        views = tuple((name, view.base, view.prefix) for name, view in target.views)
+        key = (getattr(target.function, "__code__", target.function), target.negative, views, target.part)
         while self.taken.setdefault(name, key) != key:
             count += 1
             name = f"{wanted}_{count}"
@@ -197,7 +221,9 @@ def _translate(
             "`return` and a number"
         )
     arguments = [a.arg for a in tree.args.args]
-    translator = _Translator(where, layouts, arguments, function.__globals__, flat, names, target.negative)
+    views = {a: _View(a, "", layouts[a]) for a in arguments if a in layouts} | dict(target.views)
+    translator = _Translator(where, layouts, arguments, views, function.__globals__, flat, names, target)
+    translator.rename(tree)
     body = [s for s in (translator.visit(statement) for statement in tree.body) if s is not None]
     if flat:
         # Once at the top: the compiler cannot know that writing to a state leaves the parameters alone.
@@ -210,7 +236,8 @@ def _translate(
             raise translator.refuse(
                 node, f"the value of {what}(), which returns none,", "let it return a number"
             )
-    arguments = ast.arguments([], [ast.arg(a.arg) for a in tree.args.args], None, [], [], None, [])
+    given = [ast.arg(name) for name in dict.fromkeys(map(translator.given_as, arguments))]
+    arguments = ast.arguments([], given, None, [], [], None, [])
     if not flat:
         body = [*_docstring(tree), *body]
     done[name] = ast.fix_missing_locations(
@@ -252,15 +279,33 @@ class _Translator(ast.NodeTransformer):
     where: _Place
     layouts: Mapping[str, Layout]
     arguments: list[str]
+    views: Mapping[str, _View]
     scope: dict[str, Any]
     flat: bool
     names: _Names
-    negative: bool
+    target: _Target
     calls: dict[str, _Target] = field(default_factory=dict[str, _Target])
     locals: set[str] = field(default_factory=set[str])
     counts: dict[str, None] = field(default_factory=dict[str, None])
     read: dict[str, ast.Call] = field(default_factory=dict[str, ast.Call])
     """Calls whose value is used, by callee."""
+    renamed: dict[str, str] = field(default_factory=dict[str, str])
+    """Numbers that are called as a structure is that the function reads under another name here."""
+
+    @property
+    def negative(self) -> bool:
+        """Whether this is the function for v < 0."""
+        return self.target.negative
+
+    def rename(self, tree: ast.FunctionDef) -> None:
+        """Find names for numbers that would hide a structure."""
+        bases = {view.base for view in self.views.values()} - self.views.keys()
+        own = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)} | set(self.arguments)
+        self.renamed = {name: f"{name}_number" for name in own & bases}
+
+    def given_as(self, argument: str) -> str:
+        """The name of an argument in the result; parts of one structure are one argument."""
+        return self.views[argument].base if argument in self.views else self.renamed.get(argument, argument)
 
     def refuse(self, node: ast.AST, what: str, remedy: str) -> LawError:
         return LawError(f"{self.where.at(node)}: {what} is outside the scalar subset; {remedy}")
@@ -305,6 +350,7 @@ class _Translator(ast.NodeTransformer):
 
     def visit_Name(self, node: ast.Name) -> Any:
         if isinstance(node.ctx, ast.Store) or node.id in self.locals or node.id in self.arguments:
+            node.id = self.renamed.get(node.id, node.id)
             return node
         value = self.scope.get(node.id)
         if isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -319,28 +365,34 @@ class _Translator(ast.NodeTransformer):
             if node.attr not in MATH:
                 raise self.refuse(node, f"math.{node.attr}", suggestion(node.attr, MATH))
             return node
-        name, layout = self.structure(node)
-        if node.attr in layout.blocks:
-            raise self.refuse(node, f"{name}.{node.attr} as a whole", f"use {name}.{node.attr}[i]")
-        if node.attr not in layout.scalars:
+        view, name = self.structure(node)
+        if name in view.layout.blocks:
+            raise self.refuse(node, f"{ast.unparse(node)} as a whole", f"use {ast.unparse(node)}[i]")
+        if name not in view.layout.scalars:
+            here = len(view.prefix)
+            fields = [f[here:] for f in view.layout.scalars + view.layout.blocks if f.startswith(view.prefix)]
             raise LawError(
-                f"{self.where.at(node)}: {name} has no field {node.attr!r}; "
-                f"{suggestion(node.attr, layout.scalars + layout.blocks)}"
+                f"{self.where.at(node)}: {ast.unparse(owner)} has no field {node.attr!r}; "
+                f"{suggestion(node.attr, fields)}"
             )
         if not self.flat:
-            return node
-        return self.element(name, ast.Constant(layout.scalars.index(node.attr)), node)
+            return ast.copy_location(ast.Attribute(ast.Name(view.base, ast.Load()), name, node.ctx), node)
+        return self.element(view.base, ast.Constant(view.layout.scalars.index(name)), node)
 
     def visit_Subscript(self, node: ast.Subscript) -> Any:
         if not isinstance(node.value, ast.Attribute):
             raise self.refuse(node, "this index", "index a field of the state or parameters, z.force[i]")
-        name, layout = self.structure(node.value)
-        if node.value.attr not in layout.blocks:
-            raise self.refuse(node, f"{name}.{node.value.attr}[...]", "it has one value, not one per element")
+        view, name = self.structure(node.value)
+        layout = view.layout
+        if name not in layout.blocks:
+            raise self.refuse(
+                node, f"{ast.unparse(node.value)}[...]", "it has one value, not one per element"
+            )
         if not self.flat:
-            return ast.copy_location(ast.Subscript(node.value, self.visit(node.slice), node.ctx), node)
+            value = ast.Attribute(ast.Name(view.base, ast.Load()), name, ast.Load())
+            return ast.copy_location(ast.Subscript(value, self.visit(node.slice), node.ctx), node)
         first = len(layout.scalars) + (len(layout.counts) if layout.counted else 0)
-        block = layout.blocks.index(node.value.attr)
+        block = layout.blocks.index(name)
         index: ast.expr = self.visit(node.slice)
         before = [layout.per(i) for i in range(block)]
         for per in reversed(dict.fromkeys(before)):
@@ -348,7 +400,7 @@ class _Translator(ast.NodeTransformer):
             index = ast.BinOp(offset, ast.Add(), index)
         if first:
             index = ast.BinOp(ast.Constant(first), ast.Add(), index)
-        return self.element(name, index, node)
+        return self.element(view.base, index, node)
 
     def visit_Call(self, node: ast.Call, read: bool = True) -> Any:
         if node.keywords:
@@ -369,20 +421,48 @@ class _Translator(ast.NodeTransformer):
         if not isinstance(function, types.FunctionType) or function is negative:
             known = [n for n, v in self.scope.items() if isinstance(v, types.FunctionType)]
             raise self.refuse(node, f"{name}()", suggestion(name, [*known, *BUILTINS]))
-        target = _Target(function, self.negative or any(map(self.is_negative, node.args)))
-        callee = self.names.of("_" + name, target)
+        takes = len(inspect.signature(function).parameters)
+        if len(node.args) != takes:
+            raise self.refuse(node, f"{name}() with {len(node.args)} arguments", f"it takes {takes}")
+        target = self.aimed(node, function)
+        callee = self.names.of(f"_{target.part}{name}", target)
         self.calls[callee] = target
         if read:
             self.read[callee] = node
         node.func = ast.copy_location(ast.Name(callee, ast.Load()), node)
-        node.args = [self.argument(a) for a in node.args]
+        node.args = self.passed(node, target)
         return node
 
-    def argument(self, node: ast.expr) -> ast.expr:
-        """An argument of a call: `negative(p)` is `p`, read by a callee of its own."""
-        if isinstance(node, ast.Call) and self.is_negative(node):
-            node = node.args[0]
-        return node if self.is_structure(node) else self.visit(node)
+    def aimed(self, node: ast.Call, function: Callable[..., Any]) -> _Target:
+        """The callee, for the parts of structures that it is called with."""
+        views: list[tuple[str, _View]] = []
+        for formal, actual in zip(inspect.signature(function).parameters, node.args):
+            view = self.view(self.positive(actual))
+            if view is not None and (view.prefix or self.layouts.get(formal) != view.layout):
+                views.append((formal, view))
+        negative = self.negative or any(map(self.is_negative, node.args))
+        prefixes = [view.prefix for _, view in views if view.prefix]
+        return _Target(function, negative, tuple(views), max(prefixes, key=len, default=self.target.part))
+
+    def passed(self, node: ast.Call, target: _Target) -> list[ast.expr]:
+        """The arguments of a call; a structure of which several parts are meant is passed once."""
+        views, out, bases = dict(target.views), list[ast.expr](), dict[str, str]()
+        for formal, actual in zip(inspect.signature(target.function).parameters, node.args):
+            view = self.view(self.positive(actual))
+            if view is None:
+                out.append(self.visit(actual))
+                continue
+            name = views[formal].base if formal in views else formal
+            if name not in bases:
+                out.append(ast.copy_location(ast.Name(view.base, ast.Load()), actual))
+            elif bases[name] != view.base:
+                raise self.refuse(node, "this call", f"give the argument {formal} another name")
+            bases[name] = view.base
+        return out
+
+    def positive(self, node: ast.expr) -> ast.expr:
+        """`p` of `negative(p)`: a callee of its own reads it."""
+        return node.args[0] if isinstance(node, ast.Call) and self.is_negative(node) else node
 
     def is_negative(self, node: ast.expr) -> bool:
         """Whether this is `negative(p)`."""
@@ -392,17 +472,23 @@ class _Translator(ast.NodeTransformer):
 
     # ---- structured arguments --------------------------------------------------------------------------
 
-    def is_structure(self, node: ast.expr) -> bool:
-        return isinstance(node, ast.Name) and node.id in self.layouts and node.id in self.arguments
+    def view(self, node: ast.expr) -> _View | None:
+        """What an expression stands for as a whole: a structure or a part of one; None for a number."""
+        if isinstance(node, ast.Name):
+            return self.views.get(node.id)
+        if not isinstance(node, ast.Attribute) or (owner := self.view(node.value)) is None:
+            return None
+        prefix = f"{owner.prefix}{node.attr}_"
+        return _View(owner.base, prefix, owner.layout) if prefix in owner.layout.parts else None
 
-    def structure(self, node: ast.Attribute) -> tuple[str, Layout]:
-        owner = node.value
-        if not isinstance(owner, ast.Name) or not self.is_structure(owner):
+    def structure(self, node: ast.Attribute) -> tuple[_View, str]:
+        """What the field belongs to, and its whole name."""
+        view = self.view(node.value)
+        if view is None:
             raise self.refuse(node, f"`.{node.attr}` here", f"fields belong to {', '.join(self.layouts)}")
-        layout = self.layouts[owner.id]
-        if self.negative and owner.id == "p" and node.attr + NEGATIVE in layout.scalars + layout.blocks:
-            node.attr += NEGATIVE
-        return owner.id, layout
+        name, root = view.prefix + node.attr, ast.unparse(node.value).partition(".")[0]
+        doubled = name + NEGATIVE in view.layout.scalars + view.layout.blocks
+        return view, name + NEGATIVE if self.negative and root == "p" and doubled else name
 
     def element(self, name: str, index: ast.expr, like: ast.expr) -> ast.expr:
         return ast.copy_location(
@@ -411,24 +497,32 @@ class _Translator(ast.NodeTransformer):
 
     def count(self, node: ast.AST, per: str) -> ast.expr:
         """The number of elements (or what else), which the parameters hold after their scalars."""
-        if "p" not in self.arguments:
+        if self.counting() is None:
             raise self.refuse(
                 node, "a field per element without `p`", "pass the parameters `p` to this function"
             )
         self.counts[per] = None
         return ast.Name(f"{per}s_", ast.Load())
 
+    def counting(self) -> _View | None:
+        """The structure that holds the numbers of elements."""
+        return next((view for view in self.views.values() if view.layout.counted), None)
+
     def counted(self, per: str) -> ast.stmt:
         """The statement that reads a number of elements."""
-        layout = self.layouts["p"]
-        place = ast.Constant(len(layout.scalars) + layout.counts.index(per))
-        read = ast.Subscript(ast.Name("p", ast.Load()), place, ast.Load())
+        view = self.counting()
+        assert view is not None
+        place = ast.Constant(len(view.layout.scalars) + view.layout.counts.index(per))
+        read = ast.Subscript(ast.Name(view.base, ast.Load()), place, ast.Load())
         count = ast.Call(ast.Name("int", ast.Load()), [read], [])
         return ast.Assign([ast.Name(f"{per}s_", ast.Store())], count)
 
     def length(self, node: ast.Call) -> ast.expr:
         of = node.args[0] if len(node.args) == 1 else None
-        layout = self.structure(of)[1] if isinstance(of, ast.Attribute) else None
-        if not isinstance(of, ast.Attribute) or layout is None or of.attr not in layout.blocks:
+        if (
+            not isinstance(of, ast.Attribute)
+            or (found := self.structure(of))[1] not in found[0].layout.blocks
+        ):
             raise self.refuse(node, "this len()", "use len(p.field) of a field that has a value per element")
-        return ast.copy_location(self.count(node, layout.per(layout.blocks.index(of.attr))), node)
+        view, name = found
+        return ast.copy_location(self.count(node, view.layout.per(view.layout.blocks.index(name))), node)
