@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from stickslip.identify.axis_trial import Trial
     from stickslip.identify.doctor import Diagnosis
     from stickslip.identify.estimate import Identification
+    from stickslip.identify.regressions import Regress
     from stickslip.machines.servo import ServoAxis
     from stickslip.record import Record
     from stickslip.report.identified import Source
@@ -145,16 +146,17 @@ def run(args: argparse.Namespace) -> int:
     """Print estimates and verdicts, write the model and the report."""
     from stickslip.cli import _output
     from stickslip.cli._identified import show
+    from stickslip.identify.regressions import Regressions
     from stickslip.report.answers import answers_of
     from stickslip.report.identified import files_of
 
     sane(args)
     model_file, report_file = places(args.out)
-    files = [*args.files, *args.validation]
+    files, regress = [*args.files, *args.validation], Regressions()
     beside, loops = _reading.beside_of(args, len(files)), loops_of(args, len(files))
     sources: list[Source] = []
     for number, (path, more, loop) in enumerate(zip(files, beside, loops, strict=True)):
-        read = checked(path, args, held_out=number >= len(args.files), beside=more)
+        read = checked(path, args, regress, held_out=number >= len(args.files), beside=more)
         sources += [replace(s, record=with_loop(s.record, loop)) for s in read]
     if friction_alone([s.record for s in sources], args):
         args.method = "hysteresis"
@@ -175,7 +177,7 @@ def run(args: argparse.Namespace) -> int:
         # What draws and writes it loads while compiled code runs.
         names = ("matplotlib.figure", "matplotlib.backends.backend_svg", "jinja2")
         threading.Thread(target=lambda: [importlib.import_module(name) for name in names]).start()
-    found = identified(sources, args)
+    found = identified(sources, args, regress)
     if left_out:
         names = ", ".join(left_out)
         note = (
@@ -241,7 +243,7 @@ def places(out: Path) -> tuple[Path, Path]:
     return out / "model.toml", out / "report.html"
 
 
-def identified(sources: Sequence[Source], args: argparse.Namespace) -> Identification:
+def identified(sources: Sequence[Source], args: argparse.Namespace, regress: Regress) -> Identification:
     """The method's result, with the doctor's findings."""
     from stickslip.machines.servo import ServoAxis
 
@@ -254,7 +256,7 @@ def identified(sources: Sequence[Source], args: argparse.Namespace) -> Identific
                 found, estimates=tuple(replace(e, unit=linear.unit(e.unit)) for e in found.estimates)
             )
     else:
-        found = whole_axis(records, args, sum(s.held_out for s in sources))
+        found = whole_axis(records, args, sum(s.held_out for s in sources), regress)
     notes = (*found.notes, *assumptions(found, args), *load_note(records, found))
     return replace(found, notes=notes, findings=tuple(f for s in sources for f in s.findings))
 
@@ -273,7 +275,9 @@ def assumptions(found: Identification, args: argparse.Namespace) -> list[str]:
     return [f"Assumed, not fitted: {listed}{fit}, --set NAME=VALUE takes another."]
 
 
-def whole_axis(records: Sequence[Record], args: argparse.Namespace, held_out: int) -> Identification:
+def whole_axis(
+    records: Sequence[Record], args: argparse.Namespace, held_out: int, regress: Regress
+) -> Identification:
     """The methods `axis` and `inertia`; the last `held_out` records judge."""
     from stickslip.cli import _output
     from stickslip.identify.axis import AUTOMATIC, identify_axis
@@ -291,14 +295,15 @@ def whole_axis(records: Sequence[Record], args: argparse.Namespace, held_out: in
         return inertia(fitted, axis)
     if args.inverse:
         plain = inverse_dynamics(fitted, axis, per_direction=args.per_direction, harmonics=args.harmonics)
-        sliding, _ = regressed(fitted, axis, skew_of(fitted, args))
+        sliding, _ = regressed(fitted, axis, skew_of(fitted, args), regress=regress)
         return inverse_identification(plain, axis, sliding, held)
     given = values([p for p in (*args.set, *args.freeze, *args.free) if p in args.set or "=" in p])
     return identify_axis(
         fitted, axis, args.law or list(AUTOMATIC), validation=held, free=[n.partition("=")[0] for n in args.free],
         frozen=[n.partition("=")[0] for n in args.freeze], values=given,
         extras=Extras(harmonics=args.harmonics, load=args.load), per_direction=args.per_direction,
-        robust=args.robust, intervals=args.intervals, skew=skew_of(fitted, args), progress=_output.say,
+        robust=args.robust, intervals=args.intervals, skew=skew_of(fitted, args), regress=regress,
+        progress=_output.say,
     )  # fmt: skip
 
 
@@ -397,7 +402,7 @@ def refuse_unused(records: Sequence[Record], trials: Sequence[Trial], args: argp
 
 
 def checked(
-    path: Path, args: argparse.Namespace, held_out: bool = False, beside: Path | None = None
+    path: Path, args: argparse.Namespace, regress: Regress, held_out: bool = False, beside: Path | None = None
 ) -> list[Source]:
     """Read a record and let the doctor look at it; several pieces where many rows in a row are left out."""
     from stickslip.errors import InputError
@@ -407,7 +412,7 @@ def checked(
 
     def accepted(record: Record) -> list[Diagnosis]:
         parts, short = pieces(record)
-        every = [examine(part, accept=args.accept) for part in parts]
+        every = [examine(part, accept=args.accept, regress=regress) for part in parts]
         for found in every:
             if found.errors:
                 raise InputError(f"{path}: {found.errors[0].line()}; see `stickslip doctor {path}`")

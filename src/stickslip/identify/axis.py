@@ -35,7 +35,8 @@ from stickslip.identify.axis_result import assembled, evident, narrow_note, note
 from stickslip.identify.axis_search import Extras, FittedAxis, require_start
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification, silent
-from stickslip.identify.regression import Regression
+from stickslip.identify.regression import Regression, regress_axis
+from stickslip.identify.regressions import Regress
 from stickslip.identify.vector import Vector
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
@@ -71,6 +72,7 @@ def identify_axis(
     profiles: bool = False,
     intervals: str = "prediction",
     skew: float | None = None,
+    regress: Regress = regress_axis,
     progress: Callable[[str], None] = silent,
 ) -> Identification:
     """Identify an axis: which law it has, its values, and how sure they are.
@@ -99,6 +101,8 @@ def identify_axis(
         it; or from the covariance of the output error, which is too narrow where noise is coloured.
     skew : float, optional
         s by which the column of the torque lies behind the torque that acted, where it is known; found otherwise.
+    regress : callable
+        The regression on certain sliding; a `stickslip.identify.regressions.Regressions` does not repeat the doctor's.
     progress : callable
         Is told what begins, in a few words.
 
@@ -126,7 +130,7 @@ def identify_axis(
         "free": free, "frozen": frozen, "values": values, "extras": extras, "robust": robust
     }  # fmt: skip
     refuse_harmonics(trials, extras.harmonics + extras.friction_harmonics, simulated=True)
-    sliding, notes = regressed(trials, axis, skew, extras.harmonic_period)
+    sliding, notes = regressed(trials, axis, skew, extras.harmonic_period, regress)
     trials, validation = aligned(trials, sliding), aligned(validation, sliding)
     inverse, more = first_look(trials, axis, extras, per_direction)
     notes = [*(on_timing(sliding) if skew is None else []), *notes, *more]

@@ -22,6 +22,7 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.gravity import hanging
 from stickslip.identify.noise import Noise
 from stickslip.identify.regression import QUANTILE, Regression, regress_axis
+from stickslip.identify.regressions import Regress
 from stickslip.identify.uncertainty import verdict_on
 from stickslip.identify.vector import Parameter, Vector
 from stickslip.machines.servo import ServoAxis
@@ -44,13 +45,14 @@ DOUBT = (
 
 
 def regressed(
-    trials: Sequence[Trial], axis: ServoAxis, skew: float | None, harmonic_period: float | None = None
-) -> tuple[Regression | None, list[str]]:
+    trials: Sequence[Trial], axis: ServoAxis, skew: float | None, harmonic_period: float | None = None,
+    regress: Regress = regress_axis,
+) -> tuple[Regression | None, list[str]]:  # fmt: skip
     """The regression on certain sliding, where the records allow it; else why they do not."""
     if any(t.drive is None for t in trials):
         return None, []
     try:
-        return regress_axis(trials, axis, skew=skew, harmonic_period=harmonic_period), []
+        return regress(trials, axis, skew=skew, harmonic_period=harmonic_period), []
     except InputError as error:
         return None, [f"No regression on certain sliding: {error}."]
 

@@ -228,7 +228,7 @@ def rows_of(signals: Sequence[Signals], width: float, skew: float) -> tuple[list
     top = float(np.max(speed))
     levels = np.geomspace(max(float(np.min(speed)), SLOWEST * top), FASTEST * top, LEVELS).tolist()
     way = rebuilding_way(first, skew)
-    rows = [sliding_rows(s, w, levels).farther(way) for s, w in zip(signals, windows, strict=True)]
+    rows = [r.falling_at(levels).farther(way) for r in first]
     rows = [r for r in rows if r.time.size >= FEWEST]
     if not rows:
         raise InputError("friction is rebuilt over the whole of every stroke; record longer strokes")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ FINER = 3.0  # times narrower: the window that tells whether the axis moves
 CERTAIN = 6.0  # standard deviations of the fine velocity's noise from which on its sign is certain
 CREEPING = 3e-3  # of the usual speed
 FEWEST = 30  # rows
+DIRECTION = 2  # its column
 PIECE = 0.25  # s: the longest stretch that counts as one observation for the jackknife
 
 
@@ -113,7 +114,7 @@ class SlidingRows:
     jerk : array, shape (n,)
         rad/s³ (m/s³).
     falling : array, shape (n, m)
-        exp(-(v/vs)²) in the direction of motion, for every Stribeck velocity asked for.
+        exp(-(v/vs)²) in the direction of motion, for every Stribeck velocity that `falling_at` was asked for.
     piece : array of int, shape (n,)
         Stretch of sliding that a row belongs to, 0 ...
     signals : Signals
@@ -122,6 +123,8 @@ class SlidingRows:
         Rows of the signals.
     gone : array, shape (n,)
         Way since the last reversal or stop, rad (m).
+    quick : array
+        Velocity of every row of the signals, seen through a narrower window, rad/s (m/s).
     """
 
     time: Array
@@ -135,6 +138,15 @@ class SlidingRows:
     window: Window
     places: np.ndarray[Any, np.dtype[np.int64]]
     gone: Array
+    quick: Array
+
+    def falling_at(self, stribeck: Sequence[float]) -> SlidingRows:
+        """The same rows, with the fall of friction laid out for every Stribeck velocity vs, rad/s (m/s)."""
+        sign, middle = self.fixed[:, DIRECTION], self.window.weights(0)
+        falling = [
+            seen(np.exp(-np.minimum((self.quick / vs) ** 2, 700.0)), middle)[0][self.places] * sign for vs in stribeck
+        ]  # fmt: skip
+        return replace(self, falling=np.column_stack(falling))
 
     def farther(self, distance: float) -> SlidingRows:
         """Only the rows that lie farther behind a reversal or stop, rad (m)."""
@@ -142,7 +154,7 @@ class SlidingRows:
         return SlidingRows(
             self.time[kept], self.position[kept], self.speed[kept], self.fixed[kept], self.jerk[kept],
             self.falling[kept], np.unique(self.piece[kept], return_inverse=True)[1].astype(np.int64),
-            self.signals, self.window, self.places[kept], self.gone[kept],
+            self.signals, self.window, self.places[kept], self.gone[kept], self.quick,
         )  # fmt: skip
 
     def torque(self, skew: float) -> Array:
@@ -158,15 +170,13 @@ class SlidingRows:
         return np.column_stack([np.cos(angle) * damped, np.sin(angle) * damped])
 
 
-def sliding_rows(signals: Signals, window: Window, stribeck: Sequence[float] = ()) -> SlidingRows:
+def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
     """The rows of certain sliding.
 
     Parameters
     ----------
     signals : Signals
     window : Window
-    stribeck : sequence of float
-        Velocities vs, rad/s (m/s), for which the fall of friction is laid out.
 
     Raises
     ------
@@ -196,15 +206,10 @@ def sliding_rows(signals: Signals, window: Window, stribeck: Sequence[float] = (
     begins = signals.time[places[rises]][np.cumsum(rises) - 1]
     cut = np.floor((signals.time[places] - begins) / PIECE)
     piece = np.cumsum(rises | np.concatenate([[False], np.diff(cut) != 0.0])) - 1
-    falling = [
-        seen(np.exp(-np.minimum((quick / vs) ** 2, 700.0)), window.weights(0))[0][places] * sign
-        for vs in stribeck
-    ]
     return SlidingRows(
         signals.time[places], q[places] + signals.origin, v[places],
         np.column_stack([a[places], v[places], sign, np.ones(places.size)]), jerk[places],
-        np.column_stack(falling) if falling else np.zeros((places.size, 0)), piece, signals, window, places,
-        np.abs(q[places] - q[stopped[places]]),
+        np.zeros((places.size, 0)), piece, signals, window, places, np.abs(q[places] - q[stopped[places]]), quick,
     )  # fmt: skip
 
 

@@ -16,6 +16,8 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import change, excitation, physics, signals, spikes, timing, units
 from stickslip.identify.doctor._view import View
+from stickslip.identify.regression import regress_axis
+from stickslip.identify.regressions import Regress
 from stickslip.readers.cut import range_words, taken
 from stickslip.record import Record
 
@@ -81,8 +83,9 @@ class Diagnosis:
 
 
 def examine(
-    record: Record, *, stribeck_velocity: float | None = None, accept: Sequence[str] = ()
-) -> Diagnosis:
+    record: Record, *, stribeck_velocity: float | None = None, accept: Sequence[str] = (),
+    regress: Regress = regress_axis,
+) -> Diagnosis:  # fmt: skip
     """Check a record for everything that would spoil an identification.
 
     Parameters
@@ -93,6 +96,8 @@ def examine(
         rad/s (or m/s): whether the record has speeds near it. Without it, near a twentieth of the usual speed.
     accept : sequence of str
         Codes of errors that count as warnings, since the caller knows better; those of `FINAL` stay errors.
+    regress : callable
+        The regression on certain sliding; a `stickslip.identify.regressions.Regressions` keeps it for who asks again.
 
     Raises
     ------
@@ -102,7 +107,7 @@ def examine(
     for code in accept:
         if code not in ERRORS:
             raise UnknownName("error of the doctor", code, ERRORS)
-    view = View(record)
+    view = View(record, regress)
     reading = cast("Mapping[str, Any]", record.meta.get("reading", {}))
     findings = [Finding.from_data(f) for f in reading.get("findings", [])]
     # Absurd numbers overflow; whatever comes of them compares as false.

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.filters import ZeroPhase, butterworth_poles
+from stickslip.identify.regression import regress_axis
+from stickslip.identify.regressions import Regress
 from stickslip.readers.cut import file_rows
 from stickslip.record import Record, encoder_step
 
@@ -70,8 +72,8 @@ def is_number(values: Array) -> Mask:
 class View:
     """A record as the checks see it."""
 
-    def __init__(self, record: Record) -> None:
-        self.record = record
+    def __init__(self, record: Record, regress: Regress = regress_axis) -> None:
+        self.record, self.regress = record, regress
 
     @cached_property
     def columns(self) -> dict[str, Column]:

@@ -18,7 +18,6 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.doctor._view import Array, Smooth, View
-from stickslip.identify.regression import regress_axis
 from stickslip.machines.servo import ServoAxis
 
 __all__ = ["gravity", "sign", "skew"]
@@ -121,7 +120,7 @@ def skew(view: View) -> Iterator[Finding]:
     position, torque = (record[n][view.usable] for n in ("position", "motor_torque"))
     axis = ServoAxis(motion="linear" if linear else "rotary", drive_side="load")
     try:
-        found = regress_axis([Trial("record", view.time, position, torque)], axis)
+        found = view.regress([Trial("record", view.time, position, torque)], axis)
     except (InputError, np.linalg.LinAlgError):
         return
     low, high = found.interval("skew")
