@@ -1,4 +1,4 @@
-"""Names to things: laws, kinds of reference, compensators, kinds of rig.
+"""Names to things: laws, control laws, kinds of reference, kinds of rig.
 
 Built-in ones are named in their family's tuple (``stickslip.laws.LAWS`` and so on) and imported when asked for.
 Others come from installed packages (entry points ``stickslip.laws``, ``stickslip.references``, ``stickslip.rigs``)
@@ -20,6 +20,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from stickslip import approval, trial
+from stickslip.control_spec import ControlLaw
 from stickslip.errors import InputError, LawError, UnknownName
 from stickslip.spec import Law, ReferenceKind
 from stickslip.subset import law_layouts, lower
@@ -27,7 +28,16 @@ from stickslip.subset import law_layouts, lower
 if TYPE_CHECKING:
     from stickslip.rigs.rig import RigKind
 
-__all__ = ["law", "law_names", "reference_kind", "reference_names", "rig_kind", "rig_kind_names"]
+__all__ = [
+    "control_law",
+    "control_law_names",
+    "law",
+    "law_names",
+    "reference_kind",
+    "reference_names",
+    "rig_kind",
+    "rig_kind_names",
+]
 
 
 def law_names() -> tuple[str, ...]:
@@ -67,6 +77,47 @@ def completed(law: Law) -> Law:
     places = [name.split(".") for name in importlib.import_module("stickslip.laws").COMMON_CHOICES]
     common = [getattr(importlib.import_module(f"stickslip.laws.{module}"), name) for module, name in places]
     return law.offering(common)
+
+
+def control_law_names() -> tuple[str, ...]:
+    """The name of every control law and velocity estimator."""
+    builtin = (name for names in _control_folders().values() for name in names)
+    return (*builtin, *_installed("stickslip.control_laws"))
+
+
+def control_law(name: str, named_by: str = "") -> ControlLaw:
+    """The control law or velocity estimator of that name, or of the file of that path; `named_by` as in `law`.
+
+    Raises
+    ------
+    UnknownName, LawError, CodeRefused
+    """
+    if name.endswith(".py"):
+        return _control_law_in(*_code_at(str(Path(name).resolve()), named_by))
+    for folder, names in _control_folders().items():
+        if name in names:
+            found: ControlLaw = importlib.import_module(f"{folder}.{name}").CONTROL_LAW
+            return found
+    if name in (installed := _installed("stickslip.control_laws")):
+        return installed[name].load()
+    raise UnknownName("control law", name, control_law_names())
+
+
+def _control_folders() -> dict[str, tuple[str, ...]]:
+    """Where control laws are, and their names."""
+    laws, estimators = "stickslip.control.laws", "stickslip.control.estimators"
+    return {
+        laws: importlib.import_module(laws).CONTROL_LAWS,
+        estimators: importlib.import_module(estimators).ESTIMATORS,
+    }
+
+
+@functools.cache
+def _control_law_in(path: str, code: bytes) -> ControlLaw:
+    found = getattr(_module_of(path, code), "CONTROL_LAW", None)
+    if not isinstance(found, ControlLaw):
+        raise LawError(f"{path} defines no control law; end it with `CONTROL_LAW = ControlLaw(...)`")
+    return found
 
 
 def reference_names() -> tuple[str, ...]:

@@ -167,6 +167,8 @@ class Option:
         Whether the law still is what its ``modes`` say.
     reads_surroundings : bool
         Whether the torque depends on position, load, temperature or time.
+    linear : bool
+        False where a control law is not linear with it.
     """
 
     function: Callable[..., float] | None = None
@@ -180,6 +182,7 @@ class Option:
     wraps: Mapping[str, Callable[..., Any]] = field(default_factory=dict[str, Any])
     keeps_elements: bool = True
     reads_surroundings: bool = False
+    linear: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,6 +259,21 @@ def fields_of(description: type | None) -> tuple[Field, ...]:
     return tuple(out)
 
 
+def packed(fields: Sequence[Field], p: Any) -> list[float]:
+    """Return parameters as the flat list that compiled functions read.
+
+    Scalars in order, then the number of elements (and of whatever else parameters have values per), then one block per
+    field with several values.
+    """
+    flat = [getattr(p, f.name) for f in fields if not f.per_element]
+    blocks = [f for f in fields if f.per_element]
+    sizes = {f.par.per: len(getattr(p, f.name)) for f in reversed(blocks)}
+    flat += [float(sizes[per]) for per in dict.fromkeys(f.par.per for f in blocks)]
+    for f in blocks:
+        flat.extend(getattr(p, f.name))
+    return flat
+
+
 class Described:
     """Something with a name and described parameters: a law, a reference."""
 
@@ -322,17 +340,8 @@ class Described:
         return next((len(getattr(p, f.name)) for f in self.fields if f.per_element and f.par.per == per), 0)
 
     def pack(self, p: Any) -> list[float]:
-        """Return `p` as the flat list that compiled functions read.
-
-        Scalars in order, then the number of elements (and of whatever else parameters have values per), then one
-        block per field with several values.
-        """
-        flat = [getattr(p, f.name) for f in self.fields if not f.per_element]
-        blocks = [f for f in self.fields if f.per_element]
-        flat += [float(self.count_in(p, per)) for per in dict.fromkeys(f.par.per for f in blocks)]
-        for f in blocks:
-            flat.extend(getattr(p, f.name))
-        return flat
+        """Return `p` as the flat list that compiled functions read (`packed`)."""
+        return packed(self.fields, p)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,19 +1,39 @@
-"""The sampled controller (`stickslip.control.sampled`) compiled, with the law of its compensator inside."""
+"""Sampled controllers compiled, with their laws inside: `stickslip.control.sampled` and those made of control laws."""
 
 from __future__ import annotations
 
 import functools
 import math
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from stickslip.control.composition import MEMORY as MEMORY_FIELDS
 from stickslip.control.sampled import Memory, Settings, sampled_by
-from stickslip.jit import compiled_sample, kernel
+from stickslip.control.sampled_controller import SampledController
+from stickslip.jit import call_sample, compiled_sample, flat, kernel, pointer
 from stickslip.spec import Law, Surroundings, fields_of
 from stickslip.subset import Layout, law_layouts
 
-__all__ = ["COMPENSATION", "FAULT", "MEMORY", "measured_position", "sampler"]
+__all__ = [
+    "COMPENSATION",
+    "COMPOSED_COMPENSATION",
+    "COMPOSED_FAULT",
+    "FAULT",
+    "MEMORY",
+    "Sampled",
+    "compiled",
+    "measured_position",
+    "replay",
+    "sampler",
+]
 
 COMPENSATION, FAULT, MEMORY = *map(Memory._fields.index, ("compensation", "fault")), len(Memory._fields)
 """Places of the compensating torque and of the fault in the memory, and its size; the law's state follows it."""
+COMPOSED_COMPENSATION, COMPOSED_FAULT = (
+    [f.name for f in MEMORY_FIELDS].index(name) for name in ("others", "fault")
+)
+"""The same places in the memory of a controller made of control laws."""
 
 
 @kernel()
@@ -35,3 +55,49 @@ def sampler(law: Law | None) -> int:
         "m": Layout.of(fields_of(Memory), counted=False),
     }
     return compiled_sample(f"sampled_{law.name}" if law else "sampled", sampled_by(law), layouts)
+
+
+class Sampled(NamedTuple):
+    """A composed controller, compiled, in flat arrays."""
+
+    address: int
+    """of one sample"""
+    settings: Any
+    memory: Any
+    state: Any
+    parameters: Any
+
+
+def compiled(controller: SampledController) -> Sampled:
+    """Compile a controller made of control laws, at its start."""
+    laws = tuple(
+        (part, block.law, block.friction and block.friction.law) for part, block in controller.blocks.items()
+    )
+    if laws not in _compiled:
+        _compiled[laws] = compiled_sample("controller", controller.functions["sample"], controller.layouts)
+    return Sampled(
+        _compiled[laws],
+        np.array(controller.settings),
+        np.zeros(len(MEMORY_FIELDS)),
+        flat(controller.packed_state()),
+        flat(controller.packed()),
+    )
+
+
+_compiled: dict[Any, int] = {}
+
+
+@kernel()
+def replay(sampled: Sampled, inputs: Any, surroundings: Any, torque: Any, fault: Any) -> None:
+    """Run a controller over recorded samples.
+
+    Each row of `inputs` is measured position, reference position, velocity and acceleration; `torque` (N·m) and `fault`
+    get what the controller answers and how many samples in a row were no numbers.
+    """
+    for i in range(inputs.shape[0]):
+        torque[i] = call_sample(
+            sampled.address, inputs[i, 0], inputs[i, 1], inputs[i, 2], inputs[i, 3], pointer(sampled.settings, 0),
+            pointer(sampled.memory, 0), pointer(sampled.state, 0), pointer(sampled.parameters, 0),
+            pointer(surroundings, 0),
+        )  # fmt: skip
+        fault[i] = sampled.memory[COMPOSED_FAULT]

@@ -1,0 +1,120 @@
+"""A control law with its parameters, and the friction law that it holds: what a controller is made of."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Mapping
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+from stickslip import plugins
+from stickslip.control_spec import ControlLaw
+from stickslip.errors import ParameterError
+from stickslip.model import Model
+from stickslip.spec import Field
+
+__all__ = ["ControlBlock", "within"]
+
+HELD = "friction"
+"""The part of a block's state and parameters that is the friction law's."""
+
+
+class ControlBlock:
+    """A control law with its parameters.
+
+    Parameters
+    ----------
+    law : str or ControlLaw
+        A registered name, the path of a control law's file, or a control law.
+    friction : Model, optional
+        The friction law that it holds, where it needs one.
+    choices : mapping, optional
+        Options of the law by name, ``{"anti_windup": "back_calculation"}``.
+    **parameters
+        The law's parameters in SI units.
+
+    Raises
+    ------
+    UnknownName, ParameterError
+        One line that names the thing, its value and the remedy.
+    """
+
+    __slots__ = ("friction", "law", "parameters")
+
+    def __init__(
+        self,
+        law: str | ControlLaw,
+        friction: Model | None = None,
+        choices: Mapping[str, str] | None = None,
+        **parameters: Any,
+    ) -> None:
+        found = plugins.control_law(law) if isinstance(law, str) else law
+        self.law: ControlLaw = found.having(**choices) if choices else found
+        if self.law.holds_friction and friction is None:
+            raise ParameterError(f"{self.law.name}: it needs a friction law; give friction=Model(...)")
+        if friction is not None and not self.law.holds_friction:
+            raise ParameterError(f"{self.law.name}: it takes no friction law; leave friction out")
+        self.friction = friction
+        own = self.law.parameters(parameters)
+        make: Any = namedtuple  # whose fields are not known to a type checker
+        held = {HELD: friction.parameters} if friction else {}
+        self.parameters: Any = make("Parameters", [*own._fields, *held])(*own, *held.values())
+
+    # ---- what a composition reads ----------------------------------------------------------------------
+
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """Parameters, those of the friction law under their whole names."""
+        return (*self.law.fields, *within(HELD, self.friction.law.fields if self.friction else ()))
+
+    @property
+    def state_fields(self) -> tuple[Field, ...]:
+        """As `fields`, of the state."""
+        return (
+            *self.law.state_fields,
+            *within(HELD, self.friction.law.state_fields if self.friction else ()),
+        )
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """What the names of the fields of its parts begin with."""
+        return (f"{HELD}_",) if self.friction else ()
+
+    def state(self) -> SimpleNamespace:
+        """The state at the start, everything zero."""
+        z = self.law.state(self.law.Parameters(*self.parameters[: len(self.law.fields)]))
+        if self.friction:
+            setattr(z, HELD, self.friction.law.state(self.friction.parameters))
+        return z
+
+    def function(self, name: str) -> Any:
+        """The law's function of that name with the friction law in its place; None where it has none."""
+        own = getattr(self.law, name)
+        return self.law.holding(name, self.friction.law.step) if own and self.friction else own
+
+    # ---- for people --------------------------------------------------------------------------------------
+
+    def as_dict(self) -> dict[str, Any]:
+        """Law, choices and parameters as plain data."""
+        values = {f.name: getattr(self.parameters, f.name) for f in self.law.fields}
+        held = {HELD: self.friction.as_dict()} if self.friction else {}
+        return {"law": self.law.name, **dict(self.law.chosen), **values, **held}
+
+    def __repr__(self) -> str:
+        inside = "".join(f", {k}={v!r}" for k, v in self.as_dict().items() if k not in ("law", HELD))
+        held = f", friction={self.friction!r}" if self.friction else ""
+        return f"ControlBlock({self.law.name!r}{held}{inside})"
+
+
+def within(part: str, fields: tuple[Field, ...]) -> tuple[Field, ...]:
+    """Fields of a part under their names in the whole; what they have a value per is told apart too."""
+    return tuple(
+        replace(
+            f,
+            name=f"{part}_{f.name}",
+            par=replace(f.par, per=f"{part}_{f.par.per}"),
+            like=f"{part}_{f.like}" if f.like else "",
+        )
+        for f in fields
+    )

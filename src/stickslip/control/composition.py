@@ -1,0 +1,279 @@
+"""One sample of a controller made of control laws: measure, feed forward, observe, control, limit.
+
+Written in the scalar subset (`stickslip.subset`). Arguments: settings ``n``, memory ``m`` (which begins with
+what the laws see: `stickslip.control_spec.Signals`), and the laws' states ``z`` and parameters ``p``, each law
+a part of them; surroundings ``u``. The functions `estimate`, `feedforwards`, `observers`, `loops` and
+`left_over` call the laws of one controller; `stickslip.control.sampled_controller` writes them.
+
+An input that is no number leaves the memory alone: the torque that is held fades to 0, ``fault`` counts the
+samples, and the first usable one goes on from there. Positions may be split into whole turns and the rest
+(`sample_turns`), so that their differences are as exact after a thousand turns as in the first one, in single
+precision too.
+"""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, NamedTuple
+
+from stickslip.binding import rescoped
+from stickslip.control_spec import Signals
+from stickslip.spec import Field, Par, fields_of
+
+__all__ = [
+    "MEMORY",
+    "Memory",
+    "Settings",
+    "follow",
+    "follow_turns",
+    "functions_with",
+    "sample",
+    "sample_turns",
+]
+
+TURN = 2.0 * math.pi  # rad
+LARGEST = 1e9  # rad, rad/s, N·m, s: an input beyond it is no measurement
+STILL = 1e-6  # rad/s: a reference that moves slower stands still
+
+
+class Settings(NamedTuple):
+    """Numbers of the composition."""
+
+    torque_limit: Annotated[float, Par("N·m", "T_max", "largest torque")]
+    sample_time: Annotated[float, Par("s", "T", "sample time")]
+    slow: Annotated[float, Par("-", "", "part of the difference by which the slow velocity moves a sample")]
+    fade: Annotated[float, Par("s", "", "over which a torque that was taken over, or held in a fault, fades")]
+    clock: Annotated[float, Par("-", "", "1 where samples make the time, 0 where the caller gives it")]
+
+
+class Memory(NamedTuple):
+    """What the composition remembers besides what the laws see."""
+
+    turns: Annotated[float, Par("-", "", "measured position: whole turns; 0 where they are not counted")]
+    seconds: Annotated[float, Par("s", "", "time since the first sample, in whole seconds")]
+    part: Annotated[float, Par("s", "", "the rest of that time")]
+    waited: Annotated[float, Par("s", "", "time without a usable input since the last one")]
+    fault: Annotated[
+        float, Par("-", "", "samples in a row whose inputs, or torque, were no numbers; 0: none")
+    ]
+    taken: Annotated[float, Par("N·m", "", "difference of the torque that was taken over from its own")]
+    share: Annotated[float, Par("-", "", "of that difference that is left")]
+
+
+MEMORY: tuple[Field, ...] = (*fields_of(Signals), *fields_of(Memory))
+"""The fields of ``m``."""
+
+
+# ---- the laws of one controller: written for it -------------------------------------------------------------------
+
+
+def estimate(m: Any, z: Any, p: Any, u: Any) -> float:
+    """Velocity by the estimator, rad/s."""
+    return 0.0
+
+
+def feedforwards(m: Any, z: Any, p: Any, u: Any) -> float:
+    """Torque of the feedforwards, N·m."""
+    return 0.0
+
+
+def observers(m: Any, z: Any, p: Any, u: Any) -> float:
+    """Torque of the observers, N·m."""
+    return 0.0
+
+
+def loops(m: Any, z: Any, p: Any, u: Any) -> float:
+    """Torque of the control loop, N·m."""
+    return 0.0
+
+
+def left_over(missing: float, m: Any, z: Any, p: Any, u: Any) -> float:
+    """What the laws cannot take over of a missing torque, N·m."""
+    return missing
+
+
+# ---- a sample ------------------------------------------------------------------------------------------------------
+
+
+def unusable(
+    turns: float, position: float, reference_turns: float, reference: float, reference_velocity: float,
+    reference_acceleration: float, u: Any,
+) -> float:  # fmt: skip
+    """1 where an input is no number, or one that no machine has; else 0."""
+    size = abs(turns) + abs(position) + abs(reference_turns) + abs(reference) + abs(reference_velocity)
+    size += abs(reference_acceleration)
+    size += abs(u.load) + abs(u.temperature) + abs(u.time) + abs(u.applied)
+    if size < LARGEST:
+        return 0.0
+    return 1.0
+
+
+def faulty(n: Any, m: Any) -> float:
+    """A sample without a usable input: the torque that is held falls to 0 over the fade. Returns it, N·m."""
+    before = m.share
+    if m.fault == 0.0:
+        m.taken = m.applied
+        before = 1.0
+    m.fault += 1.0
+    m.share = max(0.0, 1.0 - m.fault * n.sample_time / max(n.fade, n.sample_time))
+    m.applied = m.share * m.taken
+    m.commanded = m.applied
+    m.others = 0.0
+    if before > 0.0:
+        m.feedforward *= m.share / before
+    return m.applied
+
+
+def keep_time(n: Any, m: Any, u: Any) -> None:
+    """The time, s; whole seconds are kept apart, so that single precision loses no sample in years."""
+    if n.clock != 0.0:
+        u.time = m.seconds + m.part
+        m.part += n.sample_time
+        whole = math.floor(m.part)
+        m.seconds += whole
+        m.part -= whole
+
+
+def see(
+    turns: float, position: float, reference_turns: float, reference: float, reference_velocity: float,
+    reference_acceleration: float, n: Any, m: Any, u: Any,
+) -> None:  # fmt: skip
+    """Write down what is measured and asked for."""
+    m.moved = 0.0
+    m.elapsed = n.sample_time
+    if m.started != 0.0:
+        m.moved = TURN * (turns - m.turns) + (position - m.position)
+        m.elapsed = n.sample_time + m.waited
+    m.turns = turns
+    m.position = position
+    m.reference = reference
+    m.reference_velocity = reference_velocity
+    m.reference_acceleration = reference_acceleration
+    m.error = TURN * (reference_turns - turns) + (reference - position)
+    m.torque_limit = n.torque_limit
+    if abs(reference_velocity) < STILL:
+        m.rest += 1.0
+    else:
+        m.rest = 0.0
+    u.position = TURN * turns + position
+
+
+def respond(n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
+    """Run the laws in the order of their places. Returns the torque before the limit, N·m."""
+    m.velocity = estimate(m, z, p, u)
+    m.slow_velocity += n.slow * (m.velocity - m.slow_velocity)
+    m.residual = m.applied - m.feedforward
+    m.feedforward = 0.0
+    m.others = 0.0
+    m.feedforward = feedforwards(m, z, p, u)
+    m.others = m.feedforward
+    m.others += observers(m, z, p, u)
+    torque = m.others + loops(m, z, p, u)
+    m.started = 1.0
+    m.waited = 0.0
+    return torque
+
+
+def faded(torque: float, n: Any, m: Any) -> float:
+    """The torque with what is left of the one that was taken over, or held in a fault, N·m."""
+    if m.fault > 0.0:
+        m.fault = 0.0
+        m.taken = m.applied - torque
+        m.share = 1.0
+    whole = torque
+    if m.share > 0.0:
+        whole = torque + m.share * m.taken
+        m.share = max(0.0, m.share - n.sample_time / max(n.fade, n.sample_time))
+    return whole
+
+
+def sample_turns(
+    turns: float, position: float, reference_turns: float, reference: float, reference_velocity: float,
+    reference_acceleration: float, n: Any, m: Any, z: Any, p: Any, u: Any,
+) -> float:  # fmt: skip
+    """One sample with positions as whole turns and the rest, rad. Returns the torque to hold, N·m."""
+    keep_time(n, m, u)
+    if (
+        unusable(turns, position, reference_turns, reference, reference_velocity, reference_acceleration, u)
+        != 0.0
+    ):
+        m.waited += n.sample_time
+        return faulty(n, m)
+    see(turns, position, reference_turns, reference, reference_velocity, reference_acceleration, n, m, u)
+    torque = respond(n, m, z, p, u)
+    if not abs(torque) < math.inf:
+        return faulty(n, m)
+    m.commanded = faded(torque, n, m)
+    m.applied = min(max(m.commanded, -n.torque_limit), n.torque_limit)
+    return m.applied
+
+
+def sample(
+    position: float, reference: float, reference_velocity: float, reference_acceleration: float,
+    n: Any, m: Any, z: Any, p: Any, u: Any,
+) -> float:  # fmt: skip
+    """One sample: measure, compensate, control, limit. Returns the torque to hold, N·m."""
+    return sample_turns(
+        0.0, position, 0.0, reference, reference_velocity, reference_acceleration, n, m, z, p, u
+    )
+
+
+def follow_turns(
+    turns: float, position: float, reference_turns: float, reference: float, reference_velocity: float,
+    reference_acceleration: float, torque: float, n: Any, m: Any, z: Any, p: Any, u: Any,
+) -> float:  # fmt: skip
+    """Watch one sample while another controls the axis with `torque`, N·m; the sample that takes over starts there.
+
+    The laws run, so that an observer knows the disturbance when it takes over; what they would give otherwise
+    goes into the integral, or fades.
+    """
+    keep_time(n, m, u)
+    m.share = 0.0
+    if not abs(torque) < LARGEST:
+        m.waited += n.sample_time
+        return faulty(n, m)
+    if (
+        unusable(turns, position, reference_turns, reference, reference_velocity, reference_acceleration, u)
+        != 0.0
+    ):
+        m.waited += n.sample_time
+        m.fault += 1.0
+        m.applied = torque
+        return torque
+    see(turns, position, reference_turns, reference, reference_velocity, reference_acceleration, n, m, u)
+    own = respond(n, m, z, p, u)
+    m.applied = torque
+    m.commanded = torque
+    if not abs(own) < math.inf:
+        m.fault += 1.0
+        return torque
+    m.fault = 0.0
+    m.taken = left_over(torque - own, m, z, p, u)
+    m.share = 1.0
+    return torque
+
+
+def follow(
+    position: float, reference: float, reference_velocity: float, reference_acceleration: float, torque: float,
+    n: Any, m: Any, z: Any, p: Any, u: Any,
+) -> float:  # fmt: skip
+    """Watch one sample while another controls the axis with `torque`, N·m; the sample that takes over starts there."""
+    return follow_turns(
+        0.0, position, 0.0, reference, reference_velocity, reference_acceleration, torque, n, m, z, p, u
+    )
+
+
+def functions_with(laws: Mapping[str, Callable[..., float]]) -> dict[str, Callable[..., float]]:
+    """The functions of this file by name, with those of a controller's laws in their places."""
+    home = globals()
+    own = {
+        name: value
+        for name, value in home.items()
+        if isinstance(value, types.FunctionType) and value.__globals__ is home
+    }
+    scope = dict(home)
+    scope.update({name: rescoped(function, scope) for name, function in own.items()})
+    scope.update(laws)
+    return {name: scope[name] for name in own}

@@ -1,0 +1,40 @@
+"""PD: proportional to the position error and to the velocity error; thesis eq. 3.5."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from stickslip.control.linear import Gains
+from stickslip.control.linear import pd as gains_of
+from stickslip.control_spec import ControlLaw
+from stickslip.spec import Par
+
+__all__ = ["CONTROL_LAW"]
+
+
+class Params(NamedTuple):
+    """Gains, thesis eq. 3.10."""
+
+    kp: Annotated[float, Par("N·m/rad", "k_p", "proportional gain", lower=0.0)]
+    kd: Annotated[float, Par("N·m·s/rad", "k_d", "gain on the velocity error", lower=0.0)]
+
+
+def sample(y: Any, z: Any, p: Any, u: Any) -> float:
+    """Torque, N·m."""
+    return p.kp * y.error + p.kd * (y.reference_velocity - y.velocity)
+
+
+def continuous(p: Any) -> Gains:
+    """The same in continuous time."""
+    return gains_of(p.kp, p.kd)
+
+
+CONTROL_LAW = ControlLaw(
+    "pd", Params, sample, "loop",
+    title="PD",
+    equation=r"T = k_p e + k_d (\dot\theta_d - v)",
+    source=("thesis eq. 3.5",),
+    example={"kp": 6.099, "kd": 0.097067},
+    continuous=continuous,
+    linear=True,
+)  # fmt: skip

@@ -1,0 +1,241 @@
+"""A sampled controller made of control laws, with its limit and its sample time."""
+
+from __future__ import annotations
+
+import functools
+import linecache
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+from stickslip.control.block import ControlBlock, within
+from stickslip.control.composition import MEMORY, Settings, functions_with
+from stickslip.control_spec import PLACES
+from stickslip.errors import ParameterError
+from stickslip.spec import Field, Surroundings, fields_of, packed
+from stickslip.subset import Layout
+
+__all__ = ["FADE", "SampledController"]
+
+FADE = 0.1
+"""s, over which a torque that was taken over fades."""
+SLOW = 2.0 * math.pi * 20.0
+"""rad/s, corner of the low-pass of the slow velocity."""
+
+Blocks = ControlBlock | Sequence[ControlBlock] | None
+
+
+@dataclass(frozen=True)
+class SampledController:
+    """A controller that acts every sample time and holds its torque in between.
+
+    Attributes
+    ----------
+    loop : ControlBlock or sequence of ControlBlock
+        The control loop: PD, PID, ...
+    sample_time : float
+        s
+    feedforward, observer : ControlBlock or sequence of ControlBlock, optional
+        What acts on the reference alone, and on the measurement.
+    estimator : ControlBlock, optional
+        How the velocity is found from measured positions; the backward difference, if none is given.
+    torque_limit : float
+        The size of the torque never exceeds it, N·m; infinite for none.
+    encoder_counts : float
+        Counts per revolution of the encoder; 0 measures exactly.
+
+    Raises
+    ------
+    ParameterError
+        If a law does not belong where it is given, or a number is out of bounds.
+    """
+
+    loop: Blocks
+    sample_time: float
+    feedforward: Blocks = None
+    observer: Blocks = None
+    estimator: ControlBlock | None = None
+    torque_limit: float = math.inf
+    encoder_counts: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value, unit in (
+            ("sample_time", self.sample_time, "s"),
+            ("torque_limit", self.torque_limit, "N·m"),
+        ):
+            if not value > 0.0 or (name == "sample_time" and not math.isfinite(value)):
+                raise ParameterError(f"controller: {name} = {value:g} {unit} must be greater than 0")
+        if not (math.isfinite(self.encoder_counts) and self.encoder_counts >= 0.0):
+            raise ParameterError(f"controller: encoder_counts = {self.encoder_counts:g} must be at least 0")
+        for place in PLACES:
+            for block in _listed(getattr(self, place)):
+                if block.law.place != place:
+                    raise ParameterError(
+                        f"controller: {place} = {block.law.name!r} is no {place}; give it as {block.law.place}"
+                    )
+        if not self.blocks.keys() - {"estimator"}:
+            raise ParameterError("controller: it has no law; give a loop, a feedforward or an observer")
+
+    # ---- its laws ----------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def blocks(self) -> dict[str, ControlBlock]:
+        """Its laws by the names of their parts, in the order in which a sample runs them."""
+        out: dict[str, ControlBlock] = {}
+        for place in PLACES:
+            found = _listed(getattr(self, place))
+            if place == "estimator" and not found:
+                found = [ControlBlock("backward_difference")]
+            for i, block in enumerate(found, 1):
+                out[place if i == 1 else f"{place}_{i}"] = block
+        return out
+
+    @functools.cached_property
+    def fields(self) -> tuple[Field, ...]:
+        """The parameters of all its laws, under their whole names."""
+        return _distinct(f for part, block in self.blocks.items() for f in within(part, block.fields))
+
+    @functools.cached_property
+    def state_fields(self) -> tuple[Field, ...]:
+        """As `fields`, of the states."""
+        return _distinct(f for part, block in self.blocks.items() for f in within(part, block.state_fields))
+
+    @functools.cached_property
+    def layouts(self) -> dict[str, Layout]:
+        """The layouts of the arguments of `functions`."""
+        parts = [f"{part}_" for part in self.blocks]
+        parts += [f"{part}_{inner}" for part, block in self.blocks.items() for inner in block.parts]
+        return {
+            "n": Layout.of(fields_of(Settings), counted=False),
+            "m": Layout.of(MEMORY, counted=False),
+            "z": Layout.of(self.state_fields, counted=False, parts=tuple(parts)),
+            "p": Layout.of(self.fields, counted=True, parts=tuple(parts)),
+            "u": Layout(Surroundings._fields),
+        }
+
+    @functools.cached_property
+    def functions(self) -> dict[str, Callable[..., float]]:
+        """The functions of `stickslip.control.composition` with its laws in their places."""
+        return functions_with(_written(self.blocks))
+
+    # ---- its numbers -------------------------------------------------------------------------------------
+
+    @property
+    def settings(self) -> Settings:
+        """The numbers of the composition."""
+        return Settings(
+            self.torque_limit, self.sample_time, 1.0 - math.exp(-SLOW * self.sample_time), FADE, 0.0
+        )
+
+    @property
+    def parameters(self) -> SimpleNamespace:
+        """Parameters of the laws, each law's a part: ``p.loop.kp``."""
+        return SimpleNamespace(**{part: block.parameters for part, block in self.blocks.items()})
+
+    def state(self) -> SimpleNamespace:
+        """The state of the laws at the start."""
+        return SimpleNamespace(**{part: block.state() for part, block in self.blocks.items()})
+
+    @staticmethod
+    def memory() -> SimpleNamespace:
+        """The memory of the composition at the start."""
+        return SimpleNamespace(**{f.name: 0.0 for f in MEMORY})
+
+    def packed(self) -> list[float]:
+        """The parameters as the flat list that compiled functions read."""
+        values = {f.name: _at(self.parameters, name) for f, name in zip(self.fields, self._paths("fields"))}
+        return packed(self.fields, SimpleNamespace(**values))
+
+    def packed_state(self, z: SimpleNamespace | None = None) -> list[float]:
+        """A state (that at the start, if none is given) as the flat list that compiled functions read."""
+        z = self.state() if z is None else z
+        values = [(f, _at(z, name)) for f, name in zip(self.state_fields, self._paths("state_fields"))]
+        flat = [value for f, value in values if not f.per_element]
+        for f, value in values:
+            if f.per_element:
+                flat.extend(value)
+        return flat
+
+    def _paths(self, kind: str) -> list[tuple[str, ...]]:
+        """Where each field lies among the parts: ``("feedforward", "friction", "sigma0")``."""
+        paths: list[tuple[str, ...]] = []
+        for part, block in self.blocks.items():
+            own = len(getattr(block.law, kind))
+            for i, f in enumerate(getattr(block, kind)):
+                held = f.name.removeprefix("friction_")
+                paths.append((part, f.name) if i < own else (part, "friction", held))
+        return paths
+
+    # ---- for people --------------------------------------------------------------------------------------
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data that says everything about it."""
+        return {
+            **{part: block.as_dict() for part, block in self.blocks.items()},
+            "sample_time": self.sample_time,
+            "torque_limit": self.torque_limit,
+            "encoder_counts": self.encoder_counts,
+        }
+
+
+def _listed(blocks: Blocks) -> list[ControlBlock]:
+    """None, one or several as a list."""
+    if blocks is None:
+        return []
+    return [blocks] if isinstance(blocks, ControlBlock) else list(blocks)
+
+
+def _distinct(fields: Iterable[Field]) -> tuple[Field, ...]:
+    """The fields; two of one name would be one number."""
+    out = tuple(fields)
+    names = [f.name for f in out]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ParameterError(
+            f"controller: two of its laws' fields are called {twice[0]!r}; rename one of them"
+        )
+    return out
+
+
+def _at(whole: Any, path: Sequence[str]) -> Any:
+    """The value that lies there."""
+    for name in path:
+        whole = getattr(whole, name)
+    return whole
+
+
+# ---- the functions that call the laws -----------------------------------------------------------------------------
+
+SUMS = {
+    "estimate": ("estimator", "Velocity by the estimator, rad/s."),
+    "feedforwards": ("feedforward", "Torque of the feedforwards, N·m."),
+    "observers": ("observer", "Torque of the observers, N·m."),
+    "loops": ("loop", "Torque of the control loop, N·m."),
+}
+
+
+def _written(blocks: Mapping[str, ControlBlock]) -> dict[str, Callable[..., float]]:
+    """`estimate`, `feedforwards`, `observers`, `loops` and `left_over` of these laws."""
+    lines: list[str] = []
+    scope: dict[str, Any] = {}
+    for name, (place, about) in SUMS.items():
+        parts = [part for part, block in blocks.items() if block.law.place == place]
+        calls = " + ".join(f"{part}_sample(m, z.{part}, p.{part}, u)" for part in parts)
+        lines += [f"def {name}(m, z, p, u):", f'    """{about}"""', f"    return {calls or '0.0'}", ""]
+        scope |= {f"{part}_sample": blocks[part].function("sample") for part in parts}
+    able = [part for part, block in blocks.items() if block.law.take_over]
+    scope |= {f"{part}_take_over": blocks[part].function("take_over") for part in able}
+    lines += [
+        "def left_over(missing, m, z, p, u):",
+        '    """What they cannot take over of a missing torque, N·m."""',
+    ]
+    lines += [f"    missing = {part}_take_over(missing, m, z.{part}, p.{part}, u)" for part in able]
+    lines += ["    return missing", ""]
+    text = "\n".join(lines)
+    # The translation reads a function's text, as it does that of a file.
+    file = f"<controller of {', '.join(f'{part}: {block.law.name}' for part, block in blocks.items())}>"
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+    exec(compile(text, file, "exec"), scope)
+    return {name: scope[name] for name in (*SUMS, "left_over")}

@@ -1,0 +1,159 @@
+"""The one description of a control law: its parameters, its state and its functions.
+
+Everything that reads a control law (the composition of a controller, the engines, exports, the contract suite)
+reads this description, so that a control law is written once, in one file.
+
+Argument order, everywhere: signals of the loop ``y``, state ``z``, parameters ``p``, surroundings ``u``.
+
+====================================  ==============================================================
+``sample(y, z, p, u)``                torque of this sample, N·m (of an estimator: the velocity, rad/s); advances ``z``
+``take_over(missing, y, z, p, u)``    changes ``z`` so that the torque would be ``missing`` N·m higher; returns what it
+                                      could not take over, N·m
+``check(p)``                          a sentence that says what is wrong with the parameters, or ""
+``delay(p, sample_time)``             of an estimator: its delay at low frequency, s
+``continuous(p)``                     the law in continuous time, as `stickslip.control.linear.Gains`
+====================================  ==============================================================
+
+``sample`` and ``take_over`` are written in the scalar subset (`stickslip.subset`). ``y`` has the fields of
+`Signals`, ``u`` those of `stickslip.spec.Surroundings`. A law that holds a friction law calls ``friction(v0,
+v1, dt, z.friction, p.friction, u)``.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from dataclasses import fields as dataclass_fields
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+from stickslip.binding import bound, first_complaint
+from stickslip.errors import LawError
+from stickslip.spec import Choice, Configurable, Field, Par, fields_of
+
+__all__ = ["PLACES", "REST", "ControlLaw", "Signals", "friction"]
+
+PLACES = ("estimator", "feedforward", "observer", "loop")
+"""Where a law stands in a controller, in the order in which a sample runs them."""
+
+REST = 10.0
+"""Samples for which the reference has stood still where an axis counts as at rest: a reversal is none."""
+
+
+class Signals(NamedTuple):
+    """What a control law sees in one sample."""
+
+    position: Annotated[float, Par("rad", "theta", "measured position, minus the whole turns")]
+    moved: Annotated[float, Par("rad", "", "change of the measured position since the last usable sample")]
+    velocity: Annotated[float, Par("rad/s", "v", "velocity by the controller's estimator")]
+    slow_velocity: Annotated[float, Par("rad/s", "v_f", "the same through a slow low-pass, for gates")]
+    reference: Annotated[float, Par("rad", "theta_d", "reference position, minus the whole turns")]
+    reference_velocity: Annotated[float, Par("rad/s", "v_d", "reference velocity")]
+    reference_acceleration: Annotated[float, Par("rad/s²", "a_d", "reference acceleration")]
+    error: Annotated[float, Par("rad", "e", "reference minus measured position")]
+    applied: Annotated[float, Par("N·m", "T_m", "torque applied since the last sample, after the limit")]
+    commanded: Annotated[float, Par("N·m", "", "the same before the limit")]
+    residual: Annotated[
+        float, Par("N·m", "", "torque applied since the last sample minus the feedforward in it")
+    ]
+    feedforward: Annotated[
+        float, Par("N·m", "T_ff", "feedforward of this sample; 0 while feedforwards are computed")
+    ]
+    others: Annotated[float, Par("N·m", "T_hat", "torque of the places that ran before in this sample")]
+    torque_limit: Annotated[float, Par("N·m", "T_max", "largest torque")]
+    elapsed: Annotated[
+        float, Par("s", "T", "time since the last usable sample; the sample time at the first")
+    ]
+    started: Annotated[float, Par("-", "", "1 after the first sample")]
+    rest: Annotated[float, Par("-", "", "samples for which the reference velocity has been 0")]
+
+
+def friction(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
+    """The friction law that a control law holds; a controller puts its ``step`` here. N·m."""
+    return 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ControlLaw(Configurable):
+    """A control law (see the module's docstring for its functions and their arguments).
+
+    Attributes
+    ----------
+    name, title : str
+        The name by which people and files call it; its name in words.
+    Params : type
+        A NamedTuple with ``Annotated[float, Par(...)]`` fields. Fields of the chosen options are added to them.
+    sample : callable
+    place : str
+        One of `PLACES`.
+    equation, source : str
+        Its equation in LaTeX; thesis equation numbers and keys of ``references.bib``.
+    example : mapping
+        Parameters for an axis of 3.8623e-4 kg·m² at 1 kHz, for documentation and the contract tests.
+    State : type or None
+        As ``Params``, for the internal state. Everything is 0 at the start.
+    take_over, check, delay, continuous : callable or None
+    linear : bool
+        Superposition holds while the torque is within its limit. A declaration: the contract tests try it.
+    holds_friction : bool
+        Whether it needs a friction law.
+    choices : tuple of Choice
+    """
+
+    kind: ClassVar[str] = "control law"
+    name: str
+    Params: type
+    sample: Callable[..., float]
+    place: str
+    title: str
+    equation: str
+    source: tuple[str, ...]
+    example: Mapping[str, Any]
+    State: type | None = None
+    take_over: Callable[..., float] | None = None
+    check: Callable[[Any], str] | None = None
+    delay: Callable[[Any, float], float] | None = None
+    continuous: Callable[[Any], Any] | None = None
+    linear: bool = False
+    holds_friction: bool = False
+    choices: tuple[Choice, ...] = ()
+    chosen: Mapping[str, str] = field(default_factory=dict[str, str])
+    variants: dict[tuple[tuple[str, str], ...], Any] = field(default_factory=dict[Any, Any], repr=False)
+    written: Mapping[str, Any] = field(init=False, repr=False)
+    fields: tuple[Field, ...] = field(init=False)
+    state_fields: tuple[Field, ...] = field(init=False)
+    Parameters: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        if self.place not in PLACES:
+            raise LawError(
+                f"control law {self.name!r}: place = {self.place!r} must be one of {', '.join(PLACES)}"
+            )
+        written = {f.name: getattr(self, f.name) for f in dataclass_fields(self) if f.init}
+        chosen = [self.option(choice) for choice in self.choices]
+        fields, scope = self.option_fields(self.Params), self.option_scope()
+        make: Any = namedtuple  # whose fields are not known to a type checker
+        checks = [f for f in (self.check, *(o.check for o in chosen)) if f]
+        parts: dict[str, Any] = {
+            "written": written,
+            "fields": tuple(fields.values()),
+            "state_fields": fields_of(self.State),
+            "Parameters": make(self.Params.__name__, list(fields)),
+            "example": self.option_examples(self.example, fields),
+            "check": first_complaint(checks),
+            **{name: bound(getattr(self, name), scope) for name in ("sample", "take_over", "delay")},
+        }
+        for name, part in parts.items():
+            object.__setattr__(self, name, part)
+        self.parameters(dict(self.example))
+
+    def holding(self, name: str, step: Callable[..., float]) -> Callable[..., float]:
+        """The function of that name with a friction law's ``step`` in its place, in the chosen options too."""
+        held = {"friction": step}
+        options = {replaces: bound(function, held) for replaces, function in self.option_scope().items()}
+        return bound(self.written[name], {**options, **held})
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether superposition holds with the chosen options."""
+        return self.linear and all(self.option(choice).linear for choice in self.choices)

@@ -1,0 +1,67 @@
+"""The controllers of the reference's golden traces, by the names of its rows."""
+
+from __future__ import annotations
+
+import math
+
+from stickslip.control.block import ControlBlock
+from stickslip.control.sampled_controller import SampledController
+from stickslip.model import Model
+
+INERTIA = 3.8623e-4
+W = 2.0 * math.pi * 20.0
+PD = {"kp": INERTIA * W**2, "kd": 2.0 * INERTIA * W}
+PID = {"kp": 3.0 * INERTIA * W**2, "kd": 3.0 * INERTIA * W, "ki": INERTIA * W**3}
+CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
+LUGRE = Model("lugre", sigma0=3.5e4, sigma1=0.0, **CURVE)
+GMS = Model("gms", k=[12896.0, 8141.0, 4273.0], alpha=[1 / 3] * 3, c=23.8782, **CURVE)
+
+
+def controller(loop, feedforward=None, observer=None):
+    return SampledController(loop, 1e-3, feedforward, observer, torque_limit=1.0)
+
+
+def pd():
+    return ControlBlock("pd", **PD)
+
+
+def pid(choices=None, **more):
+    return ControlBlock("pid", None, choices, **PID, **more)
+
+
+def compensation(model):
+    return ControlBlock("friction_feedforward", model, {"velocity": "held"}, gain=0.9)
+
+
+def observer(corner, **choices):
+    return ControlBlock("disturbance_observer", None, choices, inertia=INERTIA, corner=corner)
+
+
+ROWS = {
+    "PD": controller(pd()),
+    "PID": controller(pid()),
+    "PD + FF LuGre .9": controller(pd(), compensation(LUGRE)),
+    "PID + FF LuGre .9": controller(pid(), compensation(LUGRE)),
+    "PD + FF GMS3 .9": controller(pd(), compensation(GMS)),
+    "PID + FF GMS3 .9": controller(pid(), compensation(GMS)),
+    "PD + DOB 200": controller(pd(), None, observer(200.0)),
+    "PD + DOB 400": controller(pd(), None, observer(400.0)),
+    "PD + DOB 800": controller(pd(), None, observer(800.0)),
+    "PD + DOB 400 aligned": controller(pd(), None, observer(400.0, aligned="yes")),
+    "PD + DOB2 400": controller(pd(), None, observer(400.0, order="second")),
+    "PD + FF LuGre .9 + DOB 200 residual": controller(pd(), compensation(LUGRE), observer(200.0)),
+    "PD + FF LuGre .9 + DOB 400 residual": controller(pd(), compensation(LUGRE), observer(400.0)),
+    "PD + FF LuGre .9 + DOB 400 aligned residual": controller(
+        pd(), compensation(LUGRE), observer(400.0, aligned="yes")
+    ),
+    "PD + FF LuGre .9 + DOB 400 whole (wrong)": controller(
+        pd(), compensation(LUGRE), observer(400.0, fed_with="whole")
+    ),
+    "PD + FF GMS3 .9 + DOB 400 residual": controller(pd(), compensation(GMS), observer(400.0)),
+    "PID reset at rest": controller(pid({"at_rest": "reset"})),
+    "PID dead band 2e-4 at rest": controller(pid({"at_rest": "dead_band"}, dead_band=2e-4)),
+    "PD + DOB 400 reset at rest": controller(pd(), None, observer(400.0, at_rest="reset")),
+    "PD + FF LuGre .9 + DOB 400 residual reset at rest": controller(
+        pd(), compensation(LUGRE), observer(400.0, at_rest="reset")
+    ),
+}

@@ -1,0 +1,59 @@
+"""Velocity estimators: the stated delay is the one measured, and rest is rest."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from stickslip import plugins
+from stickslip.control.block import ControlBlock
+from stickslip.control.estimators import ESTIMATORS
+from stickslip.control.sampled_controller import SampledController
+from stickslip.spec import Surroundings
+
+TIME = 1e-3
+
+
+def velocities(block, position):
+    """The estimate along measured positions, rad/s."""
+    controller = SampledController(ControlBlock("pd", kp=0.0, kd=1.0), TIME, estimator=block)
+    n, m, z, p = controller.settings, controller.memory(), controller.state(), controller.parameters
+    u, sample = SimpleNamespace(**Surroundings()._asdict()), controller.functions["sample"]
+    return np.array([-sample(x, x, 0.0, 0.0, n, m, z, p, u) for x in position.tolist()])
+
+
+@pytest.mark.parametrize("time", [1e-3, 2.5e-4])
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_the_stated_delay_is_the_lag_behind_a_constant_acceleration(name, time, monkeypatch):
+    monkeypatch.setattr(f"{__name__}.TIME", time)
+    law = plugins.control_law(name)
+    block = ControlBlock(law, **dict(law.example))
+    t = np.arange(2000) * time
+    lag = (t - velocities(block, 0.5 * t**2))[-1]
+    assert law.delay(block.parameters, time) == pytest.approx(lag, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_a_constant_velocity_is_found_and_rest_is_rest(name):
+    block = ControlBlock(name, **dict(plugins.control_law(name).example))
+    found = velocities(block, 0.3 * TIME * np.arange(400) + 7.0)
+    assert found[0] == 0.0
+    assert found[-1] == pytest.approx(0.3, rel=1e-9)
+    assert not velocities(block, np.full(50, 7.0)).any()
+
+
+def test_more_filter_is_more_delay_and_less_noise():
+    noise = 1e-5 * np.random.default_rng(1).standard_normal(4000)
+    blocks = [ControlBlock("backward_difference")]
+    blocks += [
+        ControlBlock(name, corner=corner)
+        for name in ("filtered_difference", "butterworth_difference", "luenberger")
+        for corner in (800.0, 200.0)
+    ]
+    spread = [float(np.std(velocities(block, noise))) for block in blocks]
+    delay = [block.law.delay(block.parameters, TIME) for block in blocks]
+    for wide in (1, 3, 5):
+        assert spread[0] > spread[wide] > spread[wide + 1]
+        assert delay[0] < delay[wide] < delay[wide + 1]
