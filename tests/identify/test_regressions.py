@@ -22,7 +22,7 @@ AXIS = ServoAxis(drive_side="load")
 
 def record(fc: float = 0.1) -> Trial:
     """An axis with Coulomb and viscous friction on two sines."""
-    t = np.arange(8000) * 1e-3
+    t = 1e-3 * np.arange(8000, dtype=np.float64)
     q = 0.5 * np.sin(4.0 * t) + 0.3 * np.sin(1.5 * t)
     v, a = 2.0 * np.cos(4.0 * t) + 0.45 * np.cos(1.5 * t), -8.0 * np.sin(4.0 * t) - 0.675 * np.sin(1.5 * t)
     noise = np.random.default_rng(1).normal(0.0, 1.0, (2, t.size))

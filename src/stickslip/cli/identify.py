@@ -174,9 +174,8 @@ def run(args: argparse.Namespace) -> int:
         args.law = [*tried, *(x for x in args.law if x != "all" and x not in tried)]
     _output.say(f"method {args.method}, {sum(len(s.record) for s in sources)} samples")
     if not args.no_report:
-        # What draws and writes it loads while compiled code runs.
-        names = ("matplotlib.figure", "matplotlib.backends.backend_svg", "jinja2")
-        threading.Thread(target=lambda: [importlib.import_module(name) for name in names]).start()
+        # What writes it loads while compiled code runs.
+        threading.Thread(target=lambda: importlib.import_module("jinja2")).start()
     found = identified(sources, args, regress)
     if left_out:
         names = ", ".join(left_out)

@@ -11,10 +11,12 @@ import numpy as np
 from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.report import plots
 
-__all__ = ["draw_identification", "draw_picture", "draw_picture_to"]
+__all__ = ["HEIGHT", "draw_identification", "draw_picture", "draw_picture_to", "panel_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+HEIGHT = 2.7
+"""Of a picture's axes, inches."""
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES: tuple[Any, ...] = (
     "-",
@@ -34,7 +36,7 @@ def draw_identification(result: Identification, folder: Path) -> tuple[Path, ...
 def draw_picture(picture: Picture, folder: Path) -> Path:
     """Draw one picture into `folder` as SVG and PNG; returns the PNG."""
     stem = folder / picture.name
-    plots.draw(stem, picture.title, picture.message, [_panel(picture)], 2.7)
+    plots.draw(stem, picture.title, picture.message, [panel_of(picture)], HEIGHT)
     return stem.with_name(stem.name + ".png")
 
 
@@ -46,11 +48,12 @@ def draw_picture_to(picture: Picture, target: Path) -> Path:
     InputError
         If the file cannot be written.
     """
-    plots.save([target], picture.title, picture.message, [_panel(picture)], 2.7, option="--plot")
+    plots.save([target], picture.title, picture.message, [panel_of(picture)], HEIGHT, option="--plot")
     return target
 
 
-def _panel(picture: Picture) -> plots.Panel:
+def panel_of(picture: Picture) -> plots.Panel:
+    """The picture in the house style: colours, dashes, small values in milli and micro."""
     styles = iter(zip(LINES, DASHES, strict=True))
     x_factor, x_label = _readable(picture.x_label, [t.x for t in picture.traces])
     if picture.x_scale == "log":

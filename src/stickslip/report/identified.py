@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,15 +17,13 @@ from stickslip.record import Record
 from stickslip.report.answers import answers_of, meaning_of, one_number_each, speeds_in
 from stickslip.report.axis_evidence import judgements
 from stickslip.report.axis_pictures import data_pictures, pictures_of
-from stickslip.report.identification import draw_picture_to
+from stickslip.report.identification import HEIGHT, panel_of
 from stickslip.report.page import filled, replaced
-from stickslip.report.plots import embedded
 from stickslip.report.sliding_torque import sliding_of
+from stickslip.report.svg import embedded_svg
 
 __all__ = ["Source", "comparison_of", "number", "write_identification"]
 
-DENSE = 3000
-"""Points of a picture beyond which it is embedded as pixels: drawing both forms to compare them takes as long again."""
 TABLE = 15
 """Estimates beyond which a table of all correlations is too wide to read."""
 STRONG = 0.9
@@ -118,18 +115,12 @@ def rendered(
     law = found.model.law if found.model else None
     method = found.method.replace("_", " ")
     columns, rows = comparison_of(found)
-    with tempfile.TemporaryDirectory() as folder:
-        parts = {
-            "data": figures(
-                data_pictures([s.record for s in sources], [s.name for s in sources]), Path(folder)
-            ),
-            "friction": figures(law_picture, Path(folder)),
-            "trust": figures(torque, Path(folder)),
-            "fits": figures(
-                [p for p in pictures if p not in rest and p.name not in shown_first], Path(folder)
-            ),
-            "residuals": figures(rest, Path(folder)),
-        }
+    parts = {
+        "data": figures(data_pictures([s.record for s in sources], [s.name for s in sources])),
+        "friction": figures(law_picture), "trust": figures(torque),
+        "fits": figures([p for p in pictures if p not in rest and p.name not in shown_first]),
+        "residuals": figures(rest),
+    }  # fmt: skip
     return filled(
         "commission.html" if headline else "identification.html",
         headline=headline,
@@ -303,11 +294,10 @@ def correlation(found: Identification) -> dict[str, Any]:
     return {**none, "names": names, "rows": rows}
 
 
-def figures(pictures: Sequence[Picture], folder: Path) -> list[dict[str, Any]]:
+def figures(pictures: Sequence[Picture]) -> list[dict[str, Any]]:
     """Draw pictures and embed them."""
-    out: list[dict[str, Any]] = []
-    for p in pictures:
-        dense = sum(t.x.size for t in p.traces) > DENSE
-        file = draw_picture_to(p, folder / f"{p.name}.{'png' if dense else 'svg'}")
-        out.append({"id": p.name, "title": p.title, "caption": p.message, **embedded(file)})
-    return out
+    return [
+        {"id": p.name, "title": p.title, "caption": p.message}
+        | embedded_svg(p.title, p.message, panel_of(p), HEIGHT)
+        for p in pictures
+    ]
