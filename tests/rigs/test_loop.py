@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from axis_rig import FRICTION, LIMITS, AxisRig
 
+from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
@@ -25,6 +26,8 @@ from stickslip.rigs.rig import Limits, Measurement, Setpoint, setpoints
 
 PD = Controller(pd(19.7612, 0.1747), Feedforward(FRICTION), torque_limit=1.0)
 PID = Controller(pid(59.28, 4469.9, 0.2621), torque_limit=1.0)
+HOLDER = Controller(pid(30.0, 2000.0, 0.15), torque_limit=0.9)
+COMMAND, T = COLUMNS.index("torque_command"), 1e-3
 
 
 def sine(count: int, amplitude: float = 0.5, hz: float = 1.0, offset: float = 0.0):
@@ -63,6 +66,27 @@ def test_blocks_and_samples_give_the_same_record(tmp_path):
     assert a.meta["complete"] is True
     assert a.meta["ended"] == "as planned"
     assert a.units["motor_torque"] == "N·m"
+
+
+@pytest.mark.parametrize("blocks", [True, False])
+@pytest.mark.parametrize("controller", [PD, PID, Controller(pd(5.0, 0.05), Feedback(FRICTION), 1.0)])
+def test_the_torque_does_not_jump_where_a_controller_takes_over(blocks, controller):
+    """From a torque that drives the axis, from another controller, and after a pause; 5 mrad beside the reference."""
+    with Loop(AxisRig(blocks=blocks)) as loop:
+        rows = loop.run(setpoints(200, torque=np.minimum(np.linspace(0.0, 0.6, 200), 0.2)))
+        for other in (controller, HOLDER, controller):
+            position, speed = (rows[-1, COLUMNS.index(n)] for n in ("position", "velocity"))
+            last = rows[-1, COMMAND]
+            beside = setpoints(
+                300, position=position + 5e-3 + speed * T * np.arange(300), velocity=speed, closed=1.0
+            )
+            rows = loop.run(beside, other)
+            assert rows[0, COMMAND] == pytest.approx(last, abs=1e-12)
+        loop.pause(0.5)
+        rows = loop.run(
+            setpoints(100, position=rows[-1, COLUMNS.index("position")] + 5e-3, closed=1.0), controller
+        )
+        assert rows[0, COMMAND] == 0.0
 
 
 def test_the_loop_tracks(tmp_path):
@@ -165,7 +189,8 @@ def test_real_time_is_kept_and_accounted_for(tmp_path):
     assert len(account.lines()) == 6
     assert 0.0 < account.empty[0] <= account.control[0]
     assert account.faults < 100
-    assert Record.load(tmp_path / "run.stream").meta["loop"]["missed"] == account.missed
+    # The samples of the last ramp count as well.
+    assert Record.load(tmp_path / "run.stream").meta["loop"]["missed"] == loop.account().missed
 
 
 def test_what_is_refused():

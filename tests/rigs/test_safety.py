@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.controller import Controller
-from stickslip.control.linear import pd
+from stickslip.control.linear import pd, pid
 from stickslip.control.sampled import Memory, Settings
 from stickslip.model import Model
 from stickslip.rigs import safety
@@ -133,6 +133,42 @@ def test_compiled_and_plain_python_agree_bit_for_bit(data):
         assert torque == plain
         assert row["state"] == s.state
         assert row["reason"] == s.reason
+
+
+def takes_over(controller, last: float, own: float, before: Setpoint) -> tuple[list[float], list[float]]:
+    """Torques of a controller that closes the loop at a step of 0.02 rad, and those it gives where none was before."""
+    taking, alone = control_of(controller, LIMITS, T), control_of(controller, LIMITS, T)
+    alone.memory[Memory._fields.index("open")] = 0.0
+    run(taking, GOOD, before._replace(torque=last))
+    closed = HOLD._replace(position=0.12, torque=own)
+    return [run(taking, GOOD, closed)[0] for _ in range(150)], [
+        run(alone, GOOD, closed)[0] for _ in range(150)
+    ]
+
+
+@pytest.mark.parametrize("last", [0.0, 0.3, -0.6])
+@pytest.mark.parametrize("own", [0.0, 0.1])
+def test_a_controller_begins_at_the_last_command_and_only_the_difference_fades(last, own):
+    taken, alone = takes_over(PD, last, own, Setpoint())
+    assert abs(alone[0] - last) > 0.05
+    left = (np.array(taken) - alone) / (last - alone[0])
+    assert taken[0] == pytest.approx(last, abs=1e-12)
+    assert left[:100] == pytest.approx(1.0 - np.arange(100) / 100, abs=1e-9)
+    assert left[101:] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_integral_takes_over_whole():
+    taken, _ = takes_over(Controller(pid(19.8, 100.0, 0.17), torque_limit=1.0), -0.2, 0.0, Setpoint())
+    assert taken[0] == pytest.approx(-0.2, abs=1e-12)
+    assert np.diff(taken) == pytest.approx(np.full(149, 100.0 * 0.02 * T), abs=1e-9)
+
+
+@pytest.mark.parametrize("closed", [0.0, 1.0])
+def test_torques_of_a_procedure_are_never_altered(closed):
+    """No controller: what the setpoints give is commanded, bit for bit, closed or open."""
+    control = control_of(None, LIMITS, T)
+    for torque in (0.3, -0.5, 0.0, 0.7, 0.7, -0.1):
+        assert run(control, GOOD, HOLD._replace(torque=torque, closed=closed))[0] == torque
 
 
 def test_a_segment_ends_at_its_travel_without_a_fault():

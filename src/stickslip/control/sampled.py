@@ -76,7 +76,9 @@ class Settings(NamedTuple):
     slow: Annotated[
         float, Par("-", "", "part of its old value that the controller's velocity keeps a sample")
     ]
-    fade: Annotated[float, Par("s", "", "over which a torque that was taken over, or held in a fault, fades")]
+    fade: Annotated[
+        float, Par("s", "", "over which a torque that was taken over, or held in a fault, fades; 0: at once")
+    ]
     offset: Annotated[float, Par("N·m", "T_0", "constant torque that is fed forward")]
     inertia: Annotated[float, Par("kg·m²", "J", "inertia whose torque along the reference is fed forward")]
     clock: Annotated[float, Par("-", "", "1 where samples make the law's time, 0 where the caller gives it")]
@@ -117,6 +119,9 @@ class Memory(NamedTuple):
     ]
     taken: Annotated[float, Par("N·m", "", "difference of the torque that was taken over from its own")]
     share: Annotated[float, Par("-", "", "of that difference that is left")]
+    open: Annotated[
+        float, Par("-", "", "1 while another has the axis, with `torque`: the next sample starts there")
+    ]
 
 
 def design_filter(n: Any, m: Any) -> None:
@@ -229,8 +234,10 @@ def unusable(
 
 def faulty(n: Any, m: Any) -> float:
     """A sample without a usable input: the torque that is held falls to 0 over the fade. Returns it, N·m."""
-    if m.fault == 0.0:
+    if m.fault == 0.0 or m.open != 0.0:
         m.taken = m.torque
+        m.open = 0.0
+        m.fault = 0.0
     m.fault += 1.0
     m.share = max(0.0, 1.0 - m.fault * n.sample_time / max(n.fade, n.sample_time))
     m.torque = m.share * m.taken
@@ -264,15 +271,31 @@ def respond(
     return torque + m.compensation
 
 
+def start_at(held: float, torque: float, n: Any, m: Any) -> float:
+    """The first sample after another had the axis: its torque is the one held, N·m; what lacks is in the integral."""
+    m.open = 0.0
+    m.fault = 0.0
+    m.share = 0.0
+    if n.ki > 0.0:
+        m.error_sum += (held - torque) / n.ki
+        return held
+    if n.fade > 0.0:
+        m.taken = held - torque
+        m.share = 1.0
+    return torque
+
+
 def taken_over(torque: float, n: Any, m: Any) -> float:
     """The torque with what is left of the one that was taken over, or held in a fault, N·m."""
-    if m.fault > 0.0:
+    whole = torque
+    if m.open != 0.0:
+        whole = start_at(m.torque, torque, n, m)
+    elif m.fault > 0.0:
         m.fault = 0.0
         m.taken = m.torque - torque
         m.share = 1.0
-    whole = torque
     if m.share > 0.0:
-        whole = torque + m.share * m.taken
+        whole += m.share * m.taken
         m.share = max(0.0, m.share - n.sample_time / max(n.fade, n.sample_time))
     return whole
 
@@ -317,22 +340,18 @@ def follow_turns(
     keep_time(n, m, u)
     m.error_sum = 0.0
     m.share = 0.0
+    m.fault = 0.0
+    m.open = 1.0
     m.torque = 0.0
     if abs(torque) < LARGEST:
         m.torque = torque
     if unusable(turns, position, wanted_turns, wanted, wanted_velocity, wanted_acceleration, u) != 0.0:
         m.waited += n.sample_time
-        m.fault += 1.0
+        m.fault = 1.0
         return m.torque
-    own = respond(turns, position, wanted_turns, wanted, wanted_velocity, wanted_acceleration, n, m, z, p, u)
+    respond(turns, position, wanted_turns, wanted, wanted_velocity, wanted_acceleration, n, m, z, p, u)
     m.started = 1.0
     m.waited = 0.0
-    m.fault = 0.0
-    if n.ki > 0.0:
-        m.error_sum = (m.torque - own) / n.ki
-    else:
-        m.taken = m.torque - own
-        m.share = 1.0
     return m.torque
 
 

@@ -90,7 +90,10 @@ def control_of(
         )
     chosen = replace(controller or NOTHING, sample_time=sample_time)
     numbers = settings(chosen)
+    if controller is None:
+        numbers = numbers._replace(fade=0.0)  # the setpoints' torques are given as they are
     memory = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0))
+    memory.open = 1.0
     design_filter(numbers, memory)
     helper = chosen.compensator
     law = helper.model.law if helper else None

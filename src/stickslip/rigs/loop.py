@@ -47,7 +47,7 @@ BLOCK = 50
 """Samples of one compiled block: a signal is heard, and rows are committed, at least that often"""
 TIME, POSITION = Measurement._fields.index("time"), Measurement._fields.index("position")
 TORQUE, STARTED, ORIGIN, VALUE = (Safety._fields.index(n) for n in ("torque", "started", "origin", "value"))
-BEGUN, ERROR_SUM = Memory._fields.index("started"), Memory._fields.index("error_sum")
+BEGUN, ERROR_SUM, OPEN = (Memory._fields.index(n) for n in ("started", "error_sum", "open"))
 KNOWN = slice(0, Memory._fields.index("forward"))
 """What one controller takes over from another: position and velocities, but not its own filter's weights"""
 TRAVEL = Bounds._fields.index("travel")
@@ -293,7 +293,7 @@ class Loop:
         control.safety[:] = last.safety
         if control is not last:
             control.memory[KNOWN] = last.memory[KNOWN]
-            control.memory[ERROR_SUM] = 0.0
+            control.memory[ERROR_SUM], control.memory[OPEN] = 0.0, 1.0
         control.safety[ORIGIN] = control.measured[POSITION]
         if self._fault is None:
             control.safety[STATE] = RUNNING
@@ -430,6 +430,7 @@ class Loop:
             s[STATE] = STOPPING
             self._ramp(self._stream)
         s[STATE], s[REASON] = RUNNING, 0.0
+        self._control.memory[OPEN] = 1.0  # a controller that goes on begins without torque
 
     def _error(self, stream: Stream) -> BaseException:
         """What is raised once the torque is zero."""

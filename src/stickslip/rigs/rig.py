@@ -73,8 +73,9 @@ class Setpoint(NamedTuple):
     torque: float = 0.0
     """Added to the controller's output; alone where the loop is open, N·m"""
     closed: float = 0.0
-    """1: the controller follows position and velocity, and the following error is watched. 0: torque alone; the
-    controller forgets what it knew"""
+    """1: the controller follows position and velocity, and the following error is watched. Its first command is the
+    last one given; its integral takes the difference, or that fades over 0.1 s. 0: torque alone; the controller
+    forgets what it knew"""
     acceleration: float = 0.0
     """rad/s², for a compensator that feeds the inertia forward"""
 

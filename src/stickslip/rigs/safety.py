@@ -127,6 +127,7 @@ def watch_state(y: Any, b: Any, s: Any) -> None:
 def idle(y: Any, w: Any, n: Any, m: Any) -> float:
     """The loop is open: the controller watches, so that it can be closed at any sample. Returns no torque."""
     observe(0.0, y.position, 0.0, y.position, n, m)
+    m.open = 1.0
     m.error_sum = 0.0
     m.filtered = m.velocity
     m.compensation = 0.0
@@ -142,10 +143,12 @@ def idle(y: Any, w: Any, n: Any, m: Any) -> float:
     return 0.0
 
 
-def control(y: Any, w: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
-    """The torque that is wanted, N·m."""
+def control(y: Any, w: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
+    """The torque that is wanted, N·m; a controller that takes over starts where the last command left the axis."""
     if w.closed == 0.0:
         return w.torque + idle(y, w, n, m)
+    if m.open != 0.0:
+        m.torque = s.torque - w.torque
     u.time = y.time
     if abs(y.temperature) < UNBOUNDED:
         u.temperature = y.temperature
@@ -166,7 +169,7 @@ def guarded(y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: A
     watch_motion(y, w, b, s)
     watch_state(y, b, s)
     if s.state == RUNNING:
-        torque = control(y, w, n, m, z, p, u)
+        torque = control(y, w, s, n, m, z, p, u)
         if m.fault != 0.0:
             stop(NOT_FINITE, w.velocity, s)
         elif abs(torque) <= b.torque:
