@@ -7,7 +7,7 @@ import pytest
 import stickslip as ss
 from stickslip.errors import StepFailure
 from stickslip.simulation import adaptive, exact
-from stickslip.simulation._case import StepBudget
+from stickslip.simulation._case import TOO_STIFF, StepBudget
 from stickslip.simulation.closed_loop import prepare
 
 LUGRE = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}
@@ -28,12 +28,29 @@ def loop(inertia: float, frequency: float):
 )
 def test_too_many_steps_end_the_run_with_the_remedy(module, name, inertia, frequency, monkeypatch):
     monkeypatch.setattr(module, "STEPS", StepBudget(2000.0, 0.0, 0.0))
-    with pytest.raises(
-        StepFailure, match=r"far more steps than a motion of its length takes.*use the fixed"
-    ) as caught:
+    with pytest.raises(StepFailure) as caught:
         ss.simulate(*loop(inertia, frequency), 0.5, integrator=name)
-    assert "\n" not in str(caught.value)
-    assert caught.value.record.meta["counts"]["steps"] <= 2010
+    said, counts = str(caught.value), caught.value.record.meta["counts"]
+    taken = counts["steps"]
+    assert 2000 < taken + counts["rejected"] * (module is adaptive) <= 2010
+    whole = taken * 0.5 / caught.value.time
+    assert f"{taken:,} so far; at this pace 0.5 s take some {whole:.2g}" in said
+    assert "use the fixed integrator" in said
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    ("module", "inertia", "frequency"),
+    [(exact, 1e-12, 1.0), (adaptive, 4e-4, 1e3)],
+    ids=["exact", "adaptive"],
+)
+def test_a_run_without_end_is_found_out_at_its_start(module, inertia, frequency, monkeypatch):
+    """The budget of 60 s is not there for the first of them."""
+    monkeypatch.setattr(module, "STEPS", StepBudget(10_000, 50_000, 0))
+    outcome = module.run(prepare(*loop(inertia, frequency), 60.0))
+    assert outcome.code == TOO_STIFF
+    assert outcome.time < 1.0
+    assert outcome.counts["steps"] <= 10_000 + 50_000 * outcome.time + 10
 
 
 def test_the_budget_grows_with_the_motion_and_holds_what_the_thesis_takes():
@@ -43,3 +60,6 @@ def test_the_budget_grows_with_the_motion_and_holds_what_the_thesis_takes():
     for module in (exact, adaptive):
         assert module.STEPS.of(long) > 10 * module.STEPS.of(short) - 10 * module.STEPS.base
         assert module.STEPS.of(long) <= 50_000_000
+        first, rate = module.STEPS.pace(long)
+        assert first + rate * 60.0 == pytest.approx(module.STEPS.of(long))
+        assert first == module.STEPS.base

@@ -16,7 +16,7 @@ from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
-from stickslip import compiling
+from stickslip import compiling, waiting
 from stickslip.approval import allow_code
 from stickslip.cli import _kinds
 from stickslip.errors import InputError, Interrupted, ModelRemark, StickslipError
@@ -52,6 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             # NumPy's are of numbers that are looked at afterwards; tests and python -W see them.
             warnings.filterwarnings("ignore", category=RuntimeWarning)
         compiling.listen(notice)
+        waiting.listen(_tell)
     try:
         return _dispatch(list(sys.argv[1:] if argv is None else argv))
     except InputError as error:
@@ -68,6 +69,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 141
     finally:
         notice.close()
+
+
+def _tell(line: str) -> None:
+    """A line on stderr, above a bar if there is one."""
+    if "tqdm" in sys.modules:
+        sys.modules["tqdm"].tqdm.write(f"stickslip: {line}", file=sys.stderr)
+    else:
+        print(f"stickslip: {line}", file=sys.stderr, flush=True)
 
 
 def _one_thread_for_algebra() -> None:

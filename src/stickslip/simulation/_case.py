@@ -193,7 +193,7 @@ def slip_rules(**models: Model | None) -> dict[str, str]:
 class StepBudget(NamedTuple):
     """How many steps an integrator may take: at the start, for each second, and for each break of the reference.
 
-    What goes beyond is far stiffer than its motion is long, and would take minutes without a word.
+    What is beyond the start's comes with the motion, so that a run far stiffer than its motion is long ends soon.
     """
 
     base: float
@@ -202,9 +202,14 @@ class StepBudget(NamedTuple):
     most: float = math.inf
 
     def of(self, case: Case) -> float:
-        """Steps for a case."""
+        """Steps for the whole of a case."""
         steps = self.per_second * float(case.numbers[DURATION]) + self.per_break * case.breaks.size
         return min(self.base + steps, self.most)
+
+    def pace(self, case: Case) -> tuple[float, float]:
+        """Steps at the start, and for each second of the motion."""
+        first = min(self.base, self.most)
+        return first, (self.of(case) - first) / float(case.numbers[DURATION])
 
 
 def lay_out(

@@ -35,14 +35,15 @@ from stickslip.simulation._exact_state import (
     COUNTS,
     EDGE,
     EVENTS,
+    FIRST_STEPS,
     GRID_ROWS,
     GRID_WRITTEN,
     HELD,
     LOOP_SIZE,
-    MOST_STEPS,
     POSITION,
     REJECTED,
     SIDE_SIZE,
+    STEP_RATE,
     STEPS,
     STORM_COUNT,
     STORM_SINCE,
@@ -263,6 +264,6 @@ def solve(
             return code
         if storms(count, loop):
             return STORM
-        if count[STEPS] > plan[MOST_STEPS]:
+        if count[STEPS] > plan[FIRST_STEPS] + plan[STEP_RATE] * loop[TIME]:
             return TOO_STIFF
     return DONE

@@ -52,10 +52,11 @@ LOOP_SIZE = PROFILE_OUT + 3
 # ---- entries of `plan`: addresses (exact as floats), offsets and sizes ---------------------------------------
 (
     CURVE_0, PARAMETERS_0, CURVE_1, PARAMETERS_1, PROFILE, PROFILE_PARAMETERS, LITERAL_0, LITERAL_1, FIRST_1, ELEMENTS,
-    SIDES, CELLS, GRID_ROWS, ROWS, SPACING, STIFFNESS_FLOOR, SHARED, MOST_STEPS,
-    PLAN_SIZE,
-) = range(19)  # fmt: skip
-"""``parameters`` begins with Case.numbers; elements of side 1 begin at FIRST_1; SHARED: both sides have one curve."""
+    SIDES, CELLS, GRID_ROWS, ROWS, SPACING, STIFFNESS_FLOOR, SHARED, FIRST_STEPS,
+    STEP_RATE, PLAN_SIZE,
+) = range(20)  # fmt: skip
+"""``parameters`` begins with Case.numbers; elements of side 1 begin at FIRST_1; SHARED: both sides have one curve.
+FIRST_STEPS, STEP_RATE: how many steps there may be, and how many more for each second of the motion."""
 
 # ---- entries of `count` --------------------------------------------------------------------------------------
 STEPS, REJECTED, EVENTS, ROWS_WRITTEN, GRID_WRITTEN, COUNTS = range(6)

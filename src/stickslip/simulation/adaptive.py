@@ -82,6 +82,7 @@ from stickslip.simulation._meter import (
     new_meter,
     settle_band_of,
 )
+from stickslip.waiting import Reached, watched
 
 __all__ = ["can_run", "run"]
 
@@ -89,6 +90,8 @@ EVENT_ROWS = 20_000
 CREEP, STEEPEST = 1e-9, 1e6
 """Velocity (rad/s) at which a law's slope is taken, and the relaxation rate (1/s) that explicit steps can follow."""
 STEPS = StepBudget(1_000_000, 1_000_000, 2_000, 50_000_000)
+FIRST_STEPS, STEP_RATE, NOW = range(3)
+"""Of the pace: how many steps there may be, how many more for each second of the motion, and the time reached, s."""
 
 
 def can_run(case: Case) -> str:
@@ -118,10 +121,17 @@ def run(case: Case) -> Outcome:
     rows = np.empty((case.grid.size + EVENT_ROWS, len(COLUMNS)))
     acc = new_meter(numbers[DURATION], settle_band_of(case.reference, float(numbers[DURATION])))
     turns = np.empty((4096, 2))
-    counts = np.array([0, 0, 0, 0, STEPS.of(case)], dtype=np.int64)
-    code, time = integrate(
-        *arrays_of(case), y, tolerances(case), case.breaks, case.grid, rows, acc, turns, counts
-    )
+    counts, pace = np.zeros(4, dtype=np.int64), np.array([*STEPS.pace(case), 0.0])
+    arrays = (*arrays_of(case), y, tolerances(case), case.breaks, case.grid, rows, acc, turns, counts, pace)
+
+    def stop() -> None:
+        pace[FIRST_STEPS] = -math.inf
+
+    code = watched(
+        lambda: integrate(*arrays),
+        lambda: Reached(float(pace[NOW]), float(numbers[DURATION]), float(counts[0] + counts[1])), stop,
+    )  # fmt: skip
+    time = pace[NOW]
     names = ("steps", "rejected", "events")
     return Outcome(
         rows[: counts[3]], int(code), float(time), acc, turns[: int(acc[TURN_COUNT])],
@@ -247,10 +257,11 @@ def integrate(
     acc: Any,
     turns: Any,
     counts: Any,
-) -> tuple[int, float]:
-    """Run the loop from rest to the last break. Returns how it ended and when.
+    pace: Any,
+) -> int:
+    """Run the loop from rest to the last break. Returns how it ended; when is in the ``pace`` (see `NOW`).
 
-    ``counts`` receives steps, rejected steps, events and rows; its last entry is how many steps there may be.
+    ``counts`` receives steps, rejected steps, events and rows.
     """
     n = y.shape[0]
     k, nodes, trial = np.zeros((STAGES + 1, n)), np.zeros((SIGNALS, 5)), np.zeros(TRIAL)
@@ -289,6 +300,7 @@ def integrate(
             if w[METERED] != 0.0:
                 measure(a, w, t, step, y, k, end, u, nodes, acc, turns, trial[SMOOTH] != 0.0, trial[FOURTH])
             t = stop if trial[FINAL] else t + step
+            pace[NOW] = t
             # Element by element: assigning slices would compile numpy's checks of shapes, seconds of it.
             for j in range(n):
                 y[j] = end[j]
@@ -303,10 +315,10 @@ def integrate(
                     storm_start, storm_events = t, 0
                 if storm_events > STORM_EVENTS or rounds == 9:
                     code = STORM
-            if code == DONE and counts[0] + counts[1] > counts[4]:
+            if code == DONE and counts[0] + counts[1] > pace[FIRST_STEPS] + pace[STEP_RATE] * t:
                 code = TOO_STIFF
         if code != DONE:
             break
     close_standstill(acc, t)
     counts[3] = written
-    return code, t
+    return code

@@ -46,8 +46,7 @@ REASONS: dict[int, tuple[type[SimulationError], str]] = {
     _case.ROWS_FULL: (StepFailure, "the record is full"),
     _case.TOO_STIFF: (
         StepFailure,
-        "far more steps than a motion of its length takes: friction is too stiff for the inertia; check both, or use "
-        "the fixed integrator",
+        "far more steps than a motion of its length takes",
     ),
 }
 
@@ -155,8 +154,21 @@ def run_case(
     record = _record(case, outcome, how)
     if outcome.code != _case.DONE:
         kind, why = REASONS[outcome.code]
+        if outcome.code == _case.TOO_STIFF:
+            why += _in_numbers(case, outcome)
         raise kind(f"the run ended at {outcome.time:.6g} s: {why}", outcome.time, record)
     return record
+
+
+def _in_numbers(case: Case, outcome: Outcome) -> str:
+    """What a run that took too many steps would have taken, and what to do."""
+    steps = outcome.counts["steps"]
+    duration = float(case.numbers[_case.DURATION])
+    whole = f"some {steps * duration / outcome.time:.2g}" if outcome.time > 0.0 else "no number of them"
+    return (
+        f", {steps:,} so far; at this pace {duration:g} s take {whole}: friction is too stiff for the inertia, or the "
+        "reference too fast; check them, give a shorter duration, or use the fixed integrator"
+    )
 
 
 def prepare(

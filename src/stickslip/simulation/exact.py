@@ -42,11 +42,12 @@ from stickslip.simulation._exact_kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, L
 from stickslip.simulation._forcing import NO_CELLS, feedforward
 from stickslip.simulation._meter import SIZE, close_standstill, new_meter, settle_band_of
 from stickslip.spec import Bristle, Elements, Law, Option
+from stickslip.waiting import Reached, watched
 
 __all__ = ["Prepared", "can_run", "is_literal", "prepare", "run"]
 
 EVENT_ROWS = 20_000
-STEPS = StepBudget(300_000, 300_000, 1_000, 50_000_000)
+STEPS = StepBudget(1_000_000, 300_000, 1_000, 50_000_000)
 """The thesis's runs take 90,000 a second at most."""
 TURNS = 20_000
 NOTHING: Array = np.zeros((0, 2))
@@ -154,7 +155,8 @@ class Prepared:
         time : float
         """
         out = np.empty((self.case.grid.size, 2))
-        code, work = self._solve(out, NOTHING, NOTHING_1, NOTHING, light=True)
+        work = self.work.copy()
+        code = self._solve(self.plan, work, out, NOTHING, NOTHING_1, NOTHING, light=True)
         return out[: int(work[col.GRID_WRITTEN])], code, float(work[AT_LOOP])
 
     def record(self) -> Outcome:
@@ -165,7 +167,15 @@ class Prepared:
         )
         turns = np.zeros((TURNS if metered else 0, 2))
         rows = np.empty((int(self.plan[col.ROWS]), len(COLUMNS)))
-        code, work = self._solve(NOTHING, rows, acc, turns, full=True, metered=metered)
+        plan, work = self.plan.copy(), self.work.copy()
+
+        def stop() -> None:
+            plan[col.FIRST_STEPS] = -math.inf
+
+        code = watched(
+            lambda: self._solve(plan, work, NOTHING, rows, acc, turns, full=True, metered=metered),
+            lambda: Reached(float(work[AT_LOOP]), duration, float(work[col.STEPS])), stop,
+        )  # fmt: skip
         time = float(work[AT_LOOP])
         if metered:
             close_standstill(acc, time)
@@ -175,15 +185,14 @@ class Prepared:
         return Outcome(rows[: int(work[col.ROWS_WRITTEN])].copy(), code, time, acc, turns, named)
 
     def _solve(
-        self, out: Array, rows: Array, acc: Array, turns: Array, *, light: bool = False, full: bool = False,
-        metered: bool = False,
-    ) -> tuple[int, Array]:  # fmt: skip
-        work = self.work.copy()
+        self, plan: Array, work: Array, out: Array, rows: Array, acc: Array, turns: Array, *, light: bool = False,
+        full: bool = False, metered: bool = False,
+    ) -> int:  # fmt: skip
         code = solve(
-            self.parameters, self.plan, self.cells, self.breaks, self.case.grid, work, out, rows, acc, turns,
+            self.parameters, plan, self.cells, self.breaks, self.case.grid, work, out, rows, acc, turns,
             NODES.copy(), light, full, metered,
         )  # fmt: skip
-        return int(code), work
+        return int(code)
 
 
 def prepare(case: Case) -> Prepared:
@@ -231,7 +240,7 @@ def prepare(case: Case) -> Prepared:
         case.grid.size,
         case.grid.size + EVENT_ROWS,
     )
-    plan[col.MOST_STEPS] = STEPS.of(case)
+    plan[col.FIRST_STEPS], plan[col.STEP_RATE] = STEPS.pace(case)
     plan[col.SPACING] = even_spacing(case.grid)
     damping = case.numbers[KD] + float(np.sum(sides[:, col.WEIGHT] * sides[:, col.VISCOUS]))
     inertia = case.axis.inertia

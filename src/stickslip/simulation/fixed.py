@@ -42,6 +42,7 @@ from stickslip.simulation._case import (
     STORM,
     STORM_EVENTS,
     STORM_TIME,
+    TOO_STIFF,
     VELOCITY_0,
     VELOCITY_LIMIT,
     Case,
@@ -83,6 +84,7 @@ from stickslip.simulation._meter import (
 )
 from stickslip.simulation._sampled import COMPENSATION, FAULT, MEMORY, measured_position, sampler
 from stickslip.spec import Surroundings
+from stickslip.waiting import Reached, watched
 
 __all__ = ["can_run", "run"]
 
@@ -90,7 +92,8 @@ RESOLVED = 2.0
 """dt * slope / J up to which the trapezoid runs; omega dt = 2 after `contact_slope` of a spring."""
 RINGING = 0.25
 """omega dt of the steps that resolve a motion near rest which a longer, damped one would lose."""
-NOW, CAP = range(2)  # of the clock
+NOW, CAP, ASKED = range(3)
+"""Of the clock: the time reached and the longest next step, s, and whether the run is to end."""
 
 
 def can_run(case: Case) -> str:
@@ -135,9 +138,17 @@ def run(case: Case, dt: float) -> Outcome:
     counts = np.zeros(4, dtype=np.int64)
     grid = np.ascontiguousarray(case.grid, dtype=np.float64)
     stops = stops_of(case)
-    rows, code, time = integrate(loop, start, memory, stops, grid, dt, accumulator, turns, counts)
+    clock = np.array([0.0, dt, 0.0])
+
+    def stop() -> None:
+        clock[ASKED] = 1.0
+
+    rows, code = watched(
+        lambda: integrate(loop, start, memory, stops, grid, dt, clock, accumulator, turns, counts),
+        lambda: Reached(float(clock[NOW]), float(n[DURATION]), float(counts[STEPS])), stop,
+    )  # fmt: skip
     return Outcome(
-        rows, int(code), float(time), accumulator, turns[: int(accumulator[TURN_COUNT])],
+        rows, int(code), float(clock[NOW]), accumulator, turns[: int(accumulator[TURN_COUNT])],
         {"steps": int(counts[STEPS]), "rejected": 0, "events": int(counts[EVENTS])},
     )  # fmt: skip
 
@@ -237,15 +248,15 @@ def integrate(
     stops: Any,
     grid: Any,
     dt: float,
+    clock: Any,
     accumulator: Any,
     turns: Any,
     counts: Any,
-) -> tuple[Any, int, float]:
-    """Run from 0 to the last stop; returns rows, code and the time reached."""
+) -> tuple[Any, int]:
+    """Run from 0 to the last stop; returns rows and code."""
     b = a.copy()
     rows = np.zeros((grid.size + 256, len(COLUMNS)))
     storm = np.full(STORM_EVENTS, -1.0)
-    clock = np.array([0.0, dt])
     sampled = loop.numbers[SAMPLE_TIME] > 0.0
     a[FRICTION] = step_plant(loop, a, a[VELOCITY], a[VELOCITY], 0.0)
     code = DONE
@@ -269,7 +280,7 @@ def integrate(
         rows = write(loop, a, a, clock[NOW], 1.0, 0.0, clock[NOW], 0.0, rows, counts)
     if loop.numbers[METERED] != 0.0:
         close_standstill(accumulator, clock[NOW])
-    return rows[: counts[ROWS]].copy(), code, clock[NOW]
+    return rows[: counts[ROWS]].copy(), code
 
 
 @kernel()
@@ -289,9 +300,11 @@ def reach(
 ) -> tuple[Any, int]:
     """Step from the clock's time to `goal`, once or, where events cut the step, more often; rows and code.
 
-    ``clock`` holds the time and the longest next step; ``storm`` the times of the last events.
+    ``storm`` holds the times of the last events.
     """
     while goal - clock[NOW] > 1e-12 * dt:
+        if clock[ASKED] != 0.0:
+            return rows, TOO_STIFF
         t = clock[NOW]
         if loop.steep:
             clock[CAP] = LANDING * dt if a[VELOCITY] == 0.0 else min(GROWTH * clock[CAP], dt)

@@ -1,0 +1,122 @@
+"""A long run says how far it is, and Ctrl-C ends it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import pytest
+
+import stickslip as ss
+from stickslip import waiting
+from stickslip.simulation import adaptive, exact, fixed
+from stickslip.simulation._case import DONE, TOO_STIFF
+from stickslip.simulation.closed_loop import prepare
+from stickslip.waiting import Reached, Watch, watched
+
+LUGRE = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}
+
+
+@pytest.fixture
+def said(monkeypatch):
+    lines: list[str] = []
+    monkeypatch.setattr(waiting, "_listeners", [])
+    waiting.listen(lines.append)
+    return lines
+
+
+def case():
+    axis = ss.RigidAxis(4e-4, ss.Model("lugre", **LUGRE))
+    controller = ss.Controller(ss.place("PD", 4e-4, 10.0, 1.0))
+    return prepare(axis, controller, ss.Reference("sine", amplitude=0.1, frequency=1.0), 2.0)
+
+
+def looks(*reached: tuple[float, float, float]) -> list[str]:
+    """Lines of a watch that is looked at, each entry at its own second: second, time and steps of a motion of 100 s."""
+    seconds = iter([0.0, *(row[0] for row in reached)])
+    rows = iter(Reached(row[1], 100.0, row[2]) for row in reached)
+    watch = Watch(lambda: next(rows), lambda: next(seconds))
+    return [watch.look() for _ in reached]
+
+
+def test_a_line_says_what_was_done_and_at_the_pace_of_late_what_is_left():
+    first, second = looks((2.0, 10.0, 1e6), (6.0, 20.0, 3e6))
+    assert first == "simulated 10 of 100 s in 2 s (1,000,000 steps), about 18 s more; Ctrl-C ends it"
+    assert second == "simulated 20 of 100 s in 6 s (3,000,000 steps), about 32 s more; Ctrl-C ends it"
+
+
+def test_what_is_compiled_first_does_not_count():
+    assert looks((2.0, 0.0, 0.0), (20.0, 0.0, 0.0), (22.0, 50.0, 1e6))[:2] == ["", ""]
+    assert "50 of 100 s in 2 s" in looks((2.0, 0.0, 0.0), (20.0, 0.0, 0.0), (22.0, 50.0, 1e6))[2]
+
+
+def test_a_run_that_stands_has_no_end_in_sight():
+    assert "no end in sight" in looks((2.0, 10.0, 1e6), (6.0, 10.0, 3e6))[1]
+
+
+def test_it_is_looked_at_ever_more_seldom():
+    seconds = iter(range(10))
+    watch = Watch(lambda: Reached(1.0, 2.0, 1.0), lambda: float(next(seconds)))
+    waits = [watch.wait]
+    for _ in range(3):
+        watch.look()
+        waits.append(watch.wait)
+    assert waits == [2.0, 4.0, 8.0, 16.0]
+
+
+def impatient(reached):
+    watch = Watch(reached)
+    watch.wait = 1e-3
+    return watch
+
+
+def test_listeners_hear_it_while_the_work_goes_on(said):
+    def work():
+        while not said:
+            pass
+        return "done"
+
+    assert watched(work, lambda: Reached(1.0, 2.0, 5.0), lambda: None, impatient) == "done"
+    assert said[0].startswith("simulated 1 of 2 s")
+
+
+def test_what_the_work_raises_is_raised(said):
+    with pytest.raises(ZeroDivisionError):
+        watched(lambda: 1 // 0, lambda: Reached(0.0, 1.0, 0.0), lambda: None)
+
+
+def test_ctrl_c_ends_the_work():
+    ending = threading.Event()
+
+    def work():
+        os.kill(os.getpid(), signal.SIGINT)
+        assert ending.wait(60.0)
+
+    with pytest.raises(KeyboardInterrupt):
+        watched(work, lambda: Reached(0.0, 1.0, 0.0), ending.set)
+
+
+@pytest.mark.parametrize("module", [exact, adaptive, fixed])
+def test_every_integrator_tells_how_far_it_is_and_ends_when_asked(module, monkeypatch):
+    """What it tells after the run is what the run counted; asked beforehand, it ends at its first steps."""
+    told = []
+
+    def asked(work, reached, stop):
+        if told:  # the second run
+            stop()
+        found = work()
+        told.append(reached())
+        return found
+
+    monkeypatch.setattr(module, "watched", asked)
+    steps = []
+    for code in (DONE, TOO_STIFF):
+        outcome = module.run(case(), 1e-4) if module is fixed else module.run(case())
+        assert outcome.code == code
+        assert told[-1].time == outcome.time
+        assert told[-1].of == 2.0
+        assert told[-1].steps == outcome.counts["steps"] + outcome.counts["rejected"] * (module is adaptive)
+        steps.append(outcome.counts["steps"])
+    assert told[0].time == 2.0
+    assert steps[1] < 0.01 * steps[0]
