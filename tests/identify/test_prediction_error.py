@@ -19,7 +19,7 @@ from stickslip.identify.axis_trial import trial_of
 from stickslip.identify.contact import contact_frequency, of_slow_motion, unseen_refused
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.jackknife import leave_blocks_out
-from stickslip.identify.observer import GRASP, prepare
+from stickslip.identify.observer import GRASP, REMEMBERED, Prepared, prepare
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.record import encoder_step
@@ -114,6 +114,37 @@ def test_the_true_parameters_need_few_corrections_where_the_axis_sticks_and_slip
     sizes = [float(np.std(p.correction(axis, case.model.parameters))) for p in (firm, soft)]
     assert sizes[0] < 0.02 * case.truth["fc"]
     assert sizes[1] > 1.2 * sizes[0]
+
+
+def test_what_was_asked_a_moment_ago_is_not_simulated_again(
+    generator: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = generator.make(0, "coulomb")
+    p = case.model.parameters
+    motion = motion_of(trial_of(case.record, AXIS))
+    prepared = prepare(motion, case.model.law, case.truth["inertia"], case.truth["fc"], 40.0)
+    asked: list[Mechanics] = []
+    raw = Prepared.raw
+
+    def counted(self: Prepared, mechanics: Mechanics, parameters: Any) -> Any:
+        asked.append(mechanics)
+        return raw(self, mechanics, parameters)
+
+    monkeypatch.setattr(Prepared, "raw", counted)
+    axis, other = (Mechanics(x * case.truth["inertia"]) for x in (1.0, 1.1))
+    first = prepared.correction(axis, p)
+    assert prepared.correction(axis, p) is first
+    assert len(asked) == 1
+    # Whatever it depends on asks anew, and what is shaken has a memory of its own.
+    assert np.any(prepared.correction(other, p) != first)
+    assert np.any(prepared.correction(axis, p._replace(fc=2.0 * p.fc)) != first)
+    assert np.any(prepared.shaken(0.1 * np.sin(motion.time)).correction(axis, p) != first)
+    assert len(asked) == 4
+    for k in range(REMEMBERED):
+        prepared.correction(Mechanics((2.0 + 0.01 * k) * case.truth["inertia"]), p)
+    assert len(prepared.known) == REMEMBERED
+    assert np.array_equal(prepared.correction(axis, p), first)
+    assert len(asked) == 4 + REMEMBERED + 1
 
 
 @pytest.mark.slow

@@ -19,6 +19,7 @@ from stickslip.identify.contact import stiffness_at_rest
 from stickslip.identify.optimum import descend
 from stickslip.identify.vector import Vector
 from stickslip.model import Model
+from stickslip.simulation.steady import Steady
 from stickslip.spec import Field, Law
 
 __all__ = ["dimensions", "feasible", "frozen_by_default", "starts"]
@@ -217,14 +218,14 @@ def told_by(model: Model, v: Array, held: Sequence[str]) -> tuple[str, ...]:
     law, p = model.law, model.parameters
     if law.steady is None:
         return ()
-    torque = [law.steady(x, p) for x in v]
-    told: list[str] = []
+    steady, told = Steady(law, v, np.sign(v)), list[str]()
+    torque = steady.torque(np.array(law.pack(p)))
     for f in law.fields:
         if f.per_element or f.name in (*held, *frozen_by_default(law)) or dimensions_of(f.par.unit) is None:
             continue
         value = float(getattr(p, f.name))
         more = p._replace(**{f.name: value + 1e-3 * max(abs(value), 1e-3)})
-        if any(law.steady(x, more) != y for x, y in zip(v, torque, strict=True)):
+        if np.any(steady.torque(np.array(law.pack(more))) != torque):
             told.append(f.name)
     return tuple(told)
 
@@ -232,16 +233,16 @@ def told_by(model: Model, v: Array, held: Sequence[str]) -> tuple[str, ...]:
 def steady_values(model: Model, v: Array, curve: Array, names: Sequence[str]) -> dict[str, float]:
     """These parameters, fitted so that the steady torque follows the curve."""
     law = model.law
-    assert law.steady is not None
     vector = Vector(model, frozen=[f.name for f in law.fields if f.name not in names])
-    first, size, steady = vector.start, float(np.max(np.abs(curve))), law.steady
+    first, size, steady = vector.start, float(np.max(np.abs(curve))), Steady(law, v, np.sign(v))
 
     def residuals(u: Array) -> Array:
         p = feasible(law, vector.law_parameters(u))
         if p is None:
             return np.full(v.size + u.size, np.inf)
-        torque = np.array([steady(x, p) for x in v])
-        return np.concatenate([(torque - curve) / size, TIE / v.size * (u - first)])
+        return np.concatenate(
+            [(steady.torque(np.array(law.pack(p))) - curve) / size, TIE / v.size * (u - first)]
+        )
 
     best = descend(residuals, first, vector.lower, vector.upper, iterations=30, tolerance=1e-8)
     p = feasible(law, vector.law_parameters(best.u))
