@@ -102,7 +102,7 @@ class Prepared:
         values = mechanics, *self.course.law.pack(parameters)
         if (found := self.known.get(values)) is None:
             found = self.simulated(mechanics, parameters)
-            found.flags.writeable = False
+            found.setflags(write=False)
             while len(self.known) >= REMEMBERED:
                 self.known.pop(next(iter(self.known)), None)
             self.known[values] = found
