@@ -88,6 +88,7 @@ def study(task: tuple[tuple[int, str, int, str, str, str], str, bool]) -> tuple[
             found = regress_axis([trial], AXIS)
             told = {n: (*v, n != "offset" and v[2] <= 2.0 * v[1]) for n, v in sliding_values(found).items()}
             level = found.numbers["fc"].value
+            told = {n: (*v[:3], v[3] and not found.doubt) for n, v in told.items()}
             value, low, high = sliding_values(found)["offset"]
             told["offset"] = (value, low, high, 0.5 * (high - low) <= 0.05 * level)
         else:

@@ -144,6 +144,8 @@ def agreed(
             continue
         size = scale.get(e.name, math.nan)
         own = told(e, parameters[e.name], *sliding[e.name], size)
+        if found.doubt and own.identified:
+            own = replace(own, identified=False, verdict=found.doubt)
         apart = abs(e.value - own.value) > math.hypot(e.upper - e.lower, own.upper - own.lower) / 2.0
         if fine and not apart:
             # Its intervals are narrow, and hold where the torque acted as simulations take it.

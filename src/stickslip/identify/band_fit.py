@@ -22,7 +22,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.sliding_rows import SlidingRows
 
-__all__ = ["BandFit", "Number", "fit_band", "pieces_of", "stacked"]
+__all__ = ["BandFit", "Number", "fit_band", "memory_of", "pieces_of", "rows_in", "stacked", "strokes_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Places = np.ndarray[Any, np.dtype[np.int64]]
@@ -44,13 +44,20 @@ MOST_LAGS = 300
 FADED = 0.05  # correlation that counts as none
 
 # Standard deviations of what no law holds, in parts of Fc.
-CURVE, AFTER, UNEVEN, LAGGING, AROUND = 0.003, 0.01, 0.03, 0.02, 0.005
+CURVE, AFTER, UNEVEN, LAGGING, AROUND = 0.002, 0.01, 0.03, 0.013, 0.005
+LEANING, LEANS = (
+    3,
+    0.02,
+)  # order of a slow torque over the travel (cables, a load, gravity), and its part of Fc
+BLURRED = 0.3  # of the largest order found, that those beside it may have where the way is short
 FORM = 0.003  # of Fc: misfit that is assumed at least
-MEMORY = 8.0  # rows over which it is correlated at least
-SYSTEMATIC, STIFF = (
-    0.05,
-    0.2,
-)  # of the misfit: what may not average out; for inertia and skew, of an axis that is not stiff
+MEMORY = 3.0  # rows over which it is correlated at least
+PIECE, LONGER = (
+    0.25,
+    2.0,
+)  # s, and times the memory: length of a piece that counts as one observation, at least
+SYSTEMATIC = 0.02  # of the misfit: what may not average out
+STIFF, LATE = 0.15, 0.2  # the same for inertia and skew, of an axis that is not stiff
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,19 +127,31 @@ def stacked(records: Sequence[SlidingRows], name: str) -> Array:
     return np.concatenate([getattr(r, name) for r in records])
 
 
-def pieces_of(records: Sequence[SlidingRows]) -> Places:
+def strokes_of(records: Sequence[SlidingRows]) -> Places:
     """The stretch of sliding of every row, counted through all records."""
-    first = np.cumsum([0, *(int(r.piece[-1]) + 1 for r in records[:-1])])
-    return np.concatenate([r.piece + f for r, f in zip(records, first, strict=True)])
+    first = np.cumsum([0, *(int(r.stroke[-1]) + 1 for r in records[:-1])])
+    return np.concatenate([r.stroke + f for r, f in zip(records, first, strict=True)])
 
 
-def memory_of(residual: Array, piece: Places) -> float:
-    """Rows over which a residual is correlated: what the variance of a mean is greater by."""
+def pieces_of(stroke: Places, rows: int) -> Places:
+    """The strokes cut into pieces of so many rows: what counts as one observation."""
+    begins = np.flatnonzero(np.concatenate([[True], np.diff(stroke) != 0]))
+    within = np.arange(stroke.size) - np.repeat(begins, np.diff([*begins.tolist(), stroke.size]))
+    return np.cumsum(within % max(1, rows) == 0) - 1
+
+
+def rows_in(seconds: float, records: Sequence[SlidingRows]) -> int:
+    """Rows of the densest record in so many seconds."""
+    return max(1, round(seconds / min(r.spacing for r in records)))
+
+
+def memory_of(residual: Array, stroke: Places) -> float:
+    """Rows over which a residual is correlated within a stroke: what the variance of a mean is greater by."""
     power, total = float(residual @ residual), 1.0
     if power <= 0.0:
         return total
     for lag in range(1, min(MOST_LAGS, residual.size - 1)):
-        same = piece[lag:] == piece[:-lag]
+        same = stroke[lag:] == stroke[:-lag]
         share = float(np.sum((residual[lag:] * residual[:-lag])[same])) / power
         if share < FADED:
             break
@@ -184,6 +203,10 @@ def small_columns(records: Sequence[SlidingRows], fc: float, orders: Sequence[fl
     for order in orders:
         columns += list(np.concatenate([r.around(order) for r in records]).T)
         std += [AROUND] * 2
+    along = stacked(records, "position")
+    middle, reach = 0.5 * (along.max() + along.min()), max(0.5 * float(np.ptp(along)), 1e-300)
+    columns += list(np.polynomial.legendre.legvander((along - middle) / reach, LEANING).T[1:])
+    std += [LEANS] * LEANING
     return np.column_stack(columns), fc * np.array(std)
 
 
@@ -195,7 +218,8 @@ class System:
         Sequence[float], pendulum: bool, skew_size: float,
     ):  # fmt: skip
         self.records, self.skew_size, self.expected = records, skew_size, 0.0
-        self.piece = pieces_of(records)
+        self.stroke = strokes_of(records)
+        self.shortest = rows_in(PIECE, records)
         core = [stacked(records, "fixed"), stacked(records, "jerk")[:, None]]
         if pendulum:
             angle = stacked(records, "position")
@@ -227,7 +251,12 @@ class System:
         self.small: Places = np.arange(columns.shape[1] - small.shape[1], columns.shape[1])
         residual = first - plain[:, :JERK] @ start
         self.noise = float(residual @ residual) / first.size
-        self.memory = memory_of(residual, self.piece)
+        self.memory = memory_of(residual, self.stroke)
+
+    @property
+    def piece(self) -> Places:
+        """The piece of every row: so long that what one leaves says little of the next."""
+        return pieces_of(self.stroke, max(self.shortest, round(LONGER * self.memory)))
 
     def torque(self, skew: float) -> Array:
         """The torque that acted, N·m (N)."""
@@ -260,6 +289,13 @@ class System:
             cost += float(coefficients @ held @ coefficients)
             out.append(Candidate(level, own, mixing, inverse, values, coefficients, cost))
         return out
+
+    def beside(self, c: Candidate, orders: int, background: int) -> None:
+        """Let the torque over the position hold a part of the orders found in those beside them."""
+        found = slice(self.core - 2 * orders, self.core)
+        size = float(np.max(np.abs(c.values[found] / self.scale[found])))
+        last = self.std[-2 * background - LEANING :]
+        self.std[-2 * background - LEANING :] = np.maximum(last, BLURRED * size)
 
     def residual(self, torque: Array, c: Candidate) -> Array:
         """What a candidate leaves, N·m (N)."""
@@ -307,7 +343,7 @@ class System:
         least, plain = self.noise * self.memory * np.diag(c.inverse), np.diag(noise)
         noise[np.diag_indices_from(noise)] = np.maximum(plain, least)
         share = np.full(c.columns.size, SYSTEMATIC)
-        share[[INERTIA, JERK]] = STIFF
+        share[[INERTIA, JERK]] = STIFF, LATE
         coherent = np.diag(share**2 * float(residual @ residual) * np.diag(c.inverse))
         scale = self.scale[c.columns]
         return (noise + moved @ moved.T + coherent) / np.outer(scale, scale)
@@ -316,7 +352,7 @@ class System:
 def fit_band(
     records: Sequence[SlidingRows], stribeck: Sequence[float], *, orders: Sequence[float] = (),
     background: Sequence[float] = (), pendulum: bool = False, skew_size: float = 3e-3, skew: float | None = None,
-    start: float = 0.0,
+    start: float = 0.0, blurred: bool = False,
 ) -> BandFit:  # fmt: skip
     """Fit the rows of certain sliding that one window shows.
 
@@ -336,6 +372,8 @@ def fit_band(
         s, where it is known.
     start : float
         s: where the search for the skew begins, and what it is expected to be.
+    blurred : bool
+        Whether the way is too short to tell orders apart: what is near those found is then not small.
     """
     system = System(records, stribeck, orders, background, pendulum, skew_size)
     at = start if skew is None else skew
@@ -348,8 +386,10 @@ def fit_band(
         residual = system.residual(torque, best)
         freedom = max(1, residual.size - best.columns.size - system.small.size)
         system.noise = float(residual @ residual) / freedom + (FORM * system.fc) ** 2
-        system.memory = max(memory_of(residual, system.piece), MEMORY)
+        system.memory = max(memory_of(residual, system.stroke), MEMORY)
         weight = system.weights(candidates)
+        if blurred and orders:
+            system.beside(best, len(orders), len(background))
         inertia, jerk = (
             sum(w * c.values[i] for w, c in zip(weight, candidates, strict=True)) / system.scale[i]
             for i in (INERTIA, JERK)

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.band_fit import memory_of, pieces_of, stacked
+from stickslip.identify.band_fit import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
 from stickslip.identify.sliding_rows import SlidingRows
 
-__all__ = ["candidate_orders", "shown_orders"]
+__all__ = ["candidate_orders", "goes_round", "shown_orders"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -43,11 +43,21 @@ def candidate_orders(
     period : float, optional
         rad (m) after which the torque repeats, where it is known.
     """
-    way = max(float(np.ptp(r.position)) for r in records)
-    turn = period if period is not None else 2.0 * math.pi if rotary else math.inf
-    if way > WHOLE_TURN * turn:
+    if goes_round(records, rotary, period):
+        turn = 2.0 * math.pi if period is None else period
         return [k / turn for k in range(1, HIGHEST_ORDER + 1)]
-    return [k / (2.0 * way) for k in range(1, PARTS + 1)]
+    return [k / (2.0 * way_of(records)) for k in range(1, PARTS + 1)]
+
+
+def goes_round(records: Sequence[SlidingRows], rotary: bool, period: float | None = None) -> bool:
+    """Whether the way is long enough for orders to be told apart by whole numbers a turn."""
+    turn = period if period is not None else 2.0 * math.pi if rotary else math.inf
+    return way_of(records) > WHOLE_TURN * turn
+
+
+def way_of(records: Sequence[SlidingRows]) -> float:
+    """The longest way between two rows of one record, rad (m)."""
+    return max(float(np.ptp(r.position)) for r in records)
 
 
 def shown_orders(records: Sequence[SlidingRows], skew: float, candidates: Sequence[float]) -> list[float]:
@@ -62,7 +72,8 @@ def shown_orders(records: Sequence[SlidingRows], skew: float, candidates: Sequen
     basis = left[:, singular > 1e-6 * singular[0]]
     residual = torque - basis @ (basis.T @ torque)
     pool = {o: np.concatenate([r.around(o) for r in records]) for o in candidates}
-    piece = pieces_of(records)
+    stroke = strokes_of(records)
+    piece = pieces_of(stroke, rows_in(PIECE, records))
     found: list[float] = []
     while len(found) < MOST and pool:
         power = float(residual @ residual)
@@ -73,7 +84,7 @@ def shown_orders(records: Sequence[SlidingRows], skew: float, candidates: Sequen
             ),
             key=lambda entry: entry[0],
         )
-        independent = torque.size / memory_of(residual, piece)
+        independent = torque.size / memory_of(residual, stroke)
         if power <= 0.0 or independent * explained / power < 2.0 * math.log(len(candidates)) + SURE:
             break
         if held_out_power(own, residual, piece % 2 == 0) > power - HELPS * explained:

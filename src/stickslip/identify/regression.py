@@ -23,7 +23,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.band_fit import BandFit, Number, fit_band, stacked
-from stickslip.identify.orders import candidate_orders, shown_orders
+from stickslip.identify.orders import candidate_orders, goes_round, shown_orders
 from stickslip.identify.sliding_rows import (
     FEWEST,
     Signals,
@@ -51,6 +51,10 @@ TELLING, NARROW = 4.0, 0.1
 value."""
 LOOKED, CLEAR = 0.04, 0.5
 """s over which a skew is looked for at a glance; part of the misfit without one that it must leave at most."""
+UNSURE = 0.3
+"""Part of Fc to which the torque that accelerates must be known for friction to be believed."""
+USUALLY = 2.0
+"""Standard deviations of the usual skew that need no inertia above 0 to be believed."""
 GIVEN = 0.05
 """Rows to which a skew that is given is known."""
 REBUILT, SHORT, MARGIN = -0.15, 0.6, 2.5
@@ -114,6 +118,19 @@ class Regression:
         return float(np.sqrt(np.mean((torque - known) ** 2)))
 
     @property
+    def doubt(self) -> str:
+        """Why its numbers are not to be believed; empty where they are."""
+        inertia, level = self.numbers["inertia"], abs(self.numbers["fc"].value)
+        usual = float(np.sqrt(np.mean(stacked(self.rows, "fixed")[:, 0] ** 2)))
+        unsure = QUANTILE * inertia.std * usual
+        if unsure <= UNSURE * level:
+            return ""
+        return (
+            f"the axis does not follow its torque as one inertia does: what its acceleration needs is unsure to "
+            f"{unsure / max(level, 1e-300):.2g} of Fc"
+        )
+
+    @property
     def harmonics(self) -> Array:
         """Amplitude of every order found, N·m (N), shape (k,)."""
         return np.hypot(*self.bands[0].harmonics.T) if self.orders else np.zeros(0)
@@ -158,47 +175,73 @@ def regress_axis(
     period = max(s.period for s in signals)
     size = max(SKEW_ROWS * period, SKEW_TIME) if skew is None else GIVEN * period
     options: dict[str, Any] = {"pendulum": axis.gravity == "pendulum", "skew_size": size, "skew": skew}
-    bands: list[BandFit] = []
-    widest: list[SlidingRows] = []
-    lacking = InputError("no band of the record slides long enough in one direction")
-    for factor in BANDS:
-        try:
-            if not bands:
-                start = clear_skew(signals, factor * width) if skew is None else skew
-                widest, levels = rows_of(signals, factor * width, start)
-                options |= {"start": start} | (
-                    orders_in(widest, levels, axis, harmonic_period, {**options, "start": start})
-                    if harmonics else {}
-                )  # fmt: skip
-                rows = widest
-            else:
-                rows, levels = rows_of(signals, factor * width, bands[0].numbers["skew"].value)
-            bands.append(fit_band(rows, levels, **options))
-        except InputError as error:
-            lacking = error
-    if not bands:
-        raise lacking
+    bands, widest, orders = in_bands(signals, width, axis, options, harmonics, harmonic_period)
+    if skew is None and not follows(bands[0], widest, size):
+        # Seen half a cycle late, ringing explains itself by an inertia below 0: the torque acts about its row.
+        bands, widest, orders = in_bands(
+            signals, width, axis, {**options, "skew": 0.0}, harmonics, harmonic_period
+        )
     speed = np.abs(stacked(widest, "speed"))
     falls, vs = fall_of(bands)
     numbers = {name: together(name, bands) for name in bands[0].numbers}
     if skew is not None:
         numbers["skew"] = Number(skew, size)
     return Regression(
-        numbers, tuple(bands), tuple(options.get("orders", ())), falls, vs, float(np.quantile(speed, 0.01)),
+        numbers, tuple(bands), tuple(orders), falls, vs, float(np.quantile(speed, 0.01)),
         float(np.max(speed)), period, tuple(widest),
     )  # fmt: skip
+
+
+def in_bands(
+    signals: Sequence[Signals], width: float, axis: ServoAxis, options: Mapping[str, Any], harmonics: bool,
+    period: float | None,
+) -> tuple[list[BandFit], list[SlidingRows], list[float]]:  # fmt: skip
+    """Fits from the widest band of frequencies to the narrowest, the rows of the widest, and its orders."""
+    bands: list[BandFit] = []
+    widest: list[SlidingRows] = []
+    chosen: dict[str, Any] = {}
+    lacking = InputError("no band of the record slides long enough in one direction")
+    for factor in BANDS:
+        try:
+            if not bands:
+                known = options["skew"]
+                start = clear_skew(signals, factor * width) if known is None else known
+                widest, levels = rows_of(signals, factor * width, start)
+                own = {**options, "start": start}
+                chosen = {
+                    "start": start,
+                    **(orders_in(widest, levels, axis, period, own) if harmonics else {}),
+                }
+                rows = widest
+            else:
+                rows, levels = rows_of(signals, factor * width, bands[0].numbers["skew"].value)
+            bands.append(fit_band(rows, levels, **{**options, **chosen}))
+        except InputError as error:
+            lacking = error
+    if not bands:
+        raise lacking
+    return bands, widest, chosen.get("orders", [])
+
+
+def follows(band: BandFit, rows: Sequence[SlidingRows], size: float) -> bool:
+    """Whether a fit's skew may be one: a small one, or one with an inertia above 0."""
+    inertia, skew = band.numbers["inertia"], band.numbers["skew"]
+    return abs(skew.value) <= USUALLY * size or inertia.value > QUANTILE * inertia.std
 
 
 def orders_in(
     rows: Sequence[SlidingRows], levels: Sequence[float], axis: ServoAxis, period: float | None,
     options: Mapping[str, Any],
-) -> dict[str, list[float]]:  # fmt: skip
+) -> dict[str, Any]:  # fmt: skip
     """Orders of a torque over the position that show, and the lowest others, which may be there but are small."""
     skew = fit_band(rows, levels, **options).numbers["skew"].value
     candidates = candidate_orders(rows, axis.motion == "rotary", period)
     candidates = candidates[axis.gravity == "pendulum" :]  # the first is a pendulum's own
     shown = shown_orders(rows, skew, candidates)
-    return {"orders": shown, "background": [o for o in candidates[:BACKGROUND] if o not in shown]}
+    return {
+        "orders": shown, "background": [o for o in candidates[:BACKGROUND] if o not in shown],
+        "blurred": not goes_round(rows, axis.motion == "rotary", period),
+    }  # fmt: skip
 
 
 def clear_skew(signals: Sequence[Signals], width: float) -> float:
@@ -270,8 +313,18 @@ def together(name: str, bands: Sequence[BandFit]) -> Number:
     least = min(n.std for n in numbers)
     signed = name in ROTATED or name in ("skew", "offset")
     told = [n for n in numbers if n.std <= max(TELLING * least, 0.0 if signed else NARROW * abs(n.value))]
-    value = math.fsum(n.value for n in told) / len(told)
-    variance = math.fsum(n.std**2 + (n.value - value) ** 2 for n in told) / len(told)
+    found = mixed(told)
+    against = [
+        n for n in numbers
+        if n not in told and abs(n.value - found.value) > QUANTILE * math.hypot(n.std, found.std)
+    ]  # fmt: skip
+    return mixed([*told, *against]) if against else found
+
+
+def mixed(numbers: Sequence[Number]) -> Number:
+    """Their mean, with the spread of what each says."""
+    value = math.fsum(n.value for n in numbers) / len(numbers)
+    variance = math.fsum(n.std**2 + (n.value - value) ** 2 for n in numbers) / len(numbers)
     return Number(value, math.sqrt(variance))
 
 

@@ -32,7 +32,6 @@ CERTAIN = 6.0  # standard deviations of the fine velocity's noise from which on 
 CREEPING = 3e-3  # of the usual speed
 FEWEST = 30  # rows
 DIRECTION = 2  # its column
-PIECE = 0.25  # s: the longest stretch that counts as one observation for the jackknife
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +114,8 @@ class SlidingRows:
         rad/s³ (m/s³).
     falling : array, shape (n, m)
         exp(-(v/vs)²) in the direction of motion, for every Stribeck velocity that `falling_at` was asked for.
-    piece : array of int, shape (n,)
-        Stretch of sliding that a row belongs to, 0 ...
+    stroke : array of int, shape (n,)
+        Stretch of sliding in one direction that a row belongs to, 0 ...
     signals : Signals
     window : Window
     places : array of int, shape (n,)
@@ -133,7 +132,7 @@ class SlidingRows:
     fixed: Array
     jerk: Array
     falling: Array
-    piece: np.ndarray[Any, np.dtype[np.int64]]
+    stroke: np.ndarray[Any, np.dtype[np.int64]]
     signals: Signals
     window: Window
     places: np.ndarray[Any, np.dtype[np.int64]]
@@ -148,12 +147,17 @@ class SlidingRows:
         ]  # fmt: skip
         return replace(self, falling=np.column_stack(falling))
 
+    @property
+    def spacing(self) -> float:
+        """From one row to the next of the same stroke, s."""
+        return stride_of(self.window) * self.window.period
+
     def farther(self, distance: float) -> SlidingRows:
         """Only the rows that lie farther behind a reversal or stop, rad (m)."""
         kept = self.gone > distance
         return SlidingRows(
             self.time[kept], self.position[kept], self.speed[kept], self.fixed[kept], self.jerk[kept],
-            self.falling[kept], np.unique(self.piece[kept], return_inverse=True)[1].astype(np.int64),
+            self.falling[kept], np.unique(self.stroke[kept], return_inverse=True)[1].astype(np.int64),
             self.signals, self.window, self.places[kept], self.gone[kept], self.quick,
         )  # fmt: skip
 
@@ -168,6 +172,11 @@ class SlidingRows:
         # Over a window the speed hardly changes: the mean of a harmonic over it.
         damped = np.exp(-0.5 * (2.0 * math.pi * order * self.speed * self.window.width) ** 2)
         return np.column_stack([np.cos(angle) * damped, np.sin(angle) * damped])
+
+
+def stride_of(window: Window) -> int:
+    """Rows of the signals from one that is looked at to the next: neighbours within a window say the same."""
+    return max(1, int(window.width / window.period))
 
 
 def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
@@ -193,7 +202,7 @@ def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
     doubtful = turned | (np.abs(quick) < certain) | ~signals.rows
     clear = ~within(doubtful, window.reach)
     clear[: window.reach] = clear[q.size - window.reach :] = False
-    stride = max(1, int(window.width / period))
+    stride = stride_of(window)
     places = np.flatnonzero(clear[::stride]) * stride
     if places.size < FEWEST:
         raise InputError(
@@ -203,13 +212,11 @@ def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
     stopped = np.maximum.accumulate(np.where(doubtful, np.arange(q.size), 0))
     sign = direction[places]
     rises = np.concatenate([[True], (np.diff(places) > stride) | (sign[1:] != sign[:-1])])
-    begins = signals.time[places[rises]][np.cumsum(rises) - 1]
-    cut = np.floor((signals.time[places] - begins) / PIECE)
-    piece = np.cumsum(rises | np.concatenate([[False], np.diff(cut) != 0.0])) - 1
+    stroke = np.cumsum(rises) - 1
     return SlidingRows(
         signals.time[places], q[places] + signals.origin, v[places],
         np.column_stack([a[places], v[places], sign, np.ones(places.size)]), jerk[places],
-        np.zeros((places.size, 0)), piece, signals, window, places, np.abs(q[places] - q[stopped[places]]), quick,
+        np.zeros((places.size, 0)), stroke, signals, window, places, np.abs(q[places] - q[stopped[places]]), quick,
     )  # fmt: skip
 
 
