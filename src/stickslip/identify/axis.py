@@ -33,6 +33,7 @@ from stickslip.identify.axis_prediction import axis_prediction
 from stickslip.identify.axis_problem import Problem
 from stickslip.identify.axis_result import assembled, evident, narrow_note, noted, untold_by_reversals
 from stickslip.identify.axis_search import Extras, FittedAxis, require_start
+from stickslip.identify.axis_settled import settled
 from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification, silent
 from stickslip.identify.regression import Regression, regress_axis
@@ -51,8 +52,8 @@ NO_PREDICTION = "The prediction error cannot be had from these records:"
 INTERVALS = ("prediction", "covariance")
 HELD = 0.1
 """Rows by which a torque may act beside its row for reversals to tell stiffness."""
-FALLS = 0.95
-"""Probability from which on friction is taken to fall with velocity."""
+FALLS, SHOWN = 0.95, 4.0
+"""Probability, and standard deviations of Fs - Fc, from which on friction is taken to fall with velocity."""
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
 
@@ -170,11 +171,11 @@ def identify_axis(
 
 
 def shortlist(laws: Sequence[Law], sliding: Regression | None) -> list[Law]:
-    """The laws worth a comparison where none was named: only those with a fall of friction where one shows.
+    """The laws worth a comparison where none was named: only those with a fall of friction where one shows clearly.
 
     Where none shows it may lie below the speeds of certain sliding.
     """
-    if sliding is None or sliding.falls < FALLS:
+    if sliding is None or sliding.falls < FALLS or sliding.fall_shown < SHOWN:
         return list(laws)
     return [law for law in laws if "fs" in {f.name for f in law.fields}] or list(laws)
 
@@ -205,6 +206,8 @@ def by_sliding(
     estimates, said = agreed(first, sliding, vector, inverse, scale, fine=False)
     u = vector.coordinates(vector.named(vector.start) | {e.name: e.value for e in estimates})
     estimates = evident(estimates, vector, u, trials, axis)
+    estimates, more = settled(estimates, model, inverse)
+    u = vector.coordinates(vector.named(u) | {e.name: e.value for e in estimates})
     found = with_values(trials, axis, law, vector, u, extras)
     shown = [replace(e, unit=axis.unit(e.unit)) for e in estimates]
     names, told = [e.name for e in shown], list(sliding.numbers)[:4]
@@ -213,7 +216,9 @@ def by_sliding(
         for j, b in enumerate(names):
             if a in told and b in told:
                 correlation[i, j] = sliding.bands[0].correlation[told.index(a), told.index(b)]
-    result = assembled(found, shown, correlation, inverse, validation, candidates, [*notes, *said], sliding)
+    result = assembled(
+        found, shown, correlation, inverse, validation, candidates, [*notes, *said, *more], sliding
+    )
     return noted(result)
 
 
@@ -261,13 +266,19 @@ def predicted(
             result.vector.named(u) | {e.name: e.value for e in estimates if e.name in TOLD_BY_SLIDING}
         )
     estimates = evident(estimates, result.vector, u, trials, axis)
-    u = result.vector.coordinates(
-        result.vector.named(u) | {e.name: e.value for e in estimates if e.name == "fs"}
-    )
+    estimates, more = settled(estimates, result.model, inverse if sliding is not None else None)
+    u = result.vector.coordinates(result.vector.named(u) | {e.name: e.value for e in estimates})
     fitted = with_values(trials, axis, law, result.vector, u, options["extras"])
     estimates = tuple(replace(e, unit=axis.unit(e.unit)) for e in estimates)
     found = assembled(
-        fitted, estimates, result.correlation(), inverse, validation, candidates, [*notes, *said], sliding
+        fitted,
+        estimates,
+        result.correlation(),
+        inverse,
+        validation,
+        candidates,
+        [*notes, *said, *more],
+        sliding,
     )
     return noted(replace(found, details={**found.details, "prediction": result}))
 

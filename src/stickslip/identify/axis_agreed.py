@@ -164,13 +164,6 @@ def agreed(
             for e in estimates if taken.get(e.name) is e
         }  # fmt: skip
         notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
-    if inverse is not None:
-        # A number that is one choice among many: the one that goes best with the others.
-        best = completed(inverse, {n: e.value for n, e in taken.items() if e.identified})
-        taken |= {
-            n: told(e, parameters[n], best[n], min(e.lower, best[n]), max(e.upper, best[n]), scale.get(n, math.nan))
-            for n, e in taken.items() if n in best
-        }  # fmt: skip
     out = tuple(
         taken[e.name] if e.name in sliding and e.name in taken
         else replace(e, identified=False, verdict=doubts) if doubts and e.identified else e
@@ -190,22 +183,6 @@ def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale
 
 PLAIN = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}
 """Names of the plain inverse dynamics."""
-
-
-def completed(inverse: InverseDynamics, known: Mapping[str, float]) -> dict[str, float]:
-    """What plain least squares gives the numbers that are not known, with those that are."""
-    if not all(inverse.has(n) for n in PLAIN.values()):
-        return {}
-    fixed = [inverse.names.index(PLAIN[n]) for n in known if n in PLAIN]
-    values = np.array([known[n] for n in known if n in PLAIN])
-    free = [i for i in range(len(inverse.names)) if i not in fixed]
-    left = inverse.torque - inverse.matrix[:, fixed] @ values
-    columns = inverse.matrix[:, free]
-    size = np.linalg.norm(columns, axis=0)
-    size = np.where(size > 0.0, size, 1.0)
-    found = np.asarray(np.linalg.lstsq(columns / size, left, rcond=1e-9)[0] / size, dtype=np.float64)
-    own = {inverse.names[i]: float(x) for i, x in zip(free, found, strict=True)}
-    return {n: own[p] for n, p in PLAIN.items() if p in own}
 
 
 def plain_value(name: str, inverse: InverseDynamics | None) -> tuple[float, float] | None:

@@ -34,6 +34,9 @@ __all__ = ["Candidate", "chosen_of", "compared", "foreseen", "options_of", "sent
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BLOCKS = 20
+CLEARLY = 0.75
+"""Times the held-out misfit of a simpler law, that a law of more parameters must stay below: parts of one record, and
+records of one machine, then have the same law."""
 FORETOLD = 2.0
 """Standard deviations of the lowest held-out misfit above which no law is said to foretell what was held out."""
 COMPARABLE = 1e-2
@@ -208,7 +211,7 @@ def values_of(vector: Vector, u: Array, model: Model) -> dict[str, Any]:
 
 
 def chosen_of(candidates: Sequence[Candidate]) -> int:
-    """The simplest law within one standard error of the best."""
+    """The simplest law of which no other is clearly better: by more than a standard error, and by a quarter."""
     means = [float(np.mean(c.score)) for c in candidates]
     best = int(np.nanargmin(means))
     near = [best]
@@ -217,7 +220,7 @@ def chosen_of(candidates: Sequence[Candidate]) -> int:
             continue
         difference = c.score - candidates[best].score
         error = float(np.std(difference, ddof=1)) / math.sqrt(difference.size)
-        if float(np.mean(difference)) <= error:
+        if float(np.mean(difference)) <= error or CLEARLY**2 * means[i] <= means[best]:
             near.append(i)
     return min(near, key=lambda i: (candidates[i].parameters, means[i]))
 
@@ -229,8 +232,8 @@ def sentence_on(candidates: Sequence[Candidate], chosen: str) -> str:
         for c in candidates
     ]
     said = (
-        f"Law {chosen!r} is the simplest within one standard error of the lowest held-out misfit (in standard "
-        f"deviations: {', '.join(parts)})."
+        f"Law {chosen!r} is the simplest of those that foretell what was held out about as well as any: no other's "
+        f"misfit is below it by a standard error and a quarter (in standard deviations: {', '.join(parts)})."
     )
     if min(math.sqrt(float(np.mean(c.score))) for c in candidates) > FORETOLD:
         said += (

@@ -205,7 +205,10 @@ def small_columns(records: Sequence[SlidingRows], fc: float, orders: Sequence[fl
         std += [AROUND] * 2
     along = stacked(records, "position")
     middle, reach = 0.5 * (along.max() + along.min()), max(0.5 * float(np.ptp(along)), 1e-300)
-    columns += list(np.polynomial.legendre.legvander((along - middle) / reach, LEANING).T[1:])
+    leaning: Array = np.asarray(
+        np.polynomial.legendre.legvander((along - middle) / reach, LEANING), dtype=np.float64
+    )
+    columns += list(leaning.T[1:])
     std += [LEANS] * LEANING
     return np.column_stack(columns), fc * np.array(std)
 

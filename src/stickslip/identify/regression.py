@@ -131,6 +131,12 @@ class Regression:
         )
 
     @property
+    def fall_shown(self) -> float:
+        """Friction at rest above its level, in standard deviations."""
+        rest, level = self.numbers["fs"], self.numbers["fc"]
+        return (rest.value - level.value) / max(math.hypot(rest.std, level.std), 1e-300)
+
+    @property
     def harmonics(self) -> Array:
         """Amplitude of every order found, N·m (N), shape (k,)."""
         return np.hypot(*self.bands[0].harmonics.T) if self.orders else np.zeros(0)

@@ -25,7 +25,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 RATIO = 2.0
 """A positive parameter is identified where upper/lower is at most this."""
-SHARE = 0.05
+SHARE = 0.1
 """A signed parameter is identified where the half-width is at most this part of its scale (Fc for torques)."""
 
 
@@ -237,7 +237,7 @@ def interval_of(
 def verdict_on(p: Parameter, value: float, low: float, high: float, noise: Noise, scale: float) -> str:
     """Why a parameter is not identified; empty where it is.
 
-    Positive ones need upper/lower of at most 2, signed ones a half-width of at most 5 % of `scale`.
+    Positive ones need upper/lower of at most 2, signed ones a half-width of at most 10 % of `scale`.
     """
     if not noise.known:
         return "the noise level is unknown: give it, or repeat measurements"
