@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stickslip.approval import allow_code
+    from stickslip.control.block import ControlBlock
     from stickslip.control.compensators.feedback import Feedback
     from stickslip.control.compensators.feedforward import Feedforward
     from stickslip.control.controller import Controller
     from stickslip.control.linear import Cascade, Gains, pd, pid, place, pr
+    from stickslip.control.sampled_controller import SampledController
+    from stickslip.control_spec import ControlLaw
     from stickslip.errors import InputError, SimulationError, StickslipError
     from stickslip.machines.rigid import RigidAxis
     from stickslip.model import Model, Reference
-    from stickslip.plugins import law, law_names
+    from stickslip.plugins import control_law, control_law_names, law, law_names
     from stickslip.record import Record
     from stickslip.simulation.closed_loop import simulate
     from stickslip.simulation.open_loop import respond
@@ -27,6 +30,8 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Cascade": "control.linear",
+    "ControlBlock": "control.block",
+    "ControlLaw": "control_spec",
     "Controller": "control.controller",
     "Feedback": "control.compensators.feedback",
     "Feedforward": "control.compensators.feedforward",
@@ -39,9 +44,12 @@ _HOME = {
     "Record": "record",
     "Reference": "model",
     "RigidAxis": "machines.rigid",
+    "SampledController": "control.sampled_controller",
     "SimulationError": "errors",
     "StickslipError": "errors",
     "allow_code": "approval",
+    "control_law": "plugins",
+    "control_law_names": "plugins",
     "law": "plugins",
     "law_names": "plugins",
     "pd": "control.linear",
@@ -54,6 +62,8 @@ _HOME = {
 
 __all__ = [
     "Cascade",
+    "ControlBlock",
+    "ControlLaw",
     "Controller",
     "Feedback",
     "Feedforward",
@@ -66,9 +76,12 @@ __all__ = [
     "Record",
     "Reference",
     "RigidAxis",
+    "SampledController",
     "SimulationError",
     "StickslipError",
     "allow_code",
+    "control_law",
+    "control_law_names",
     "law",
     "law_names",
     "pd",

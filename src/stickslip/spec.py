@@ -383,6 +383,7 @@ class Configurable(Described):
     variants: dict[tuple[tuple[str, str], ...], Any]
     written: Mapping[str, Any]
     state_fields: tuple[Field, ...]
+    example: Mapping[str, Any]
 
     def option_fields(self, own: type) -> dict[str, Field]:
         """The fields of a ``Params`` class and of the chosen options, by name; the first of a name holds."""

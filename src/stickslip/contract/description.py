@@ -9,7 +9,7 @@ from typing import Any
 from stickslip.contract.motions import name_of, variants
 from stickslip.contract.verdict import Verdict, failed, held
 from stickslip.errors import LawError, ParameterError
-from stickslip.spec import Law, Mode
+from stickslip.spec import Configurable, Law, Mode
 from stickslip.subset import law_layouts, lower
 
 __all__ = ["bounds", "description", "subset"]
@@ -52,7 +52,7 @@ def subset(law: Law) -> Verdict:
     return held("subset", f"all functions, under {count} options")
 
 
-def bounds(law: Law) -> Verdict:
+def bounds(law: Configurable) -> Verdict:
     """Parameters out of bounds are refused by name, and the example holds with every option."""
     good = dict(law.example)
     for f in law.fields:

@@ -271,7 +271,7 @@ def functions_with(laws: Mapping[str, Callable[..., float]]) -> dict[str, Callab
     own = {
         name: value
         for name, value in home.items()
-        if isinstance(value, types.FunctionType) and value.__globals__ is home
+        if isinstance(value, types.FunctionType) and value.__globals__ is home and value is not functions_with
     }
     scope = dict(home)
     scope.update({name: rescoped(function, scope) for name, function in own.items()})

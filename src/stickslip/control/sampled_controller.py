@@ -143,10 +143,13 @@ class SampledController:
         """The memory of the composition at the start."""
         return SimpleNamespace(**{f.name: 0.0 for f in MEMORY})
 
+    def values(self) -> dict[str, Any]:
+        """The parameters of all its laws by their whole names."""
+        return {f.name: _at(self.parameters, path) for f, path in zip(self.fields, self._paths("fields"))}
+
     def packed(self) -> list[float]:
         """The parameters as the flat list that compiled functions read."""
-        values = {f.name: _at(self.parameters, name) for f, name in zip(self.fields, self._paths("fields"))}
-        return packed(self.fields, SimpleNamespace(**values))
+        return packed(self.fields, SimpleNamespace(**self.values()))
 
     def packed_state(self, z: SimpleNamespace | None = None) -> list[float]:
         """A state (that at the start, if none is given) as the flat list that compiled functions read."""

@@ -48,7 +48,7 @@ from stickslip.export.target import Target
 from stickslip.spec import Field, Law, Surroundings, fields_of
 from stickslip.subset import law_layouts, named
 
-__all__ = ["SINGLE_BOUND", "TARGET", "dialect_of", "translated", "write"]
+__all__ = ["SINGLE_BOUND", "TARGET", "checked", "dialect_of", "translated", "write"]
 
 SINGLE_BOUND = 1e-2
 """Largest error of single precision, as a share of the largest torque: where a contact breaks away a step sooner or
@@ -281,15 +281,20 @@ def controller_of(job: Job, dialect: Dialect) -> Mapping[str, Any] | None:
 
 def check(job: Job, export: Export) -> Check:
     """Compile with every compiler at hand, warnings as errors, and run the golden vectors."""
+    return checked(export, job.name)
+
+
+def checked(export: Export, name: str) -> Check:
+    """Compile NAME.c with NAME_check.c and run it."""
     compilers = [c for c in ("gcc", "clang") if shutil.which(c)]
     if not compilers:
         return Check(None, "neither gcc nor clang is installed")
     errors: dict[str, float] = {}
     with TemporaryDirectory() as folder:
-        for name, content in export.files.items():
-            Path(folder, name).write_text(str(content))
+        for file, content in export.files.items():
+            Path(folder, file).write_text(str(content))
         for compiler in compilers:
-            sources = [f"{job.name}.c", f"{job.name}_check.c"]
+            sources = [f"{name}.c", f"{name}_check.c"]
             built = run([compiler, *FLAGS, *sources, "-lm", "-o", "check"], folder)
             if built.returncode:
                 return Check(False, f"{compiler}: {built.stderr.strip().splitlines()[0]}")

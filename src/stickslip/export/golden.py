@@ -25,6 +25,7 @@ __all__ = [
     "golden",
     "golden_around",
     "golden_samples",
+    "random_motion",
     "random_steps",
     "room_beside_jumps",
 ]
@@ -154,33 +155,38 @@ class Samples(NamedTuple):
     torque: Array
 
 
-def random_samples(controller: Controller, count: int, seed: int) -> tuple[Array, Array, Array, Array]:
-    """Position and reference of a motion with reversals, stops, a blocked axis and inputs that are no numbers."""
+def random_motion(
+    sample_time: float, reach: float, count: int, seed: int
+) -> tuple[Array, Array, Array, Array]:
+    """Position and reference of a motion with reversals, stops, a blocked axis and inputs that are no numbers.
+
+    ``reach`` is the error at which the controller comes to its torque limit, rad.
+    """
     draw = np.random.default_rng(seed)
     pieces = np.arange(count) // 20
     speed: Array = 10.0 ** draw.uniform(-2.0, 0.5, count // 20 + 1) * draw.choice(
         (-1.0, 1.0), count // 20 + 1
     )
     speed[::5] = 0.0
-    time = controller.sample_time
     velocity: Array = speed[pieces]
-    wanted = FAR + np.cumsum(velocity) * time
-    lag = 1e-3 * np.cumsum(draw.standard_normal(count) * (velocity != 0.0)) * math.sqrt(time)
+    wanted = FAR + np.cumsum(velocity) * sample_time
+    lag = 1e-3 * np.cumsum(draw.standard_normal(count) * (velocity != 0.0)) * math.sqrt(sample_time)
     position = wanted - lag
     # The axis is blocked until the limit holds the torque back, and comes free again.
-    most = controller.torque_limit / controller.linear.kp if controller.linear.kp else 1.0
     blocked = slice(count // 2, 3 * count // 4)
-    position[blocked] -= 2.0 * min(most, 1.0)
+    position[blocked] -= 2.0 * min(reach, 1.0)
     position[count // 4 : count // 4 + 3] = math.nan
     wanted[count - 20] = math.nan
-    return position, wanted, velocity, np.gradient(velocity, time)
+    return position, wanted, velocity, np.gradient(velocity, sample_time)
 
 
 def golden_samples(
     controller: Controller, around: Surroundings | None = None, count: int = 400, seed: int = 1
 ) -> Samples:
     """Random samples and the torque of plain Python, from the first sample on, at this load and temperature."""
-    inputs = random_samples(controller, count, seed)
+    stiffness = controller.linear.kp
+    reach = controller.torque_limit / stiffness if stiffness else 1.0
+    inputs = random_motion(controller.sample_time, reach, count, seed)
     helper = controller.compensator
     n, p = settings(controller)._replace(clock=1.0), helper.model.parameters if helper else None
     m = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0))

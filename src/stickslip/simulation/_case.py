@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.control.controller import Controller
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import UnknownName
 from stickslip.jit import LawPointers, compiled_law, compiled_profile, flat
 from stickslip.laws._stick import SLIP_RULE
@@ -119,7 +120,7 @@ class Case:
     """
 
     axis: RigidAxis
-    controller: Controller
+    controller: Controller | SampledController
     reference: Reference
     numbers: Array
     plant: Side
@@ -214,7 +215,7 @@ class StepBudget(NamedTuple):
 
 def lay_out(
     axis: RigidAxis,
-    controller: Controller,
+    controller: Controller | SampledController,
     reference: Reference,
     duration: float,
     *,
@@ -227,13 +228,15 @@ def lay_out(
     limits: tuple[float, float] = (1e6, 1e6),
 ) -> Case:
     """Lay a closed loop out in flat arrays (compiles its laws and reference if they are not cached)."""
-    helper = controller.compensator
+    composed = isinstance(controller, SampledController)
+    helper = None if composed else controller.compensator
     plant = Side.of(ruled(axis.friction, slip_rule))
     assist = Side.of(ruled(helper.model, slip_rule) if helper else None)
     numbers = np.zeros(NUMBERS)
     numbers[INERTIA] = axis.inertia
-    gains = controller.linear
-    numbers[[KP, KI, KD, KR]] = gains.kp, gains.ki, gains.kd, gains.kr
+    if not composed:
+        gains = controller.linear
+        numbers[[KP, KI, KD, KR]] = gains.kp, gains.ki, gains.kd, gains.kr
     numbers[TORQUE_LIMIT] = controller.torque_limit
     numbers[DURATION], numbers[TOLERANCE], numbers[MAX_STEP] = duration, tolerance, max_step
     if helper:

@@ -24,6 +24,7 @@ from stickslip.simulation._case import (
     SOURCE,
     TORQUE_LIMIT,
 )
+from stickslip.simulation._sampled import Sampled
 
 # ---- the state at one time: these entries, then the plant's state, then the compensator's -----------------
 (
@@ -50,8 +51,7 @@ class Loop(NamedTuple):
     helper_parameters: Any
     profile: int
     reference_parameters: Any
-    sampler: int
-    settings: Any
+    sampled: Sampled
     plant_states: int
     damped: bool
     steep: bool

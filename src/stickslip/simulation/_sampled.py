@@ -9,24 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.control.composition import MEMORY as MEMORY_FIELDS
-from stickslip.control.sampled import Memory, Settings, sampled_by
+from stickslip.control.controller import Controller
+from stickslip.control.sampled import Memory, Settings, sampled_by, settings
 from stickslip.control.sampled_controller import SampledController
 from stickslip.jit import call_sample, compiled_sample, flat, kernel, pointer
 from stickslip.spec import Law, Surroundings, fields_of
 from stickslip.subset import Layout, law_layouts
 
-__all__ = [
-    "COMPENSATION",
-    "COMPOSED_COMPENSATION",
-    "COMPOSED_FAULT",
-    "FAULT",
-    "MEMORY",
-    "Sampled",
-    "compiled",
-    "measured_position",
-    "replay",
-    "sampler",
-]
+__all__ = ["Sampled", "compiled", "measured_position", "replay", "sampled_with"]
 
 COMPENSATION, FAULT, MEMORY = *map(Memory._fields.index, ("compensation", "fault")), len(Memory._fields)
 """Places of the compensating torque and of the fault in the memory, and its size; the law's state follows it."""
@@ -58,7 +48,7 @@ def sampler(law: Law | None) -> int:
 
 
 class Sampled(NamedTuple):
-    """A composed controller, compiled, in flat arrays."""
+    """A sampled controller, compiled, in flat arrays, at its start."""
 
     address: int
     """of one sample"""
@@ -66,10 +56,28 @@ class Sampled(NamedTuple):
     memory: Any
     state: Any
     parameters: Any
+    compensation: int
+    """place of the compensating torque in the memory"""
+    fault: int
+    """place of the fault in it"""
+
+
+def sampled_with(controller: Controller, state: Any, parameters: Any) -> Sampled:
+    """Compile a controller with gains and a compensator, whose law's state and parameters are given."""
+    helper = controller.compensator
+    return Sampled(
+        sampler(helper.model.law if helper else None),
+        np.array(settings(controller)),
+        np.zeros(MEMORY),
+        flat(state).copy(),
+        parameters,
+        COMPENSATION,
+        FAULT,
+    )
 
 
 def compiled(controller: SampledController) -> Sampled:
-    """Compile a controller made of control laws, at its start."""
+    """Compile a controller made of control laws."""
     laws = tuple(
         (part, block.law, block.friction and block.friction.law) for part, block in controller.blocks.items()
     )
@@ -81,6 +89,8 @@ def compiled(controller: SampledController) -> Sampled:
         np.zeros(len(MEMORY_FIELDS)),
         flat(controller.packed_state()),
         flat(controller.packed()),
+        COMPOSED_COMPENSATION,
+        COMPOSED_FAULT,
     )
 
 
@@ -100,4 +110,4 @@ def replay(sampled: Sampled, inputs: Any, surroundings: Any, torque: Any, fault:
             pointer(sampled.memory, 0), pointer(sampled.state, 0), pointer(sampled.parameters, 0),
             pointer(surroundings, 0),
         )  # fmt: skip
-        fault[i] = sampled.memory[COMPOSED_FAULT]
+        fault[i] = sampled.memory[sampled.fault]

@@ -11,6 +11,7 @@ import numpy as np
 
 import stickslip
 from stickslip.control.controller import Controller
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import (
     Divergence,
     EventStorm,
@@ -21,7 +22,7 @@ from stickslip.errors import (
     UnknownName,
 )
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Reference
+from stickslip.model import Model, Reference
 from stickslip.record import Record
 from stickslip.simulation import _case
 from stickslip.simulation._case import COLUMNS, UNITS, Case, Outcome, lay_out, slip_rules
@@ -53,7 +54,7 @@ REASONS: dict[int, tuple[type[SimulationError], str]] = {
 
 def simulate(
     axis: RigidAxis,
-    controller: Controller,
+    controller: Controller | SampledController,
     reference: Reference,
     duration: float,
     *,
@@ -71,7 +72,7 @@ def simulate(
     Parameters
     ----------
     axis : RigidAxis
-    controller : Controller
+    controller : Controller or SampledController
     reference : Reference
     duration : float
         s
@@ -173,7 +174,7 @@ def _in_numbers(case: Case, outcome: Outcome) -> str:
 
 def prepare(
     axis: RigidAxis,
-    controller: Controller,
+    controller: Controller | SampledController,
     reference: Reference,
     duration: float,
     *,
@@ -260,7 +261,7 @@ def integrator_for(case: Case, name: str = "auto") -> Choice:
 def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
     rows = outcome.rows
     columns = np.ascontiguousarray(rows.T)
-    helper, plant, assist = case.controller.compensator, case.plant.model, case.compensator.model
+    controller, plant, assist = case.controller, case.plant.model, case.compensator.model
     assert plant is not None
     meta: dict[str, Any] = {
         "what": "simulation",
@@ -272,27 +273,29 @@ def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
         "ended": outcome.time,
         "inertia": case.axis.inertia,
         "friction": plant.as_dict(),
-        "gains": case.controller.gains._asdict(),
         "reference": case.reference.as_dict(),
         "counts": outcome.counts,
     }
-    if helper and assist:
-        meta["compensator"] = {
-            "kind": helper.name,
-            "gain": helper.gain,
-            "filter_hz": helper.filter_hz,
-            "lead": helper.lead,
-            "deadband": helper.deadband,
-            "offset": helper.offset,
-            "inertia_feedforward": helper.inertia_feedforward,
-            "substeps": helper.substeps,
-            **assist.as_dict(),
-        }
+    if isinstance(controller, SampledController):
+        meta["controller"] = controller.as_dict()
+    else:
+        meta["gains"] = controller.gains._asdict()
+        meta |= _compensator(controller, assist)
     if case.numbers[_case.METERED] and outcome.code == _case.DONE:
         meta["metrics"] = {k: float(v) for k, v in metrics(outcome.meter, outcome.turns).items()}
         meta["energy"] = _energy(case, columns, meta["metrics"])
     channels = {name: columns[i] for i, name in enumerate(COLUMNS) if name != "time"}
     return Record(columns[0], channels, UNITS, meta)
+
+
+def _compensator(controller: Controller, assist: Model | None) -> dict[str, Any]:
+    """What a record says of a compensator, if there is one."""
+    helper = controller.compensator
+    if helper is None or assist is None:
+        return {}
+    numbers = ("gain", "filter_hz", "lead", "deadband", "offset", "inertia_feedforward", "substeps")
+    own = {name: getattr(helper, name) for name in numbers}
+    return {"compensator": {"kind": helper.name, **own, **assist.as_dict()}}
 
 
 def _energy(case: Case, columns: Any, found: dict[str, float]) -> dict[str, float]:

@@ -21,6 +21,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from stickslip.control.sampled_controller import SampledController
 from stickslip.jit import flat
 from stickslip.simulation import _exact_state as col
 from stickslip.simulation._case import (
@@ -67,7 +68,7 @@ def elements_of(side: Side) -> Elements | Bristle | None:
 def can_run(case: Case) -> str:
     """Say why the exact integrator cannot run `case`, in one sentence; "" if it can."""
     controller = case.controller
-    if controller.sample_time > 0.0:
+    if isinstance(controller, SampledController) or controller.sample_time > 0.0:
         return "the exact integrator runs controllers in continuous time, not with a sample time"
     if math.isfinite(controller.torque_limit):
         return "the exact integrator needs a controller without a torque limit"

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.control.sampled import settings
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
 from stickslip.jit import call_sample, kernel, pointer
 from stickslip.simulation._case import (
@@ -82,7 +82,7 @@ from stickslip.simulation._meter import (
     new_meter,
     settle_band_of,
 )
-from stickslip.simulation._sampled import COMPENSATION, FAULT, MEMORY, measured_position, sampler
+from stickslip.simulation._sampled import Sampled, compiled, measured_position, sampled_with
 from stickslip.spec import Surroundings
 from stickslip.waiting import Reached, watched
 
@@ -132,7 +132,6 @@ def run(case: Case, dt: float) -> Outcome:
     start[SIDE] = np.sign(start[VELOCITY])
     if abs(start[VELOCITY]) < n[PLANT_BAND]:
         start[VELOCITY], start[GATHERED] = 0.0, start[VELOCITY]
-    memory = np.concatenate([np.zeros(MEMORY), case.compensator.state])
     accumulator = new_meter(float(n[DURATION]), settle_band_of(case.reference, float(n[DURATION])))
     turns = np.zeros((4096, 2))
     counts = np.zeros(4, dtype=np.int64)
@@ -144,7 +143,7 @@ def run(case: Case, dt: float) -> Outcome:
         clock[ASKED] = 1.0
 
     rows, code = watched(
-        lambda: integrate(loop, start, memory, stops, grid, dt, clock, accumulator, turns, counts),
+        lambda: integrate(loop, start, stops, grid, dt, clock, accumulator, turns, counts),
         lambda: Reached(float(clock[NOW]), float(n[DURATION]), float(counts[STEPS])), stop,
     )  # fmt: skip
     return Outcome(
@@ -171,8 +170,7 @@ def loop_of(case: Case, dt: float) -> Loop:
         case.compensator.parameters,
         case.profile,
         case.reference_parameters,
-        sampler(case.compensator.model.law if case.compensator.model else None),
-        np.array(settings(case.controller)),
+        sampled_of(case),
         case.plant.state.size,
         bool(dt * contact_slope(case.plant, dt) > RESOLVED * n[INERTIA]),
         steep,
@@ -186,6 +184,13 @@ def loop_of(case: Case, dt: float) -> Loop:
         np.zeros(size),
         np.zeros((8, 5)),
     )
+
+
+def sampled_of(case: Case) -> Sampled:
+    """The sampled controller of the case, compiled (one in continuous time is laid out, and never called)."""
+    if isinstance(case.controller, SampledController):
+        return compiled(case.controller)
+    return sampled_with(case.controller, case.compensator.state, case.compensator.parameters)
 
 
 def contact_slope(side: Side, dt: float) -> float:
@@ -244,7 +249,6 @@ def stops_of(case: Case) -> Any:
 def integrate(
     loop: Loop,
     a: Any,
-    memory: Any,
     stops: Any,
     grid: Any,
     dt: float,
@@ -265,7 +269,7 @@ def integrate(
         copy(a, b)
         restart(loop, a, begin)
         if sampled and (segment == 0 or stops[segment - 1, 1] > 0.0):
-            act(loop, a, memory)
+            act(loop, a)
         elif segment > 0:
             rows = record_jump(loop, b, a, begin, rows, counts)
         pieces = max(1, math.ceil((stop - begin) / dt * (1.0 - 1e-12)))
@@ -333,16 +337,18 @@ def reach(
 
 
 @kernel()
-def act(loop: Loop, a: Any, memory: Any) -> None:
+def act(loop: Loop, a: Any) -> None:
     """Let the sampled controller act on the state a and hold its output."""
+    sampled = loop.sampled
     wanted = loop.motion[0] - NUDGE * loop.motion[1]
     read = measured_position(a[POSITION], loop.numbers[ENCODER])
     a[MOTOR] = call_sample(
-        loop.sampler, read, wanted, loop.motion[1], loop.motion[2], pointer(loop.settings, 0),
-        pointer(memory, 0), pointer(memory, MEMORY), pointer(loop.helper_parameters, 0), pointer(loop.surroundings, 0),
+        sampled.address, read, wanted, loop.motion[1], loop.motion[2], pointer(sampled.settings, 0),
+        pointer(sampled.memory, 0), pointer(sampled.state, 0), pointer(sampled.parameters, 0),
+        pointer(loop.surroundings, 0),
     )  # fmt: skip
-    a[HELP] = memory[COMPENSATION]
-    if memory[FAULT] != 0.0:
+    a[HELP] = sampled.memory[sampled.compensation]
+    if sampled.memory[sampled.fault] != 0.0:
         a[MOTOR] = math.nan
 
 

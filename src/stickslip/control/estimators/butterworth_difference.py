@@ -21,7 +21,7 @@ MOST = 0.99 * math.pi
 class Params(NamedTuple):
     """The low-pass."""
 
-    corner: Annotated[float, Par("rad/s", "omega_c", "corner", positive=True)]
+    corner: Annotated[float, Par("1/s", "omega_c", "corner", positive=True)]
 
 
 class State(NamedTuple):

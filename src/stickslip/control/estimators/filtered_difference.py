@@ -14,7 +14,7 @@ __all__ = ["CONTROL_LAW"]
 class Params(NamedTuple):
     """The low-pass."""
 
-    corner: Annotated[float, Par("rad/s", "omega_c", "corner", positive=True)]
+    corner: Annotated[float, Par("1/s", "omega_c", "corner", positive=True)]
 
 
 class State(NamedTuple):

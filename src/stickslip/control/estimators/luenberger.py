@@ -18,9 +18,7 @@ __all__ = ["CONTROL_LAW"]
 class Params(NamedTuple):
     """The poles."""
 
-    corner: Annotated[
-        float, Par("rad/s", "omega_o", "both poles, as of a continuous observer", positive=True)
-    ]
+    corner: Annotated[float, Par("1/s", "omega_o", "both poles, as of a continuous observer", positive=True)]
 
 
 class State(NamedTuple):

@@ -26,7 +26,7 @@ class Params(NamedTuple):
     """Nominal machine and corner."""
 
     inertia: Annotated[float, Par("kg·m²", "J_n", "nominal inertia", positive=True)]
-    corner: Annotated[float, Par("rad/s", "g", "corner of the low-pass Q", positive=True)]
+    corner: Annotated[float, Par("1/s", "g", "corner of the low-pass Q", positive=True)]
     delay: Annotated[
         float,
         Par("-", "d", "samples by which the torque acts later", lower=0.0, upper=MOST_DELAY, default=0.0),

@@ -1,0 +1,349 @@
+"""The contract of a control law: what the composition, the engines and the exports rely on, held against one law.
+
+What a law promises is in the docstring of `stickslip.control_spec`. Each law is tried in its place in a controller: a
+friction law is put where it needs one, and a PD where it is no loop itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from stickslip.contract.description import bounds
+from stickslip.contract.units import parsed
+from stickslip.contract.verdict import Verdict, failed, held, not_tried
+from stickslip.control.block import ControlBlock
+from stickslip.control.sampled_controller import SampledController
+from stickslip.control_spec import ControlLaw
+from stickslip.errors import LawError
+from stickslip.export import c99_controller
+from stickslip.export.golden import random_motion
+from stickslip.model import Model
+from stickslip.simulation._sampled import Sampled, compiled, replay
+from stickslip.spec import Field, Surroundings
+from stickslip.subset import lower
+
+__all__ = ["CHECKS", "examine", "specimen", "variants"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+TIME, LIMIT = 1e-3, 1.0
+"""Sample time, s, and torque limit, N·m, of the specimens."""
+COUNT = 400
+HOUR, MINUTE = 60, 60_000
+"""Minutes, and samples of one."""
+JUMP = 0.02
+"""Of the limit: what the torque may jump by when a controller takes over."""
+FRICTION = Model("lugre", sigma0=3.5e4, sigma1=0.0, sigma2=0.018, fs=0.335, fc=0.285, vs=0.01)
+PD: dict[str, Any] = {"kp": 6.099, "kd": 0.097067}
+
+
+# ---- specimens -----------------------------------------------------------------------------------------------------
+
+
+def variants(law: ControlLaw) -> Iterator[ControlLaw]:
+    """The law, and the law under every single other option of its choices."""
+    yield law
+    for choice in law.choices:
+        yield from (law.having(**{choice.name: o}) for o in choice.options if o != choice.default)
+
+
+def block_of(law: ControlLaw) -> ControlBlock:
+    """The law with its example, and with a friction law where it needs one."""
+    return ControlBlock(law, FRICTION if law.holds_friction else None, **dict(law.example))
+
+
+def specimen(law: ControlLaw, limit: float = LIMIT, time: float = TIME) -> SampledController:
+    """A controller with the law in its place."""
+    return around(block_of(law), ControlBlock("pd", **PD), limit, time)
+
+
+def around(block: ControlBlock, loop: ControlBlock, limit: float, time: float) -> SampledController:
+    """A controller with the block in its place, and the loop where the block is none."""
+    places: dict[str, Any] = {"loop": loop, block.law.place: block}
+    return SampledController(sample_time=time, torque_limit=limit, **places)
+
+
+def motion(time: float = TIME) -> Array:
+    """Random samples: reversals, stops, a blocked axis, inputs that are no numbers; shape (COUNT, 4)."""
+    return np.column_stack(random_motion(time, LIMIT / PD["kp"], COUNT, 1))
+
+
+def clean_motion() -> Array:
+    """The same without inputs that are no numbers: those of the sample before stand in."""
+    rows = motion()
+    for i in np.flatnonzero(~np.isfinite(rows).all(axis=1)):
+        rows[i] = rows[i - 1]
+    return rows
+
+
+class Plain:
+    """A controller in plain Python."""
+
+    def __init__(self, controller: SampledController) -> None:
+        self.n, self.m = controller.settings, controller.memory()
+        self.z, self.p = controller.state(), controller.parameters
+        self.u = SimpleNamespace(**Surroundings()._asdict())
+        self.functions, self.controller = controller.functions, controller
+
+    def __call__(self, row: Any, torque: float | None = None) -> float:
+        """One sample, or one that another controller's torque is watched for, N·m."""
+        name, more = ("sample", ()) if torque is None else ("follow", (torque,))
+        return self.functions[name](*map(float, row), *more, self.n, self.m, self.z, self.p, self.u)
+
+    def state(self) -> list[float]:
+        """What the laws remember."""
+        return self.controller.packed_state(self.z)
+
+
+def torques(controller: SampledController, inputs: Array) -> Array:
+    """The torques of plain Python, N·m."""
+    plain = Plain(controller)
+    return np.array([plain(row) for row in inputs])
+
+
+def replayed(sampled: Sampled, inputs: Array) -> Array:
+    """The torques of the compiled controller from its present state on, N·m."""
+    out, fault = np.zeros(len(inputs)), np.zeros(len(inputs))
+    replay(sampled, np.ascontiguousarray(inputs), np.array(Surroundings()), out, fault)
+    return out
+
+
+# ---- the checks ----------------------------------------------------------------------------------------------------
+
+
+def description(law: ControlLaw) -> Verdict:
+    """Texts and units are there."""
+    missing = [part for part in ("title", "equation", "source") if not getattr(law, part)]
+    missing += [
+        f"{part} of {f.name}"
+        for f in (*law.fields, *law.state_fields)
+        for part in ("unit", "meaning")
+        if not getattr(f.par, part)
+    ]
+    if law.place == "estimator" and law.delay is None:
+        missing.append("delay")
+    if missing:
+        return failed("description", f"{', '.join(missing)} is missing")
+    return held("description", f"{law.place}; source: {'; '.join(law.source)}")
+
+
+def subset(law: ControlLaw) -> Verdict:
+    """Every function is in the scalar subset and returns on every path."""
+    controller = specimen(law)
+    try:
+        lower(controller.functions, controller.layouts)
+    except LawError as error:
+        return failed("subset", str(error))
+    return held("subset", "all functions")
+
+
+def same_bits(law: ControlLaw) -> Verdict:
+    """Compiled, the law gives the bits of plain Python."""
+    controller = specimen(law)
+    mine, theirs = replayed(compiled(controller), motion()), torques(controller, motion())
+    if not np.array_equal(mine, theirs):
+        first = int(np.flatnonzero(mine != theirs)[0])
+        return failed(
+            "compiled", f"sample {first}: {theirs[first]!r} N·m in Python, {mine[first]!r} compiled"
+        )
+    return held("compiled", f"every bit of {COUNT} samples as plain Python")
+
+
+def in_c(law: ControlLaw) -> Verdict:
+    """Exported to C, in double precision, it gives the bits of plain Python."""
+    export = c99_controller.write(specimen(law), "controller")
+    result = c99_controller.check(export, "controller")
+    return Verdict("C99", result.passed, result.text)
+
+
+def in_single_precision(law: ControlLaw) -> Verdict:
+    """Exported to C in single precision."""
+    export = c99_controller.write(specimen(law), "controller", single=True)
+    result = c99_controller.check(export, "controller")
+    return Verdict("single precision", result.passed, result.text)
+
+
+def limit_kept(law: ControlLaw) -> Verdict:
+    """The torque stays within the limit, whatever is measured, and all of it is finite."""
+    draw = np.random.default_rng(3)
+    size = 10.0 ** draw.uniform(-9.0, 8.0, (20_000, 4))
+    inputs = size * draw.choice((-1.0, 1.0), size.shape)
+    torque = replayed(compiled(specimen(law)), inputs)
+    worst = float(np.abs(torque).max())
+    if not worst <= LIMIT:
+        return failed("limit", f"a torque of {worst:g} N·m with a limit of {LIMIT:g} N·m")
+    return held("limit", f"{len(inputs)} samples of any size: at most {worst:g} of {LIMIT:g} N·m")
+
+
+def faults(law: ControlLaw) -> Verdict:
+    """An input that is no number is a fault, leaves the state alone and does not come out as a torque."""
+    good = motion()[: COUNT // 4]
+    for place in range(6):
+        for wrong in (math.nan, math.inf, -math.inf):
+            plain = Plain(specimen(law))
+            for row in good:
+                plain(row)
+            before, row = plain.state(), good[-1].copy()
+            if place < 4:
+                row[place] = wrong
+            else:
+                setattr(plain.u, ("load", "temperature")[place - 4], wrong)
+            torque = plain(row)
+            if not abs(torque) <= LIMIT or plain.m.fault != 1.0:
+                return failed(
+                    "fault", f"input {place} = {wrong}: torque {torque:g} N·m, fault {plain.m.fault:g}"
+                )
+            if plain.state() != before:
+                return failed("fault", f"input {place} = {wrong} reaches the state")
+            plain.u.load, plain.u.temperature = 1.0, 20.0
+            if not abs(plain(good[-1])) <= LIMIT or plain.m.fault != 0.0:
+                return failed("fault", f"after input {place} = {wrong} it does not go on")
+    return held("fault", "inputs that are no numbers: declared, not given out, not remembered")
+
+
+def taken_over(law: ControlLaw) -> Verdict:
+    """After another controller's torque was watched, the first torque is that one."""
+    plain, still, other = Plain(specimen(law)), (0.0, 0.02, 0.0, 0.0), 0.3
+    alone = abs(Plain(specimen(law))(still) - other)
+    for _ in range(200):
+        plain(still, other)
+    jump = abs(plain(still) - other)
+    said = f"the torque jumps by {jump:.3g} N·m as it takes over, by {alone:.3g} without"
+    return held("take-over", said) if jump <= JUMP * LIMIT else failed("take-over", said)
+
+
+def at_rest(law: ControlLaw) -> Verdict:
+    """Nothing grows in an hour at rest, with an encoder that flickers by a count, or in one at the torque limit."""
+    count = 2.0 * math.pi / 65536
+    flicker = np.zeros((MINUTE, 4))
+    flicker[:, 0] = count * np.tile((0.0, 1.0, 0.0, -1.0), MINUTE // 4)
+    blocked = np.zeros((MINUTE, 4))
+    blocked[:, 1] = 1.0
+    for name, inputs in (("with a flickering encoder", flicker), ("blocked at the limit", blocked)):
+        sampled = compiled(specimen(law))
+        replayed(sampled, motion()[: COUNT // 4])
+        replayed(sampled, inputs)
+        first = np.concatenate([np.abs(sampled.state), [np.abs(replayed(sampled, inputs)).max()]])
+        torque = np.zeros(0)
+        for _ in range(HOUR - 2):
+            torque = replayed(sampled, inputs)
+        last = np.concatenate([np.abs(sampled.state), [np.abs(torque).max()]])
+        if not np.all(last <= 1.01 * first + 1e-9) or sampled.memory[sampled.fault] != 0.0:
+            i = int(np.argmax(last - first))
+            return failed("rest", f"{name}: {first[i]:.6g} after two minutes, {last[i]:.6g} after an hour")
+    return held("rest", "an hour at rest and an hour at the limit: state and torque as after two minutes")
+
+
+def units(law: ControlLaw) -> Verdict:
+    """The same controller and motion in other units of torque, angle and time gives the same torque."""
+    strange = [f.par.unit for f in block_of(law).fields if parsed(f.par.unit) is None]
+    if strange:
+        return not_tried("units", f"the unit {strange[0]!r} is not understood")
+    inputs = clean_motion()  # how a fault fades is a setting of its own, s
+    here = torques(specimen(law), inputs)
+    for what, factors in (
+        ("torque", (4.0, 1.0, 1.0)),
+        ("angle", (1.0, 4.0, 1.0)),
+        ("time", (1.0, 1.0, 0.25)),
+    ):
+        torque, angle, time = factors
+        block, loop = scaled(block_of(law), factors), scaled(ControlBlock("pd", **PD), factors)
+        there = inputs * np.array([angle, angle, angle / time, angle / time**2])
+        found = torques(around(block, loop, LIMIT * torque, TIME * time), there) / torque
+        apart = float(np.abs(found - here).max())
+        if not apart <= 1e-9:
+            return failed("units", f"in other units of {what} the torque is {apart:.2g} N·m off; mend a unit")
+    return held("units", "the same controller in other units gives the same torque")
+
+
+def scaled(block: ControlBlock, factors: tuple[float, float, float]) -> ControlBlock:
+    """The block in other units."""
+    law, p = block.law, block.parameters
+    own = {f.name: in_units(f, getattr(p, f.name), factors) for f in law.fields}
+    friction = block.friction
+    if friction is not None:
+        held_by = friction.parameters
+        values = {f.name: in_units(f, getattr(held_by, f.name), factors) for f in friction.law.fields}
+        friction = Model(friction.law, **values)
+    return ControlBlock(law, friction, **own)
+
+
+def in_units(f: Field, value: Any, factors: tuple[float, float, float]) -> Any:
+    """A parameter's value in other units; an inertia is N·m over rad/s²."""
+    unit = parsed(f.par.unit)
+    assert unit is not None
+    torque, angle, time = factors
+    lengths = unit.radian - (1 if "kg·m²" in f.par.unit else 0)
+    factor = torque**unit.newton * angle**lengths * time**unit.second
+    return [factor * x for x in value] if f.per_element else factor * value
+
+
+def superposition(law: ControlLaw) -> Verdict:
+    """A law that is declared linear answers to the sum of two motions with the sum of its torques."""
+    if not law.is_linear:
+        return not_tried("linear", "the law is not declared linear")
+    draw = np.random.default_rng(5)
+    one, two = (np.cumsum(draw.standard_normal((COUNT, 4)), axis=0) * 1e-3 for _ in range(2))
+    answers = [torques(specimen(law, math.inf), x) for x in (one, two, one + two)]
+    apart = float(np.abs(answers[0] + answers[1] - answers[2]).max() / np.abs(answers[2]).max())
+    said = f"the torque of a sum of two motions is {apart:.2g} of it off the sum of their torques"
+    return held("linear", said) if apart <= 1e-9 else failed("linear", said)
+
+
+def continuous(law: ControlLaw) -> Verdict:
+    """The continuous form is what fine samples come to."""
+    if law.continuous is None:
+        return not_tried("continuous", "sampled only")
+    time, gains = 1e-5, law.continuous(block_of(law).parameters)
+    t = time * np.arange(20_000)
+    reference, position = 0.02 * np.sin(20.0 * t), 0.015 * np.sin(20.0 * t - 0.2) + 0.015 * math.sin(0.2)
+    velocities = 0.4 * np.cos(20.0 * t), 0.3 * np.cos(20.0 * t - 0.2)
+    inputs = np.column_stack([position, reference, velocities[0], np.zeros(len(t))])
+    error = reference - position
+    wanted = gains.kp * error + gains.kr * velocities[0] - gains.kd * velocities[1]
+    wanted += gains.ki * time * (np.cumsum(error) - 0.5 * error)
+    apart = float(
+        np.abs(torques(specimen(law, math.inf, time), inputs) - wanted)[10:].max() / np.abs(wanted).max()
+    )
+    said = f"samples of {time:g} s are {apart:.2g} of the largest torque off it"
+    return held("continuous", said) if apart <= 1e-3 else failed("continuous", said)
+
+
+def delayed(law: ControlLaw) -> Verdict:
+    """An estimator lags behind a constant acceleration by the delay that it states."""
+    if law.place != "estimator" or law.delay is None:
+        return not_tried("delay", "it is no estimator")
+    t = np.linspace(0.0, 1999 * TIME, 2000)
+    position = 0.5 * t * t
+    reading = SampledController(ControlBlock("pd", kp=0.0, kd=1.0), TIME, estimator=block_of(law))
+    inputs: Array = np.column_stack([position, position, np.zeros((len(t), 2))])
+    lag = float(t[-1] + torques(reading, inputs)[-1])
+    stated = law.delay(block_of(law).parameters, TIME)
+    said = f"it lags by {1e3 * lag:.6g} ms and states {1e3 * stated:.6g} ms"
+    return held("delay", said) if abs(lag - stated) <= 1e-6 * TIME else failed("delay", said)
+
+
+CHECKS: tuple[Callable[[ControlLaw], Verdict], ...] = (
+    description, subset, bounds, units, same_bits, in_c, in_single_precision, limit_kept, faults, taken_over, at_rest,
+    superposition, continuous, delayed,
+)  # fmt: skip
+"""In the order in which `examine` runs them."""
+
+
+def examine(law: ControlLaw) -> Iterator[Verdict]:
+    """Hold a control law to its contract, check after check, under its chosen options.
+
+    Yields
+    ------
+    Verdict
+        As soon as it is known.
+    """
+    for check in CHECKS:
+        try:
+            yield check(law)
+        except Exception as error:  # whatever the law's own code may raise
+            yield failed(check.__name__.replace("_", " "), f"ends in {type(error).__name__}: {error}")

@@ -1,0 +1,186 @@
+"""C99: header and source of a sampled controller made of control laws.
+
+One definition feeds it: the text of its laws and of their composition, printed by `stickslip.export._c`. In double
+precision and without contraction the code gives the bits of plain Python (tested).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from stickslip.control.composition import MEMORY, Settings
+from stickslip.control.sampled_controller import SampledController
+from stickslip.errors import InputError
+from stickslip.export._analysis import Facts, analyse, merged
+from stickslip.export._c import Dialect, functions, head, safe
+from stickslip.export._c_control import rows_of
+from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export.c99 import (
+    SINGLE_BOUND,
+    STRUCTURES,
+    SURROUNDINGS,
+    checked,
+    given,
+    initial,
+    scale_of,
+    structure,
+)
+from stickslip.export.golden import Samples, as_csv, random_motion
+from stickslip.export.job import IDENTIFIER, Check, Export
+from stickslip.spec import Field, Surroundings, fields_of
+from stickslip.subset import named
+
+__all__ = ["check", "golden_samples", "write"]
+
+PUBLIC = ("_sample", "_sample_turns", "_follow", "_follow_turns")
+NARROW = "float turns, float position, float reference_turns, float reference, "
+WIDE = {
+    "_sample": "One sample; positions in double precision, so that their difference is rounded and not they.",
+    "_follow": "Watch one sample while another controls the axis with `torque`, N*m; positions in double precision.",
+}
+
+
+def write(controller: SampledController, name: str, *, single: bool = False) -> Export:
+    """Header, source, golden samples, a program that checks them, and how to use it.
+
+    Parameters
+    ----------
+    controller : SampledController
+    name : str
+        Prefix of every name in C.
+    single : bool
+        Single precision.
+
+    Raises
+    ------
+    InputError
+        If `name` is none in C.
+    """
+    if not IDENTIFIER.fullmatch(name):
+        raise InputError(f"{name!r} is no name in C; use letters, digits and _, a letter first (--name)")
+    dialect = Dialect(name, single, STRUCTURES)
+    common = {**code_of(controller, dialect), **numbers_of(controller, dialect)}
+    samples = golden_samples(controller)
+    common |= {
+        "rows": rows_of(samples),
+        "bound": SINGLE_BOUND if single else 0.0,
+        "scale": scale_of(samples.torque),
+    }
+    return Export(
+        {
+            f"{name}.h": render("c99_controller.h.j2", **common),
+            f"{name}.c": render("c99_controller.c.j2", **common),
+            f"{name}_check.c": render("c99_controller_check.c.j2", **common),
+            "golden_samples.csv": as_csv(samples),
+            "README.md": render("c99_controller_readme.md.j2", **common),
+        }
+    )
+
+
+def check(export: Export, name: str) -> Check:
+    """Compile with every compiler at hand, warnings as errors, and run the golden samples."""
+    return checked(export, name)
+
+
+def golden_samples(controller: SampledController, count: int = 400, seed: int = 1) -> Samples:
+    """Random samples and the torque of plain Python, from the first sample on."""
+    stiffness = controller.values().get("loop_kp", 0.0)
+    reach = controller.torque_limit / stiffness if stiffness else 1.0
+    inputs = random_motion(controller.sample_time, reach, count, seed)
+    n, m = controller.settings._replace(clock=1.0), controller.memory()
+    z, p, u = controller.state(), controller.parameters, SimpleNamespace(**Surroundings()._asdict())
+    sample = controller.functions["sample"]
+    torque = [sample(*map(float, row), n, m, z, p, u) for row in zip(*inputs)]
+    return Samples(*inputs, np.array(torque, dtype=np.float64))
+
+
+# ---- what the templates are filled with ----------------------------------------------------------------------------
+
+
+def code_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
+    """Names, structures and functions."""
+    found = controller.functions
+    # In single precision the ones with whole positions are `wide`.
+    entries = {n: found[n[1:]] for n in PUBLIC if n.endswith("_turns") or not dialect.single}
+    trees = merged(named(entries, controller.layouts))
+    known, public = analyse(trees), [n for n in PUBLIC if n in trees]
+    written = functions(trees, dialect, public)
+    about = {n: ascii_only(first_line(doc)) for n, doc, _ in written}
+    text = "\n".join(line for _, _, lines in written for line in lines)
+    x = dialect.prefix
+    return {
+        "x": x,
+        "X": x.upper(),
+        "real": dialect.real,
+        "title": "Sampled controller",
+        "laws": [
+            ascii_only(f"{part}: {block.law.title}; {', '.join(block.law.source)}")
+            for part, block in controller.blocks.items()
+        ],
+        "structures": list(structures(controller, dialect)),
+        "public": [{"about": about[n], "head": head(n, known[n], dialect)} for n in public],
+        "wide": list(wide(known, dialect)),
+        "functions": [{"about": about[n], "lines": lines} for n, _, lines in written],
+        "extremes": [n for n in ("min", "max") if f"{x}_{n}(" in text],
+    }
+
+
+def numbers_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
+    """Values of the structures."""
+    values, settings = controller.values(), controller.settings._replace(clock=1.0)._asdict()
+    lists = [f for f in controller.fields if f.per_element]
+    return {
+        "sample_time": controller.sample_time,
+        "unlimited": math.isinf(controller.torque_limit),
+        "counts": {dialect.count(f"{f.par.per}s_"): len(values[f.name]) for f in lists},
+        "designed": [*initial(controller.fields, values, dialect)],
+        "settings": [*given(fields_of(Settings), settings, "n", dialect)],
+        "reset": [*cleared(MEMORY, "m", dialect), *cleared(controller.state_fields, "z", dialect)],
+        "surroundings": ", ".join(dialect.number(x) for x in Surroundings()),
+        "table": [
+            {"name": f.name, "value": values[f.name], "unit": f.par.unit, "meaning": f.par.meaning}
+            for f in controller.fields
+        ],
+    }
+
+
+def wide(known: Mapping[str, Facts], dialect: Dialect) -> Iterable[Mapping[str, Any]]:
+    """In single precision: the functions that take positions in double precision."""
+    for name, about in WIDE.items() if dialect.single else ():
+        inner = f"{name}_turns"
+        own = head(inner, known[inner], dialect)
+        own = own.replace(f"{inner}({NARROW}", f"{name}(double position, double reference, ")
+        rest = ", ".join(known[inner].arguments[4:])
+        yield {"about": about, "head": own, "call": f"{dialect.prefix}{inner}", "given": rest}
+
+
+def structures(controller: SampledController, dialect: Dialect) -> Iterable[Mapping[str, Any]]:
+    """The structures of the header."""
+    yield structure("parameters", "Parameters of the laws.", controller.fields, dialect)
+    yield structure("state", "What the laws remember.", controller.state_fields, dialect)
+    around = [
+        {"declared": f"{dialect.real} {name};", "meaning": SURROUNDINGS.get(name, name)}
+        for name in Surroundings._fields
+    ]
+    about = "What friction depends on; the controller writes position and time."
+    yield {"name": "surroundings", "about": about, "fields": around}
+    yield structure("settings", "Settings of the controller.", fields_of(Settings), dialect)
+    yield structure("memory", "What the laws see, and what the controller remembers.", MEMORY, dialect)
+
+
+def cleared(fields: tuple[Field, ...], owner: str, dialect: Dialect) -> Iterable[str]:
+    """Assignments of zero to every field of a structure."""
+    zero = dialect.number(0.0)
+    for f in fields:
+        if f.per_element:
+            count = dialect.count(f"{f.par.per}s_")
+            yield f"for (int i = 0; i < {count}; i++) {{ {owner}->{safe(f.name)}[i] = {zero}; }}"
+        else:
+            yield f"{owner}->{safe(f.name)} = {zero};"
+    if not fields:
+        yield f"{owner}->none = 0;"

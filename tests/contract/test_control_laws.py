@@ -1,0 +1,105 @@
+"""Every control law and velocity estimator, under every option, against its contract; and laws that break it."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import pytest
+
+from stickslip import plugins
+from stickslip.contract.control_laws import CHECKS, examine, specimen, variants
+from stickslip.control_spec import ControlLaw
+from stickslip.simulation._sampled import compiled, replay
+from stickslip.spec import Par, Surroundings
+
+ALL = {
+    "-".join([law.name, *law.chosen.values()]): law
+    for name in plugins.control_law_names()
+    for law in variants(plugins.control_law(name))
+}
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_control_laws_keep_their_contract(name):
+    verdicts = list(examine(ALL[name]))
+    assert len(verdicts) == len(CHECKS)
+    assert [f"{v.name}: {v.text}" for v in verdicts if v.passed is False] == []
+
+
+# ---- laws that break it --------------------------------------------------------------------------------------------
+
+
+class Params(NamedTuple):
+    """Of the laws below."""
+
+    k: Annotated[float, Par("N·m/rad", "k", "stiffness", positive=True)]
+
+
+class State(NamedTuple):
+    """Of the laws below."""
+
+    sum: Annotated[float, Par("rad", "", "sum of errors")]
+
+
+def winds_up(y, z, p, u):
+    z.sum += y.error
+    return p.k * y.error + 1e-3 * p.k * z.sum
+
+
+def hidden_unit(y, z, p, u):
+    return p.k * y.error + 0.01 * y.velocity
+
+
+def squared(y, z, p, u):
+    return p.k * y.error * abs(y.error)
+
+
+def late(y, z, p, u):
+    z.sum += 0.5 * (y.moved / y.elapsed - z.sum)
+    return z.sum
+
+
+def half(p, sample_time):
+    return 0.5 * sample_time
+
+
+def broken(sample, **more):
+    given = {"place": "loop", "State": State, **more}
+    return ControlLaw(
+        "broken", Params, sample, title="x", equation="x", source=("own",), example={"k": 5.0}, **given
+    )
+
+
+BROKEN = {
+    "rest": broken(winds_up),
+    "units": broken(hidden_unit),
+    "linear": broken(squared, linear=True),
+    "delay": broken(late, place="estimator", delay=half),
+    "continuous": broken(squared, continuous=lambda p: plugins.control_law("pd").continuous(_Gains())),
+}
+
+
+class _Gains:
+    kp, kd = 5.0, 0.0
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_what_breaks_the_contract_is_told(name):
+    assert name in [v.name for v in examine(BROKEN[name]) if v.passed is False]
+
+
+def divides(y, z, p, u):
+    return p.k / y.error
+
+
+def test_what_a_law_makes_that_is_no_number_is_a_fault_and_does_not_come_out():
+    sampled = compiled(specimen(broken(divides)))
+    inputs = np.zeros((5, 4))
+    inputs[[0, 1, 4], 1] = 10.0
+    torque, fault = np.zeros(5), np.zeros(5)
+    replay(sampled, inputs, np.array(Surroundings()), torque, fault)
+    assert torque[:2] == pytest.approx(0.5)
+    assert torque[2:4] == pytest.approx(0.5 * np.array([0.99, 0.98]))
+    assert list(fault) == [0.0, 0.0, 1.0, 2.0, 0.0]
+    assert np.isfinite(torque).all()

@@ -1,0 +1,87 @@
+"""Closed loops under controllers made of control laws: as the controllers that they replace, and as the reference's."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+
+INERTIA, TIME = 3.8623e-4, 1e-3
+CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
+AXIS = ss.RigidAxis(INERTIA, ss.Model("gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, **CURVE))
+LUGRE = ss.Model("lugre", sigma0=3.5e4, sigma1=0.0, **CURVE)
+LOW = ss.Reference("sine", amplitude=0.01, frequency=0.4)
+W = 2.0 * math.pi * 20.0
+PD = ss.ControlBlock("pd", kp=INERTIA * W**2, kd=2.0 * INERTIA * W)
+PID = ss.ControlBlock("pid", kp=3.0 * INERTIA * W**2, kd=3.0 * INERTIA * W, ki=INERTIA * W**3)
+
+
+def feedforward(**choices):
+    return ss.ControlBlock("friction_feedforward", LUGRE, choices, gain=0.9)
+
+
+PAIRS = {
+    "PID": (
+        ss.SampledController(PID, TIME),
+        ss.Controller(ss.place("PID", INERTIA, 20.0, 1.0), sample_time=TIME),
+    ),
+    "PID with feedforward and a coarse encoder": (
+        ss.SampledController(PID, TIME, feedforward(), torque_limit=0.6, encoder_counts=4096.0),
+        ss.Controller(ss.place("PID", INERTIA, 20.0, 1.0), ss.Feedforward(LUGRE, 0.9), 0.6, TIME, 4096.0),
+    ),
+}
+
+
+@pytest.mark.parametrize("pair", PAIRS.values(), ids=PAIRS)
+def test_the_loop_is_that_of_the_controller_it_replaces(pair):
+    one, two = (ss.simulate(AXIS, c, LOW, 1.5, time_step=1e-4) for c in pair)
+    for channel in ("position", "motor_torque", "compensation_torque"):
+        assert one[channel] == pytest.approx(two[channel], abs=1e-10)
+    assert np.ptp(one["position"]) > 1e-3
+    assert one.meta["metrics"] == pytest.approx(two.meta["metrics"], rel=1e-6, abs=1e-12, nan_ok=True)
+
+
+def test_a_record_says_which_laws_controlled():
+    observer = ss.ControlBlock("disturbance_observer", inertia=INERTIA, corner=400.0)
+    controller = ss.SampledController(PD, TIME, feedforward(), observer)
+    record = ss.simulate(AXIS, controller, LOW, 0.05)
+    said = record.meta["controller"]
+    assert [said[part]["law"] for part in ("loop", "feedforward", "observer", "estimator")] == [
+        "pd",
+        "friction_feedforward",
+        "disturbance_observer",
+        "backward_difference",
+    ]
+    assert said["feedforward"]["friction"]["sigma0"] == 3.5e4
+    assert "gains" not in record.meta
+    assert np.abs(record["compensation_torque"]).max() > 0.0
+
+
+@pytest.mark.parametrize("integrator", ["exact", "adaptive"])
+def test_an_integrator_in_continuous_time_refuses_it_in_a_line(integrator):
+    with pytest.raises(ss.InputError, match="sample") as refused:
+        ss.simulate(AXIS, ss.SampledController(PD, TIME), LOW, 0.1, integrator=integrator)
+    assert "\n" not in str(refused.value)
+
+
+REFERENCE = {
+    # RMS error in mrad along LOW, of the reference computation (engine B, rtol 1e-9; class W: 1e-3)
+    "PID": (PID, None, None, 1.266),
+    "PD + DOB 400": (PD, None, 400.0, 0.6540),
+    "PD + FF LuGre 0.9": (PD, feedforward(velocity="held"), None, 5.904),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", REFERENCE)
+def test_errors_are_those_of_the_reference(name):
+    loop, ahead, corner, rms = REFERENCE[name]
+    observer = ss.ControlBlock("disturbance_observer", inertia=INERTIA, corner=corner) if corner else None
+    controller = ss.SampledController(loop, TIME, ahead, observer, torque_limit=1.0)
+    record = ss.simulate(AXIS, controller, LOW, 5.0, time_step=2e-5)
+    t = TIME * np.arange(5000)
+    error = np.interp(t, record.time, record["position_reference"] - record["position"])
+    assert 1e3 * math.sqrt(np.mean(error**2)) == pytest.approx(rms, rel=1e-3)
