@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from stickslip.cli import main
+from stickslip.control.sampled import Memory, sampled_by, settings
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis_trial import trial_of
 from stickslip.identify.breakaway import find_breaks
@@ -21,6 +23,7 @@ from stickslip.record import Record
 from stickslip.rigs.procedures import PROCEDURES, procedure
 from stickslip.rigs.procedures.base import CheckFailed, perform
 from stickslip.rigs.virtual import VirtualRig, virtual_rig
+from stickslip.spec import Surroundings
 
 SHORT = {
     "inertia": {"duration": "25"},
@@ -130,6 +133,11 @@ def test_a_plan_beyond_the_limits_is_refused_before_anything_moves():
         ("track", {"model": "gsm"}, "give a model.toml or one of"),
         ("track", {"compensator": "both"}, "compensator 'both'"),
         ("track", {"reference": "slow"}, "reference 'slow'"),
+        (
+            "track",
+            {"compensator": "feedforward", "model": "lugre", "substeps": "0"},
+            "substeps = 0 must be a whole number from 1",
+        ),
     ],
 )
 def test_options_that_make_no_sense(name, options, says):
@@ -137,6 +145,30 @@ def test_options_that_make_no_sense(name, options, says):
         run(name, virtual_rig("thesis-dry"), **options)
     with pytest.raises(UnknownName):
         procedure("breakaways")
+
+
+def test_track_divides_the_laws_step_as_it_is_told():
+    """The law answers to the reference as plain Python does, in as many steps, whatever was measured before."""
+    rig, compensation = virtual_rig("thesis-dry"), {}
+    given = {"compensator": "feedforward", "model": "lugre", "duration": "1", "filter": "400"}
+    for parts in (1, 4):
+        chosen = procedure("track").with_options({**given, "substeps": str(parts)})
+        controller = chosen.controller(rig)
+        assert controller.compensator.substeps == parts
+        assert ("4 steps a sample" in chosen.plan(rig).text[0]) == (parts == 4)
+        record = perform(chosen, rig).record
+        law, p = controller.compensator.model.law, controller.compensator.model.parameters
+        z, n = law.state(p), settings(controller)
+        m = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0))
+        u = SimpleNamespace(**Surroundings()._asdict())
+        sample = sampled_by(law)
+        expected = []
+        for position, velocity in zip(record["position"], record["velocity_reference"]):
+            sample(float(position), float(position), float(velocity), 0.0, n, m, z, p, u)
+            expected.append(m.compensation)
+        assert record["compensation_torque"] == pytest.approx(expected, abs=1e-12)
+        compensation[parts] = record["compensation_torque"]
+    assert np.abs(compensation[1] - compensation[4]).max() > 1e-7
 
 
 def test_an_option_with_a_direction_may_be_below_zero_and_a_plan_then_is_no_lighter(

@@ -182,7 +182,6 @@ def ahead(wanted_velocity: float, n: Any, m: Any) -> float:
     found = wanted_velocity
     if m.started != 0.0 and wanted_velocity != 0.0:
         found = wanted_velocity + n.lead * (wanted_velocity - m.wanted_velocity) / since(n, m)
-    m.wanted_velocity = wanted_velocity
     return found
 
 
@@ -268,6 +267,7 @@ def respond(
     elif n.source == FROM_MEASUREMENT:
         m.compensation = compensate(m.velocity, n, m, z, p, u)
     m.compensation += n.offset + n.inertia * wanted_acceleration
+    m.wanted_velocity = wanted_velocity
     return torque + m.compensation
 
 

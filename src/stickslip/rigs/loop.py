@@ -21,7 +21,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from stickslip.control.controller import Controller
-from stickslip.control.sampled import Memory
+from stickslip.control.sampled import FROM_REFERENCE, Memory, Settings
 from stickslip.errors import InputError, Interrupted, RigError
 from stickslip.record import Record
 from stickslip.rigs import safety
@@ -48,8 +48,11 @@ BLOCK = 50
 TIME, POSITION = Measurement._fields.index("time"), Measurement._fields.index("position")
 TORQUE, STARTED, ORIGIN, VALUE = (Safety._fields.index(n) for n in ("torque", "started", "origin", "value"))
 BEGUN, ERROR_SUM, OPEN = (Memory._fields.index(n) for n in ("started", "error_sum", "open"))
-KNOWN = slice(0, Memory._fields.index("forward"))
-"""What one controller takes over from another: position and velocities, but not its own filter's weights"""
+KNOWN = slice(0, Memory._fields.index("seen"))
+"""What one controller takes over from another: position and velocities, but nothing of its compensator"""
+SEEN = slice(Memory._fields.index("seen"), Memory._fields.index("forward"))
+VELOCITY, WANTED_VELOCITY = (Memory._fields.index(n) for n in ("velocity", "wanted_velocity"))
+SOURCE = Settings._fields.index("source")
 TRAVEL = Bounds._fields.index("travel")
 
 
@@ -294,6 +297,8 @@ class Loop:
         if control is not last:
             control.memory[KNOWN] = last.memory[KNOWN]
             control.memory[ERROR_SUM], control.memory[OPEN] = 0.0, 1.0
+            ahead = control.settings[SOURCE] == FROM_REFERENCE
+            control.memory[SEEN] = control.memory[WANTED_VELOCITY if ahead else VELOCITY]
         control.safety[ORIGIN] = control.measured[POSITION]
         if self._fault is None:
             control.safety[STATE] = RUNNING

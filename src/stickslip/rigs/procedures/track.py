@@ -45,8 +45,8 @@ class Track(Procedure):
     one of the machine's, its ``gain``, ``filter`` (Hz, 0: the machine's), ``lead`` (s, of feedforward), ``deadband``
     (rad/s), ``offset`` (N·m) and ``inertia_feedforward`` (kg·m²); or recommended: all of that from the ``model``, a
     recommended.toml of `stickslip rig commission` (of this machine) or `stickslip recommend`, and none of it given
-    beside it. What a file knows of the angle (``[angle]``) is compensated as well. ``duration`` in s (0: the
-    reference's own).
+    beside it. ``substeps`` divide the law's step over a sample, whichever compensator it is. What a file knows of the
+    angle (``[angle]``) is compensated as well. ``duration`` in s (0: the reference's own).
     """
 
     name: ClassVar[str] = "track"
@@ -66,6 +66,7 @@ class Track(Procedure):
     deadband: float = 0.0
     offset: float = 0.0
     inertia_feedforward: float = 0.0
+    substeps: int = 1
     duration: float = 0.0
     wait: float = 1.0
 
@@ -112,7 +113,14 @@ class Track(Procedure):
         corner = corner if math.isfinite(corner) else 0.0
         law = self.angle().on(self.law(rig))
         helper = KINDS[self.compensator](
-            law, self.gain, corner or None, self.lead, self.deadband, self.offset, self.inertia_feedforward
+            law,
+            self.gain,
+            corner or None,
+            self.lead,
+            self.deadband,
+            self.offset,
+            self.inertia_feedforward,
+            self.substeps,
         )
         return Controller(gains, helper, limit, rig.sample_time)
 
@@ -180,6 +188,8 @@ class Track(Procedure):
             words = f"as {self.model} recommends"
         elif self.compensator != "none":
             words += f" with {self.compensator} {self.model}"
+        if self.compensator != "none" and self.substeps != 1:
+            words += f", the law in {self.substeps} steps a sample"
         return Plan(
             len(samples) * rig.sample_time + 0.1, float(np.ptp(samples[:, 0])),
             float(np.max(np.abs(samples[:, 1]))), ROOM * rig.limits.torque,
