@@ -137,6 +137,59 @@ def test_substeps_in_python(tmp_path):
         assert [contact.step(*row, substeps=parts) for row in MOTION] == divided(MOTION, parts)
 
 
+def as_python(text):
+    """A function of MATLAB, of assignments and loops, in Python: the same lines in the same order."""
+    changes = (
+        (r"^function \[(.*?)\] = (\w+)\((.*)\)$", r"def \2(\3):"), (r"^(\s*)%.*", r"\1pass"),
+        (r"for (\w+) = 1:\((.*)\)$", r"for \1 in range(1, (\2) + 1):"), (r"\[(~|\w+), z\] =", r"\1, z ="),
+        ("~", "_"), (r"\bfix\(", "int("), (r"^(\s*)end;?$", r"\1pass"), (";$", ""),
+    )  # fmt: skip
+    lines = text.splitlines()
+    assert lines[-1] == "end"
+    outputs = re.match(r"function \[(.*?)\]", lines[0])[1]
+    for i, line in enumerate(lines):
+        for pattern, by in changes:
+            line = re.sub(pattern, by, line)
+        lines[i] = line
+    lines[-1] = f"    return {outputs}"
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("parts", [0, 1, 4])
+def test_substeps_in_matlab_by_their_lines(parts):
+    def step(v0, v1, dt, z, p, u):
+        return LUGRE.law.step(v0, v1, dt, z, p, u), z
+
+    scope = {"x_step": step}
+    exec(as_python(matlab.write(Job(LUGRE, "x")).files["x_substeps.m"]), scope)
+    z, found = LUGRE.law.state(LUGRE.parameters), []
+    for row in MOTION:
+        torque, z = scope["x_substeps"](*row, parts, z, LUGRE.parameters, Surroundings())
+        found.append(torque)
+    assert found == divided(MOTION, max(parts, 1))
+
+
+@pytest.mark.skipif(shutil.which("octave-cli") is None, reason="needs Octave")
+def test_substeps_in_octave(tmp_path):
+    for name, text in matlab.write(Job(LUGRE, "x")).files.items():
+        (tmp_path / name).write_text(str(text))
+    rows = "; ".join(" ".join(map(repr, row)) for row in MOTION)
+    (tmp_path / "main.m").write_text(f"""rows = [{rows}];
+p = x_parameters(); u = x_surroundings();
+for count = [1 4]
+    z = x_reset();
+    for i = 1:size(rows, 1)
+        [torque, z] = x_substeps(rows(i, 1), rows(i, 2), rows(i, 3), count, z, p, u);
+        disp(num2str(torque, 17));
+    end
+end
+""")
+    command = ["octave-cli", "--norc", "--quiet", "--eval", "main"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    expected = [torque for parts in (1, 4) for torque in divided(MOTION, parts)]
+    assert [float(line) for line in done.stdout.split()] == pytest.approx(expected, rel=matlab.BOUND)
+
+
 @pytest.mark.parametrize("parts", [0, 1, 4])
 def test_substeps_in_structured_text(parts):
     program = Program(st.write(Job(LUGRE, "friction")).files["friction.st"])

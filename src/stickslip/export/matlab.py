@@ -23,7 +23,9 @@ BOUND = 1e-12
 """Largest relative error in Octave, whose exp and power are not the C library's."""
 
 
-SUBSTEPS = "A step is divided by calling the function several times with the velocities in between."
+SUBSTEPS = (
+    "`[torque, z] = {x}_substeps(v0, v1, dt, count, z, p, u)` divides a step, the velocity linear in between."
+)
 
 
 def write(job: Job) -> Export:
@@ -44,9 +46,12 @@ def write(job: Job) -> Export:
     return Export(
         {
             **files,
+            f"{job.name}_substeps.m": render("matlab_substeps.m.j2", **common),
             f"{job.name}_check.m": render("matlab_check.m.j2", **common),
             "golden.csv": as_csv(golden(job.model)),
-            "README.md": render("matlab_readme.md.j2", **about_steps(job.model, SUBSTEPS), **common),
+            "README.md": render(
+                "matlab_readme.md.j2", **about_steps(job.model, SUBSTEPS.format(x=job.name)), **common
+            ),
         }
     )
 
