@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,11 @@ from stickslip.identify.axis_agreed import agreed, aligned, on_timing
 from stickslip.identify.axis_inverse import inverse_dynamics
 from stickslip.identify.axis_plain import inverse_identification
 from stickslip.identify.axis_trial import Trial
+from stickslip.identify.band_fit import Number
 from stickslip.identify.doctor import examine
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.force_error import force_error, force_error_on, plain_error_on
-from stickslip.identify.regression import regress_axis
+from stickslip.identify.regression import regress_axis, together
 from stickslip.identify.smooth import Window, seen
 from stickslip.identify.vector import Parameter, Vector
 from stickslip.machines.servo import ServoAxis
@@ -303,3 +305,35 @@ def test_the_doctor_says_when_the_torque_acted(logs: Any) -> None:
     (said,) = (f for f in examine(record(log)).findings if f.code == "torque-timing")
     assert said.level == "note"
     assert f"{abs(log.truth['skew']) * 1e3:.1f}" in said.message
+
+
+# ---- what is not believed ------------------------------------------------------------------------------------
+
+
+def test_ringing_is_not_explained_half_a_cycle_late_by_an_inertia_below_0(logs: Any) -> None:
+    """Tuning steps with cogging: a skew of 5 rows made J -0.3 of the truth and Fc half as high again, both identified."""
+    log = logs.draw(140636, "mean", 500, "pid", "steps", "cogging")
+    found = regress_axis([trial(log)], AXIS)
+    assert abs(found.numbers["skew"].value - log.truth["skew"]) < 0.5 * found.period
+    assert found.numbers["inertia"].value == pytest.approx(log.truth["inertia"], rel=0.2)
+
+
+def test_bands_that_contradict_each_other_widen_the_interval() -> None:
+    def band(value: float, std: float) -> Any:
+        return SimpleNamespace(numbers={"fc": Number(value, std)})
+
+    alone = together("fc", [band(1.0, 0.005), band(1.002, 0.006)])
+    assert alone.std < 0.01
+    apart = together("fc", [band(1.0, 0.005), band(0.6, 0.15)])
+    assert apart.std > 0.15
+    assert together("fc", [band(1.0, 0.005), band(0.9, 0.15)]).std == pytest.approx(0.005)
+
+
+def test_friction_is_not_believed_where_the_axis_does_not_follow(logs: Any) -> None:
+    log = logs.draw(140118, "held", 500, "feedforward", "steps", "flexible")
+    found = regress_axis([trial(log)], AXIS)
+    assert "does not follow" in found.doubt
+    result = identify_axis([trial(log)], AXIS, ["coulomb"])
+    assert not result["fc"].identified
+    calm = regress_axis([trial(logs.draw(4, "held", 1000, "p-pi", "production", "clean"))], AXIS)
+    assert calm.doubt == ""

@@ -8,6 +8,7 @@ as far as the intervals and physics allow it.
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -85,9 +86,8 @@ class Settling:
 
 def bounded(columns: Array, target: Array, low: Array, high: Array) -> Array:
     """Least squares within bounds."""
-    from scipy.optimize import lsq_linear
-
-    found: Any = lsq_linear(columns, target, (low, np.maximum(high, np.nextafter(low, np.inf))))
+    optimize: Any = importlib.import_module("scipy.optimize")  # it carries no types
+    found = optimize.lsq_linear(columns, target, (low, np.maximum(high, np.nextafter(low, np.inf))))
     return np.asarray(found.x, dtype=np.float64)
 
 

@@ -1,0 +1,129 @@
+"""The values that a model takes: identified ones stand, the rest explains the record within the bounds of physics."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip.identify.axis_choice import Candidate, chosen_of, sentence_on
+from stickslip.identify.axis_inverse import inverse_dynamics
+from stickslip.identify.axis_settled import settled
+from stickslip.identify.axis_trial import Trial
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.force_error import force_error
+from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
+
+AXIS = ServoAxis(drive_side="load")
+TRUE = {"inertia": 4e-3, "offset": 0.05, "fc": 0.3, "sigma2": 0.02}
+COULOMB = Model("coulomb", fc=0.3, sigma2=0.02)
+
+
+def moving(gravity: float = 0.0, angle: float = 0.0) -> Trial:
+    """An axis that moves both ways at many speeds, its torque known to 0.01 N·m."""
+    t = np.arange(0.0, 20.0, 2e-3)
+    rates = (1.3, 3.1, 5.7)
+    q = sum(a * np.sin(w * t) for a, w in zip((1.0, 0.5, 0.2), rates, strict=True))
+    v = sum(a * w * np.cos(w * t) for a, w in zip((1.0, 0.5, 0.2), rates, strict=True))
+    acceleration = -sum(a * w * w * np.sin(w * t) for a, w in zip((1.0, 0.5, 0.2), rates, strict=True))
+    torque = TRUE["inertia"] * acceleration + TRUE["sigma2"] * v + TRUE["fc"] * np.sign(v) + TRUE["offset"]
+    noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
+    return Trial("made", t, q, torque + gravity * np.sin(q - angle) + noise)
+
+
+def estimate(name: str, value: float, half: float = 0.0, told: bool = True) -> Estimate:
+    return Estimate(
+        name, "N·m", "x", value, half / 1.96, value - half, value + half, told, "" if told else "why"
+    )
+
+
+def test_what_is_not_identified_goes_with_what_is() -> None:
+    inverse = inverse_dynamics([moving()], AXIS)
+    given = [estimate(n, 3.0 * x, told=n == "inertia") for n, x in TRUE.items()]
+    given[0] = replace(given[0], value=4.02e-3, lower=4.0e-3, upper=4.04e-3)
+    found, _ = settled(given, COULOMB, inverse)
+    values = {e.name: e.value for e in found}
+    assert values["inertia"] == 4.02e-3
+    assert values["fc"] == pytest.approx(0.3, rel=0.03)
+    assert values["offset"] == pytest.approx(0.05, abs=0.003)
+    assert all(e.lower <= e.value <= e.upper for e in found)
+
+
+def test_identified_values_move_within_their_intervals_where_the_record_asks_for_it() -> None:
+    inverse = inverse_dynamics([moving()], AXIS)
+    off = {"inertia": 5.5e-3, "offset": 0.05, "fc": 0.36, "sigma2": 0.02}
+    given = [estimate(n, x, 0.4 * x) for n, x in off.items()]
+    found, said = settled(given, COULOMB, inverse)
+    values = {e.name: e.value for e in found}
+    assert force_error(inverse, COULOMB, off) > 1.5 * inverse.relative_error
+    model = Model("coulomb", fc=values["fc"], sigma2=values["sigma2"])
+    assert force_error(inverse, model, values) == pytest.approx(inverse.relative_error, rel=0.02)
+    assert all(e.lower <= values[e.name] <= e.upper for e in given)
+    assert "within their intervals" in said[0]
+
+
+def test_identified_values_that_explain_the_record_stay() -> None:
+    inverse = inverse_dynamics([moving()], AXIS)
+    given = [
+        estimate(e, inverse[n], 0.01)
+        for e, n in (("inertia", "inertia"), ("offset", "offset"), ("fc", "fc"), ("sigma2", "fv"))
+    ]
+    found, said = settled(given, COULOMB, inverse)
+    assert [e.value for e in found] == [e.value for e in given]
+    assert not said
+
+
+def test_values_keep_the_bounds_of_physics() -> None:
+    trial = moving()
+    assert trial.drive is not None
+    speed = np.gradient(trial.position, trial.time)
+    inverse = inverse_dynamics([replace(trial, drive=trial.drive - 0.1 * speed)], AXIS)
+    assert inverse["fv"] < 0.0
+    found, _ = settled([estimate(n, x, told=False) for n, x in TRUE.items()], COULOMB, inverse)
+    assert all(e.value >= 0.0 for e in found if e.name != "offset")
+
+
+def test_a_fall_of_friction_that_is_not_identified_is_left_out_where_it_explains_nothing() -> None:
+    inverse = inverse_dynamics([moving()], AXIS)
+    model = Model("stribeck", k=1e4, fs=5.0, fc=0.3, vs=300.0, delta_s=2.0, sigma2=0.02)
+    given = [*(estimate(n, x) for n, x in TRUE.items()), estimate("fs", 5.0, told=False)]
+    values = {e.name: e.value for e in settled(given, model, inverse)[0]}
+    assert values["fs"] == values["fc"]
+
+
+def test_gravity_that_is_not_identified_is_found_with_the_rest() -> None:
+    inverse = inverse_dynamics([moving(0.8, 0.3)], ServoAxis(gravity="pendulum", drive_side="load"))
+    given = [*(estimate(n, x, told=n == "fc") for n, x in TRUE.items())]
+    given += [estimate("gravity", 7.0, told=False), estimate("gravity_angle", 2.0, told=False)]
+    values = {e.name: e.value for e in settled(given, COULOMB, inverse)[0]}
+    assert values["gravity"] == pytest.approx(0.8, rel=0.05)
+    assert values["gravity_angle"] == pytest.approx(0.3, abs=0.05)
+
+
+def test_nothing_is_changed_without_the_inverse_dynamics() -> None:
+    given = tuple(estimate(n, x) for n, x in TRUE.items())
+    assert settled(given, COULOMB, None) == (given, [])
+
+
+# ---- which law ------------------------------------------------------------------------------------------------
+
+
+def scored(law: str, parameters: int, misfit: float, seed: int = 0) -> Candidate:
+    """A law whose held-out misfit is so large, the same in all blocks but for a thousandth."""
+    score = misfit**2 * (1.0 + 1e-3 * np.random.default_rng(seed).standard_normal(20))
+    return Candidate(law, parameters, {}, score, {})
+
+
+@pytest.mark.parametrize(("finer", "chosen"), [(0.9, "coulomb"), (0.77, "coulomb"), (0.7, "lugre")])
+def test_a_law_of_more_parameters_must_foretell_clearly_better(finer: float, chosen: str) -> None:
+    tried = [scored("coulomb", 4, 1.0), scored("lugre", 8, finer, 1)]
+    assert tried[chosen_of(tried)].law == chosen
+    assert f"{finer:.3g}" in sentence_on(tried, chosen)
+
+
+def test_a_law_that_failed_is_not_chosen() -> None:
+    failed = Candidate("coulomb", 0, {}, np.full(20, math.inf), {}, "why")
+    assert chosen_of([failed, scored("lugre", 8, 1.0)]) == 1
