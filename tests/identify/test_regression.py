@@ -311,7 +311,7 @@ def test_the_doctor_says_when_the_torque_acted(logs: Any) -> None:
 
 
 def test_ringing_is_not_explained_half_a_cycle_late_by_an_inertia_below_0(logs: Any) -> None:
-    """Tuning steps with cogging: a skew of 5 rows made J -0.3 of the truth and Fc half as high again, both identified."""
+    """Tuning steps with cogging: a skew of 5 rows made J -0.3 of the truth, Fc half as high again."""
     log = logs.draw(140636, "mean", 500, "pid", "steps", "cogging")
     found = regress_axis([trial(log)], AXIS)
     assert abs(found.numbers["skew"].value - log.truth["skew"]) < 0.5 * found.period
