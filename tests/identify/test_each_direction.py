@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import axis_cases as cases
+import numpy as np
 import pytest
 
 from stickslip.identify.axis import identify_axis
 from stickslip.identify.axis_inverse import inverse_dynamics
 from stickslip.identify.axis_plain import inverse_identification
 from stickslip.identify.axis_trial import Trial
+from stickslip.identify.draws import draw_models
 from stickslip.identify.estimate import Identification
 from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
@@ -42,6 +45,62 @@ def test_least_squares_per_direction_is_an_asymmetric_law(trial: Trial, tmp_path
     assert model.law.chosen["symmetry"] == "asymmetric"
     assert (model.parameters.fc, model.parameters.fc_negative) == pytest.approx((FORTH, BACK), rel=0.06)
     assert found.details["mechanics"].offset == 0.0
+
+
+@pytest.mark.parametrize("per_direction", [False, True])
+def test_least_squares_names_its_numbers_as_the_law_and_the_axis_do(
+    trial: Trial, tmp_path: Path, per_direction: bool
+) -> None:
+    """What draws axes from the intervals (`recommend`) looks its numbers up by name."""
+    plain = inverse_dynamics([trial], AXIS, per_direction=per_direction)
+    found = inverse_identification(plain, AXIS)
+    read = read_identified(write_model(tmp_path / "model.toml", found))
+    own = {f.name for f in read.model.law.fields}
+    assert {e.name for e in read.law_estimates[0]} == own
+    assert {e.name for e in read.estimates} - own <= {"inertia", "offset"}
+    for e in read.law_estimates[0]:
+        assert e.value == pytest.approx(getattr(read.model.parameters, e.name))
+    drawn = draw_models(read.model, read.estimates, read.correlation, 50)
+    spread = np.std([m.parameters.fc for m, _ in drawn])
+    assert spread == pytest.approx(found["fc"].std, rel=0.4)
+
+
+def test_least_squares_of_friction_below_the_constant_torque_keeps_its_correlations(trial: Trial) -> None:
+    """Means and differences of both directions, with the covariance that such have."""
+    assert trial.drive is not None
+    hanging = replace(trial, drive=trial.drive + 3.0 * FORTH)
+    each = inverse_dynamics([hanging], AXIS, per_direction=True)
+    assert min(each["fc_plus"], each["fc_minus"]) < 0.0
+    found = inverse_identification(each, AXIS)
+    assert found["fc"].value == pytest.approx(0.5 * (each["fc_plus"] + each["fc_minus"]))
+    assert found["offset"].value == pytest.approx(0.5 * (each["fc_plus"] - each["fc_minus"]))
+    i, j = (each.names.index(n) for n in ("fc_plus", "fc_minus"))
+    c = each.covariance
+    assert found["fc"].std == pytest.approx(0.5 * np.sqrt(c[i, i] + c[j, j] + 2.0 * c[i, j]))
+    assert found["offset"].std == pytest.approx(0.5 * np.sqrt(c[i, i] + c[j, j] - 2.0 * c[i, j]))
+
+
+def test_least_squares_of_a_pendulum_tells_gravity_and_where_it_hangs(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    t = 1e-3 * np.arange(20_000, dtype=np.float64)
+    q = 2.0 * np.sin(1.5 * t) + 0.8 * np.sin(4.0 * t)
+    v = 3.0 * np.cos(1.5 * t) + 3.2 * np.cos(4.0 * t)
+    a = -4.5 * np.sin(1.5 * t) - 12.8 * np.sin(4.0 * t)
+    torque = (
+        0.02 * a + 0.03 * v + 0.2 * np.sign(v) + 1.5 * np.sin(q - 0.4) + 0.02 * rng.standard_normal(t.size)
+    )
+    axis = replace(AXIS, gravity="pendulum")
+    plain = inverse_dynamics([Trial("pendulum", t, q, torque)], axis)
+    found = inverse_identification(plain, axis)
+    assert found["gravity"].value == pytest.approx(1.5, rel=0.01)
+    assert found["gravity_angle"].value == pytest.approx(0.4, abs=0.01)
+    assert found["gravity"].identified
+    assert found["gravity_angle"].identified
+    # The delta method against draws of sine and cosine.
+    i = [plain.names.index(n) for n in ("gravity_sin", "gravity_cos")]
+    s, c = rng.multivariate_normal(plain.values[i], plain.covariance[np.ix_(i, i)], 20_000).T
+    assert found["gravity"].std == pytest.approx(float(np.std(np.hypot(s, c))), rel=0.05)
+    assert found["gravity_angle"].std == pytest.approx(float(np.std(np.arctan2(-c, s))), rel=0.05)
 
 
 def test_the_model_of_least_squares_holds_inertia_offset_and_gravity(trial: Trial, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,11 @@ from stickslip.simulation.driven import Mechanics
 
 __all__ = ["inverse_identification"]
 
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+POSITIVE = ("inertia", "fc", "sigma2", "gravity")
+"""Beginnings of the names of numbers that are greater than 0; the angle of a pendulum is none."""
+
 
 def inverse_identification(
     found: InverseDynamics,
@@ -35,42 +41,88 @@ def inverse_identification(
     sliding says (`stickslip.identify.regression`) where both contradict each other; `validation` records give the
     held-out error.
     """
+    model, mechanics = parts_of(found)
+    names, units, values, covariance = of_the_model(found, model)
+    std = np.sqrt(np.diag(covariance))
     estimates: list[Estimate] = []
     notes: list[str] = []
-    for name, unit, value, std in zip(found.names, found.units, found.values, found.robust_std, strict=True):
-        low, high = float(value - 1.96 * std), float(value + 1.96 * std)
-        own = {"fv": "sigma2"}.get(name, name)
-        if sliding is not None and own in ("inertia", "fc", "sigma2", "offset"):
-            other, half = sliding.numbers[own].value, QUANTILE * sliding.numbers[own].std
+    # Where each direction has its own, none is the mean of both that certain sliding tells.
+    both = ("inertia",) if "fc_negative" in names else ("inertia", "fc", "sigma2", "offset")
+    for name, unit, value, spread in zip(names, units, values.tolist(), std.tolist(), strict=True):
+        low, high = value - 1.96 * spread, value + 1.96 * spread
+        if sliding is not None and name in both:
+            other, half = sliding.numbers[name].value, QUANTILE * sliding.numbers[name].std
             apart = abs(other - value) > math.hypot(half, 0.5 * (high - low))
             if apart and abs(other - value) > SAME * max(
-                abs(value), abs(found.coulomb) if own == "offset" else 0.0
+                abs(value), abs(found.coulomb) if name == "offset" else 0.0
             ):
                 low, high = min(low, other), max(high, other)
                 notes.append(
-                    f"{name}: {float(value):.4g} here, {other:.4g} {unit} where the axis slides for certain "
+                    f"{name}: {value:.4g} here, {other:.4g} {unit} where the axis slides for certain "
                     "(reversals, stops and the hold of the torque left out); the interval holds both."
                 )
-        signed = not name.startswith(("inertia", "fc", "fv"))
-        if signed:
-            good = bool(0.5 * (high - low) <= 0.05 * abs(found.coulomb))
-        else:
+        if name.startswith(POSITIVE) and name != "gravity_angle":
             good = low > 0.0 and high <= 2.0 * low
+        else:
+            good = 0.5 * (high - low) <= 0.05 * (1.0 if unit == "rad" else abs(found.coulomb))
         why = "" if good else "its interval is too wide"
-        estimates.append(Estimate(name, unit, name, float(value), float(std), low, high, good, why))
-    std = np.sqrt(np.diag(found.covariance))
-    model, mechanics = parts_of(found)
+        estimates.append(Estimate(name, unit, name, value, spread, low, high, good, why))
     misfit = {"inverse_dynamics_relative": found.relative_error}
     if validation:
         misfit["held_out_inverse_dynamics_relative"] = plain_error_on(validation, axis, found)
     return Identification(
-        "inverse dynamics", model, tuple(estimates), found.covariance / np.outer(std, std),
+        "inverse dynamics", model, tuple(estimates), covariance / np.outer(std, std),
         misfit,
         (f"Position filtered at {found.cutoff:.4g} Hz, decimated to {found.band:.4g} Hz; intervals allow for the "
          "correlation of the residuals.", *notes),
         details={"inverse": found, "axis": axis, "mechanics": mechanics,
                  "classic_std": dict(zip(found.names, found.std.tolist()))},
     )  # fmt: skip
+
+
+def of_the_model(
+    found: InverseDynamics, model: Model
+) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
+    """Names, units, values and covariance of the numbers as the model has them: ``sigma2`` for ``fv``, those of a
+    direction or of both, and a pendulum's gravity as its amplitude and the angle at which it hangs."""
+    row = dict(zip(found.names, np.eye(len(found.names)), strict=True))
+    unit = dict(zip(found.names, found.units, strict=True))
+    rows: list[tuple[str, str, Array]] = [("inertia", unit["inertia"], row["inertia"])]
+    if not found.has("fc_plus"):
+        rows += [
+            (new, unit[old], row[old]) for new, old in (("sigma2", "fv"), ("fc", "fc"), ("offset", "offset"))
+        ]
+    elif "fc_negative" in {f.name for f in model.law.fields}:
+        each = (
+            ("sigma2", "fv_plus"),
+            ("fc", "fc_plus"),
+            ("sigma2_negative", "fv_minus"),
+            ("fc_negative", "fc_minus"),
+        )
+        rows += [(new, unit[old], row[old]) for new, old in each]
+    else:
+        rows += [
+            ("sigma2", unit["fv_plus"], 0.5 * (row["fv_plus"] + row["fv_minus"])),
+            ("fc", unit["fc_plus"], 0.5 * (row["fc_plus"] + row["fc_minus"])),
+            ("offset", unit["fc_plus"], 0.5 * (row["fc_plus"] - row["fc_minus"])),
+        ]
+    if found.has("gravity_sin"):
+        sine, cosine = row["gravity_sin"], row["gravity_cos"]
+        s, c = found["gravity_sin"], found["gravity_cos"]
+        size = max(math.hypot(s, c), 1e-300)
+        rows.append(("gravity", unit["gravity_sin"], (s * sine + c * cosine) / size))
+        rows.append(("gravity_angle", "rad", (c * sine - s * cosine) / size**2))
+    rows += [(n, unit[n], row[n]) for n in found.names if n.startswith(("cos[", "sin["))]
+    weights = np.array([w for _, _, w in rows])
+    values = np.asarray(weights @ found.values, dtype=np.float64)
+    if found.has("gravity_sin"):
+        values[[n for n, _, _ in rows].index("gravity_angle")] = hanging(s, c, found.position)[1]
+    return (
+        tuple(n for n, _, _ in rows),
+        tuple(u for _, u, _ in rows),
+        values,
+        weights @ found.covariance @ weights.T,
+    )
 
 
 def parts_of(found: InverseDynamics) -> tuple[Model, Mechanics]:

@@ -37,9 +37,6 @@ ELSEWHERE = 1.5
 ROUGH = 0.1
 """Of the torque where the axis slides for certain: what a model misses at most for its form to be taken as right."""
 OWN_WORDS = {
-    "fv": "viscous friction", "fc_plus": "Coulomb torque, v > 0", "fc_minus": "Coulomb torque, v < 0",
-    "fv_plus": "viscous friction, v > 0", "fv_minus": "viscous friction, v < 0",
-    "gravity_sin": "gravity, over the sine of the position", "gravity_cos": "gravity, over its cosine",
     "fc": "Coulomb torque", "fs": "static (break-away) torque", "fs_positive": "break-away torque, v > 0",
     "stiffness": "stiffness at rest", "fs_negative": "break-away torque, v < 0",
     "rate_effect": "change per tenfold ramp rate",
@@ -338,7 +335,7 @@ def next_steps(
 def lacking(found: Identification) -> list[str]:
     """Names of the numbers without which nothing can be built: inertia, a pendulum's gravity, and friction's level."""
     names = {e.name.rpartition(".")[2]: e for e in found.estimates}
-    levels = [n for n in names if n in ("fc", "fc_negative", "fc_plus", "fc_minus")]
+    levels = [n for n in names if n in ("fc", "fc_negative")]
     if not levels:
         law = {f.name for f in found.model.law.fields} if found.model else set[str]()
         levels = [n for n in names if n.partition("[")[0] in law]
