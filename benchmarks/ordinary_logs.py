@@ -28,6 +28,29 @@ IMPERFECTIONS = ("clean", "cogging", "backlash", "flexible", "asymmetry")
 
 
 @dataclass(frozen=True, eq=False)
+class Machine:
+    """What `simulate` needs of an axis, and what its drive is made for.
+
+    Attributes
+    ----------
+    axis, orders, sizes : array
+        As `simulate` takes them (``cog_order``, ``cog_size``).
+    encoder : float
+        rad, its step.
+    limit, fastest, acceleration : float
+        Of the drive: N·m, rad/s, rad/s².
+    """
+
+    axis: Array
+    orders: Array
+    sizes: Array
+    encoder: float
+    limit: float
+    fastest: float
+    acceleration: float
+
+
+@dataclass(frozen=True, eq=False)
 class Log:
     """One log, and what is true of the axis that made it.
 
@@ -41,6 +64,8 @@ class Log:
         the torque that acted, on average (negative: ahead of it).
     about : dict
         Which column, rate, loop, motion and imperfection, and the seed.
+    machine : Machine
+        The axis itself.
     """
 
     time: Array
@@ -49,6 +74,7 @@ class Log:
     torque: Array
     truth: dict[str, float]
     about: dict[str, Any]
+    machine: Machine
 
     def frame(self) -> dict[str, Array]:
         """Columns with headers that state their units."""
@@ -248,6 +274,7 @@ def draw(
         sigma2, "sigma0": sigma0,
          "skew": skew},
         {"seed": seed, "column": column, "rate": rate, "loop": loop, "motion": moves, "imperfection": imperfection},
+        Machine(axis, order, size, 2.0 * math.pi / counts, limit, fastest, acceleration),
     )  # fmt: skip
 
 

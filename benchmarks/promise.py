@@ -1,15 +1,17 @@
-"""Does `stickslip recommend` keep its promise? Random axes, loops and motions, simulated by plain code of its own with
-the exported C in the loop.
+"""Does `stickslip recommend` keep its promise, from an ordinary log to the exported C on the machine?
 
-    python benchmarks/promise.py --axes 100 --seed 0
+    python benchmarks/promise.py --want 100 --out promise.jsonl     # goes on where it was left; a line of JSON an axis
+    python benchmarks/promise.py --out promise.jsonl --only-sum
 
-Every axis is LuGre friction with a constant torque beside it, and by chance a flexible train, cogging, backlash and a
-current loop, of which the package knows nothing. Its loop runs at 1 kHz (P-PI cascade, PID or PD) on an encoder of 2^18
-with a torque limit. What was identified is the truth perturbed within its intervals. `recommend` is asked for this loop
-and motion; the setting is exported as C, compiled, and added to the loop's torque. Printed is whether the part of the
-RMS error that it takes away lies in the promised interval, and whether any setting is worse than none.
+Every axis is one of `ordinary_logs.py`, of which the package knows nothing but a log: any torque column and rate, moves,
+sine, staircase or tuning steps, and by chance cogging, backlash, a flexible train or friction that differs by direction.
+`identify` reads the log as it is; `recommend` is asked for a loop that a person would set on this axis (P-PI cascade,
+PID or PD) and for a motion (production moves, slow sine, staircase); the setting is exported as C, compiled, and added
+to the loop's torque on the generator's own machine. Printed is whether the part of the RMS error that it takes away lies
+in the promised interval, and whether any setting is worse than none.
 
-The simulator takes steps of 10 us (semi-implicit Euler; bristles implicit) and shares no code with the package.
+Where nothing is recommended, the same machine shows what a plain feedforward of the true numbers (inertia, Coulomb,
+viscous, constant torque; gain 0.8) would have done: whether the refusal was right.
 """
 
 from __future__ import annotations
@@ -18,54 +20,68 @@ import argparse
 import ctypes
 import json
 import math
+import os
 import subprocess
 import sys
 import tempfile
 import time
-from contextlib import redirect_stdout
+from collections import Counter
+from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import numba
-import numpy as np
-import tomli_w
+sys.path.insert(0, str(Path(__file__).parent))
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+import numba  # noqa: E402
+import numpy as np  # noqa: E402
+
+import ordinary_logs as logs  # noqa: E402
 
 T = 1e-3
-SUBSTEPS = 100
-COUNTS = 2**18
-JM, JL, K, D, GAP, S0, S1, S2, FS, FC, VS, OFFSET, COG, ORDER, PHASE, LAG, SIZE = range(17)
-PLAY = (0.005, 0.02)
-"""Backlash: rad, at most this part of the motion's amplitude."""
+STEPS = round(T / logs.STEP)
+HELD = 0.3
+"""s at rest before the motion."""
+TEST = 5.0
+"""s of it, about."""
+PLAIN = 0.8
+"""Gain of the feedforward that a refusal is compared with."""
 
 
 # ---- the machine -------------------------------------------------------------------------------------------------
 
 
 @numba.njit(cache=True)
-def advance(x, p, torque):
-    """One sample: x holds motor and load (position, velocity), bristle, and the lagging torque."""
-    h = 1e-3 / 100
-    for _ in range(100):
-        x[5] += (torque - x[5]) * (h / p[15] if p[15] > h else 1.0)
-        flexible = p[2] > 0.0
-        v = x[3] if flexible else x[1]
-        g = (p[9] + (p[8] - p[9]) * math.exp(-((v / p[10]) ** 2))) / p[5]
-        before = x[4]
-        x[4] = (x[4] + h * v) / (1.0 + h * abs(v) / g)
-        friction = p[5] * x[4] + p[6] * (x[4] - before) / h + p[7] * v
-        cog = p[12] * math.cos(p[13] * x[0] + p[14])
-        if flexible:
-            twist = x[0] - x[2]
-            half = 0.5 * p[4]
-            beyond = twist - min(max(twist, -half), half)
-            shaft = p[2] * beyond + (p[3] * (x[1] - x[3]) if beyond != 0.0 or half == 0.0 else 0.0)
-            x[1] += h / p[0] * (x[5] + cog - shaft)
-            x[3] += h / p[1] * (shaft - friction - p[11])
-            x[2] += h * x[3]
-        else:
-            x[1] += h / (p[0] + p[1]) * (x[5] + cog - friction - p[11])
-        x[0] += h * x[1]
+def advance(x, axis, orders, sizes, torque):
+    """One sample of `ordinary_logs.simulate`'s machine; x: motor and load (position, velocity, bristle), torque."""
+    jm, jl, stiff, damp, gap, offset, fc_up, fc_down, ratio, vs, sigma0, sigma1, sigma2, lag, at_load = axis
+    h = 2e-5
+    decay = math.exp(-h / lag) if lag > 0.0 else 0.0
+    q, v, z, ql, vl, zl, actual = x
+    for _ in range(50):
+        actual = torque + (actual - torque) * decay
+        z, contact = logs_bristle(z, v, fc_up if v > 0.0 else fc_down, ratio, vs, sigma0, sigma1, sigma2)
+        contact *= 1.0 - at_load
+        for i in range(orders.shape[0]):
+            contact += sizes[i, 0] * math.sin(orders[i] * q + sizes[i, 1])
+        spring = 0.0
+        if jl > 0.0:
+            twist = q - ql
+            if twist > 0.5 * gap:
+                spring = stiff * (twist - 0.5 * gap) + damp * (v - vl)
+            elif twist < -0.5 * gap:
+                spring = stiff * (twist + 0.5 * gap) + damp * (v - vl)
+            zl, drag = logs_bristle(zl, vl, fc_up if vl > 0.0 else fc_down, ratio, vs, sigma0, sigma1, sigma2)
+            vl += h * (spring - at_load * drag) / jl
+            ql += h * vl
+        v += h * (actual - contact - offset - spring) / jm
+        q += h * v
+    x[0], x[1], x[2], x[3], x[4], x[5], x[6] = q, v, z, ql, vl, zl, actual
+
+
+logs_bristle = logs.bristle
 
 
 def loop_torque(loop, m, y, r, rd, extra):
@@ -89,100 +105,51 @@ def loop_torque(loop, m, y, r, rd, extra):
     return out
 
 
-def ran(p, loop, wanted, helper=None):
+def ran(machine, loop, wanted, helper=None):
     """Positions of the motor at every sample, rad."""
-    x, m = np.zeros(6), {"y": 0.0, "v": 0.0, "e": 0.0, "sum": 0.0, "over": 0.0, "started": False}
-    count = 2.0 * math.pi / COUNTS
+    x = np.zeros(7)
+    m = {"y": 0.0, "v": 0.0, "e": 0.0, "sum": 0.0, "over": 0.0, "started": False}
     out = np.empty(len(wanted))
     if helper:
         helper.begin()
     for k, (r, rd, rdd) in enumerate(wanted.tolist()):
         out[k] = x[0]
-        y = count * math.floor(x[0] / count + 0.5)
+        y = machine.encoder * math.floor(x[0] / machine.encoder)
         extra = helper.torque(y, r, rd, rdd) if helper else 0.0
-        advance(x, p, loop_torque(loop, m, y, r, rd, extra))
+        advance(x, machine.axis, machine.orders, machine.sizes, loop_torque(loop, m, y, r, rd, extra))
     return out
 
 
-# ---- random axes, loops, motions ---------------------------------------------------------------------------------
+# ---- loops and motions -------------------------------------------------------------------------------------------
 
 
 def between(rng, low, high):
+    """Log-uniform."""
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
-def axis_of(rng, kinds):
-    p = np.zeros(SIZE)
-    inertia, fc = between(rng, 2e-4, 5e-3), between(rng, 0.1, 2.0)
-    p[JM], p[JL] = 0.5 * inertia, 0.5 * inertia
-    p[FC], p[FS] = fc, fc * float(rng.uniform(1.05, 1.5))
-    p[VS], p[S2] = between(rng, 0.02, 0.3), fc * between(rng, 0.005, 0.1)
-    p[S0] = p[FS] / between(rng, 2e-4, 3e-3)
-    p[S1] = 0.6 * math.sqrt(p[S0] * inertia)
-    p[OFFSET] = fc * float(rng.uniform(-0.4, 0.4))
-    p[ORDER], p[PHASE] = float(rng.choice([4, 6, 12, 24])), float(rng.uniform(0.0, 6.28))
-    if "cogging" in kinds:
-        p[COG] = fc * float(rng.uniform(0.02, 0.1))
-    if "flexible" in kinds or "backlash" in kinds:
-        f = between(rng, 80.0, 250.0)
-        p[K] = (2.0 * math.pi * f) ** 2 * p[JM] * p[JL] / inertia
-        p[D] = 0.06 * math.sqrt(p[K] * p[JM] * p[JL] / inertia)
-    if "backlash" in kinds:
-        p[GAP] = 1.0  # of `PLAY`
-    if "current" in kinds:
-        p[LAG] = 3e-4
-    return p
-
-
-def scurve(way, top, ramp):
-    """Position, velocity, acceleration of one move with smooth (sin²) acceleration, every sample."""
-    accelerating = min(ramp, way / top)
-    cruise = way / top - accelerating
-    t = T * np.arange(1, math.ceil((2.0 * accelerating + cruise) / T) + 1)
-
-    def part(s):  # velocity over top, in a ramp of unit length
-        s = np.clip(s, 0.0, 1.0)
-        return s - np.sin(2.0 * math.pi * s) / (2.0 * math.pi)
-
-    v = top * (part(t / accelerating) - part((t - accelerating - cruise) / accelerating))
-    x = np.cumsum(v) * T
-    return x * (way / x[-1]), v * (way / x[-1])
-
-
-def motion_of(rng):
-    """Name and (n, 3): a production cycle, a slow sine, a staircase of speeds, or small steps."""
-    name = str(rng.choice(["moves", "sine", "staircase", "short"]))
-    if name == "sine":
-        a, f = between(rng, 0.05, 2.0), between(rng, 0.2, 1.0)
-        t = T * np.arange(round(2.0 / f / T))
+def motion_of(kind, rng, machine):
+    """Position, velocity and acceleration of a motion from rest to rest, every sample, shape (n, 3)."""
+    if kind == "sine":
+        f = between(rng, 0.2, 0.8)
+        a = rng.uniform(0.05, 0.3) * machine.fastest / (2.0 * math.pi * f)
+        t = T * np.arange(round(max(2.0, round(TEST * f)) / f / T))
         x = a * (1.0 - np.cos(2.0 * math.pi * f * t))
         v = 2.0 * math.pi * f * a * np.sin(2.0 * math.pi * f * t)
     else:
-        xs, vs, here = [np.zeros(200)], [np.zeros(200)], 0.0
-        top, ramp = between(rng, 1.0, 20.0), between(rng, 0.03, 0.15)
-        for i in range(4):
-            speed = {"moves": top, "staircase": top * 0.3 ** (i // 2), "short": 0.3 * top}[name]
-            way = {"moves": top * 0.4, "staircase": speed * 0.5, "short": 0.1}[name] * float(
-                rng.uniform(0.7, 1.3)
-            )
-            x, v = scurve(way, speed, ramp)
-            side = -1.0 if i % 2 else 1.0
-            xs += [here + side * x, np.full(250, here + side * way)]
-            vs += [side * v, np.zeros(250)]
-            here += side * way
-        x, v = np.concatenate(xs), np.concatenate(vs)
-    return name, np.stack([x, v, np.gradient(v, T)], axis=1)
+        path = logs.motion(kind, rng, machine.fastest, machine.acceleration, TEST, T)
+        still = np.flatnonzero((path[1:, 1] == 0.0) & (path[:-1, 1] != 0.0))
+        x, v = path[: still[-1] + 2, 0], path[: still[-1] + 2, 1]
+    rest = round(HELD / T)
+    x, v = np.concatenate([np.zeros(rest), x]), np.concatenate([np.zeros(rest), v])
+    return np.stack([x, v, np.gradient(v, T)], axis=1)
 
 
-def loop_of(rng, p, wanted, kinds):
-    """Gains of a loop that a person would have set on this axis."""
-    inertia = p[JM] + p[JL]
-    kind = str(rng.choice(["P-PI", "PID", "PD"]))
-    w = 2.0 * math.pi * between(rng, 5.0, 15.0 if p[K] == 0.0 else 8.0)
-    need = (
-        inertia * np.max(np.abs(wanted[:, 2])) + p[FS] + abs(p[OFFSET]) + p[S2] * np.max(np.abs(wanted[:, 1]))
-    )
-    loop = {"filter": float(rng.choice([0.0, 150.0, 300.0])), "limit": float(need * rng.uniform(1.3, 3.0))}
+def loop_of(kind, rng, log):
+    """Gains that a person would have set on this axis."""
+    inertia, stiff = log.truth["inertia"], log.machine.axis[1] == 0.0
+    w = 2.0 * math.pi * between(rng, 5.0, 15.0 if stiff else 8.0)
+    loop = {"filter": float(rng.choice([0.0, 150.0, 300.0])), "limit": float(log.machine.limit)}
     if kind == "P-PI":
         loop |= {"kv": w / 2.0, "kvp": 2.0 * w * inertia, "feed": float(rng.choice([0.0, 1.0, 1.0]))}
         loop["kvi"] = loop["kvp"] * w / 3.0
@@ -190,74 +157,29 @@ def loop_of(rng, p, wanted, kinds):
         loop |= {"kp": 3.0 * inertia * w * w, "ki": inertia * w**3, "kd": 3.0 * inertia * w}
     else:
         loop |= {"kp": inertia * w * w, "ki": 0.0, "kd": 2.0 * inertia * w}
-    return kind, loop
-
-
-# ---- what was identified -----------------------------------------------------------------------------------------
-
-
-def model_file(rng, path, p, wanted):
-    """The truth perturbed within its intervals, as `stickslip identify` writes it."""
-    law = str(rng.choice(["lugre", "stribeck", "coulomb"]))
-    truth = {"fs": p[FS], "fc": p[FC], "vs": p[VS], "sigma2": p[S2], "sigma0": p[S0], "sigma1": p[S1]}
-    spread = {"fs": 0.03, "fc": 0.015, "vs": 0.15, "sigma2": 0.05, "sigma0": 0.7, "sigma1": 0.7}
-    if law == "stribeck":
-        truth["k"], spread["k"] = 10.0 * p[FS] / p[VS], 0.7
-    names = {"lugre": ["sigma0", "sigma1", "sigma2", "fs", "fc", "vs"], "stribeck": ["k", "fs", "fc", "vs", "sigma2"],
-             "coulomb": ["fc", "sigma2"]}[law]  # fmt: skip
-    estimates, parameters = [], {}
-    truth |= {"inertia": p[JM] + p[JL]}
-    spread |= {"inertia": 0.02}
-    for name in ["inertia", *names]:
-        s = spread[name]
-        value = truth[name] * math.exp(s * float(rng.standard_normal()))
-        if name == "fs":
-            value = max(value, 1.001 * parameters.get("fc", 0.0))
-        lower, upper = value * math.exp(-1.96 * s), value * math.exp(1.96 * s)
-        estimates.append({"name": name, "unit": "", "value": value, "std": s * value, "lower": lower, "upper": upper,
-                          "identified": s < 0.17})  # fmt: skip
-        if name != "inertia":
-            parameters[name] = value
-    if "fs" in parameters:
-        parameters["fs"] = max(parameters["fs"], 1.001 * parameters["fc"])
-    s = 0.01 * p[FC]
-    offset = p[OFFSET] + s * float(rng.standard_normal())
-    estimates.append({"name": "offset", "unit": "N·m", "value": offset, "std": s, "lower": offset - 1.96 * s,
-                      "upper": offset + 1.96 * s, "identified": True})  # fmt: skip
-    step = 8
-    points = wanted[::step]
-    n = len(estimates)
-    content = {
-        "format": "stickslip-model-1", "law": law, "method": "axis", "motion": "rotary", "notes": [],
-        "measure_next": [], "parameters": parameters,
-        "axis": {"inertia": estimates[0]["value"], "offset": offset},
-        "misfit": {"drive_rms": math.hypot(p[COG] / math.sqrt(2.0), 0.02 * p[FC])},
-        "estimates": estimates,
-        "correlation": {"names": [e["name"] for e in estimates], "matrix": np.eye(n).tolist()},
-        "trajectory": {"source": "log", "time": (T * step * np.arange(len(points))).tolist(),
-                       "position": points[:, 0].tolist(), "velocity": points[:, 1].tolist()},
-    }  # fmt: skip
-    path.write_text(tomli_w.dumps(content), encoding="utf-8")
-    return law
+    return loop
 
 
 # ---- the package -------------------------------------------------------------------------------------------------
 
 
+class Refused(Exception):
+    """A verb of the command line that ends with what is wrong."""
+
+
 def stickslip(*words):
     """A verb of the command line; its output."""
-    from stickslip.cli import parser_of
+    from stickslip.cli import main
 
-    said = StringIO()
-    args = parser_of(list(words[:1])).parse_args([str(w) for w in words])
-    with redirect_stdout(said):
-        code = args.run(args)
+    said, wrong = StringIO(), StringIO()
+    with redirect_stdout(said), redirect_stderr(wrong):
+        code = main([str(w) for w in words])
     if code:
-        raise RuntimeError(f"{words}: {code}")
+        raise Refused(f"{words[0]}: {wrong.getvalue().strip().splitlines()[-1]}")
     return said.getvalue()
 
 
-class Helper:
+class Exported:
     """The exported C, compiled."""
 
     def __init__(self, folder: Path) -> None:
@@ -291,91 +213,187 @@ class Helper:
         self.torque.restype, self.torque.argtypes = ctypes.c_double, [ctypes.c_double] * 4
 
 
-def asked(model: Path, loop: dict[str, float], out: Path, more: list[str]) -> dict[str, Any]:
-    """What is recommended for this loop and the motion of the log."""
+class Plain:
+    """Feedforward of the true numbers."""
+
+    def __init__(self, log: logs.Log) -> None:
+        self.truth = log.truth
+
+    def begin(self) -> None:
+        """It has no memory."""
+
+    def torque(self, y, r, v, a):
+        """N·m"""
+        t = self.truth
+        return t["inertia"] * a + PLAIN * (t["fc"] * float(np.sign(v)) + t["sigma2"] * v) + t["offset"]
+
+
+def identified(log: logs.Log, folder: Path) -> dict[str, Any]:
+    """The model of the log, as a user gets it; what is called identified, and its error in parts of the truth."""
+    from stickslip.identify.identified_file import read_identified
+
+    if not (folder / "model.toml").exists():
+        table = log.frame()
+        np.savetxt(
+            folder / "log.csv", np.column_stack(list(table.values())), fmt="%.9g", delimiter=",",
+            header=",".join(table), comments="", encoding="utf-8",
+        )  # fmt: skip
+        stickslip("identify", folder / "log.csv", "--no-report", "--out", folder / "model.toml")
+    found = read_identified(folder / "model.toml")
+    errors = {
+        e.name: (e.value - log.truth[e.name]) / (log.truth["fc"] if e.name == "offset" else log.truth[e.name])
+        for e in found.estimates if e.identified and e.name in log.truth
+    }  # fmt: skip
+    return {"law": found.model.law.name, "errors": {k: round(v, 4) for k, v in errors.items()}}
+
+
+def asked(
+    loop: dict[str, float], wanted: Any, log: logs.Log, folder: Path, more: list[str]
+) -> dict[str, Any]:
+    """What is recommended for this loop and motion."""
+    np.savetxt(
+        folder / "motion.csv", np.column_stack([T * np.arange(len(wanted)), wanted[:, 0]]), fmt="%.9g", delimiter=",",
+        header="time [s],position [rad]", comments="",
+    )  # fmt: skip
     names = ("kv", "kvp", "kvi", "feed") if "kv" in loop else ("kp", "ki", "kd")
     given = {n: loop[n] for n in (*names, "filter", "limit")}
     if "kp" in loop:
         given["kr"] = loop["kd"]
     text = ",".join(f"{k}={float(v)!r}" for k, v in given.items())
+    counts = round(2.0 * math.pi / log.machine.encoder)
     return json.loads(
         stickslip(
-            "recommend", model, "--loop", text, "--counts-per-rev", COUNTS, "--out", out, "--json", *more
+            "recommend", folder / "model.toml", "--loop", text, "--motion", folder / "motion.csv", "--counts-per-rev",
+            counts, "--out", folder / "recommended.toml", "--force", "--json", *more,
         )
-    )
+    )  # fmt: skip
 
 
 def rms(x):
+    """Root mean square."""
     return math.sqrt(float(np.mean(np.square(x))))
 
 
-def one(seed: int, more: list[str]) -> dict[str, Any]:
-    """One axis: what was promised, and what came."""
+def case(seed: int) -> tuple[logs.Log, str, dict[str, float], str, Any]:
+    """Log, kind of loop and its gains, kind of motion and its points."""
     rng = np.random.default_rng([16, seed])
-    kinds = [k for k in ("flexible", "cogging", "backlash", "current") if rng.uniform() < 0.3]
-    p = axis_of(rng, kinds)
-    name, wanted = motion_of(rng)
-    p[GAP] *= min(PLAY[0], PLAY[1] * 0.5 * np.ptp(wanted[:, 0]))
-    kind, loop = loop_of(rng, p, wanted, kinds)
-    found: dict[str, Any] = {
-        "seed": seed,
-        "machine": "+".join(kinds) or "clean",
-        "motion": name,
-        "loop": kind,
-    }
-    with tempfile.TemporaryDirectory() as folder:
-        model, out = Path(folder) / "axis.toml", Path(folder) / "recommended.toml"
-        found["law"] = model_file(rng, model, p, wanted)
-        begin = time.perf_counter()
+    column, rate, moves, imperfection, by = (
+        x[int(rng.integers(len(x)))]
+        for x in (logs.COLUMNS, logs.RATES, logs.MOTIONS, logs.IMPERFECTIONS, logs.LOOPS)
+    )
+    log = logs.draw(70_000 + seed, column, rate, by, moves, imperfection)
+    kind = str(rng.choice(["P-PI", "PID", "PD"]))
+    name = str(rng.choice(["production", "sine", "staircase"]))
+    return log, kind, loop_of(kind, rng, log), name, motion_of(name, rng, log.machine)
+
+
+def one(seed: int, more: list[str], keep: Path | None = None) -> dict[str, Any]:
+    """One axis: what was promised, and what came."""
+    log, kind, loop, name, wanted = case(seed)
+    found: dict[str, Any] = {**log.about, "seed": seed, "logged": log.about["motion"], "by": log.about["loop"],
+                             "loop": kind, "motion": name}  # fmt: skip
+    alone = rms(wanted[:, 0] - ran(log.machine, loop, wanted))
+    found |= {"alone": alone}
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = (keep or Path(temporary)).resolve() / str(seed)
+        folder.mkdir(parents=True, exist_ok=True)
+        begin = time.process_time()
         try:
-            advice = asked(model, loop, out, more)
-        except Exception as error:  # refused: said, and counted
-            return found | {"refused": str(error)}
-        found["seconds"] = time.perf_counter() - begin
-        alone = rms(wanted[:, 0] - ran(p, loop, wanted))
-        if advice["chosen"] is None:
-            return found | {"refused": next(n for n in advice["notes"] if "No comp" in n), "alone": alone}
-        stickslip("export", out, "--to", "c99", "--compensator", "recommended", "--name", "axis", "--out",
-                  Path(folder) / "c")  # fmt: skip
-        after = rms(wanted[:, 0] - ran(p, loop, wanted, Helper(Path(folder) / "c")))
+            found |= identified(log, folder)
+            found["identify_s"], begin = time.process_time() - begin, time.process_time()
+            advice = asked(loop, wanted, log, folder, more)
+            found["recommend_s"] = time.process_time() - begin
+            if advice["chosen"] is None:
+                raise Refused(next(n for n in advice["notes"] if "No comp" in n))
+        except Refused as why:
+            plain = rms(wanted[:, 0] - ran(log.machine, loop, wanted, Plain(log)))
+            return found | {"refused": str(why), "plain": 1.0 - plain / alone}
+        stickslip("export", folder / "recommended.toml", "--to", "c99", "--compensator", "recommended", "--name", "axis",
+                  "--out", folder / "c", "--force")  # fmt: skip
+        after = rms(wanted[:, 0] - ran(log.machine, loop, wanted, Exported(folder / "c")))
     low, high = advice["reduction"]
-    reduction = 1.0 - after / alone
-    chosen = advice["chosen"]
+    reduction, chosen = 1.0 - after / alone, advice["chosen"]
     return found | {
-        "alone": alone, "low": low, "high": high, "reduction": reduction, "holds": low <= reduction <= high,
-        "worse": after > alone, "what": f"{chosen['law']} {chosen['kind']} {chosen['gain']:g}",
+        "low": low, "high": high, "reduction": reduction, "holds": low <= reduction <= high, "worse": after > alone,
+        "what": f"{chosen['law']} {chosen['kind']} {chosen['gain']:g}", "errors_there": chosen["errors"],
     }  # fmt: skip
 
 
-def main() -> int:
-    """Print one line an axis and the sum."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--axes", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=0, help="of the first axis")
-    parser.add_argument("--out", type=Path, help="write all as JSON")
-    args, more = parser.parse_known_args()
-    rows = []
-    for seed in range(args.seed, args.seed + args.axes):
-        r = one(seed, more)
-        rows.append(r)
-        head = f"{seed:>3} {r['machine']:<26}{r['motion']:<10}{r['loop']:<5}{r.get('law', ''):<9}"
-        if "refused" in r:
-            print(f"{head} nothing: {r['refused'][:90]}", flush=True)
-            continue
-        mark = "" if r["holds"] else "  MISSED" + (" WORSE" if r["worse"] else "")
-        print(f"{head} {100 * r['reduction']:>6.1f} %  promised {100 * r['low']:>5.1f} to {100 * r['high']:>5.1f} %  "
-              f"{r['what']:<25}{r['seconds']:>5.1f} s{mark}", flush=True)  # fmt: skip
+# ---- what comes out ----------------------------------------------------------------------------------------------
+
+
+def line(r: dict[str, Any]) -> str:
+    """One axis."""
+    head = (
+        f"{r['seed']:>4} {r['imperfection']:<10}{r['column']:<10}{r['rate']:>5} {r['logged']:<11}{r.get('law', '-'):<10}"
+        f"{r['loop']:<5}{r['motion']:<11}"
+    )
+    if "refused" in r:
+        return f"{head} nothing: {r['refused'][:100]} (plain feedforward: {100 * r['plain']:.0f} %)"
+    mark = "" if r["holds"] else "  MISSED" + (" WORSE" if r["worse"] else "")
+    return (
+        f"{head}{100 * r['reduction']:>6.1f} %  promised {100 * r['low']:>6.1f} to {100 * r['high']:>5.1f} %  "
+        f"{r['what']:<25}{r['recommend_s']:>5.1f} s{mark}"
+    )
+
+
+def summed_up(rows: list[dict[str, Any]]) -> int:
+    """How many promises held, by what; why nothing was recommended. Returns the exit code."""
     told = [r for r in rows if "low" in r]
     held, worse = sum(r["holds"] for r in told), sum(r["worse"] for r in told)
     print(f"\n{held} of {len(told)} reductions lie in the promised interval; {worse} settings are worse than none; "
           f"{len(rows) - len(told)} of {len(rows)} axes get no compensator")  # fmt: skip
     if told:
         width = float(np.median([r["high"] - r["low"] for r in told]))
-        print(f"median reduction {100 * float(np.median([r['reduction'] for r in told])):.0f} %, "
-              f"median width of the interval {100 * width:.0f} points")  # fmt: skip
-    if args.out:
-        args.out.write_text(json.dumps(rows, indent=1), encoding="utf-8")
+        print(f"median reduction {100 * float(np.median([r['reduction'] for r in told])):.0f} %, median width of the "
+              f"interval {100 * width:.0f} points; {np.median([r['recommend_s'] for r in told]):.1f} s of CPU")  # fmt: skip
+    for key in ("imperfection", "column", "rate", "logged", "law", "loop", "motion"):
+        parts = [
+            f"{v} {sum(r['holds'] for r in of)}/{len(of)}"
+            for v in sorted({str(r.get(key)) for r in told}) if (of := [r for r in told if str(r.get(key)) == v])
+        ]  # fmt: skip
+        print(f"  {key}: {', '.join(parts)}")
+    for why, count in Counter(r["refused"].split(":")[0][:60] for r in rows if "refused" in r).most_common():
+        of = [r["plain"] for r in rows if r.get("refused", "").startswith(why)]
+        print(f"  {count} nothing: {why}; a plain feedforward of the true numbers would take away "
+              f"{100 * min(of):.0f} to {100 * max(of):.0f} %")  # fmt: skip
     return 0 if told and held >= 0.9 * len(told) and not worse else 1
+
+
+def main() -> int:
+    """Go on until so many axes got a setting; print one line an axis and the sum."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--want", type=int, default=100, help="axes with a setting")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first axis")
+    parser.add_argument("--every", type=int, default=1, help="every so many seeds (to share the work)")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[], help="these alone")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="begin no axis after these")
+    parser.add_argument(
+        "--out", type=Path, required=True, help="a line of JSON an axis; what it holds is not done again"
+    )
+    parser.add_argument(
+        "--keep", type=Path, help="folder for the files of every axis; a model that is there stands"
+    )
+    parser.add_argument("--only-sum", action="store_true")
+    args, more = parser.parse_known_args()
+    rows = [json.loads(r) for r in args.out.read_text().splitlines()] if args.out.exists() else []
+    if not args.only_sum:
+        known, seed, begin = {r["seed"] for r in rows}, args.first, time.monotonic()
+        todo = iter(args.seeds)
+        while sum("low" in r for r in rows) < args.want and time.monotonic() - begin < 60.0 * args.minutes:
+            if args.seeds and (seed := next(todo, -1)) < 0:
+                break
+            if seed not in known:
+                rows.append(one(seed, more, args.keep))
+                with args.out.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(rows[-1]) + "\n")
+                print(line(rows[-1]), flush=True)
+            seed += args.every
+    else:
+        print("\n".join(line(r) for r in sorted(rows, key=lambda r: r["seed"])))
+    return summed_up(rows)
 
 
 if __name__ == "__main__":
