@@ -3,12 +3,12 @@
     python benchmarks/promise.py --want 100 --out promise.jsonl     # goes on where it was left; a line of JSON an axis
     python benchmarks/promise.py --out promise.jsonl --only-sum
 
-Every axis is one of `ordinary_logs.py`, of which the package knows nothing but a log: any torque column and rate, moves,
-sine, staircase or tuning steps, and by chance cogging, backlash, a flexible train or friction that differs by direction.
-`identify` reads the log as it is; `recommend` is asked for a loop that a person would set on this axis (P-PI cascade,
-PID or PD) and for a motion (production moves, slow sine, staircase); the setting is exported as C, compiled, and added
-to the loop's torque on the generator's own machine. Printed is whether the part of the RMS error that it takes away lies
-in the promised interval, and whether any setting is worse than none.
+Every axis is one of `ordinary_logs.py`, of which the package knows nothing but a log: any torque column and rate,
+moves, sine, staircase or tuning steps, and by chance cogging, backlash, a flexible train or friction that differs by
+direction. `identify` reads the log as it is; `recommend` is asked for a loop that a person would set on this axis
+(P-PI cascade, PID or PD) and for a motion (production moves, slow sine, staircase); the setting is exported as C,
+compiled, and added to the loop's torque on the generator's own machine. Printed is whether the part of the RMS error
+that it takes away lies in the promised interval, and whether any setting is worse than none.
 
 Where nothing is recommended, the same machine shows what a plain feedforward of the true numbers (inertia, Coulomb,
 viscous, constant torque; gain 0.8) would have done: whether the refusal was right.
@@ -308,8 +308,8 @@ def one(seed: int, more: list[str], keep: Path | None = None) -> dict[str, Any]:
         except Refused as why:
             plain = rms(wanted[:, 0] - ran(log.machine, loop, wanted, Plain(log)))
             return found | {"refused": str(why), "plain": 1.0 - plain / alone}
-        stickslip("export", folder / "recommended.toml", "--to", "c99", "--compensator", "recommended", "--name", "axis",
-                  "--out", folder / "c", "--force")  # fmt: skip
+        stickslip("export", folder / "recommended.toml", "--to", "c99", "--compensator", "recommended",
+                  "--name", "axis", "--out", folder / "c", "--force")  # fmt: skip
         after = rms(wanted[:, 0] - ran(log.machine, loop, wanted, Exported(folder / "c")))
     low, high = advice["reduction"]
     reduction, chosen = 1.0 - after / alone, advice["chosen"]
@@ -325,8 +325,8 @@ def one(seed: int, more: list[str], keep: Path | None = None) -> dict[str, Any]:
 def line(r: dict[str, Any]) -> str:
     """One axis."""
     head = (
-        f"{r['seed']:>4} {r['imperfection']:<10}{r['column']:<10}{r['rate']:>5} {r['logged']:<11}{r.get('law', '-'):<10}"
-        f"{r['loop']:<5}{r['motion']:<11}"
+        f"{r['seed']:>4} {r['imperfection']:<10}{r['column']:<10}{r['rate']:>5} {r['logged']:<11}"
+        f"{r.get('law', '-'):<10}{r['loop']:<5}{r['motion']:<11}"
     )
     if "refused" in r:
         return f"{head} nothing: {r['refused'][:100]} (plain feedforward: {100 * r['plain']:.0f} %)"
@@ -346,7 +346,7 @@ def summed_up(rows: list[dict[str, Any]]) -> int:
     if told:
         width = float(np.median([r["high"] - r["low"] for r in told]))
         print(f"median reduction {100 * float(np.median([r['reduction'] for r in told])):.0f} %, median width of the "
-              f"interval {100 * width:.0f} points; {np.median([r['recommend_s'] for r in told]):.1f} s of CPU")  # fmt: skip
+              f"interval {100 * width:.0f} points; {np.median([r['recommend_s'] for r in told]):.1f} s")  # fmt: skip
     for key in ("imperfection", "column", "rate", "logged", "law", "loop", "motion"):
         parts = [
             f"{v} {sum(r['holds'] for r in of)}/{len(of)}"

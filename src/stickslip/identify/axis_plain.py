@@ -82,47 +82,42 @@ def inverse_identification(
 
 def of_the_model(
     found: InverseDynamics, model: Model
-) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
+) -> tuple[list[str], list[str], Array, Array]:  # fmt: skip
     """Names, units, values and covariance of the numbers as the model has them: ``sigma2`` for ``fv``, those of a
     direction or of both, and a pendulum's gravity as its amplitude and the angle at which it hangs."""
     row = dict(zip(found.names, np.eye(len(found.names)), strict=True))
-    unit = dict(zip(found.names, found.units, strict=True))
-    rows: list[tuple[str, str, Array]] = [("inertia", unit["inertia"], row["inertia"])]
+    own: dict[str, Array] = {"inertia": row["inertia"]}
     if not found.has("fc_plus"):
-        rows += [
-            (new, unit[old], row[old]) for new, old in (("sigma2", "fv"), ("fc", "fc"), ("offset", "offset"))
-        ]
+        own |= {"sigma2": row["fv"], "fc": row["fc"], "offset": row["offset"]}
     elif "fc_negative" in {f.name for f in model.law.fields}:
-        each = (
-            ("sigma2", "fv_plus"),
-            ("fc", "fc_plus"),
-            ("sigma2_negative", "fv_minus"),
-            ("fc_negative", "fc_minus"),
-        )
-        rows += [(new, unit[old], row[old]) for new, old in each]
+        own |= {"sigma2": row["fv_plus"], "fc": row["fc_plus"]}
+        own |= {"sigma2_negative": row["fv_minus"], "fc_negative": row["fc_minus"]}
     else:
-        rows += [
-            ("sigma2", unit["fv_plus"], 0.5 * (row["fv_plus"] + row["fv_minus"])),
-            ("fc", unit["fc_plus"], 0.5 * (row["fc_plus"] + row["fc_minus"])),
-            ("offset", unit["fc_plus"], 0.5 * (row["fc_plus"] - row["fc_minus"])),
-        ]
+        own |= {
+            "sigma2": 0.5 * (row["fv_plus"] + row["fv_minus"]),
+            "fc": 0.5 * (row["fc_plus"] + row["fc_minus"]),
+        }
+        own |= {"offset": 0.5 * (row["fc_plus"] - row["fc_minus"])}
     if found.has("gravity_sin"):
-        sine, cosine = row["gravity_sin"], row["gravity_cos"]
+        # Their values are not linear in these, but what they change by is.
         s, c = found["gravity_sin"], found["gravity_cos"]
         size = max(math.hypot(s, c), 1e-300)
-        rows.append(("gravity", unit["gravity_sin"], (s * sine + c * cosine) / size))
-        rows.append(("gravity_angle", "rad", (c * sine - s * cosine) / size**2))
-    rows += [(n, unit[n], row[n]) for n in found.names if n.startswith(("cos[", "sin["))]
-    weights = np.array([w for _, _, w in rows])
+        own["gravity"] = (s * row["gravity_sin"] + c * row["gravity_cos"]) / size
+        own["gravity_angle"] = (c * row["gravity_sin"] - s * row["gravity_cos"]) / size**2
+    own |= {n: row[n] for n in found.names if n.startswith(("cos[", "sin["))}
+    names, weights = list(own), np.array(list(own.values()))
     values = np.asarray(weights @ found.values, dtype=np.float64)
-    if found.has("gravity_sin"):
-        values[[n for n, _, _ in rows].index("gravity_angle")] = hanging(s, c, found.position)[1]
-    return (
-        tuple(n for n, _, _ in rows),
-        tuple(u for _, u, _ in rows),
-        values,
-        weights @ found.covariance @ weights.T,
-    )
+    if "gravity_angle" in names:
+        values[names.index("gravity_angle")] = pendulum_of(found)[1]
+    of = dict(zip(found.names, found.units, strict=True))
+    torque, damping = (of.get(n, of.get(f"{n}_plus", "")) for n in ("fc", "fv"))
+    units = {"inertia": of["inertia"], "sigma2": damping, "sigma2_negative": damping, "gravity_angle": "rad"}
+    return names, [units.get(n, torque) for n in names], values, weights @ found.covariance @ weights.T
+
+
+def pendulum_of(found: InverseDynamics) -> tuple[float, float]:
+    """Amplitude of gravity, N·m, and the angle at which the pendulum hangs, rad."""
+    return hanging(found["gravity_sin"], found["gravity_cos"], found.position)
 
 
 def parts_of(found: InverseDynamics) -> tuple[Model, Mechanics]:
@@ -137,7 +132,6 @@ def parts_of(found: InverseDynamics) -> tuple[Model, Mechanics]:
         model = Model("coulomb", fc=max(found.coulomb, 0.0), sigma2=max(found.viscous, 0.0))
     mechanics = Mechanics(max(found["inertia"], 0.0), offset=offset)
     if found.has("gravity_sin"):
-        sine, cosine = found["gravity_sin"], found["gravity_cos"]
-        size, angle = hanging(sine, cosine, found.position)
+        size, angle = pendulum_of(found)
         mechanics = replace(mechanics, gravity=size, gravity_angle=angle)
     return model, mechanics
