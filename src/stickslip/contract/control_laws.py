@@ -35,7 +35,7 @@ TIME, LIMIT = 1e-3, 1.0
 COUNT = 400
 HOUR, MINUTE = 60, 60_000
 """Minutes, and samples of one."""
-JUMP = 0.02
+JUMP = 1e-12
 """Of the limit: what the torque may jump by when a controller takes over."""
 FRICTION = Model("lugre", sigma0=3.5e4, sigma1=0.0, sigma2=0.018, fs=0.335, fc=0.285, vs=0.01)
 PD: dict[str, Any] = {"kp": 6.099, "kd": 0.097067}

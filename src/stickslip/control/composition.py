@@ -44,7 +44,9 @@ class Settings(NamedTuple):
     torque_limit: Annotated[float, Par("N·m", "T_max", "largest torque")]
     sample_time: Annotated[float, Par("s", "T", "sample time")]
     slow: Annotated[float, Par("-", "", "part of the difference by which the slow velocity moves a sample")]
-    fade: Annotated[float, Par("s", "", "over which a torque that was taken over, or held in a fault, fades")]
+    fade: Annotated[
+        float, Par("s", "", "over which a torque that was taken over, or held in a fault, fades; 0: at once")
+    ]
     clock: Annotated[float, Par("-", "", "1 where samples make the time, 0 where the caller gives it")]
 
 
@@ -60,6 +62,10 @@ class Memory(NamedTuple):
     ]
     taken: Annotated[float, Par("N·m", "", "difference of the torque that was taken over from its own")]
     share: Annotated[float, Par("-", "", "of that difference that is left")]
+    open: Annotated[
+        float,
+        Par("-", "", "1 while another controls the axis, with `applied`: the next sample starts there"),
+    ]
 
 
 MEMORY: tuple[Field, ...] = (*fields_of(Signals), *fields_of(Memory))
@@ -113,8 +119,10 @@ def unusable(
 def faulty(n: Any, m: Any) -> float:
     """A sample without a usable input: the torque that is held falls to 0 over the fade. Returns it, N·m."""
     before = m.share
-    if m.fault == 0.0:
+    if m.fault == 0.0 or m.open != 0.0:
         m.taken = m.applied
+        m.open = 0.0
+        m.fault = 0.0
         before = 1.0
     m.fault += 1.0
     m.share = max(0.0, 1.0 - m.fault * n.sample_time / max(n.fade, n.sample_time))
@@ -176,15 +184,32 @@ def respond(n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
     return torque
 
 
-def faded(torque: float, n: Any, m: Any) -> float:
+def start_at(held: float, torque: float, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
+    """The first sample after another controlled the axis: what the laws give of the torque held, N·m.
+
+    What they cannot take over fades.
+    """
+    m.open = 0.0
+    m.fault = 0.0
+    m.share = 0.0
+    left = left_over(held - torque, m, z, p, u)
+    if left != 0.0 and n.fade > 0.0:
+        m.taken = left
+        m.share = 1.0
+    return held - left
+
+
+def taken_over(torque: float, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
     """The torque with what is left of the one that was taken over, or held in a fault, N·m."""
-    if m.fault > 0.0:
+    whole = torque
+    if m.open != 0.0:
+        whole = start_at(m.applied, torque, n, m, z, p, u)
+    elif m.fault > 0.0:
         m.fault = 0.0
         m.taken = m.applied - torque
         m.share = 1.0
-    whole = torque
     if m.share > 0.0:
-        whole = torque + m.share * m.taken
+        whole += m.share * m.taken
         m.share = max(0.0, m.share - n.sample_time / max(n.fade, n.sample_time))
     return whole
 
@@ -205,7 +230,7 @@ def sample_turns(
     torque = respond(n, m, z, p, u)
     if not abs(torque) < math.inf:
         return faulty(n, m)
-    m.commanded = faded(torque, n, m)
+    m.commanded = taken_over(torque, n, m, z, p, u)
     m.applied = min(max(m.commanded, -n.torque_limit), n.torque_limit)
     return m.applied
 
@@ -226,33 +251,27 @@ def follow_turns(
 ) -> float:  # fmt: skip
     """Watch one sample while another controls the axis with `torque`, N·m; the sample that takes over starts there.
 
-    The laws run, so that an observer knows the disturbance when it takes over; what they would give otherwise
-    goes into the integral, or fades.
+    The laws run, so that an observer knows the disturbance when it takes over.
     """
     keep_time(n, m, u)
     m.share = 0.0
-    if not abs(torque) < LARGEST:
-        m.waited += n.sample_time
-        return faulty(n, m)
+    m.fault = 0.0
+    m.open = 1.0
+    held = 0.0
+    if abs(torque) < LARGEST:
+        held = torque
     if (
         unusable(turns, position, reference_turns, reference, reference_velocity, reference_acceleration, u)
         != 0.0
     ):
         m.waited += n.sample_time
-        m.fault += 1.0
-        m.applied = torque
-        return torque
-    see(turns, position, reference_turns, reference, reference_velocity, reference_acceleration, n, m, u)
-    own = respond(n, m, z, p, u)
-    m.applied = torque
-    m.commanded = torque
-    if not abs(own) < math.inf:
-        m.fault += 1.0
-        return torque
-    m.fault = 0.0
-    m.taken = left_over(torque - own, m, z, p, u)
-    m.share = 1.0
-    return torque
+        m.fault = 1.0
+    else:
+        see(turns, position, reference_turns, reference, reference_velocity, reference_acceleration, n, m, u)
+        respond(n, m, z, p, u)
+    m.applied = held
+    m.commanded = held
+    return held
 
 
 def follow(

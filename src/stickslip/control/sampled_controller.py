@@ -93,6 +93,11 @@ class SampledController:
         return out
 
     @functools.cached_property
+    def laws(self) -> tuple[Any, ...]:
+        """What its functions are made of: controllers for which this is equal have the same functions."""
+        return tuple((part, b.law, b.friction and b.friction.law) for part, b in self.blocks.items())
+
+    @functools.cached_property
     def fields(self) -> tuple[Field, ...]:
         """The parameters of all its laws, under their whole names."""
         return _distinct(f for part, block in self.blocks.items() for f in within(part, block.fields))

@@ -10,13 +10,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.control.composition import MEMORY
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.control.sampled import Memory, Settings, design_filter, settings
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.jit import call_guarded, compiled_guarded, flat, kernel, pointer, pointer_at
 from stickslip.rigs.rig import Limits, Measurement, Setpoint
-from stickslip.rigs.safety import ENDED, STOPPED, Safety, bounds, guarded_by
+from stickslip.rigs.safety import ENDED, STOPPED, Safety, bounds, guarded_by, guarded_with
 from stickslip.rigs.safety import Bounds as BoundNames
 from stickslip.spec import Law, Surroundings, fields_of
 from stickslip.subset import Layout, law_layouts
@@ -45,7 +47,6 @@ COLUMNS = tuple(UNITS)
 NOTHING = Controller(Gains(0.0))
 
 STATE, REASON, VELOCITY = (Safety._fields.index(name) for name in ("state", "reason", "velocity"))
-COMPENSATION = Memory._fields.index("compensation")
 
 
 class Control(NamedTuple):
@@ -62,16 +63,26 @@ class Control(NamedTuple):
     state: Any
     parameters: Any
     surroundings: Any
+    compensation: int
+    """Place of the compensating torque in the memory"""
+
+
+def memory_names(controller: object) -> tuple[str, ...]:
+    """The fields of the memory of a controller's `Control`."""
+    return tuple(f.name for f in MEMORY) if isinstance(controller, SampledController) else Memory._fields
 
 
 def control_of(
-    controller: Controller | None, limits: Limits, sample_time: float, travel: float = math.inf
+    controller: Controller | SampledController | None,
+    limits: Limits,
+    sample_time: float,
+    travel: float = math.inf,
 ) -> Control:
     """Lay out and compile the sample of a controller (None: torques alone) under limits.
 
     Parameters
     ----------
-    controller : Controller or None
+    controller : Controller, SampledController or None
         Sampled at the rig's sample time; one in continuous time (``sample_time`` 0) is sampled too.
     limits : Limits
     sample_time : float
@@ -88,6 +99,8 @@ def control_of(
         raise InputError(
             f"controller: sample_time = {controller.sample_time:g} s, the rig's is {sample_time:g} s; give the rig's"
         )
+    if isinstance(controller, SampledController):
+        return composed(controller, limits, travel)
     chosen = replace(controller or NOTHING, sample_time=sample_time)
     numbers = settings(chosen)
     if controller is None:
@@ -108,7 +121,48 @@ def control_of(
         flat(law.pack_state(law.state(parameters)) if law else []),
         flat(law.pack(parameters) if law else []),
         np.array(Surroundings()),
+        Memory._fields.index("compensation"),
     )
+
+
+def composed(controller: SampledController, limits: Limits, travel: float) -> Control:
+    """As `control_of`, of a controller made of control laws."""
+    names = memory_names(controller)
+    memory = np.zeros(len(names))
+    memory[names.index("open")] = 1.0
+    return Control(
+        composed_sampler(controller),
+        np.zeros(len(Measurement._fields)),
+        np.array(bounds(limits, controller.sample_time, travel)),
+        np.zeros(len(Safety._fields)),
+        np.array(controller.settings),
+        memory,
+        flat(controller.packed_state()),
+        flat(controller.packed()),
+        np.array(Surroundings()),
+        names.index("others"),
+    )
+
+
+_compiled: dict[Any, int] = {}
+
+
+def composed_sampler(controller: SampledController) -> int:
+    """Address of one guarded sample of a controller made of control laws."""
+    laws = controller.laws
+    if laws not in _compiled:
+        function = guarded_with(controller.functions)
+        _compiled[laws] = compiled_guarded("guarded_controller", function, {**controller.layouts, **GUARD})
+    return _compiled[laws]
+
+
+GUARD = {
+    "y": Layout(Measurement._fields),
+    "w": Layout(Setpoint._fields),
+    "b": Layout.of(fields_of(BoundNames), counted=False),
+    "s": Layout.of(fields_of(Safety), counted=False),
+}
+"""Layouts of what the guard reads and writes."""
 
 
 @functools.cache
@@ -117,10 +171,7 @@ def sampler(law: Law | None) -> int:
     empty = {"z": Layout(()), "p": Layout(()), "u": Layout(Surroundings._fields)}
     layouts = {
         **(law_layouts(law) if law else empty),
-        "y": Layout(Measurement._fields),
-        "w": Layout(Setpoint._fields),
-        "b": Layout.of(fields_of(BoundNames), counted=False),
-        "s": Layout.of(fields_of(Safety), counted=False),
+        **GUARD,
         "n": Layout.of(fields_of(Settings), counted=False),
         "m": Layout.of(fields_of(Memory), counted=False),
     }
@@ -129,13 +180,13 @@ def sampler(law: Law | None) -> int:
 
 @kernel(inline=True)
 def step(
-    address: int, y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any, row: Any
+    address: int, y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any, row: Any, place: int
 ) -> float:
     """One guarded sample through pointers; `row` gets what the record keeps."""
     torque = call_guarded(address, y, w, b, s, n, m, z, p, u)
     row[0], row[1], row[2], row[3], row[4] = y[0], y[1], s[VELOCITY], y[2], torque
     row[5], row[6], row[7], row[8], row[9] = y[3], y[4], w[0], w[1], w[2]
-    row[10], row[11], row[12], row[13], row[14] = m[COMPENSATION], w[3], y[5], s[STATE], s[REASON]
+    row[10], row[11], row[12], row[13], row[14] = m[place], w[3], y[5], s[STATE], s[REASON]
     return torque
 
 
@@ -146,16 +197,17 @@ def decide(control: Control, setpoint: Any, row: Any) -> float:
         control.address, pointer(control.measured, 0), pointer(setpoint, 0), pointer(control.bounds, 0),
         pointer(control.safety, 0), pointer(control.settings, 0), pointer(control.memory, 0),
         pointer(control.state, 0), pointer(control.parameters, 0), pointer(control.surroundings, 0),
-        pointer(row, 0),
+        pointer(row, 0), control.compensation,
     )  # fmt: skip
 
 
 @kernel()
 def decide_at(a: Any) -> float:
-    """`decide` by addresses: the function's, then those of its arrays in its order, then the row's."""
+    """`decide` by addresses: the function's, those of its arrays in its order, the row's; then the place of the
+    compensation."""
     return step(
         a[0], pointer_at(a[1]), pointer_at(a[2]), pointer_at(a[3]), pointer_at(a[4]), pointer_at(a[5]),
-        pointer_at(a[6]), pointer_at(a[7]), pointer_at(a[8]), pointer_at(a[9]), pointer_at(a[10]),
+        pointer_at(a[6]), pointer_at(a[7]), pointer_at(a[8]), pointer_at(a[9]), pointer_at(a[10]), a[11],
     )  # fmt: skip
 
 
@@ -174,7 +226,8 @@ def addresses(control: Control) -> Any:
         control.measured, None, control.bounds, control.safety, control.settings, control.memory,
         control.state, control.parameters, control.surroundings, None,
     )  # fmt: skip
-    return np.array([control.address, *(0 if x is None else x.ctypes.data for x in arrays)], dtype=np.int64)
+    at = (0 if x is None else x.ctypes.data for x in arrays)
+    return np.array([control.address, *at, control.compensation], dtype=np.int64)
 
 
 @kernel()

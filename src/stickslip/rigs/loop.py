@@ -22,10 +22,11 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.sampled import FROM_REFERENCE, Memory, Settings
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, Interrupted, RigError
 from stickslip.record import Record
 from stickslip.rigs import safety
-from stickslip.rigs._control import COLUMNS, REASON, STATE, UNITS, Control, control_of
+from stickslip.rigs._control import COLUMNS, REASON, STATE, UNITS, Control, control_of, memory_names
 from stickslip.rigs.budget import BUDGET, Budget
 from stickslip.rigs.declared import FIELDS, answer, blamed, checked
 from stickslip.rigs.pace import TIMES, Account, Pace, soft_real_time
@@ -47,11 +48,9 @@ BLOCK = 50
 """Samples of one compiled block: a signal is heard, and rows are committed, at least that often"""
 TIME, POSITION = Measurement._fields.index("time"), Measurement._fields.index("position")
 TORQUE, STARTED, ORIGIN, VALUE = (Safety._fields.index(n) for n in ("torque", "started", "origin", "value"))
-BEGUN, ERROR_SUM, OPEN = (Memory._fields.index(n) for n in ("started", "error_sum", "open"))
-KNOWN = slice(0, Memory._fields.index("seen"))
+KNOWN = Memory._fields[: Memory._fields.index("seen")]
 """What one controller takes over from another: position and velocities, but nothing of its compensator"""
-SEEN = slice(Memory._fields.index("seen"), Memory._fields.index("forward"))
-VELOCITY, WANTED_VELOCITY = (Memory._fields.index(n) for n in ("velocity", "wanted_velocity"))
+SEEN = Memory._fields[Memory._fields.index("seen") : Memory._fields.index("forward")]
 SOURCE = Settings._fields.index("source")
 TRAVEL = Bounds._fields.index("travel")
 
@@ -111,6 +110,7 @@ class Loop:
         self._stream: Stream | None = None
         self._path, self._meta = path, dict(meta or {})
         self._controls: dict[int, tuple[Any, Control]] = {}
+        self._names: dict[int, tuple[str, ...]] = {}
         self._control = self.prepare(None)
         self._fault: BaseException | None = None
         self._late = False
@@ -180,18 +180,19 @@ class Loop:
 
     # ---- running -------------------------------------------------------------------------------------------
 
-    def prepare(self, controller: Controller | PythonController | None) -> Control:
+    def prepare(self, controller: Controller | SampledController | PythonController | None) -> Control:
         """Lay out and compile a `controller`, best before the rig is armed: an armed one has no torque meanwhile."""
         if id(controller) not in self._controls:
-            compiled = controller if isinstance(controller, Controller) else None
+            compiled = controller if isinstance(controller, (Controller, SampledController)) else None
             control = self.meanwhile(lambda: control_of(compiled, self.limits, self.rig.sample_time))
             self._controls[id(controller)] = (controller, control)
+            self._names[id(control)] = memory_names(compiled)
         return self._controls[id(controller)][1]
 
     def run(
         self,
         wanted: Array,
-        controller: Controller | PythonController | None = None,
+        controller: Controller | SampledController | PythonController | None = None,
         *,
         travel: float = math.inf,
     ) -> Array:
@@ -201,7 +202,7 @@ class Loop:
         ----------
         wanted : array, shape (n, 5)
             A `Setpoint` per sample (`stickslip.rigs.rig.setpoints`).
-        controller : Controller, callable or None
+        controller : Controller, SampledController, callable or None
             None: the setpoints' torques alone.
         travel : float
             The segment ends early, without a fault, when the axis has moved that far from where it began, rad.
@@ -247,7 +248,8 @@ class Loop:
         else:
             self._control.measured[:] = answer(self.rig, "pause", lambda: self.rig.pause(seconds))
             # The axis may have moved: no speed across the pause.
-            self._control.safety[STARTED] = self._control.memory[BEGUN] = 0.0
+            self._control.safety[STARTED] = 0.0
+            self._remember(self._control, started=0.0)
         return Measurement(*self._control.measured)
 
     def meanwhile(self, work: Callable[[], Result]) -> Result:
@@ -295,14 +297,24 @@ class Loop:
         control.measured[:] = last.measured
         control.safety[:] = last.safety
         if control is not last:
-            control.memory[KNOWN] = last.memory[KNOWN]
-            control.memory[ERROR_SUM], control.memory[OPEN] = 0.0, 1.0
-            ahead = control.settings[SOURCE] == FROM_REFERENCE
-            control.memory[SEEN] = control.memory[WANTED_VELOCITY if ahead else VELOCITY]
+            before: dict[str, float] = dict(zip(self._names[id(last)], last.memory))
+            known = {name: before[name] for name in KNOWN if name in before}
+            self._remember(control, **{**known, "error_sum": 0.0, "open": 1.0})
+            if "seen" in self._names[id(control)]:
+                ahead = control.settings[SOURCE] == FROM_REFERENCE
+                seen = known.get("wanted_velocity" if ahead else "velocity", 0.0)
+                self._remember(control, **dict.fromkeys(SEEN, seen))
         control.safety[ORIGIN] = control.measured[POSITION]
         if self._fault is None:
             control.safety[STATE] = RUNNING
         self._control, self._step = control, Step(control)
+
+    def _remember(self, control: Control, **values: float) -> None:
+        """Write into a controller's memory; what it has no place for is left out."""
+        names = self._names[id(control)]
+        for name, value in values.items():
+            if name in names:
+                control.memory[names.index(name)] = value
 
     # ---- samples -------------------------------------------------------------------------------------------
 
@@ -435,7 +447,7 @@ class Loop:
             s[STATE] = STOPPING
             self._ramp(self._stream)
         s[STATE], s[REASON] = RUNNING, 0.0
-        self._control.memory[OPEN] = 1.0  # a controller that goes on begins without torque
+        self._remember(self._control, open=1.0)  # a controller that goes on begins without torque
 
     def _error(self, stream: Stream) -> BaseException:
         """What is raised once the torque is zero."""

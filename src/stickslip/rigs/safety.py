@@ -13,15 +13,16 @@ safety ``s``, and the controller's settings ``n``, memory ``m``, and law ``z``, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.binding import bound
+from stickslip.control.composition import follow
 from stickslip.control.sampled import FROM_REFERENCE, observe, sample, sampled_by
 from stickslip.rigs.rig import Limits
 from stickslip.spec import Law, Par
 
-__all__ = ["REASONS", "Bounds", "Safety", "bounds", "guarded", "guarded_by"]
+__all__ = ["REASONS", "Bounds", "Safety", "bounds", "guarded", "guarded_by", "guarded_with"]
 
 # States. ENDED: the segment's travel is reached, which is no fault; the next segment goes on.
 RUNNING, STOPPING, STOPPED, ENDED = 0.0, 1.0, 2.0, 3.0
@@ -124,7 +125,7 @@ def watch_state(y: Any, b: Any, s: Any) -> None:
         stop(TEMPERATURE, y.temperature, s)
 
 
-def idle(y: Any, w: Any, n: Any, m: Any) -> float:
+def idle(y: Any, w: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
     """The loop is open: the controller watches, so that it can be closed at any sample. Returns no torque."""
     observe(0.0, y.position, 0.0, y.position, n, m)
     m.open = 1.0
@@ -143,12 +144,29 @@ def idle(y: Any, w: Any, n: Any, m: Any) -> float:
     return 0.0
 
 
+def start_from(torque: float, m: Any) -> None:
+    """The command that a controller which takes over starts from, N·m."""
+    m.torque = torque
+
+
+def composed_idle(y: Any, w: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
+    """As `idle`, of a controller made of control laws: they run, so that an observer knows the disturbance."""
+    follow(y.position, y.position, w.velocity, 0.0, w.torque, n, m, z, p, u)
+    m.others = 0.0
+    return 0.0
+
+
+def composed_start_from(torque: float, m: Any) -> None:
+    """As `start_from`, of a controller made of control laws."""
+    m.applied = torque
+
+
 def control(y: Any, w: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
     """The torque that is wanted, N·m; a controller that takes over starts where the last command left the axis."""
     if w.closed == 0.0:
-        return w.torque + idle(y, w, n, m)
+        return w.torque + idle(y, w, n, m, z, p, u)
     if m.open != 0.0:
-        m.torque = s.torque - w.torque
+        start_from(s.torque - w.torque, m)
     u.time = y.time
     if abs(y.temperature) < UNBOUNDED:
         u.temperature = y.temperature
@@ -188,3 +206,15 @@ def guarded(y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: A
 def guarded_by(law: Law | None) -> Callable[..., float]:
     """`guarded` with the law of the compensator in its place; None compensates nothing."""
     return bound(guarded, {"sample": sampled_by(law)})
+
+
+def guarded_with(functions: Mapping[str, Callable[..., float]]) -> Callable[..., float]:
+    """`guarded` with the functions of a controller made of control laws (`SampledController.functions`)."""
+    return bound(
+        guarded,
+        {
+            "sample": functions["sample"],
+            "idle": bound(composed_idle, {"follow": functions["follow"]}),
+            "start_from": composed_start_from,
+        },
+    )

@@ -26,7 +26,7 @@ class Step:
         # The rehearsal works on copies that stand still on their setpoint. They live here, since only their
         # addresses are used.
         self._copies = control._replace(
-            **{name: getattr(control, name).copy() for name in control._fields[1:]}
+            **{name: getattr(control, name).copy() for name in control._fields[1:-1]}
         )
         self._still = np.array(Setpoint(position=float(control.measured[POSITION]), closed=1.0))
         self._row = np.zeros(len(COLUMNS))

@@ -78,9 +78,7 @@ def sampled_with(controller: Controller, state: Any, parameters: Any) -> Sampled
 
 def compiled(controller: SampledController) -> Sampled:
     """Compile a controller made of control laws."""
-    laws = tuple(
-        (part, block.law, block.friction and block.friction.law) for part, block in controller.blocks.items()
-    )
+    laws = controller.laws
     if laws not in _compiled:
         _compiled[laws] = compiled_sample("controller", controller.functions["sample"], controller.layouts)
     return Sampled(

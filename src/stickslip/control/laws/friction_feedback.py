@@ -26,18 +26,22 @@ class State(NamedTuple):
     """Internal state."""
 
     seen: Annotated[float, Par("rad/s", "", "velocity that the law saw one sample ago")]
+    running: Annotated[float, Par("-", "", "1 after its first sample")]
 
 
 def sample(y: Any, z: Any, p: Any, u: Any) -> float:
-    """Torque, N·m; before the first sample nothing has moved."""
+    """Torque, N·m; before its first sample the law has seen nothing."""
     now = y.velocity
     if abs(now) < p.deadband:
         now = 0.0
     last = z.seen
+    elapsed = y.elapsed
+    if z.running == 0.0 or y.started == 0.0:
+        last = now
+        elapsed = 0.0
     z.seen = now
-    if y.started == 0.0:
-        return p.gain * friction(now, now, 0.0, z.friction, p.friction, u)
-    return p.gain * friction(last, now, y.elapsed, z.friction, p.friction, u)
+    z.running = 1.0
+    return p.gain * friction(last, now, elapsed, z.friction, p.friction, u)
 
 
 CONTROL_LAW = ControlLaw(

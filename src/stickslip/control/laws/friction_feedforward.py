@@ -34,11 +34,12 @@ class State(NamedTuple):
 
     reference_velocity: Annotated[float, Par("rad/s", "", "reference velocity one sample ago")]
     seen: Annotated[float, Par("rad/s", "", "velocity that the law saw one sample ago")]
+    running: Annotated[float, Par("-", "", "1 after its first sample")]
 
 
 def linear(last: float, now: float, y: Any, z: Any, p: Any, u: Any) -> float:
-    """The velocity runs linearly over the sample; before the first one nothing has moved. N·m."""
-    if y.started == 0.0:
+    """The velocity runs linearly over the sample; before its first one the law has seen nothing. N·m."""
+    if z.running == 0.0 or y.started == 0.0:
         return friction(now, now, 0.0, z.friction, p.friction, u)
     return friction(last, now, y.elapsed, z.friction, p.friction, u)
 
@@ -61,14 +62,16 @@ over_sample = linear
 def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     """Torque, N·m. A reference at rest stays at rest, however far the law looks ahead."""
     now = y.reference_velocity
-    if y.started != 0.0 and now != 0.0:
+    if z.running != 0.0 and y.started != 0.0 and now != 0.0:
         now = now + p.lead * (now - z.reference_velocity) / y.elapsed
     z.reference_velocity = y.reference_velocity
     if abs(now) < p.deadband:
         now = 0.0
     last = z.seen
     z.seen = now
-    return p.gain * over_sample(last, now, y, z, p, u)
+    torque = p.gain * over_sample(last, now, y, z, p, u)
+    z.running = 1.0
+    return torque
 
 
 CONTROL_LAW = ControlLaw(
