@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 __all__ = ["show"]
 
-JUDGED = ("force_relative", "inverse_dynamics_relative", "position_", "rms_Nm")
+JUDGED = ("force_relative", "inverse_dynamics_relative", "position_", "rms_Nm", "rms_N")
 """Misfits that sentences say, or that say little (the position of an open loop drifts); all are in --json."""
 
 

@@ -244,16 +244,13 @@ def places(out: Path) -> tuple[Path, Path]:
 
 def identified(sources: Sequence[Source], args: argparse.Namespace, regress: Regress) -> Identification:
     """The method's result, with the doctor's findings."""
-    from stickslip.machines.servo import ServoAxis
+    from stickslip.identify.on_a_line import along_a_line
 
     records = [s.record for s in sources]
     if args.method in METHODS:
         found = METHODS[args.method](records, args)
         if all(r.units.get("position") == "m" for r in records):
-            linear = ServoAxis(motion="linear")
-            found = replace(
-                found, estimates=tuple(replace(e, unit=linear.unit(e.unit)) for e in found.estimates)
-            )
+            found = along_a_line(found)
     else:
         found = whole_axis(records, args, sum(s.held_out for s in sources), regress)
     notes = (*found.notes, *assumptions(found, args), *load_note(records, found))

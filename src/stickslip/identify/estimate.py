@@ -160,7 +160,7 @@ class Identification:
 
     def misfit_unit(self, name: str) -> str:
         """Unit of a number of `misfit`; empty for a ratio or a count."""
-        for ending, unit in (("_Nm", "N·m"), ("_rad", "rad")):
+        for ending, unit in (("_Nm", "N·m"), ("_N", "N"), ("_rad", "rad")):
             if name.endswith(ending):
                 return unit
         if not name.endswith(("_rms", "_mean_absolute")):

@@ -263,8 +263,9 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
         out.append(
             f"Torque over the position (cogging, unbalance), allowed for but not part of the law: {listed}."
         )
-    if (rms := found.misfit.get("rms_Nm")) is not None:
-        out.append(f"What the curve leaves of the torque: {quantity(float(rms), 'N·m')} root mean square.")
+    if (rms := found.misfit.get("rms_N" if linear(found) else "rms_Nm")) is not None:
+        what = f"{'force' if linear(found) else 'torque'}: {quantity(float(rms), unit_in(found, 'N·m'))}"
+        out.append(f"What the curve leaves of the {what} root mean square.")
     return out
 
 

@@ -84,7 +84,8 @@ def pictures_of(
     output, inverse = found.details.get("output"), found.details.get("inverse")
     out = list(found.pictures)
     sliding = sliding_of(found) or over_all_rows(found)
-    if found.model is not None and found.model.law.steady and "axis" in found.details:
+    whole = isinstance(output, FittedAxis) or isinstance(inverse, InverseDynamics)
+    if found.model is not None and found.model.law.steady and whole:
         band = curve_picture(found, fastest(output, inverse), sliding, speeds or {})
         out += [band] if band else []
     if sliding is not None:

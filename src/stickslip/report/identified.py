@@ -44,6 +44,8 @@ LABELS = {
     "relative": ("residual over the torque", "", 1.0),
     "cross_validated": ("left-out error over the torque", "", 1.0),
     "cross_validated_Nm": ("left-out error", "N·m, RMS", 1.0),
+    "rms_N": ("residual", "N, RMS", 1.0),
+    "cross_validated_N": ("left-out error", "N, RMS", 1.0),
     "aicc": ("AICc", "", 1.0),
     "bic": ("BIC", "", 1.0),
 }

@@ -1,0 +1,54 @@
+"""Results of a linear axis: methods count in N·m and rad, whatever the record; along a line these are N and m."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from stickslip.identify.estimate import Identification, Picture
+from stickslip.machines.servo import ServoAxis
+
+__all__ = ["along_a_line"]
+
+LINEAR = ServoAxis(motion="linear")
+UNITS = re.compile(r"(?<![^\W\d_])([mµk]?)(N·m|kg·m²|rad)(?![^\W\d_])")
+"""A unit in a sentence or a label, perhaps with a prefix, between other signs than letters."""
+
+
+def along_a_line(found: Identification) -> Identification:
+    """The same numbers with the units of a linear axis, in words and pictures too; ``rms_Nm`` is then ``rms_N``.
+
+    A result that knows its axis (`Identification.details`, ``axis``) has its words right already.
+    """
+    estimates = tuple(replace(e, unit=LINEAR.unit(e.unit)) for e in found.estimates)
+    misfit = in_newtons(found.misfit)
+    if isinstance(found.details.get("axis"), ServoAxis):
+        return replace(found, estimates=estimates, misfit=misfit)
+    details: dict[str, Any] = {**found.details, "axis": LINEAR}
+    if "comparison" in details:
+        details["comparison"] = {name: in_newtons(cells) for name, cells in details["comparison"].items()}
+    return replace(
+        found, estimates=tuple(replace(e, verdict=words(e.verdict)) for e in estimates), misfit=misfit, details=details,
+        notes=tuple(words(n) for n in found.notes), measure_next=tuple(words(n) for n in found.measure_next),
+        pictures=tuple(picture(p) for p in found.pictures),
+    )  # fmt: skip
+
+
+def in_newtons(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers by names that end with their unit."""
+    return {f"{k.removesuffix('_Nm')}_N" if k.endswith("_Nm") else k: v for k, v in numbers.items()}
+
+
+def words(text: str) -> str:
+    """A sentence or a label."""
+    return UNITS.sub(lambda found: found[1] + LINEAR.unit(found[2]), text)
+
+
+def picture(p: Picture) -> Picture:
+    """Its words."""
+    return replace(
+        p, title=words(p.title), message=words(p.message), x_label=words(p.x_label), y_label=words(p.y_label),
+        traces=tuple(replace(t, label=words(t.label)) for t in p.traces),
+    )  # fmt: skip
