@@ -18,7 +18,14 @@ import numpy as np
 
 from stickslip import plugins
 from stickslip.errors import InputError, UnknownName
-from stickslip.identify.axis_agreed import TOLD_BY_SLIDING, agreed, aligned, on_timing, regressed
+from stickslip.identify.axis_agreed import (
+    TOLD_BY_SLIDING,
+    agreed,
+    aligned,
+    held_against,
+    on_timing,
+    regressed,
+)
 from stickslip.identify.axis_choice import (
     Candidate,
     chosen_of,
@@ -137,6 +144,7 @@ def identify_axis(
     notes = [*(on_timing(sliding) if skew is None else []), *notes, *more]
     if inverse is None:
         require_start(trials, axis, tried, dict(values or {}), extras)
+    unchecked = sliding is None and all(t.drive is not None for t in trials)
     if per_direction or not plain_axis(extras, free, values):
         sliding = None
     if laws is AUTOMATIC or tuple(laws) == AUTOMATIC:
@@ -160,7 +168,9 @@ def identify_axis(
                 found = by_sliding(trials, axis, chosen, inverse, sliding, own, validation, candidates, notes)
                 if all(e.identified for e in found.estimates) or not sliding.held_for(HELD):
                     return found
-            return predicted(trials, axis, chosen, inverse, sliding, own, validation, candidates, notes)
+            return predicted(
+                trials, axis, chosen, inverse, sliding, own, validation, candidates, notes, unchecked
+            )
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."
     result = output_error(trials, axis, chosen, inverse, profiles=profiles, **own)
@@ -251,6 +261,7 @@ def judged_laws(
 def predicted(
     trials: Sequence[Trial], axis: ServoAxis, law: Law, inverse: InverseDynamics | None, sliding: Regression | None,
     options: Mapping[str, Any], validation: Sequence[Trial], candidates: Sequence[Candidate], notes: Sequence[str],
+    unchecked: bool,
 ) -> Identification:  # fmt: skip
     """Each number from the estimator that shows it, misfits of the simulation with these values."""
     given = {k: v for k, v in options.items() if k != "robust"}
@@ -266,6 +277,8 @@ def predicted(
             result.vector.named(u) | {e.name: e.value for e in estimates if e.name in TOLD_BY_SLIDING}
         )
     estimates = evident(estimates, result.vector, u, trials, axis)
+    if unchecked and inverse is not None:
+        estimates = held_against(estimates, inverse)
     estimates, more = settled(estimates, result.model, inverse if sliding is not None else None)
     u = result.vector.coordinates(result.vector.named(u) | {e.name: e.value for e in estimates})
     fitted = with_values(trials, axis, law, result.vector, u, options["extras"])

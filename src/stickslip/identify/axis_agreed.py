@@ -27,7 +27,16 @@ from stickslip.identify.uncertainty import verdict_on
 from stickslip.identify.vector import Parameter, Vector
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["SAME", "TOLD_BY_SLIDING", "agreed", "aligned", "on_timing", "regressed", "sliding_values"]
+__all__ = [
+    "SAME",
+    "TOLD_BY_SLIDING",
+    "agreed",
+    "aligned",
+    "held_against",
+    "on_timing",
+    "regressed",
+    "sliding_values",
+]
 
 ALIGNED = 0.1
 """Rows by which a torque that acts from row to row must be off its row to be moved."""
@@ -38,9 +47,16 @@ SAME = 0.05
 AS_GOOD = 1.5
 """Times as much as the regression leaves of the torque in certain sliding, that other values may leave and still
 stand."""
+FALLS = 0.95
+"""Probability of a fall of friction in certain sliding from which on its numbers are held against the others'."""
 TOLD_BY_SLIDING = ("inertia", "offset", "gravity", "gravity_angle", "fc", "sigma2")
 DOUBT = (
     "the prediction error, which alone tells it, contradicts certain sliding on {name}: {other} against {own}"
+)
+
+UNDECIDED = (
+    "the prediction error says {name} {own}, the plain inverse dynamics {other}, and the record slides too little in "
+    "one direction to decide"
 )
 
 
@@ -144,8 +160,6 @@ def agreed(
             continue
         size = scale.get(e.name, math.nan)
         own = told(e, parameters[e.name], *sliding[e.name], size)
-        if found.doubt and own.identified:
-            own = replace(own, identified=False, verdict=found.doubt)
         apart = abs(e.value - own.value) > math.hypot(e.upper - e.lower, own.upper - own.lower) / 2.0
         if fine and not apart:
             # Its intervals are narrow, and hold where the torque acted as simulations take it.
@@ -164,11 +178,19 @@ def agreed(
             for e in estimates if taken.get(e.name) is e
         }  # fmt: skip
         notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
+    if fine and found.falls >= FALLS:
+        for e in estimates:
+            if e.name in ("fs", "vs") and e.name in parameters:
+                taken[e.name], said = fall_together(e, found, parameters[e.name])
+                notes += said
     out = tuple(
-        taken[e.name] if e.name in sliding and e.name in taken
+        taken[e.name] if e.name in taken
         else replace(e, identified=False, verdict=doubts) if doubts and e.identified else e
         for e in estimates
     )  # fmt: skip
+    if found.doubt:
+        out = tuple(replace(e, identified=False, verdict=found.doubt) if e.identified else e for e in out)
+        notes.append(f"Nothing is identified: {found.doubt}. Record gentler motion.")
     return out, notes
 
 
@@ -191,6 +213,36 @@ def plain_value(name: str, inverse: InverseDynamics | None) -> tuple[float, floa
     if inverse is None or not inverse.has(own):
         return None
     return inverse[own], QUANTILE * float(inverse.robust_std[inverse.names.index(own)])
+
+
+def fall_together(e: Estimate, found: Regression, p: Parameter) -> tuple[Estimate, list[str]]:
+    """Fs or vs of the prediction error, its interval widened to hold what certain sliding says of the fall of
+    friction where both contradict each other."""
+    own = found.vs if e.name == "vs" else found.numbers["fs"]
+    half = QUANTILE * own.std
+    apart = abs(own.value - e.value) > math.hypot(0.5 * (e.upper - e.lower), half)
+    if not (apart and e.identified) or abs(own.value - e.value) <= SAME * abs(e.value):
+        return e, []
+    wide = told(e, p, e.value, min(e.lower, own.value), max(e.upper, own.value), math.nan)
+    return wide, [
+        f"{e.name}: certain sliding says {own.value:.4g}, the prediction error {e.value:.4g} {e.unit}; the interval "
+        "holds both."
+    ]
+
+
+def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tuple[Estimate, ...]:
+    """The estimates of a record without certain sliding: nothing is identified where inertia or level contradicts the
+    plain inverse dynamics, since nothing decides between the two."""
+    out = tuple(estimates)
+    for e in out:
+        other = plain_value(e.name, inverse)
+        if e.name not in ("inertia", "fc") or other is None:
+            continue
+        apart = abs(other[0] - e.value) > math.hypot(0.5 * (e.upper - e.lower), other[1])
+        if apart and abs(other[0] - e.value) > SAME * abs(e.value):
+            why = UNDECIDED.format(name=e.name, own=f"{e.value:.4g}", other=f"{other[0]:.4g} {e.unit}")
+            return tuple(replace(x, identified=False, verdict=why) if x.identified else x for x in out)
+    return out
 
 
 def as_good(inverse: InverseDynamics, found: Regression) -> bool:

@@ -51,6 +51,10 @@ LEANING, LEANS = (
 )  # order of a slow torque over the travel (cables, a load, gravity), and its part of Fc
 BLURRED = 0.3  # of the largest order found, that those beside it may have where the way is short
 FORM = 0.003  # of Fc: misfit that is assumed at least
+TENSION, FAR = (
+    2.0,
+    6.0,
+)  # standard deviations: viscous friction below 0 at most; above 0, where the bound does nothing
 MEMORY = 3.0  # rows over which it is correlated at least
 PIECE, LONGER = (
     0.25,
@@ -410,6 +414,28 @@ def fit_band(
     return summed_up(system, torque, candidates, weight, at, stribeck, len(orders), pendulum)
 
 
+def brakes(values: Array, covariance: Array) -> tuple[Array, Array]:
+    """Values and covariance once viscous friction is known to brake: the normal distribution cut off at 0.
+
+    Where it lies below 0 by more than `TENSION` standard deviations, these are too small.
+    """
+    mean, variance = float(values[VISCOUS]), float(covariance[VISCOUS, VISCOUS])
+    if variance <= 0.0 or not math.isfinite(variance):
+        return values, covariance
+    wider = max(1.0, mean * mean / (TENSION * TENSION * variance)) if mean < 0.0 else 1.0
+    covariance, variance = wider * covariance, wider * variance
+    std = math.sqrt(variance)
+    beyond = -mean / std
+    if beyond < -FAR:
+        return values, covariance
+    density = math.exp(-0.5 * beyond * beyond) / math.sqrt(2.0 * math.pi)
+    rate = density / max(0.5 * math.erfc(beyond / math.sqrt(2.0)), 1e-300)
+    along = covariance[:, VISCOUS] / variance
+    left = variance * max(1.0 + beyond * rate - rate * rate, 0.0)
+    moved = values + along * std * rate
+    return moved, covariance - np.outer(along, along) * (variance - left)
+
+
 def element(i: int) -> Callable[[Array, Array], tuple[float, float]]:
     """Picks a value and its variance."""
     return lambda v, s: (v[i], s[i, i])
@@ -422,8 +448,10 @@ def summed_up(
     """Means over the candidates, their spread among the variances."""
     kept = [(w, c) for w, c in zip(weight, candidates, strict=True) if w > 1e-4]
     total = sum(w for w, _ in kept)
-    values = [c.values / system.scale[c.columns] for _, c in kept]
-    spreads = [system.covariance(torque, c) for _, c in kept]
+    braking = [
+        brakes(c.values / system.scale[c.columns], system.covariance(torque, c)) for _, c in kept
+    ]  # fmt: skip
+    values, spreads = [v for v, _ in braking], [s for _, s in braking]
 
     def mean(of: Callable[[Array, Array], tuple[float, float]]) -> Number:
         pairs = [of(v, s) for v, s in zip(values, spreads, strict=True)]
