@@ -183,11 +183,12 @@ def agreed(
             if e.name in ("fs", "vs") and e.name in parameters:
                 taken[e.name], said = fall_together(e, found, parameters[e.name])
                 notes += said
-    out = tuple(
-        taken[e.name] if e.name in taken
-        else replace(e, identified=False, verdict=doubts) if doubts and e.identified else e
-        for e in estimates
-    )  # fmt: skip
+    out = tuple(taken.get(e.name, e) for e in estimates)
+    if doubts:
+        out = tuple(
+            replace(e, identified=False, verdict=doubts) if e.identified and e.name not in sliding else e
+            for e in out
+        )
     if found.doubt:
         out = tuple(replace(e, identified=False, verdict=found.doubt) if e.identified else e for e in out)
         notes.append(f"Nothing is identified: {found.doubt}. Record gentler motion.")
