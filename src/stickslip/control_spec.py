@@ -5,14 +5,15 @@ reads this description, so that a control law is written once, in one file.
 
 Argument order, everywhere: signals of the loop ``y``, state ``z``, parameters ``p``, surroundings ``u``.
 
-====================================  ==============================================================
-``sample(y, z, p, u)``                torque of this sample, N·m (of an estimator: the velocity, rad/s); advances ``z``
-``take_over(missing, y, z, p, u)``    changes ``z`` so that the torque would be ``missing`` N·m higher; returns what it
-                                      could not take over, N·m
-``check(p)``                          a sentence that says what is wrong with the parameters, or ""
-``delay(p, sample_time)``             of an estimator: its delay at low frequency, s
-``continuous(p)``                     the law in continuous time, as `stickslip.control.linear.Gains`
-====================================  ==============================================================
+=======================================  ===========================================================
+``sample(y, z, p, u)``                   torque of this sample, N·m; advances ``z`` (an estimator: the velocity, rad/s)
+``take_over(missing, y, z, p, u)``       changes ``z`` so that the torque would be ``missing`` N·m higher; returns
+                                         what it could not take over, N·m
+``check(p)``                             a sentence that says what is wrong with the parameters, or ""
+``delay(p, sample_time)``                of an estimator: its delay at low frequency, s
+``continuous(p)``                        the law in continuous time, as `stickslip.control.linear.Gains`
+``placed(inertia, bandwidth, damping)``  parameters that place the poles of the loop without friction, by name
+=======================================  ===========================================================
 
 ``sample`` and ``take_over`` are written in the scalar subset (`stickslip.subset`). ``y`` has the fields of
 `Signals`, ``u`` those of `stickslip.spec.Surroundings`. A law that holds a friction law calls ``friction(v0,
@@ -92,7 +93,7 @@ class ControlLaw(Configurable):
         Parameters for an axis of 3.8623e-4 kg·m² at 1 kHz, for documentation and the contract tests.
     State : type or None
         As ``Params``, for the internal state. Everything is 0 at the start.
-    take_over, check, delay, continuous : callable or None
+    take_over, check, delay, continuous, placed : callable or None
     linear : bool
         Superposition holds while the torque is within its limit. A declaration: the contract tests try it.
     holds_friction : bool
@@ -114,6 +115,7 @@ class ControlLaw(Configurable):
     check: Callable[[Any], str] | None = None
     delay: Callable[[Any, float], float] | None = None
     continuous: Callable[[Any], Any] | None = None
+    placed: Callable[[float, float, float], Mapping[str, float]] | None = None
     linear: bool = False
     holds_friction: bool = False
     choices: tuple[Choice, ...] = ()

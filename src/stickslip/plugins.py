@@ -33,6 +33,7 @@ __all__ = [
     "control_law_names",
     "law",
     "law_names",
+    "law_or_control_law",
     "reference_kind",
     "reference_names",
     "rig_kind",
@@ -112,9 +113,22 @@ def _control_folders() -> dict[str, tuple[str, ...]]:
     }
 
 
+def law_or_control_law(path: str, named_by: str = "") -> Law | ControlLaw:
+    """What a file defines: a friction law or a control law; `named_by` and errors as in `law`."""
+    file, code = _code_at(str(Path(path).resolve()), named_by)
+    made = vars(_defined_in(file, code))
+    return _control_law_in(file, code) if "CONTROL_LAW" in made else _law_in(file, code)
+
+
+@functools.cache
+def _defined_in(path: str, code: bytes) -> ModuleType:
+    """The module of a file, run once: its law is one object, however often it is asked for."""
+    return _module_of(path, code)
+
+
 @functools.cache
 def _control_law_in(path: str, code: bytes) -> ControlLaw:
-    found = getattr(_module_of(path, code), "CONTROL_LAW", None)
+    found = getattr(_defined_in(path, code), "CONTROL_LAW", None)
     if not isinstance(found, ControlLaw):
         raise LawError(f"{path} defines no control law; end it with `CONTROL_LAW = ControlLaw(...)`")
     return found
@@ -181,8 +195,7 @@ def _from_files() -> dict[str, Law]:
 
 @functools.cache
 def _law_in(path: str, code: bytes) -> Law:
-    module = _module_of(path, code)
-    found = getattr(module, "LAW", None)
+    found = getattr(_defined_in(path, code), "LAW", None)
     if not isinstance(found, Law):
         raise LawError(f"{path} defines no law; end it with `LAW = Law(...)`")
     return _tried(found, path)

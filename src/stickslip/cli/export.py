@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from stickslip.control.controller import Controller
     from stickslip.control.recommended import Recommended
+    from stickslip.control.sampled_controller import SampledController
     from stickslip.export.job import Export, Job
     from stickslip.export.target import Target
     from stickslip.model import Model
@@ -129,6 +130,8 @@ def run(args: argparse.Namespace) -> int:
             raise InputError(
                 f"--{option}: {chosen.name} carries the law alone; leave it out, or take --to c99"
             )
+    if args.controller and (made := composed_in(args.file)) is not None:
+        return export_composed(args, chosen, made)
     job = job_of(args, chosen)
     if job.nearest and not chosen.forms:
         raise InputError(f"--nearest: {chosen.name} carries {chosen.carries}; leave it out")
@@ -148,6 +151,46 @@ def run(args: argparse.Namespace) -> int:
         if result:
             print(f"check: {result.text}")
     return 1 if result and result.passed is False else 0
+
+
+def composed_in(file: Path) -> SampledController | None:
+    """The controller of a file, where it is made of control laws."""
+    from stickslip.control.sampled_controller import SampledController
+    from stickslip.study.study import load_run
+
+    control = load_run(file).control
+    return control if isinstance(control, SampledController) else None
+
+
+def export_composed(args: argparse.Namespace, chosen: Target, controller: SampledController) -> int:
+    """Write a controller made of control laws; 1 if the check fails."""
+    from stickslip.cli import _output
+    from stickslip.errors import InputError
+    from stickslip.export import c99_controller
+
+    if chosen.name != "c99":
+        raise InputError(
+            f"--controller: {chosen.name} has no controllers made of control laws; take --to c99"
+        )
+    name = name_of(args)
+    export = c99_controller.write(controller, name, single=args.single)
+    written = store(export, args.out or Path(f"{name}-{chosen.name}"), args.force)
+    result = c99_controller.check(export, name) if args.check else None
+    if args.json:
+        check = {"passed": result.passed, "text": result.text, **result.numbers} if result else None
+        _output.print_json({"target": chosen.name, "files": written, "notes": [], "check": check})
+    else:
+        report(chosen, [], written)
+        if result:
+            print(f"check: {result.text}")
+    return 1 if result and result.passed is False else 0
+
+
+def name_of(args: argparse.Namespace) -> str:
+    """The prefix of every name: the one given, or the file's."""
+    import re
+
+    return args.name or re.sub(r"[^A-Za-z0-9_]+", "_", args.file.stem)
 
 
 def described(target: Target) -> list[str]:
@@ -188,13 +231,12 @@ def axis_values(file: Path, chosen: Target) -> dict[str, str | float]:
 
 def job_of(args: argparse.Namespace, chosen: Target) -> Job:
     """The model of the file, or the model and controller of a file for `stickslip simulate`."""
-    import re
-
+    from stickslip.control.sampled_controller import SampledController
     from stickslip.errors import InputError
     from stickslip.export.job import Job
     from stickslip.model import Model
 
-    name = args.name or re.sub(r"[^A-Za-z0-9_]+", "_", args.file.stem)
+    name = name_of(args)
     options: dict[str, Any] = {
         "single": args.single, "nearest": args.nearest, "top_speed": args.top_speed,
         "settings": settings_given(args, chosen),
@@ -215,7 +257,7 @@ def job_of(args: argparse.Namespace, chosen: Target) -> Job:
 
     run = load_run(args.file)
     controller = run.control
-    if controller.compensator is None:
+    if isinstance(controller, SampledController) or controller.compensator is None:
         raise InputError(f"{args.file}: [controller] has no compensator; add one, or export the law alone")
     around = Surroundings(load=run.axis.load, temperature=run.axis.temperature)
     return Job(controller.compensator.model, name, controller, surroundings=around, **options)

@@ -93,6 +93,14 @@ class ControlBlock:
         own = getattr(self.law, name)
         return self.law.holding(name, self.friction.law.step) if own and self.friction else own
 
+    def with_values(self, values: Mapping[str, Any], friction: Mapping[str, Any]) -> ControlBlock:
+        """The block with other parameters, of its own and of the friction law that it holds."""
+        own = {f.name: getattr(self.parameters, f.name) for f in self.law.fields}
+        held = self.friction
+        if held is not None and friction:
+            held = Model(held.law, **{**held.parameters._asdict(), **friction})
+        return ControlBlock(self.law, held, **{**own, **values})
+
     # ---- for people --------------------------------------------------------------------------------------
 
     def as_dict(self) -> dict[str, Any]:

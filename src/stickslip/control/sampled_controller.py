@@ -6,7 +6,7 @@ import functools
 import linecache
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -151,6 +151,25 @@ class SampledController:
     def values(self) -> dict[str, Any]:
         """The parameters of all its laws by their whole names."""
         return {f.name: _at(self.parameters, path) for f, path in zip(self.fields, self._paths("fields"))}
+
+    def with_values(self, values: Mapping[str, Any]) -> SampledController:
+        """The controller with other parameters, by their whole names (``loop_kp``, ``feedforward_friction_fc``).
+
+        Raises
+        ------
+        ParameterError
+            If a value is out of bounds.
+        """
+        own: dict[str, dict[str, Any]] = {part: {} for part in self.blocks}
+        held: dict[str, dict[str, Any]] = {part: {} for part in self.blocks}
+        for f, path in zip(self.fields, self._paths("fields")):
+            if f.name in values:
+                (own if len(path) == 2 else held)[path[0]][path[-1]] = values[f.name]
+        places: dict[str, list[ControlBlock]] = {place: [] for place in PLACES}
+        for part, block in self.blocks.items():
+            places[block.law.place].append(block.with_values(own[part], held[part]))
+        estimator = places.pop("estimator")[0]
+        return replace(self, estimator=estimator, **places)
 
     def packed(self) -> list[float]:
         """The parameters as the flat list that compiled functions read."""

@@ -14,7 +14,7 @@ from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.record import Record
 from stickslip.spec import Law
-from stickslip.study.plan import PlannedRun, Study, load, load_run
+from stickslip.study.plan import PlannedRun, Study, frictions_of, load, load_run
 
 __all__ = ["bibliography", "cited_by", "citing"]
 
@@ -127,8 +127,8 @@ def _of_study(study: Study) -> Iterator[str]:
 def _of_runs(runs: Sequence[PlannedRun]) -> Iterator[str]:
     for run in runs:
         yield from _of_law(run.axis.friction.law)
-        if run.control.compensator:
-            yield from _of_law(run.control.compensator.model.law)
+        for model in frictions_of(run.control):
+            yield from _of_law(model.law)
         yield from INTEGRATORS.get(run.numerics.integrator, ())
 
 

@@ -15,11 +15,14 @@ from stickslip.control import compensators
 from stickslip.control.compensators._base import Compensator
 from stickslip.control.controller import Controller
 from stickslip.control.linear import LINEAR, Cascade, Gains, place
+from stickslip.control.sampled_controller import SampledController
+from stickslip.control_spec import ControlLaw
 from stickslip.errors import ConfigError, InputError, suggestion
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import INTEGRATORS
 from stickslip.spec import Described, Law
+from stickslip.study.blocks import composed, is_composed
 
 __all__ = [
     "Numerics",
@@ -73,17 +76,18 @@ def numerics(table: Table, base: Numerics) -> Numerics:
 # ---- friction ------------------------------------------------------------------------------------------------
 
 
-def law_files(table: Table) -> dict[str, Law]:
-    """The laws in the files that ``plugins`` lists, by name."""
-    found: dict[str, Law] = {}
+def law_files(table: Table) -> dict[str, Law | ControlLaw]:
+    """The laws and control laws in the files that ``plugins`` lists, by name."""
+    found: dict[str, Law | ControlLaw] = {}
     for path in table.files("plugins"):
         with table.blamed():
-            law = plugins.law(str(path), table.label("plugins")) if path.suffix == ".py" else None
+            named_by = table.label("plugins")
+            law = plugins.law_or_control_law(str(path), named_by) if path.suffix == ".py" else None
             if law is None:
                 raise ConfigError(
                     f"{table.label('plugins')}: {path.name} is no law's file; its name ends in .py"
                 )
-            if law.name in found or law.name in plugins.law_names():
+            if law.name in found or law.name in (*plugins.law_names(), *plugins.control_law_names()):
                 raise ConfigError(
                     f"{table.label('plugins')}: {path.name} defines {law.name!r}, a name taken already"
                 )
@@ -91,7 +95,7 @@ def law_files(table: Table) -> dict[str, Law]:
     return found
 
 
-def models(tables: Mapping[str, Table], laws: Mapping[str, Law]) -> dict[str, Model]:
+def models(tables: Mapping[str, Table], laws: Mapping[str, Law | ControlLaw]) -> dict[str, Model]:
     """Read named models; one may be ``like`` another of them, with other values or scaled ones.
 
     Parameters
@@ -101,9 +105,15 @@ def models(tables: Mapping[str, Table], laws: Mapping[str, Law]) -> dict[str, Mo
         Laws from files, by name; the registered ones are known anyway.
     """
     done: dict[str, Model] = {}
+    own = friction_laws(laws)
     for name in tables:
-        _resolve(name, tables, laws, done, ())
+        _resolve(name, tables, own, done, ())
     return {name: done[name] for name in tables}
+
+
+def friction_laws(laws: Mapping[str, Law | ControlLaw]) -> dict[str, Law]:
+    """Those of the laws that are friction laws."""
+    return {name: law for name, law in laws.items() if isinstance(law, Law)}
 
 
 def _resolve(
@@ -259,9 +269,13 @@ def placement(table: Table) -> Placement | None:
 
 
 def controller(
-    table: Table, inertia: float, default: Placement | None, laws: Mapping[str, Model]
-) -> Controller:
-    """Read a controller.
+    table: Table,
+    inertia: float,
+    default: Placement | None,
+    laws: Mapping[str, Model],
+    files: Mapping[str, Law | ControlLaw],
+) -> Controller | SampledController:
+    """Read a controller; one made of control laws has a table ``loop`` (`stickslip.study.blocks`).
 
     Parameters
     ----------
@@ -275,7 +289,12 @@ def controller(
         Where the poles lie if the table has no ``placement``.
     laws : mapping of str to Model
         What ``law`` may name.
+    files : mapping of str to Law or ControlLaw
+        Laws from files, by name.
     """
+    if is_composed(table):
+        own = {name: law for name, law in files.items() if isinstance(law, ControlLaw)}
+        return composed(table, inertia, placement(table) or default, laws, own)
     with table.blamed():
         return Controller(
             _gains(table, inertia, default),

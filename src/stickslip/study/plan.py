@@ -12,6 +12,8 @@ from typing import Any, TypeVar
 
 from stickslip.config import Table, read_toml
 from stickslip.control.controller import Controller
+from stickslip.control.sampled_controller import SampledController
+from stickslip.control_spec import ControlLaw
 from stickslip.errors import ConfigError, InputError, UnknownName
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
@@ -21,7 +23,17 @@ from stickslip.study.build import Numerics, Placement
 from stickslip.study.provenance import engine_hash, source_hash
 from stickslip.study.result import Run
 
-__all__ = ["SLIP_RULES", "Drive", "PlannedRun", "Response", "Study", "load", "load_run", "select"]
+__all__ = [
+    "SLIP_RULES",
+    "Drive",
+    "PlannedRun",
+    "Response",
+    "Study",
+    "frictions_of",
+    "load",
+    "load_run",
+    "select",
+]
 
 SLIP_RULES = ("signed", "literal")
 OWN = "own"
@@ -39,7 +51,7 @@ class PlannedRun:
     friction: str
     controller: str
     axis: RigidAxis
-    control: Controller
+    control: Controller | SampledController
     motion: Reference
     duration: float
     numerics: Numerics
@@ -57,37 +69,26 @@ class PlannedRun:
     @functools.cached_property
     def fingerprint(self) -> str:
         """A hash of everything that determines the run's numbers."""
-        helper = self.control.compensator
-        sampled = [helper.lead, helper.deadband] if helper and helper.sampled else []
-        if helper and (helper.offset or helper.inertia_feedforward):
-            sampled += [helper.offset, helper.inertia_feedforward]
-        if helper and helper.substeps != 1:
-            sampled += ["substeps", helper.substeps]
-        filtered = [self.control.velocity_filter] if self.control.velocity_filter else []
-        content = {
+        return hashlib.sha256(json.dumps(self._content(), sort_keys=True).encode()).hexdigest()
+
+    def _content(self) -> dict[str, Any]:
+        """What the fingerprint is made of."""
+        laws = [self.axis.friction.law, *(m.law for m in frictions_of(self.control))]
+        return {
             "slip_rule": self.slip_rule,
             "inertia": self.axis.inertia,
             "friction": self.axis.friction.as_dict(),
-            "gains": self.control.gains._asdict(),
-            "compensator": helper
-            and [helper.name, helper.gain, helper.filter_hz, helper.model.as_dict(), *sampled],
-            "control": [
-                self.control.torque_limit,
-                self.control.sample_time,
-                self.control.encoder_counts,
-                *filtered,
-            ],
+            **(
+                {"controller": self.control.as_dict()}
+                if isinstance(self.control, SampledController)
+                else _control_content(self.control)
+            ),
             "reference": self.motion.as_dict(),
             "duration": self.duration,
             "numerics": asdict(self.numerics),
-            "laws": [
-                source_hash(m.law.Params.__module__)
-                for m in (self.axis.friction, helper and helper.model)
-                if m
-            ],
+            "laws": [source_hash(law.Params.__module__) for law in (*laws, *control_laws_of(self.control))],
             "engine": engine_hash(),
         }
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def check(self) -> None:
         """Find what is wrong with the run without running it; compiles its laws.
@@ -105,6 +106,36 @@ class PlannedRun:
             integrator_for(case, n.integrator)
         except InputError as error:
             raise ConfigError(f"run {self.key}: {error}") from None
+
+
+def frictions_of(control: Controller | SampledController) -> list[Model]:
+    """The friction laws that a controller holds."""
+    if isinstance(control, SampledController):
+        return [block.friction for block in control.blocks.values() if block.friction]
+    return [control.compensator.model] if control.compensator else []
+
+
+def control_laws_of(control: Controller | SampledController) -> list[ControlLaw]:
+    """The control laws that a controller is made of."""
+    blocks = control.blocks.values() if isinstance(control, SampledController) else ()
+    return [block.law for block in blocks]
+
+
+def _control_content(control: Controller) -> dict[str, Any]:
+    """What determines the numbers of a controller with gains and a compensator."""
+    helper = control.compensator
+    sampled = [helper.lead, helper.deadband] if helper and helper.sampled else []
+    if helper and (helper.offset or helper.inertia_feedforward):
+        sampled += [helper.offset, helper.inertia_feedforward]
+    if helper and helper.substeps != 1:
+        sampled += ["substeps", helper.substeps]
+    filtered = [control.velocity_filter] if control.velocity_filter else []
+    return {
+        "gains": control.gains._asdict(),
+        "compensator": helper
+        and [helper.name, helper.gain, helper.filter_hz, helper.model.as_dict(), *sampled],
+        "control": [control.torque_limit, control.sample_time, control.encoder_counts, *filtered],
+    }
 
 
 @dataclass(frozen=True)
@@ -237,24 +268,22 @@ def load_run(path: Path) -> PlannedRun:
         files = build.law_files(table)
         laws = build.models(table.tables("laws"), files)
         with table.table("friction") as t:
-            axis = build.axis(table.table("axis"), build.model(t, files))
+            axis = build.axis(table.table("axis"), build.model(t, build.friction_laws(files)))
         with table.table("reference") as t:
             motion = _Motion.read(t)
         with table.table("controller") as t:
             numerics = build.numerics(t, numerics)
-            control = build.controller(t, axis.inertia, motion.placement, laws)
+            control = build.controller(t, axis.inertia, motion.placement, laws, files)
     return PlannedRun(
         named_rule(rule, axis, control), motion.reference.kind.name, axis.friction.law.name, "controller",
         axis, control, motion.reference, motion.duration, numerics,
     )  # fmt: skip
 
 
-def named_rule(rule: str | None, axis: RigidAxis, control: Controller) -> str:
+def named_rule(rule: str | None, axis: RigidAxis, control: Controller | SampledController) -> str:
     """The rule by which a run's name calls it: what its file gives; where it gives none, "own" if one of its laws
     brings another one than the default."""
-    helper = control.compensator
-    models = (axis.friction, helper.model if helper else None)
-    kept = {m.law.option_of("slip_rule") for m in models if m is not None} - {""}
+    kept = {m.law.option_of("slip_rule") for m in (axis.friction, *frictions_of(control))} - {""}
     return rule or (OWN if kept - {SLIP_RULES[0]} else SLIP_RULES[0])
 
 
@@ -310,14 +339,16 @@ class _Parts:
         controllers: Iterable[str],
     ) -> list[PlannedRun]:
         """Every one of each with every one of the others."""
-        made: dict[tuple[str, str], tuple[Controller, Numerics]] = {}
+        made: dict[tuple[str, str], tuple[Controller | SampledController, Numerics]] = {}
         inertia = next(iter(self.frictions.values())).inertia
         for c in controllers:
             for m in motions:
                 with self.controllers[c] as table:
                     numerics = build.numerics(table, self.numerics)
                     made[c, m] = (
-                        build.controller(table, inertia, self.motions[m].placement, self.laws),
+                        build.controller(
+                            table, inertia, self.motions[m].placement, self.laws, self.laws_from_files
+                        ),
                         numerics,
                     )
         return [

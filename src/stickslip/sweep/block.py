@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.controller import Controller
 from stickslip.errors import InputError, ParameterError
 from stickslip.simulation import _case, batch, lanes
 from stickslip.simulation._meter import metrics as read_meter
@@ -138,7 +139,8 @@ def checked(
 
     kicked(np.arange(len(flagged)), 1.0)
     unmoved = np.flatnonzero(~flagged)
-    if isinstance(planned.control.compensator, Feedback) and unmoved.size:
+    control = planned.control
+    if isinstance(control, Controller) and isinstance(control.compensator, Feedback) and unmoved.size:
         # It acts on the motion itself, which may turn where the tolerance does not see it, wrong steps or not.
         flagged[unmoved] = differs(unmoved, again(unmoved, TIGHTER[0]), SURE)
     for times in TIGHTER:

@@ -16,7 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import UnknownName
 from stickslip.model import Model, Reference
 from stickslip.study.plan import PlannedRun
@@ -48,19 +50,28 @@ def poles(gains: Gains, inertia: float) -> tuple[str, float, float]:
 
 def known(run: PlannedRun) -> dict[str, Any]:
     """Every number of a run, by name; those of lists as tuples."""
-    helper, gains = run.control.compensator, run.control.gains
+    control = run.control
     found: dict[str, Any] = {"axis.inertia": run.axis.inertia}
     found |= {f"friction.{k}": v for k, v in run.axis.friction.parameters._asdict().items()}
+    if isinstance(control, SampledController):
+        found |= {f"controller.{k}": v for k, v in control.values().items()}
+    else:
+        found |= _of_gains(control, run.axis.inertia)
+    found["controller.torque_limit"] = run.control.torque_limit
+    found["controller.sample_time"] = run.control.sample_time
+    return found | {f"reference.{k}": v for k, v in run.motion.parameters._asdict().items()}
+
+
+def _of_gains(control: Controller, inertia: float) -> dict[str, Any]:
+    """The numbers of a controller with gains and a compensator."""
+    helper, gains, found = control.compensator, control.gains, dict[str, Any]()
     if helper:
         found |= {f"law.{k}": v for k, v in helper.model.parameters._asdict().items()}
         found["controller.gain"] = helper.gain
         found["controller.filter_hz"] = helper.filter_hz or math.inf
     if isinstance(gains, Gains) and gains.kp > 0.0:
-        _, found["controller.bandwidth_hz"], found["controller.damping"] = poles(gains, run.axis.inertia)
-    found |= {f"controller.{k}": v for k, v in gains._asdict().items()}
-    found["controller.torque_limit"] = run.control.torque_limit
-    found["controller.sample_time"] = run.control.sample_time
-    return found | {f"reference.{k}": v for k, v in run.motion.parameters._asdict().items()}
+        _, found["controller.bandwidth_hz"], found["controller.damping"] = poles(gains, inertia)
+    return found | {f"controller.{k}": v for k, v in gains._asdict().items()}
 
 
 def belongs(run: PlannedRun, name: str) -> bool:
@@ -125,7 +136,11 @@ def with_values(model: Model, values: Mapping[str, Any]) -> Model:
 
 
 def _control(run: PlannedRun, settings: Mapping[str, Any], law: Mapping[str, Any]) -> Any:
-    control, helper = run.control, run.control.compensator
+    control = run.control
+    if isinstance(control, SampledController):
+        both = {k: float(settings[k]) for k in ("torque_limit", "sample_time") if k in settings}
+        return replace(control.with_values(settings), **both)
+    helper = control.compensator
     own = {k: float(v) for k, v in settings.items()}
     if helper:
         hz = own.get("filter_hz", helper.filter_hz or math.inf)
@@ -134,18 +149,18 @@ def _control(run: PlannedRun, settings: Mapping[str, Any], law: Mapping[str, Any
             filter_hz=hz if math.isfinite(hz) else None,
         )  # fmt: skip
     return replace(
-        control, gains=_gains(run, own), compensator=helper,
+        control, gains=_gains(control, run.axis.inertia, own), compensator=helper,
         torque_limit=own.get("torque_limit", control.torque_limit),
         sample_time=own.get("sample_time", control.sample_time),
     )  # fmt: skip
 
 
-def _gains(run: PlannedRun, settings: Mapping[str, float]) -> Gains | Cascade:
-    gains = run.control.gains
+def _gains(control: Controller, inertia: float, settings: Mapping[str, float]) -> Gains | Cascade:
+    gains = control.gains
     if isinstance(gains, Gains) and any(name in settings for name in POLES):
-        kind, bandwidth, damping = poles(gains, run.axis.inertia)
+        kind, bandwidth, damping = poles(gains, inertia)
         gains = place(
-            kind, run.axis.inertia, settings.get("bandwidth_hz", bandwidth), settings.get("damping", damping)
+            kind, inertia, settings.get("bandwidth_hz", bandwidth), settings.get("damping", damping)
         )
     return gains._replace(**{k: v for k, v in settings.items() if k in gains._fields})
 
@@ -178,8 +193,9 @@ def as_columns(run: PlannedRun, values: Mapping[str, Array]) -> dict[str, Array]
             settings[rest] = column
         else:
             out["gain" if name == "controller.gain" else name] = column
-    if settings:
+    if settings and isinstance(run.control, Controller):
         rows = zip(*settings.values())
-        gains = [_gains(run, dict(zip(settings, map(float, row)))) for row in rows]
+        inertia = run.axis.inertia
+        gains = [_gains(run.control, inertia, dict(zip(settings, map(float, row)))) for row in rows]
         out |= {field: np.array([getattr(g, field) for g in gains]) for field in Gains._fields}
     return out

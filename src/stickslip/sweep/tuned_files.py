@@ -7,6 +7,7 @@ import json
 import os
 from pathlib import Path
 
+from stickslip.control.sampled_controller import SampledController
 from stickslip.study.files import unwritable
 from stickslip.sweep.plan import Sweep
 from stickslip.sweep.tune import Tuned
@@ -41,7 +42,8 @@ def write(folder: Path, sweep: Sweep, tuned: Tuned) -> list[Path]:
 
 
 def tuned_gains(tuned: Tuned) -> dict[str, float]:
-    """The linear gains of the chosen setting, for the drive."""
+    """The linear gains of the chosen setting, for the drive; of a controller made of control laws all its numbers."""
     from stickslip.sweep.numbers import varied
 
-    return varied(tuned.run, dict(zip(tuned.names, tuned.after.tolist()))).control.gains._asdict()
+    control = varied(tuned.run, dict(zip(tuned.names, tuned.after.tolist()))).control
+    return control.values() if isinstance(control, SampledController) else control.gains._asdict()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control.linear import Gains
+from stickslip.control.linear import Gains, place
 from stickslip.control.linear import pd as gains_of
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Par
@@ -24,6 +24,12 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     return p.kp * y.error + p.kd * (y.reference_velocity - y.velocity)
 
 
+def placed(inertia: float, bandwidth: float, damping: float) -> dict[str, float]:
+    """Thesis eq. 3.10."""
+    gains = place("PD", inertia, bandwidth, damping)
+    return {"kp": gains.kp, "kd": gains.kd}
+
+
 def continuous(p: Any) -> Gains:
     """The same in continuous time."""
     return gains_of(p.kp, p.kd)
@@ -36,5 +42,6 @@ CONTROL_LAW = ControlLaw(
     source=("thesis eq. 3.5",),
     example={"kp": 6.099, "kd": 0.097067},
     continuous=continuous,
+    placed=placed,
     linear=True,
 )  # fmt: skip

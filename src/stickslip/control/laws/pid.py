@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control.linear import Gains
+from stickslip.control.linear import Gains, place
 from stickslip.control.linear import pid as gains_of
 from stickslip.control_spec import REST, ControlLaw
 from stickslip.spec import Choice, Option, Par
@@ -143,6 +143,12 @@ def take_over(missing: float, y: Any, z: Any, p: Any, u: Any) -> float:
     return 0.0
 
 
+def placed(inertia: float, bandwidth: float, damping: float) -> dict[str, float]:
+    """Thesis eq. 3.15."""
+    gains = place("PID", inertia, bandwidth, damping)
+    return {"kp": gains.kp, "ki": gains.ki, "kd": gains.kd}
+
+
 def continuous(p: Any) -> Gains:
     """The same in continuous time."""
     return gains_of(p.kp, p.ki, p.kd)
@@ -157,6 +163,7 @@ CONTROL_LAW = ControlLaw(
     State=State,
     take_over=take_over,
     continuous=continuous,
+    placed=placed,
     linear=True,
     choices=(ANTI_WINDUP, AT_REST),
 )  # fmt: skip

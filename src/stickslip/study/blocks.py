@@ -1,0 +1,129 @@
+"""From tables of a TOML file to a controller made of control laws.
+
+    [controller]
+    sample_time = 0.001
+    torque_limit = 1.0
+    placement = {bandwidth_hz = 20.0, damping = 1.0}
+    loop = {law = "pd"}
+    feedforward = {law = "friction_feedforward", friction = "lugre", gain = 0.9}
+    observer = {law = "disturbance_observer", corner = 400.0}
+
+A place may hold a list of tables. Gains that are left out are placed; an inertia that is left out is the axis's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, cast
+
+from stickslip import plugins
+from stickslip.config import Table
+from stickslip.control.block import ControlBlock
+from stickslip.control.sampled_controller import SampledController
+from stickslip.control_spec import PLACES, ControlLaw
+from stickslip.errors import ConfigError, suggestion
+from stickslip.model import Model
+
+if TYPE_CHECKING:
+    from stickslip.study.build import Placement
+
+__all__ = ["composed", "is_composed"]
+
+
+def is_composed(table: Table) -> bool:
+    """Whether a controller's table names control laws."""
+    return any(isinstance(table.values.get(place), (dict, list)) for place in PLACES)
+
+
+def composed(
+    table: Table,
+    inertia: float,
+    poles: Placement | None,
+    models: Mapping[str, Model],
+    laws: Mapping[str, ControlLaw],
+) -> SampledController:
+    """Read a controller made of control laws.
+
+    Parameters
+    ----------
+    table : Table
+    inertia : float
+        Of the axis, kg·m².
+    poles : Placement or None
+        Where gains that are left out place the poles.
+    models : mapping of str to Model
+        What ``friction`` may name.
+    laws : mapping of str to ControlLaw
+        Control laws from files, by name; the registered ones are known anyway.
+
+    Raises
+    ------
+    ConfigError
+        One line that names the key, its value and what is allowed.
+    """
+    places: dict[str, Any] = {
+        place: [block(t, inertia, poles, models, laws) for t in listed(table, place)] for place in PLACES
+    }
+    estimator = places.pop("estimator")
+    if len(estimator) > 1:
+        raise table.error("estimator", "must be one table; a controller has one velocity")
+    with table.blamed():
+        return SampledController(
+            sample_time=table.positive("sample_time", "s"),
+            torque_limit=table.positive("torque_limit", "N·m") if table.has("torque_limit") else math.inf,
+            encoder_counts=table.number("encoder_counts", "counts per revolution", 0.0, lower=0.0),
+            estimator=estimator[0] if estimator else None,
+            **places,
+        )
+
+
+def listed(table: Table, place: str) -> Iterator[Table]:
+    """The tables of a place: none, one, or those of a list."""
+    if not table.has(place):
+        return
+    if not isinstance(table.values[place], list):
+        yield table.table(place)
+        return
+    for i, values in enumerate(cast("list[Any]", table.values[place])):
+        if not isinstance(values, dict):
+            raise table.error(place, f"must be a table or a list of tables; entry {i} is none")
+        yield Table(cast("dict[str, Any]", values), table.document, (*table.path, f"{place}[{i}]"))
+
+
+def block(
+    table: Table,
+    inertia: float,
+    poles: Placement | None,
+    models: Mapping[str, Model],
+    laws: Mapping[str, ControlLaw],
+) -> ControlBlock:
+    """Read a control law, its choices, its friction law and its parameters."""
+    with table, table.blamed():
+        law = law_of(table, laws)
+        friction = models[table.choice("friction", models, family="laws")] if law.holds_friction else None
+        options = {c.name for c in law.choices}
+        given = table.rest()
+        choices = {k: v for k, v in given.items() if k in options and isinstance(v, str)}
+        values = {k: v for k, v in given.items() if k not in choices}
+        names = [f.name for f in law.having(**choices).fields]
+        for key in values:
+            if key not in names:
+                remedy = suggestion(key, [*names, *options])
+                raise ConfigError(f"{table.label(key)}: {law.name} has no parameter {key!r}; {remedy}")
+        if poles and law.placed:
+            placed = law.placed(inertia, poles.bandwidth, poles.damping)
+            values = {**placed, **values}
+        if "inertia" in names:
+            values = {"inertia": inertia, **values}
+        return ControlBlock(law, friction, choices, **values)
+
+
+def law_of(table: Table, laws: Mapping[str, ControlLaw]) -> ControlLaw:
+    """The control law that a table names."""
+    name = table.text("law")
+    if name.endswith(".py"):
+        return plugins.control_law(str(table.document.locate(name)), table.label("law"))
+    if name in laws:
+        return laws[name]
+    return plugins.control_law(table.choice("law", (*plugins.control_law_names(), *laws)))
