@@ -99,6 +99,10 @@ class ControlLaw(Configurable):
     holds_friction : bool
         Whether it needs a friction law.
     choices : tuple of Choice
+    chosen : mapping
+        The options in force, by the names of the choices.
+    variants : dict
+        Laws that `having` has made of it; not for callers.
     """
 
     kind: ClassVar[str] = "control law"

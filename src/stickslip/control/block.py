@@ -94,7 +94,7 @@ class ControlBlock:
         return self.law.holding(name, self.friction.law.step) if own and self.friction else own
 
     def with_values(self, values: Mapping[str, Any], friction: Mapping[str, Any]) -> ControlBlock:
-        """The block with other parameters, of its own and of the friction law that it holds."""
+        """The block with other `values` of its own parameters, and of those of the `friction` law that it holds."""
         own = {f.name: getattr(self.parameters, f.name) for f in self.law.fields}
         held = self.friction
         if held is not None and friction:

@@ -153,7 +153,7 @@ class SampledController:
         return {f.name: _at(self.parameters, path) for f, path in zip(self.fields, self._paths("fields"))}
 
     def with_values(self, values: Mapping[str, Any]) -> SampledController:
-        """The controller with other parameters, by their whole names (``loop_kp``, ``feedforward_friction_fc``).
+        """The controller with other `values` of parameters, by whole names (``loop_kp``, ``feedforward_friction_fc``).
 
         Raises
         ------
@@ -176,7 +176,7 @@ class SampledController:
         return packed(self.fields, SimpleNamespace(**self.values()))
 
     def packed_state(self, z: SimpleNamespace | None = None) -> list[float]:
-        """A state (that at the start, if none is given) as the flat list that compiled functions read."""
+        """The state `z` (that at the start, if none is given) as the flat list that compiled functions read."""
         z = self.state() if z is None else z
         values = [(f, _at(z, name)) for f, name in zip(self.state_fields, self._paths("state_fields"))]
         flat = [value for f, value in values if not f.per_element]
