@@ -90,7 +90,7 @@ def study(task: tuple[tuple[int, str, int, str, str, str], str, bool]) -> tuple[
             level = found.numbers["fc"].value
             told = {n: (*v[:3], v[3] and not found.doubt) for n, v in told.items()}
             value, low, high = sliding_values(found)["offset"]
-            told["offset"] = (value, low, high, 0.5 * (high - low) <= 0.05 * level)
+            told["offset"] = (value, low, high, 0.5 * (high - low) <= 0.1 * level)
         else:
             result = identify_axis([trial], AXIS, [law] if law else ("coulomb", "stribeck", "lugre"))
             told = {e.name: (e.value, e.lower, e.upper, e.identified) for e in result.estimates}

@@ -19,6 +19,7 @@ import numpy as np
 from stickslip.identify.axis_inverse import InverseDynamics
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.gravity import hanging
+from stickslip.identify.uncertainty import RATIO, SHARE
 from stickslip.model import Model
 
 __all__ = ["settled"]
@@ -34,6 +35,7 @@ ALIKE = 1.05
 """Times the force error of plain least squares up to which identified values stay where they are."""
 PREFERRED = 0.98
 """Times the force error without a fall of friction, that one which is not identified must stay below."""
+MOVED = "the whole record, reversals included, asks for another value than certain sliding does"
 TURNS = 5
 """Rounds in which curve and levels are brought together."""
 
@@ -157,9 +159,17 @@ def turned(
 
 
 def placed(e: Estimate, values: Mapping[str, float], inverse: InverseDynamics) -> Estimate:
-    """The estimate with its value chosen; an interval that tells nothing is widened to hold it."""
+    """The estimate with its value chosen; its interval holds it, and reaches as far beyond one that was moved."""
     value = values[e.name]
     if e.name in ("gravity", "gravity_angle") and "gravity_sin" in values:
         pair = hanging(values["gravity_sin"], values["gravity_cos"], inverse.position)
         value = e.value if e.identified else pair[e.name == "gravity_angle"]
-    return replace(e, value=value, lower=min(e.lower, value), upper=max(e.upper, value))
+    if not e.identified or value == e.value:
+        return replace(e, value=value, lower=min(e.lower, value), upper=max(e.upper, value))
+    half = 0.5 * (e.upper - e.lower)
+    lower, upper = min(e.lower, value - half), max(e.upper, value + half)
+    if e.name != "offset":
+        lower = max(lower, 0.0)
+    told = half <= SHARE * values["fc"] if e.name == "offset" else lower > 0.0 and upper <= RATIO * lower
+    verdict = "" if told else MOVED
+    return replace(e, value=value, lower=lower, upper=upper, identified=told, verdict=verdict)
