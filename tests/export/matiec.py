@@ -13,7 +13,8 @@ PROGRAM = """#include <string.h>
 TIME __CURRENT_TIME;
 BOOL __DEBUG;
 #include "POUS.c"
-void run(long n, const double *velocity, const double *time, const double *position, double *out)
+void run(long n, const double *velocity, const double *time, const double *position,
+         const double *load, const double *temperature, double *out)
 {{
     {block} b;
     memset(&b, 0, sizeof b); /* no variable is forced */
@@ -22,6 +23,8 @@ void run(long n, const double *velocity, const double *time, const double *posit
         __SET_VAR(b., VELOCITY,, velocity[i]);
         __SET_VAR(b., SAMPLE_TIME,, time[i]);
         __SET_VAR(b., POSITION,, position[i]);
+        __SET_VAR(b., LOAD,, load[i]);
+        __SET_VAR(b., TEMPERATURE,, temperature[i]);
         {block}_body__(&b);
         out[i] = __GET_VAR(b.TORQUE,);
     }}
@@ -51,14 +54,14 @@ def translated(source, folder):
     return "" if done.returncode == 0 else done.stderr + f"exit {done.returncode}"
 
 
-def torques(block, folder, velocity, time, position):
-    """The torque of a translated function block, cycle by cycle."""
+def torques(block, folder, *inputs):
+    """The torque of a translated function block, cycle by cycle, of velocity, time, position, load and temperature."""
     (folder / "run.c").write_text(PROGRAM.format(block=block.upper()))
     include = ["-I", str(library() / "C"), "-I", str(folder)]
     flags = ["-w", "-O1", "-ffp-contract=off", "-shared", "-fPIC"]
     subprocess.run(["gcc", *flags, *include, "run.c", "-lm", "-o", "run.so"], cwd=folder, check=True)
-    out, array = np.empty(len(velocity)), ctypes.POINTER(ctypes.c_double)
-    given = [np.ascontiguousarray(a, dtype=float) for a in (velocity, time, position)]
+    out, array = np.empty(len(inputs[0])), ctypes.POINTER(ctypes.c_double)
+    given = [np.ascontiguousarray(a, dtype=float) for a in inputs]
     ctypes.CDLL(str(folder / "run.so")).run(
         ctypes.c_long(out.size), *(a.ctypes.data_as(array) for a in (*given, out))
     )

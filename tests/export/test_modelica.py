@@ -10,9 +10,10 @@ from modelica_text import Package
 from laws import farthest, label, registered
 from stickslip import plugins
 from stickslip.export import modelica
-from stickslip.export.golden import golden
+from stickslip.export.golden import PACE, golden_around
 from stickslip.export.job import Job
 from stickslip.model import Model
+from stickslip.spec import Surroundings
 
 HARD = plugins.law(str(Path(__file__).with_name("hard_names.py")))
 LAWS = [HARD, *registered(), *(farthest(law) for law in registered() if law.choices)]
@@ -34,11 +35,13 @@ def test_the_functions_give_the_torque_of_the_law(law):
     assert v["p"] == {
         k: list(x) if isinstance(x, tuple) else x for k, x in model.parameters._asdict().items()
     }
-    vectors = golden(model, count=30, seed=3)
+    vectors = golden_around(model, PACE, count=30, seed=3)
+    word = dict(zip(Surroundings._fields, v["u"]))
     errors = []
-    for v0, v1, dt, x, torque in zip(*vectors):
+    for v0, v1, dt, x, torque, *around in zip(*vectors):
         v |= {"v0": float(v0), "v1": float(v1), "dt": float(dt), "dt_": float(dt)}
-        v["u"]["position"] = float(x)
+        for name, value in zip(("position", "load", "temperature", "time"), (x, *around)):
+            v["u"][word[name]] = float(value)
         got, *after = package.call("step", [v[n] for n in names])
         if after:
             v["z_in"] = v["z"] = after[0]

@@ -13,7 +13,7 @@ from structured_text import Program
 from laws import farthest, label, registered
 from stickslip import plugins
 from stickslip.export import st
-from stickslip.export.golden import golden
+from stickslip.export.golden import PACE, golden_around
 from stickslip.export.job import Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
@@ -30,12 +30,14 @@ def test_the_statements_give_the_torque_of_the_law(law):
     model = Model(law, **dict(law.example))
     program = Program(st.write(Job(model, "friction")).files["friction.st"])
     v = {"p": {}, **program.instance("friction")}
-    vectors = golden(model, count=150, seed=3)
+    vectors = golden_around(model, PACE, count=150, seed=3)
     third = list(program.instance("friction_step"))[2]  # dt, a word of the norm
+    word = dict(zip(Surroundings._fields, v["u"]))
     errors = []
-    for v0, v1, dt, x, torque in zip(*vectors):
+    for v0, v1, dt, x, torque, *around in zip(*vectors):
         inner = {**program.instance("friction_step"), "friction_step": 0.0, third: float(dt)}
-        v["u"]["position"] = float(x)
+        for name, value in zip(("position", "load", "temperature", "time"), (x, *around)):
+            v["u"][word[name]] = float(value)
         inner |= {"v0": float(v0), "v1": float(v1), "z": v["z"], "p": v["p"], "u": v["u"]}
         program.run("friction_step", inner)
         errors.append(abs(inner["friction_step"] - torque))
@@ -48,14 +50,18 @@ def test_a_real_compiler_takes_it_and_gives_the_torque_of_the_law(law, tmp_path)
     model = Model(law, **dict(law.example))
     (tmp_path / "friction.st").write_text(st.write(Job(model, "friction")).files["friction.st"])
     assert matiec.translated(tmp_path / "friction.st", tmp_path) == ""
-    v0, _, dt, x, _ = golden(model, count=2000, seed=3)
+    vectors = golden_around(model, count=2000, seed=3)
+    v0, dt, x = vectors.v0, vectors.dt, vectors.position
+    still = (np.full(v0.size, value) for value in (1.0, 20.0))
+    load, temperature = vectors[5:7] or tuple(still)
     z, u = law.state(model.parameters), SimpleNamespace(**Surroundings()._asdict())
     expected = []
-    for k, (speed, time, u.position) in enumerate(zip(v0.tolist(), dt.tolist(), x.tolist())):
+    rows = zip(*(column.tolist() for column in (v0, dt, x, load, temperature)))
+    for k, (speed, time, u.position, u.load, u.temperature) in enumerate(rows):
         last = v0[k - 1].item() if k else speed
         u.time += time if k else 0.0
         expected.append(law.step(last, speed, time if k else 0.0, z, model.parameters, u))
-    found = matiec.torques("friction", tmp_path, v0, dt, x)
+    found = matiec.torques("friction", tmp_path, v0, dt, x, load, temperature)
     assert np.abs(found - expected).max() <= BOUND * np.abs(expected).max()
 
 

@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+import shutil
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,12 +17,14 @@ from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.control.sampled import Memory, functions_by, settings
-from stickslip.export import TARGETS, arduino, c99, python, st, target_named
+from stickslip.export import TARGETS, arduino, c99, matlab, modelica, python, st, target_named
+from stickslip.export.golden import answered
 from stickslip.export.job import Export, Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
 T = 1e-3
+TOOLS = {c99: bool(COMPILERS), python: True, matlab: bool(shutil.which("octave-cli"))}
 DRIFT = Model("coulomb", {"time_dependence": "settling"}, fc=1.0, drift=-0.5, drift_time=0.2)
 
 
@@ -159,15 +162,50 @@ def test_an_exported_controller_starts_where_the_run_is(target, tmp_path, monkey
 
 
 @pytest.mark.parametrize("name", ["load", "temperature", "time"])
-@pytest.mark.parametrize(("target", "single"), [(c99, False), (c99, True), (python, False)])
+@pytest.mark.parametrize(("target", "single"), [(c99, False), (c99, True), (python, False), (matlab, False)])
 def test_the_check_sees_a_modulation_that_stands_still(target, single, name):
     job, suffix = Job(modulated(), "x", single=single), "f" if single else ""
     export, read = target.write(job), rf"(?<!self\.)\bu(->|\.){name}\b(?! =)"
     still = rf"(0.0{suffix} * \g<0> + {getattr(Surroundings(), name)}{suffix})"
-    assert target.check(job, export).passed is (True if COMPILERS or target is python else None)
-    files = {n: re.sub(read, still, str(t)) if n in ("x.c", "x.py") else t for n, t in export.files.items()}
+    here = TOOLS[target]
+    assert target.check(job, export).passed is (True if here else None)
+    code = ("x.c", "x.py", "x_step.m")
+    files = {n: re.sub(read, still, str(t)) if n in code else t for n, t in export.files.items()}
     assert files != export.files
-    if COMPILERS or target is python:
+    if here:
         found = target.check(job, Export(files))
         assert found.passed is False
         assert "off the definition" in found.text
+
+
+@pytest.mark.parametrize("name", ["position", "load", "temperature", "time"])
+@pytest.mark.parametrize("target", [c99, python, st, modelica, matlab])
+def test_golden_steps_tell_an_export_that_lost_a_modulation(target, name):
+    """The torque that the law has with it at rest is another one, by more than a hundredth of the largest."""
+    model = modulated()
+    rows = np.loadtxt(target.write(Job(model, "x")).files["golden.csv"].splitlines()[1:], delimiter=",")
+    v0, v1, dt, position, torque, *around = rows.T
+    columns = dict(zip(("position", "load", "temperature", "time"), (position, *around)))
+    assert np.array_equal(answered(model, v0, v1, dt, position, around=tuple(around)), torque)
+    columns[name] = np.full(torque.size, getattr(Surroundings(), name))
+    position, *around = columns.values()
+    lost = answered(model, v0, v1, dt, position, around=tuple(around))
+    assert np.abs(lost - torque).max() > 1e-2 * np.abs(torque).max()
+
+
+@pytest.mark.parametrize("name", ["load", "temperature", "time"])
+@pytest.mark.skipif(not COMPILERS, reason="needs a C compiler")
+def test_golden_samples_tell_a_controller_that_lost_a_modulation(name):
+    controller = Controller(Gains(0.0), Feedforward(modulated()), sample_time=T)
+    job = Job(modulated(), "x", controller)
+    export = c99.write(job)
+    assert c99.check(job, export).passed
+    head, name_of, body = export.files["x.c"].partition("double x_law_steps(")
+    body, brace, rest = body.partition("\n}\n")
+    still = f"{{\n    x_surroundings here = *u;\n    here.{name} = {getattr(Surroundings(), name)};"
+    body = body.replace("{", still, 1).replace("p, u);", "p, &here);")
+    assert "&here" in body
+    source = "".join([head, name_of, body, brace, rest])
+    found = c99.check(job, Export({**export.files, "x.c": source}))
+    assert found.passed is False
+    assert "off the definition" in found.text

@@ -93,7 +93,7 @@ def form_of(motion: str, unit: float, size: float) -> Form:
 
 
 def scaling_of(unit: float, size: float) -> int:
-    """The scaling factor, 0.1 %, that leaves at least four digits of the largest torque."""
+    """The largest scaling factor, 0.1 %, that leaves four digits of the largest torque; else the least, 1."""
     largest = size / unit
     return next((s for s in (1000, 100, 10) if largest * 1000.0 / s >= 1e4), 1)
 

@@ -35,6 +35,7 @@ from stickslip.export._nearest import read_by
 from stickslip.export._step_error import PARTS, about_steps
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import (
+    PACE,
     Golden,
     Surrounded,
     answered,
@@ -53,9 +54,6 @@ __all__ = ["SINGLE_BOUND", "TARGET", "checked", "dialect_of", "translated", "wri
 SINGLE_BOUND = 1e-2
 """Largest error of single precision, as a share of the largest torque: where a contact breaks away a step sooner or
 later by rounding, it is the fall of the torque in that step."""
-
-PACE = 1e3
-"""Of the time along the golden vectors, so that single precision sees slow changes too."""
 
 STRUCTURES = {
     "z": "state", "dz": "state", "g": "state", "p": "parameters", "u": "surroundings", "n": "settings", "m": "memory",

@@ -11,8 +11,6 @@ from collections.abc import Iterable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
-
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
@@ -30,7 +28,7 @@ from stickslip.export.c99 import (
     scale_of,
     structure,
 )
-from stickslip.export.golden import Samples, as_csv, random_motion
+from stickslip.export.golden import Samples, as_csv, changing, random_motion, sampled_torques
 from stickslip.export.job import IDENTIFIER, Check, Export
 from stickslip.spec import Field, Surroundings, fields_of
 from stickslip.subset import named
@@ -88,15 +86,15 @@ def check(export: Export, name: str) -> Check:
 
 
 def golden_samples(controller: SampledController, count: int = 400, seed: int = 1) -> Samples:
-    """Random samples and the torque of plain Python, from the first sample on."""
+    """Random samples and the torque of plain Python, from the first sample on, while load and temperature change."""
     stiffness = controller.values().get("loop_kp", 0.0)
     reach = controller.torque_limit / stiffness if stiffness else 1.0
     inputs = random_motion(controller.sample_time, reach, count, seed)
     n, m = controller.settings._replace(clock=1.0), controller.memory()
     z, p, u = controller.state(), controller.parameters, SimpleNamespace(**Surroundings()._asdict())
-    sample = controller.functions["sample"]
-    torque = [sample(*map(float, row), n, m, z, p, u) for row in zip(*inputs)]
-    return Samples(*inputs, np.array(torque, dtype=np.float64))
+    sample, change = controller.functions["sample"], changing(Surroundings(), count, seed)
+    torque = sampled_torques(lambda *row: sample(*row, n, m, z, p, u), u, inputs, change)
+    return Samples(*inputs, torque, *change)
 
 
 # ---- what the templates are filled with ----------------------------------------------------------------------------

@@ -22,18 +22,24 @@ __all__ = [
     "Surrounded",
     "answered",
     "as_csv",
+    "changing",
     "golden",
     "golden_around",
     "golden_samples",
     "random_motion",
     "random_steps",
     "room_beside_jumps",
+    "sampled_torques",
 ]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TRIED, ROUNDED, NEAR = 24, 1e-6, 0.1
 """Motions that are tried beside a jump, what they differ by, and the share of the bound from which a torque counts."""
 STILL = Surroundings()
+PACE = 1e3
+"""Of the time along the golden vectors, so that single precision sees slow changes too."""
+TURNS = 6.0 * math.pi
+"""rad: over which the position goes where friction depends on it."""
 FAR = 1000.0
 """rad: where the samples' motion is, so that a loss of precision with the angle shows."""
 
@@ -79,9 +85,19 @@ def random_steps(count: int, seed: int, scale: float = 1.0) -> tuple[Array, Arra
 
 
 def golden(model: Model, count: int = 400, seed: int = 1) -> Golden:
-    """Random steps and the torque of plain Python, from rest."""
-    steps = random_steps(count, seed)
+    """Random steps and the torque of plain Python, from rest, at the load, temperature and time of rest."""
+    steps = _placed(model, random_steps(count, seed), seed)
     return Golden(*steps, answered(model, *steps))
+
+
+def _placed(
+    model: Model, steps: tuple[Array, Array, Array, Array], seed: int
+) -> tuple[Array, Array, Array, Array]:
+    """The steps all over three turns, where friction depends on the position."""
+    if "position" not in surroundings_of(model):
+        return steps
+    place = np.random.default_rng(seed + 2).uniform(-0.5 * TURNS, 0.5 * TURNS, steps[0].size)
+    return (*steps[:3], place)
 
 
 def golden_around(model: Model, pace: float = 1.0, count: int = 400, seed: int = 1) -> Golden | Surrounded:
@@ -89,14 +105,22 @@ def golden_around(model: Model, pace: float = 1.0, count: int = 400, seed: int =
     read = surroundings_of(model)
     if not read & {"load", "temperature", "time"}:
         return golden(model, count, seed)
-    steps, draw = random_steps(count, seed), np.random.default_rng(seed + 1)
-    load = draw.uniform(0.5, 2.0, count) if "load" in read else np.full(count, STILL.load)
-    temperature = (
-        draw.uniform(15.0, 40.0, count) if "temperature" in read else np.full(count, STILL.temperature)
-    )
+    steps = _placed(model, random_steps(count, seed), seed)
+    load, temperature = changing(STILL, count, seed)
+    load = load if "load" in read else np.full(count, STILL.load)
+    temperature = temperature if "temperature" in read else np.full(count, STILL.temperature)
     time = pace * np.cumsum(steps[2]) if "time" in read else np.full(count, STILL.time)
     torque = answered(model, *steps, around=(load, temperature, time))
     return Surrounded(*steps, torque, load, temperature, time)
+
+
+def changing(around: Surroundings, count: int, seed: int) -> tuple[Array, Array]:
+    """A load from half to twice that around, and a temperature up to 15 degrees beside."""
+    draw = np.random.default_rng(seed + 1)
+    return (
+        around.load * draw.uniform(0.5, 2.0, count),
+        around.temperature + draw.uniform(-15.0, 15.0, count),
+    )
 
 
 def answered(
@@ -145,7 +169,8 @@ def room_beside_jumps(
 class Samples(NamedTuple):
     """Samples of a controller in order; shape (n,) each.
 
-    position, wanted in rad, wanted_velocity in rad/s, wanted_acceleration in rad/s², torque in N·m.
+    position, wanted in rad, wanted_velocity in rad/s, wanted_acceleration in rad/s², torque in N·m, temperature in
+    degrees Celsius.
     """
 
     position: Array
@@ -153,6 +178,8 @@ class Samples(NamedTuple):
     wanted_velocity: Array
     wanted_acceleration: Array
     torque: Array
+    load: Array
+    temperature: Array
 
 
 def random_motion(
@@ -183,7 +210,7 @@ def random_motion(
 def golden_samples(
     controller: Controller, around: Surroundings | None = None, count: int = 400, seed: int = 1
 ) -> Samples:
-    """Random samples and the torque of plain Python, from the first sample on, at this load and temperature."""
+    """Random samples and the torque of plain Python, from the first sample on, about this load and temperature."""
     stiffness = controller.linear.kp
     reach = controller.torque_limit / stiffness if stiffness else 1.0
     inputs = random_motion(controller.sample_time, reach, count, seed)
@@ -193,14 +220,26 @@ def golden_samples(
     law = helper.model.law if helper else None
     z, u = law.state(p) if law else None, SimpleNamespace(**(around or Surroundings())._asdict())
     sample = sampled_by(law)
-    torque = [sample(*map(float, row), n, m, z, p, u) for row in zip(*inputs)]
-    return Samples(*inputs, np.array(torque, dtype=np.float64))
+    change = changing(around or STILL, count, seed)
+    torque = sampled_torques(lambda *row: sample(*row, n, m, z, p, u), u, inputs, change)
+    return Samples(*inputs, torque, *change)
+
+
+def sampled_torques(
+    sample: Callable[..., float], u: Any, inputs: tuple[Array, ...], change: tuple[Array, Array]
+) -> Array:
+    """What a controller answers to its inputs, N·m, while load and temperature change in ``u``."""
+    torque: list[float] = []
+    for *row, u.load, u.temperature in zip(*inputs, *change):
+        torque.append(sample(*map(float, row)))
+    return np.array(torque, dtype=np.float64)
 
 
 HEADS: dict[type, str] = {
     Golden: "v0_rad_s,v1_rad_s,dt_s,position_rad,torque_Nm",
     Surrounded: "v0_rad_s,v1_rad_s,dt_s,position_rad,torque_Nm,load,temperature_degC,time_s",
-    Samples: "position_rad,wanted_rad,wanted_velocity_rad_s,wanted_acceleration_rad_s2,torque_Nm",
+    Samples: "position_rad,wanted_rad,wanted_velocity_rad_s,wanted_acceleration_rad_s2,torque_Nm,"
+    "load,temperature_degC",
 }
 
 

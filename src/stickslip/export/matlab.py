@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from stickslip.export._matlab import HELPERS, functions, local, safe
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, first_line, render
-from stickslip.export.golden import as_csv, golden
+from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
 from stickslip.spec import Surroundings
@@ -48,7 +48,7 @@ def write(job: Job) -> Export:
             **files,
             f"{job.name}_substeps.m": render("matlab_substeps.m.j2", **common),
             f"{job.name}_check.m": render("matlab_check.m.j2", **common),
-            "golden.csv": as_csv(golden(job.model)),
+            "golden.csv": as_csv(golden_around(job.model, PACE)),
             "README.md": render(
                 "matlab_readme.md.j2", **about_steps(job.model, SUBSTEPS.format(x=job.name)), **common
             ),

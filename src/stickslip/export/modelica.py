@@ -22,7 +22,7 @@ from stickslip.export._analysis import merged
 from stickslip.export._modelica import functions, safe
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, render
-from stickslip.export.golden import as_csv, golden
+from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
@@ -70,7 +70,7 @@ def write(job: Job) -> Export:
     }  # fmt: skip
     files = {
         f"{job.name}.mo": render("modelica.mo.j2", **values),
-        "golden.csv": as_csv(golden(job.model)),
+        "golden.csv": as_csv(golden_around(job.model, PACE)),
         "README.md": render("modelica_readme.md.j2", **about_steps(job.model, SUBSTEPS), **values),
     }
     return Export(files, (NOTE,))

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import render
-from stickslip.export.golden import as_csv, golden_around
+from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
@@ -42,7 +42,7 @@ def write(job: Job) -> Export:
         functions=[ast.unparse(tree) for tree in trees.values()],
         steady=law.steady is not None,
     )
-    files = {f"{job.name}.py": text, "golden.csv": as_csv(golden_around(job.model))}
+    files = {f"{job.name}.py": text, "golden.csv": as_csv(golden_around(job.model, PACE))}
     return Export(
         {
             **files,

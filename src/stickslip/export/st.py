@@ -11,7 +11,7 @@ from stickslip.export._st import Names, functions, number
 from stickslip.export._st_names import RESERVED, named_in_st
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, first_line, render
-from stickslip.export.golden import as_csv, golden
+from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Export, Job, counts_in
 from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
@@ -80,7 +80,7 @@ def write(job: Job) -> Export:
     ]
     files = {
         f"{job.name}.st": render("st.st.j2", **values, functions=code),
-        "golden.csv": as_csv(golden(job.model)),
+        "golden.csv": as_csv(golden_around(job.model, PACE)),
         "README.md": render("st_readme.md.j2", **values, **about_steps(job.model, SUBSTEPS)),
     }
     return Export(files, (NOTE,))
