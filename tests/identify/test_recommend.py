@@ -22,6 +22,8 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.motion import sinusoid
 from stickslip.identify.recommend import Drive, Setting, recommend
+from stickslip.identify.setting_axes import plants_of
+from stickslip.identify.setting_bench import rings_alone
 from stickslip.identify.setting_trial import Plant, dangers, run
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
@@ -266,14 +268,14 @@ def test_a_torque_limit_that_moves_the_axis_in_one_direction_only_is_refused(gre
 def test_the_linear_controller_alone_is_judged_first_and_its_ringing_is_no_feedforwards(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With 4,096 counts the PD of 20 Hz chatters about every count: any number of axes then gives the same advice."""
+    """With 4,096 counts the PD of 20 Hz chatters on the best estimate, whose contact is rigid, and on none of the six
+    axes drawn beside, which have springs; any number of axes gives the same advice."""
     monkeypatch.setattr(recommending, "GAINS", (1.0,))
     monkeypatch.setattr(recommending, "LEADS", (0.0,))
     drive = Drive(20.0, amplitude=0.1, encoder_counts=4096.0, torque_limit=3.0)
     few, many = (recommend(identified(0.03), drive, axes=n, confirm=6) for n in (0, 3))
     assert many.rings == few.rings
-    told = r"at rest on [1-7] of 7 axes: a count of the encoder makes it push 0.15 N·m"
-    assert re.search(told, many.rings)
+    assert "at rest on 1 of 7 axes: a count of the encoder makes it push 0.15 N·m" in many.rings
     assert "lower the bandwidth" in many.rings
     for advice in (few, many):
         fed = [c for c in advice.candidates if c.setting.kind == "feedforward"]
@@ -283,6 +285,23 @@ def test_the_linear_controller_alone_is_judged_first_and_its_ringing_is_no_feedf
         low, high = advice.reduction
         assert low <= 1.0 - advice.chosen.errors[0] <= high
     assert max(few.reduction[0], many.reduction[0]) <= min(few.reduction[1], many.reduction[1])
+
+
+@pytest.mark.parametrize(("springs", "ringing"), [(False, 7), (True, 1)])
+def test_every_rigid_contact_rings_about_a_coarse_count_and_none_with_springs(
+    springs: bool, ringing: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not springs:
+        monkeypatch.setattr("stickslip.identify.setting_axes._with_springs", lambda model, *_: model)
+    drive = Drive(20.0, amplitude=0.1, encoder_counts=4096.0, torque_limit=3.0)
+    plants = list(plants_of(identified(0.03), INERTIA, 6, 1))
+    linear = Controller(place("PD", INERTIA, 20.0, drive.damping), None, 3.0, drive.sample_time, 4096.0)
+    bench = recommending.Bench(plants, linear, drive, {})
+    # Compared by identity: two axes may have the same numbers.
+    rung = [plant for plant, _ in bench.ringing()]
+    assert [any(p is r for r in rung) for p in plants] == [p.friction.law.name == "stribeck" for p in plants]
+    said = rings_alone(bench, INERTIA, "N·m")
+    assert said.startswith(f"at rest on {ringing} of 7 axes: a count of the encoder makes it push 0.15 N·m")
 
 
 @pytest.mark.parametrize(
