@@ -35,6 +35,8 @@ INTEGRATORS = ("exact", "adaptive", "fixed")
 
 MOST_STEPS = 1e9
 """Of a fixed length"""
+SHORTEST = 1e-9
+"""s, of a run: one-sided limits are taken a thousandth of it beside kinks and ends."""
 
 REASONS: dict[int, tuple[type[SimulationError], str]] = {
     _case.DIVERGED: (Divergence, "position or velocity left every reasonable bound"),
@@ -188,6 +190,10 @@ def prepare(
     for name, value, unit in (("duration", duration, "s"), ("tolerance", tolerance, "rad")):
         if not (math.isfinite(value) and value > 0.0):
             raise ParameterError(f"simulate: {name} = {value:g} {unit} must be greater than 0")
+    if duration < SHORTEST:
+        raise ParameterError(
+            f"simulate: duration = {duration:g} s is shorter than {SHORTEST:g} s, in which nothing moves; give a longer one"
+        )
     if not all(math.isfinite(x) for x in initial):
         raise ParameterError(f"simulate: initial = {initial} must be two finite numbers")
     if controller.sample_time > 0.0:
