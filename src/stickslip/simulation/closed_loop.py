@@ -192,7 +192,8 @@ def prepare(
             raise ParameterError(f"simulate: {name} = {value:g} {unit} must be greater than 0")
     if duration < SHORTEST:
         raise ParameterError(
-            f"simulate: duration = {duration:g} s is shorter than {SHORTEST:g} s, in which nothing moves; give a longer one"
+            f"simulate: duration = {duration:g} s is shorter than {SHORTEST:g} s, in which nothing moves; give a "
+            "longer one"
         )
     if not all(math.isfinite(x) for x in initial):
         raise ParameterError(f"simulate: initial = {initial} must be two finite numbers")
