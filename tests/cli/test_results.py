@@ -25,7 +25,7 @@ from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
 from stickslip.identify.motion import sinusoid
-from stickslip.report.identification import _panel  # type: ignore[reportPrivateUsage]
+from stickslip.report.identification import panel_of
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.virtual import virtual_rig
 
@@ -123,7 +123,7 @@ def test_a_clear_change_has_its_percentage_and_a_bound_of_its_chance(
 
 def test_each_band_has_the_colour_of_its_curve(tmp_path: Path) -> None:
     found = [read_identified(written(tmp_path / f"{n}.toml", fc=fc)) for n, fc in (("a", 0.28), ("b", 0.32))]
-    curves = _panel(compare_models(*found).picture).curves
+    curves = panel_of(compare_models(*found).picture).curves
     bands, lines = [c for c in curves if c.kind == "band"], [c for c in curves if c.kind == "line"]
     assert [c.style.colour for c in bands] == [c.style.colour for c in lines]
     assert len({c.style.colour for c in lines}) == 2

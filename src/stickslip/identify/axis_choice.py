@@ -233,7 +233,7 @@ def sentence_on(candidates: Sequence[Candidate], chosen: str) -> str:
     ]
     said = (
         f"Law {chosen!r} is the simplest of those that foretell what was held out about as well as any: no other's "
-        f"misfit is below it by a standard error and a quarter (in standard deviations: {', '.join(parts)})."
+        f"held-out misfit is below it by a standard error and a quarter (in standard deviations: {', '.join(parts)})."
     )
     if min(math.sqrt(float(np.mean(c.score))) for c in candidates) > FORETOLD:
         said += (
