@@ -26,8 +26,9 @@ from stickslip.identify.drift import compare_models
 from stickslip.identify.estimate import Identification
 from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
-from stickslip.identify.recommend import notes_on, plants_of
 from stickslip.identify.segments import constant_velocity_segments
+from stickslip.identify.setting_axes import plants_of
+from stickslip.identify.setting_notes import notes_on
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
@@ -219,14 +220,14 @@ def test_what_is_recommended_is_run_as_it_was_measured_and_nothing_beside_it_is_
     )
     options = {"compensator": "recommended", "model": str(file)}
     rig = VirtualRig(replace(OTHER, filter=10.0))
-    using = Track(**options).made(rig)
+    using = Track(**options).controller(rig)
     assert using.compensator.filter_hz is None  # not the machine's own: it was measured without one
     assert using.gains == place("PD", 1e-3, 8.0, 1.0)
     for name in RECOMMENDED:
         with pytest.raises(InputError, match=f"{name} = .* beside compensator = recommended"):
             Track.with_options({**options, name: str(getattr(Track, name))})
     with pytest.raises(InputError, match="bandwidth = 12"):
-        Track(**options, bandwidth=12.0).made(rig)
+        Track(**options, bandwidth=12.0).controller(rig)
     file.write_text(file.read_text() + f"machine = {rig.name!r}\n")
     Track(**options).controller(VirtualRig(OTHER.without("cogging")))
     with pytest.raises(

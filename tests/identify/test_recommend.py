@@ -23,6 +23,7 @@ from stickslip.identify.motion import sinusoid
 from stickslip.identify.recommend import Drive, Setting, recommend
 from stickslip.identify.setting_axes import plants_of
 from stickslip.identify.setting_bench import rings_alone
+from stickslip.identify.setting_refusals import refuse_weak
 from stickslip.identify.setting_trial import Plant, dangers, run
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
@@ -191,7 +192,7 @@ def test_axes_are_drawn_about_the_inertia_that_is_given() -> None:
     found = identified(0.02)
     own = Estimate("inertia", "kg·m²", "J", INERTIA, 0.01 * INERTIA, 0.98 * INERTIA, 1.02 * INERTIA, True)
     more = replace(found, estimates=(*found.estimates, own), correlation=np.eye(len(found.estimates) + 1))
-    drawn = [plant.inertia for plant in recommending.plants_of(more, 3.0 * INERTIA, 20, 0)]
+    drawn = [plant.inertia for plant in plants_of(more, 3.0 * INERTIA, 20, 0)]
     assert drawn == pytest.approx([3.0 * INERTIA] * 21, rel=0.05)
     assert np.ptp(drawn) > 0.01 * INERTIA
 
@@ -266,7 +267,7 @@ def test_a_torque_limit_that_moves_the_axis_in_one_direction_only_is_refused(gre
     found = replace(identified(0.03), model=Model("coulomb", {"symmetry": "asymmetric"}, sigma2=0.02, **each))
     drive = Drive(20.0, amplitude=0.1, torque_limit=0.3)
     with pytest.raises(InputError, match=r"cannot move the axis, whose friction is 0\.4 N·m"):
-        recommending.refuse_weak(found, drive)
+        refuse_weak(found, drive)
 
 
 def test_the_linear_controller_alone_is_judged_first_and_its_ringing_is_no_feedforwards(

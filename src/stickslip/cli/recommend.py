@@ -77,6 +77,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--inertia", type=float, metavar="KGM2", help="where the model has none, or another one"
     )
     parser.add_argument(
+        "--no-inertia-feedforward", dest="feed_inertia", action="store_false",
+        help="leave out the inertia times the reference's acceleration, where the drive gives it itself or knows none",
+    )  # fmt: skip
+    parser.add_argument(
         "--axes",
         type=int,
         default=6,
@@ -120,7 +124,13 @@ def run(args: argparse.Namespace) -> int:
     drive = drive_of(args)
     with _output.progress_bar("simulating") as progress:
         result = recommend(
-            found, drive, inertia=args.inertia, axes=args.axes, confirm=args.confirm, progress=progress
+            found,
+            drive,
+            inertia=args.inertia,
+            axes=args.axes,
+            confirm=args.confirm,
+            progress=progress,
+            feed_inertia=args.feed_inertia,
         )
     written = args.out and store(args.out, found, result)
     if written:
@@ -254,9 +264,9 @@ def show(result: Recommendation, unit: Callable[[str], str]) -> None:
         print(f"parameters:        {parameters(result.model, unit)}")
         print(f"lead:              {c.setting.lead:.4g} s")
         print(f"deadband:          {c.setting.deadband:.4g} {unit('rad/s')}")
-        print(
-            f"inertia:           {c.setting.inertia_feedforward:.4g} {unit('kg·m²')} times the acceleration"
-        )
+        inertia = c.setting.inertia_feedforward
+        said = f"{inertia:.4g} {unit('kg·m²')} times the acceleration" if inertia else "not fed forward"
+        print(f"inertia:           {said}")
         print(f"error reduction:   {reduction(result)}")
         print(f"margin of gain:    {margin(c, result)}")
     for note in result.notes:

@@ -21,17 +21,17 @@ from stickslip.identify.draws import sliding_torque
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.setting_axes import plants_of
 from stickslip.identify.setting_bench import (
+    TRIES,
     Account,
     Bench,
     Candidate,
     Setting,
-    breakaway,
     on_both,
-    resistance,
     rings_alone,
 )
+from stickslip.identify.setting_notes import ALLOWANCE, BETTER, axes_left_out, lag_of, notes_on, weak_on
+from stickslip.identify.setting_refusals import held, refuse_endless, refuse_unknown, refuse_weak
 from stickslip.identify.setting_trial import Drive
-from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 
 __all__ = ["Candidate", "Drive", "Recommendation", "Setting", "recommend"]
@@ -45,15 +45,8 @@ LEADS = (0.0, 0.5, 1.0, 2.0)
 """In sample times."""
 DEADBAND = 1.5
 """In counts per sample time: a single count, which an axis at rest may give, is then rest."""
-MOST_STEPS = 1e10
-"""Of all simulations together; more would take half a day."""
-STEPS_PER_HOUR = 1e9
-"""Of a law with memory on one core, about."""
 WORTH = 0.95
 """A compensator that leaves more than this part of the error is not worth its risk."""
-ALLOWANCE, BETTER = 1.4, 2.0
-"""Factors on the error left, upwards and downwards, for resonances, backlash, cogging and the like, which a machine has
-or has not: so the promise held in `benchmarks/promise.py`."""
 NEAR = 1.1
 """Errors within this factor of the best are alike; the lower gain is then taken."""
 ALIKE = 1.02
@@ -140,7 +133,7 @@ class Recommendation:
 
 def recommend(
     found: Identified, drive: Drive, *, inertia: float | None = None, axes: int = 6, confirm: int = 39, seed: int = 0,
-    progress: Callable[[int, int], None] = lambda done, of: None,
+    feed_inertia: bool = True, progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Recommendation:  # fmt: skip
     """Choose law, structure, gain, lead and deadband.
 
@@ -156,6 +149,9 @@ def recommend(
         Drawn besides, on which the best candidate is confirmed: its `Recommendation.reduction` is theirs.
     seed : int
         Of the draws.
+    feed_inertia : bool
+        Whether the inertia times the reference's acceleration is part of every setting; not where the drive feeds it
+        forward itself, or knows no acceleration.
     progress : callable
         Called with the axes that are simulated, and all of them that may be.
 
@@ -166,8 +162,8 @@ def recommend(
     Raises
     ------
     InputError
-        If there is no inertia, the drive is too weak for the motion, or the linear controller alone cannot be
-        simulated.
+        If there is no inertia, friction's level is not identified, the drive is too weak for the motion, or the linear
+        controller alone cannot be simulated or is unstable.
     """
     j = inertia if inertia is not None else found.axis.get("inertia")
     unit = found.unit("kg·m²")
@@ -176,23 +172,30 @@ def recommend(
     if not 0.0 < j < math.inf:
         raise InputError(f"inertia = {j:g} {unit} must be greater than 0; give another one with --inertia")
     drive = with_motion(found, drive)
+    refuse_unknown(found)
     refuse_weak(found, drive)
     linear, start = drive.loop(float(j)), float(drive.path.position[0])
     if not found.law_estimates[0]:
         axes = confirm = 0  # Nothing of the friction would be drawn.
     laws = laws_of(found.model)
     offset = float(found.axis.get("offset", 0.0) or 0.0)
-    settings = [replace(setting, offset=offset) for setting in settings_of(laws, drive, float(j))]
+    settings = [
+        replace(setting, offset=offset)
+        for setting in settings_of(laws, drive, float(j) if feed_inertia else 0.0)
+    ]
     # Each with the linear controller alone; then leads, the guard and the gains beyond.
     more = (axes + 1) * (len(LEADS) + 1 + len(BEYOND)) + (confirm + 1) * (3 + len(BEYOND))
     account = Account(progress, len(settings), axes + 1, more)
     refuse_endless(account.total, drive, axes, confirm)
-    bench = Bench(list(plants_of(found, float(j), axes, seed, start)), linear, drive, laws, account.one)
-    others = Bench(
-        list(plants_of(found, float(j), confirm, seed + 1, start)), linear, drive, laws, account.one
-    )
-    if isinstance(first := bench.before(0), str):
-        raise InputError(f"the linear controller alone: {first}")
+
+    def drawn(count: int, seed: int) -> Bench:
+        own = drive.gains is not None  # Only of a loop that somebody runs is it known that it holds the axis.
+        plants = plants_of(found, float(j), (TRIES if own else 1) * count, seed, start, inertia is not None)
+        return (Bench.held(plants, count, linear, drive, laws, account.one) if own
+                else Bench(list(plants), linear, drive, laws, account.one))  # fmt: skip
+
+    bench, others = drawn(axes, seed), drawn(confirm, seed + 1)
+    first = held(found, bench.before(0), drive)
     # By the axes of the confirmation, if there are more of them: what is said is then the same for any `axes`.
     rung = rings_alone(max(others, bench, key=lambda b: len(b.plants)), float(j), found.unit("N·m"))
     candidates: list[Candidate] = []
@@ -209,7 +212,10 @@ def recommend(
         unsafe += [c.setting for c in beyond if c.unsafe]
         margin, unsafe_gain = margin_of(chosen.setting, unsafe, [c.setting for c in beyond if not c.unsafe])
     account.end()
-    notes = notes_on(found, chosen, candidates, weak_on([*bench.plants, *others.plants[1:]], drive))
+    notes = [
+        *axes_left_out(bench, others, found), *lag_of(first, drive),
+        *notes_on(found, chosen, candidates, weak_on([*bench.plants, *others.plants[1:]], drive)),
+    ]  # fmt: skip
     return Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, dict(linear.gains._asdict()),
         first.moving["position_rms_rad"], margin, unsafe_gain, tuple(candidates), len(bench.plants),
@@ -233,42 +239,6 @@ def with_motion(found: Identified, drive: Drive) -> Drive:
             f"setting along, --motion FILE.csv, or the --amplitude of a slow sinusoid in {found.unit('rad')}"
         )
     return replace(drive, motion=found.trajectory)
-
-
-def refuse_weak(found: Identified, drive: Drive) -> None:
-    """Refuse a torque limit at which the axis does not move, or does not follow.
-
-    Raises
-    ------
-    InputError
-    """
-    limit, torque = drive.torque_limit, found.unit("N·m")
-    if limit <= (held := breakaway(found.model)):
-        raise InputError(
-            f"torque limit {limit:g} {torque}: the drive cannot move the axis, whose friction is {held:.3g} {torque}; "
-            "give a --torque-limit above it"
-        )
-    if limit <= (friction := resistance(found.model, drive)):
-        raise InputError(
-            f"torque limit {limit:g} {torque}: the drive cannot follow this motion, along which friction reaches "
-            f"{friction:.3g} {torque}; give a --torque-limit above it, or a slower motion: another --motion, or a "
-            "smaller --amplitude or --frequency"
-        )
-
-
-def refuse_endless(trials: int, drive: Drive, axes: int, confirm: int) -> None:
-    """Refuse what would take more than `MOST_STEPS`, before anything is drawn or simulated.
-
-    Raises
-    ------
-    InputError
-    """
-    if (steps := trials * drive.steps) > MOST_STEPS:
-        raise InputError(
-            f"up to {trials:.3g} simulations ({axes} axes, {confirm} to confirm) of {drive.steps:.2g} steps (sample "
-            f"time {drive.sample_time:g} s, a motion of {drive.path.duration:.3g} s) would take about "
-            f"{steps / STEPS_PER_HOUR:.2g} h; give fewer axes, a longer sample time or a shorter motion"
-        )
 
 
 def laws_of(model: Model) -> dict[str, Model]:
@@ -297,7 +267,7 @@ def line_through(model: Model, scale: float) -> tuple[float, float]:
 
 
 def settings_of(laws: dict[str, Model], drive: Drive, inertia: float) -> Iterator[Setting]:
-    """All settings that are tried, each with the inertia fed forward."""
+    """All settings that are tried, each with this inertia fed forward, kg·m²."""
     for law in laws:
         for gain in GAINS:
             yield Setting(law, "feedforward", gain, inertia_feedforward=inertia)
@@ -377,42 +347,3 @@ def with_lead(candidate: Candidate, bench: Bench) -> Candidate:
     safe = [c for c in tried if not c.unsafe]
     least = min(c.worst for c in safe)
     return next(c for c in safe if c.worst <= ALIKE * least)
-
-
-def weak_on(plants: Sequence[RigidAxis], drive: Drive) -> str:
-    """On how many axes the friction is above the torque limit; empty where on none."""
-    count = sum(resistance(plant.friction, drive) >= drive.torque_limit for plant in plants)
-    return f"{count} of {len(plants)}" if count else ""
-
-
-def notes_on(
-    found: Identified, chosen: Candidate | None, candidates: Sequence[Candidate], weak: str = ""
-) -> Iterator[str]:
-    """What the user must know."""
-    if weak:
-        limit = "the torque limit of the drive lies below their friction"
-        yield f"On {weak} axes {limit}, though not below that of the best estimate: they do not follow."
-    unknown = [e.name for e in found.estimates if not e.identified]
-    if not found.law_estimates[0]:
-        yield "The law has no intervals: only its best estimate was simulated, and nothing is said about its error."
-    elif unknown:
-        yield f"Not identified: {', '.join(unknown)}; the axes drawn cover at most a factor of 9 to each side for them."
-    if chosen is None:
-        reasons = sorted({r for c in candidates for r in c.refused}) or ["none reduces the error by 5 %"]
-        yield f"No compensator is recommended: {', '.join(reasons)}."
-        return
-    stiffer = [c for c in candidates if c.setting.kind == "feedback" and c.setting.gain == 1.0 and c.unsafe]
-    if stiffer:
-        yield f"Feedback at gain 1 is not safe: {', '.join(stiffer[0].unsafe)}."
-    if abs(float(found.axis.get("offset", 0.0))) > 0.0:
-        offset = f"{float(found.axis['offset']):.4g} {found.unit('N·m')}"
-        yield (
-            f"A constant torque of {offset} acts beside friction: it is part of what is recommended, simulated and "
-            "exported."
-        )
-    yield (
-        "Simulated with a rigid axis, a current loop, up to a sample of delay, friction that comes late as behind an "
-        "elastic train, and torques over the position as large as the model's misfit; resonances and backlash are not "
-        f"in it: for them the interval takes the error left as up to {ALLOWANCE:g} times as large and down to "
-        f"{BETTER:g} times as small."
-    )

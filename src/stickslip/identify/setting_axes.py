@@ -2,7 +2,8 @@
 
 Drawn are the identified numbers (friction, inertia, offset) from their intervals, and what no model holds but every
 machine has: a torque over the position of up to the misfit of the model, a current loop, a delay below one sample, and
-friction that comes later than the contact's own springs bring it (an elastic train, backlash).
+friction that comes later than the contact's own springs bring it (an elastic train, backlash), and a reference velocity
+of the instant or of the sample before.
 """
 
 from __future__ import annotations
@@ -37,12 +38,16 @@ LOST = 0.5
 """Chance of a drawn axis that friction comes later than the contact's own springs bring it."""
 LOST_MOTION = (1e-4, 1e-2)
 """rad (a tenth of it in m), displacement over which it then comes."""
+MOST_STATIC = 2.0
+"""Static over Coulomb torque at most, where the record does not tell it: contacts of machines have 1 to 2."""
+GIVEN = 0.1
+"""Part of an inertia to which a user knows it."""
 DAMPING = 0.3
 """Of the bristles, part of critical."""
 
 
 def plants_of(
-    found: Identified, inertia: float, count: int, seed: int, start: float = 0.0
+    found: Identified, inertia: float, count: int, seed: int, start: float = 0.0, given: bool = False
 ) -> Iterator[Plant]:
     """The best estimate, and `count` axes drawn; about another inertia as wide in proportion.
 
@@ -55,6 +60,8 @@ def plants_of(
     seed : int
     start : float
         Position at which the motion begins, rad: where a pendulum hangs.
+    given : bool
+        Whether the inertia is one that the user knows: then to `GIVEN`, where the record does not tell it.
     """
     known = {name: float(found.axis.get(name, 0.0) or 0.0) for name in ("offset", "gravity", "gravity_angle")}
     yield Plant(
@@ -63,14 +70,18 @@ def plants_of(
         offset=known["offset"],
         waves=_hanging(known["gravity"], known["gravity_angle"], start),
     )
-    identified = next((e.value for e in found.estimates if e.name == "inertia"), inertia)
+    told = next((e for e in found.estimates if e.name == "inertia"), None)
+    identified = told.value if told else inertia
+    known_to = GIVEN if given and told and not told.identified else math.inf
     rng = np.random.default_rng(seed)
     misfit = next(
         (v for k, v in found.misfit.items() if k in ("force_rms", "drive_rms") and math.isfinite(v)), 0.0
     )
-    for model, named in draw_models(found.model, found.estimates, found.correlation, count, seed):
+    drawn = draw_models(found.model, found.estimates, found.correlation, count, seed, MOST_STATIC)
+    for model, named in drawn:
         here = {name: named.get(name, value) for name, value in known.items()}
-        own = inertia * named.get("inertia", identified) / identified
+        part = named.get("inertia", identified) / identified
+        own = inertia * min(max(part, 1.0 / (1.0 + known_to)), 1.0 + known_to)
         yield Plant(
             own, _with_springs(model, own, found.motion, rng), offset=here["offset"],
             waves=(
@@ -86,10 +97,11 @@ def _between(rng: np.random.Generator, low: float, high: float) -> float:
     return math.exp(float(rng.uniform(math.log(low), math.log(high))))
 
 
-def _late(rng: np.random.Generator) -> dict[str, float]:
+def _late(rng: np.random.Generator) -> dict[str, Any]:
     """Delay and current loop of a drive; of some, none."""
     prompt, delay, bandwidth = float(rng.uniform()), float(rng.uniform()), _between(rng, *CURRENT_LOOP)
-    return {} if prompt < PROMPT else {"delay": delay, "bandwidth": bandwidth}
+    late = {} if prompt < PROMPT else {"delay": delay, "bandwidth": bandwidth}
+    return {**late, "backward": bool(rng.uniform() < 0.5)}
 
 
 def _hanging(gravity: float, angle: float, start: float) -> tuple[tuple[float, float, float], ...]:

@@ -18,8 +18,13 @@ from stickslip.identify.setting_trial import Drive, Trial, dangers, rings, run
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 
-__all__ = ["Account", "Bench", "Candidate", "Setting", "on_both", "resistance", "rings_alone"]
+__all__ = ["TRIES", "Account", "Bench", "Candidate", "Setting", "on_both", "resistance", "rings_alone"]
 
+FOLLOWS, LIVELY = 3.0, 5.0
+"""An axis that the drive's own loop does not hold is not the user's: times the best estimate's error, and swings per
+second beyond the best estimate's, from which on it does not."""
+TRIES = 4
+"""Times as many axes are drawn at most, for so many that are held."""
 LOOKED_AT = 16
 """Axes on which the linear controller alone is judged: the best estimate and some drawn ones."""
 KINDS = {"feedforward": Feedforward, "feedback": Feedback}
@@ -128,7 +133,7 @@ class Account:
 class Bench:
     """Axes, each with what the linear controller alone does on it, and the laws that may be switched on.
 
-    `ran` is called after every axis that was simulated.
+    `ran` is called after every axis that was simulated. `left_out` counts axes that were drawn and not held.
     """
 
     def __init__(
@@ -137,6 +142,28 @@ class Bench:
     ) -> None:  # fmt: skip
         self.plants, self.linear, self.drive, self.laws, self.ran = plants, linear, drive, laws, ran
         self.alone: list[Trial | str] = []
+        self.left_out = 0
+
+    @staticmethod
+    def held(
+        drawn: Iterator[RigidAxis], count: int, linear: Controller, drive: Drive, laws: dict[str, Model],
+        ran: Callable[[], None] = lambda: None,
+    ) -> Bench:  # fmt: skip
+        """The best estimate, which is drawn first, and the first `count` others that the linear controller holds."""
+        bench = Bench([next(drawn)], linear, drive, laws, ran)
+        best, kept, alone = bench.before(0), list(bench.plants), list(bench.alone)
+        for plant in drawn:
+            if len(kept) > count:
+                break
+            trial = run(plant, linear, drive)
+            ran()
+            if lost(trial, best, drive):
+                bench.left_out += 1
+                continue
+            kept.append(plant)
+            alone.append(trial)
+        bench.plants, bench.alone = kept, alone
+        return bench
 
     def before(self, i: int) -> Trial | str:
         """The linear controller alone on axis i."""
@@ -165,6 +192,16 @@ class Bench:
             if unsafe := tuple(dangers(before, after, self.drive, setting.kind == "feedforward")):
                 return Candidate(setting, tuple(errors), unsafe)
         return Candidate(setting, tuple(errors), ())
+
+
+def lost(trial: Trial | str, best: Trial | str, drive: Drive) -> bool:
+    """Whether a linear controller does not hold an axis, where it holds the best estimate."""
+    if isinstance(trial, str) or isinstance(best, str):
+        return isinstance(trial, str) and not isinstance(best, str)
+    swing = best.swing(drive)
+    (beyond, _), (usual, _) = trial.restless(swing), best.restless(swing)
+    error, least = (x.moving["position_rms_rad"] for x in (trial, best))
+    return error > FOLLOWS * least or beyond > max(usual, 0.0) + LIVELY
 
 
 def on_both(setting: Setting, bench: Bench, others: Bench) -> Candidate:

@@ -72,12 +72,16 @@ class Plant(RigidAxis):
         Part of a sample by which the torque acts late, from 0 to 1.
     bandwidth : float
         Of the current loop, Hz; infinite follows at once.
+    backward : bool
+        Whether the drive's reference velocity is the mean over the sample before, half a sample late, as the velocity
+        that it measures; else that of the instant.
     """
 
     offset: float = 0.0
     waves: tuple[tuple[float, float, float], ...] = ()
     delay: float = 0.0
     bandwidth: float = math.inf
+    backward: bool = False
 
 
 @dataclass(frozen=True)
@@ -184,6 +188,13 @@ class Drive:
         return self.path.sampled(self.sample_time)
 
     @cached_property
+    def wanted_backward(self) -> Array:
+        """The same, its velocity the mean over the sample before."""
+        out = self.wanted.copy()
+        out[:, 1] = np.diff(out[:, 0], prepend=out[0, 0]) / self.sample_time
+        return out
+
+    @cached_property
     def stops(self) -> float:
         """How often the motion stops or turns, 1/s."""
         side = np.sign(np.diff(self.wanted[:, 0]))
@@ -234,7 +245,7 @@ class Trial:
 
 def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
     """The motion and the rest behind it; the reason where it cannot be run to its end."""
-    wanted = drive.wanted
+    wanted = drive.wanted_backward if isinstance(plant, Plant) and plant.backward else drive.wanted
     position = simulated(plant, controller, wanted)
     if position is None:
         return "position or velocity left every reasonable bound"
