@@ -7,7 +7,7 @@ robot arm in two records, a brushless motor, a pendulum on a quasi-direct drive.
 default and by plain inverse dynamics (`--inverse`); of all pairs of parts of one machine it prints
 
 - how often two numbers that are both called identified agree within the root of the summed squared half-widths,
-- how much of what plain regression repeats is called identified,
+- how much of what plain regression tells by its own interval, and repeats, is called identified,
 - in how many sets every part has the same law,
 - the force error over that of plain regression, on the part itself and on the others of its set.
 
@@ -181,7 +181,10 @@ def identified(task: tuple[str, ServoAxis, list[Trial], int, bool]) -> Part:
             for on in ([trial], *([o] for o in others)):
                 if plain is not None:
                     part.errors.append(
-                        (force_error_on(on, axis, result.model, values), plain_error_on(on, axis, plain))
+                        (
+                            force_error_on(on, axis, result.model, values, plain.cutoff),
+                            plain_error_on(on, axis, plain),
+                        )
                     )
     except StickslipError as error:
         part.failure += f"own: {error}"
@@ -232,8 +235,9 @@ def told(sets: dict[str, list[Part]]) -> None:
             stable.append(len({p.law for p in parts}) == 1)
         for a, b in itertools.combinations(parts, 2):
             for n in NAMES:
-                repeats = n in a.plain and n in b.plain and not apart(a.plain[n], b.plain[n])
-                if all(n in x.plain and plainly(n, x) for x in (a, b)):
+                both_plain = all(n in x.plain and plainly(n, x) for x in (a, b))
+                repeats = both_plain and not apart(a.plain[n], b.plain[n])
+                if both_plain:
                     plain_agree[n].append(repeats)
                 if n not in a.own or n not in b.own:
                     if repeats:

@@ -130,6 +130,20 @@ def test_a_static_torque_that_no_record_told_is_at_most_twice_coulombs() -> None
     assert min(p.friction.parameters.fs / p.friction.parameters.fc for p in high) > 3.0
 
 
+@pytest.mark.usefixtures("few")
+def test_viscous_friction_that_no_record_told_is_fed_forward_at_its_lower_end_and_may_be_none() -> None:
+    """A record of tuning steps gave 36 times the true sigma2, not identified; fed forward, it made the error grow."""
+    untold = Estimate("sigma2", "N·m·s/rad", "sigma2", 0.018, 0.006, 0.004, 0.032, identified=False)
+    found = identified(untold)
+    drawn = [p.friction.parameters.sigma2 for p in plants_of(found, INERTIA, 60, 0)][1:]
+    assert min(drawn) < 0.001
+    assert 0.03 < max(drawn) <= 0.032
+    advice = recommend(found, Drive(20.0, amplitude=0.1, torque_limit=3.0), axes=1, confirm=1)
+    assert advice.model
+    assert advice.model.parameters.sigma2 == 0.004
+    assert any("fed forward at the lower end" in n for n in advice.notes)
+
+
 def test_an_inertia_that_the_user_knows_is_not_drawn_from_an_interval_that_tells_nothing() -> None:
     found = identified(estimate("inertia", "kg·m²", INERTIA, 2.0, identified=False))
     drawn = [p.inertia / INERTIA for p in plants_of(found, INERTIA, 40, 0, given=True)]

@@ -10,7 +10,7 @@ without the drive's signal are fitted by the output error (`stickslip.identify.a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
 
@@ -61,6 +61,10 @@ HELD = 0.1
 """Rows by which a torque may act beside its row for reversals to tell stiffness."""
 FALLS, SHOWN = 0.95, 4.0
 """Probability, and standard deviations of Fs - Fc, from which on friction is taken to fall with velocity."""
+SIMPLEST = (
+    "Law '{simplest}' is given instead of '{law}': of what '{law}' has beside it the record tells nothing, and no "
+    "fall of friction with velocity shows."
+)
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
 
@@ -147,7 +151,8 @@ def identify_axis(
     unchecked = sliding is None and all(t.drive is not None for t in trials)
     if per_direction or not plain_axis(extras, free, values):
         sliding = None
-    if laws is AUTOMATIC or tuple(laws) == AUTOMATIC:
+    automatic = tuple(laws) == AUTOMATIC
+    if automatic:
         tried = shortlist(tried, sliding)
     candidates: list[Candidate] = []
     chosen = tried[0]
@@ -163,14 +168,23 @@ def identify_axis(
     progress(f"{chosen.name}: all of the data")
     lacking = ""
     if intervals == "prediction":
-        try:
-            if sliding is not None and inverse is not None and told_whole(chosen):
-                found = by_sliding(trials, axis, chosen, inverse, sliding, own, validation, candidates, notes)
+
+        def fitted_by(law: Law, own: Mapping[str, Any], said: Sequence[str]) -> Identification:
+            if sliding is not None and inverse is not None and told_whole(law):
+                found = by_sliding(trials, axis, law, inverse, sliding, own, validation, candidates, said)
                 if all(e.identified for e in found.estimates) or not sliding.held_for(HELD):
                     return found
             return predicted(
-                trials, axis, chosen, inverse, sliding, own, validation, candidates, notes, unchecked
+                trials, axis, law, inverse, sliding, own, validation, candidates, said, unchecked
             )
+
+        try:
+            found = fitted_by(chosen, own, notes)
+            if automatic and not per_direction and nothing_more(found, {*free, *frozen, *(values or {})}):
+                simplest = plugins.law(AUTOMATIC[0])
+                said = [*notes, SIMPLEST.format(law=chosen.name, simplest=simplest.name)]
+                found = fitted_by(simplest, options_of(simplest, options, [simplest]), said)
+            return found
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."
     result = output_error(trials, axis, chosen, inverse, profiles=profiles, **own)
@@ -188,6 +202,18 @@ def shortlist(laws: Sequence[Law], sliding: Regression | None) -> list[Law]:
     if sliding is None or sliding.falls < FALLS or sliding.fall_shown < SHOWN:
         return list(laws)
     return [law for law in laws if "fs" in {f.name for f in law.fields}] or list(laws)
+
+
+def nothing_more(found: Identification, given: Set[str]) -> bool:
+    """Whether the record tells nothing of what a law has beside Coulomb's, and shows no fall of friction either.
+
+    What the user named (`given`) is never dropped.
+    """
+    estimates = {e.name: e for e in found.estimates}
+    own = {f.name for f in found.model.law.fields} - {*TOLD_BY_SLIDING} if found.model else set[str]()
+    more = {n: e for n, e in estimates.items() if n.partition("[")[0] in own}
+    falls = "fs" in estimates and estimates["fs"].value > estimates["fc"].value
+    return bool(more) and not (own & given or any(e.identified for e in more.values()) or falls)
 
 
 def told_whole(law: Law) -> bool:

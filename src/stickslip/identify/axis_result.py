@@ -61,7 +61,9 @@ def assembled(
     if validation:
         misfit |= {f"held_out_{k}": v for k, v in result.held_out(validation).items()}
         if inverse is not None and inverse.has("fc"):
-            misfit["held_out_force_relative"] = force_error_on(validation, axis, result.model, named)
+            misfit["held_out_force_relative"] = force_error_on(
+                validation, axis, result.model, named, inverse.cutoff
+            )
             misfit["held_out_inverse_dynamics_relative"] = plain_error_on(validation, axis, inverse)
     return Identification(
         "axis",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,21 +65,18 @@ def log_spread(e: Estimate) -> float:
 
 def draw_models(
     model: Model, estimates: Sequence[Estimate], correlation: Array, count: int, seed: int = 0,
-    static: float = math.inf,
+    plausible: Callable[[dict[str, float]], None] = lambda named: None,
 ) -> list[tuple[Model, Mapping[str, float]]]:  # fmt: skip
     """Laws whose parameters are drawn, each with all drawn values by name.
 
-    Draws that the law refuses are left out; an element ``k[1]`` of a list is put in its place. A static torque that is
-    not identified is brought between the Coulomb torque and `static` times it, where that is given.
+    Draws that the law refuses are left out; an element ``k[1]`` of a list is put in its place. `plausible` may change
+    drawn values, before there is a law of them.
     """
-    untold = [e.name for e in estimates if e.name.startswith("fs") and not e.identified]
     names = [e.name for e in estimates]
     out: list[tuple[Model, Mapping[str, float]]] = []
     for row in draw_values(estimates, correlation, count, seed):
         named = dict(zip(names, (float(x) for x in row), strict=True))
-        for name in untold if math.isfinite(static) else ():
-            level = named.get(name.replace("fs", "fc"), math.nan)
-            named[name] = min(max(named[name], level), static * level) if level > 0.0 else named[name]
+        plausible(named)
         try:
             out.append((with_values(model, named), named))
         except ParameterError:

@@ -61,15 +61,21 @@ def model_torque(inverse: InverseDynamics, model: Model, axis_values: Mapping[st
     # Level and slope as the decimation filter leaves them; what a curve has beside is taken at the velocity itself.
     sliding = inverse.matrix[:, inverse.names.index("fc")]
     steady = np.array([model.law.steady(float(x), model.parameters) for x in inverse.velocity])
-    return torque + steady + inverse.coulomb * (sliding - np.sign(inverse.velocity))
+    level = getattr(model.parameters, "fc", inverse.coulomb)
+    return torque + steady + level * (sliding - np.sign(inverse.velocity))
 
 
 def force_error_on(
-    trials: Sequence[Trial], axis: ServoAxis, model: Model, axis_values: Mapping[str, float]
-) -> float:
-    """The same on records; not a number where they hold too little motion."""
+    trials: Sequence[Trial], axis: ServoAxis, model: Model, axis_values: Mapping[str, float],
+    cutoff: float | None = None,
+) -> float:  # fmt: skip
+    """The same on records; not a number where they hold too little motion.
+
+    `cutoff`, Hz, is that of another inverse dynamics with whose error this one is compared: errors in another band are
+    other errors.
+    """
     try:
-        return force_error(inverse_dynamics(trials, axis), model, axis_values)
+        return force_error(inverse_dynamics(trials, axis, cutoff=cutoff), model, axis_values)
     except InputError:
         return math.nan
 

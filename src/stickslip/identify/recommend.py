@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.draws import sliding_torque
+from stickslip.identify.draws import sliding_torque, with_values
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.setting_axes import plants_of
 from stickslip.identify.setting_bench import (
@@ -177,7 +177,7 @@ def recommend(
     linear, start = drive.loop(float(j)), float(drive.path.position[0])
     if not found.law_estimates[0]:
         axes = confirm = 0  # Nothing of the friction would be drawn.
-    laws = laws_of(found.model)
+    laws = laws_of(cautious(found))
     offset = float(found.axis.get("offset", 0.0) or 0.0)
     settings = [
         replace(setting, offset=offset)
@@ -239,6 +239,17 @@ def with_motion(found: Identified, drive: Drive) -> Drive:
             f"setting along, --motion FILE.csv, or the --amplitude of a slow sinusoid in {found.unit('rad')}"
         )
     return replace(drive, motion=found.trajectory)
+
+
+def cautious(found: Identified) -> Model:
+    """The law as it is fed forward: viscous friction that no record told at the lower end of its interval.
+
+    Too much of it pushes at every speed; too little leaves what the loop had to do anyway.
+    """
+    least = {
+        e.name: max(e.lower, 0.0) for e in found.estimates if e.name.startswith("sigma2") and not e.identified
+    }
+    return with_values(found.model, least)
 
 
 def laws_of(model: Model) -> dict[str, Model]:

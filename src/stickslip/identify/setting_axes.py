@@ -9,13 +9,14 @@ of the instant or of the sample before.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from stickslip.errors import ParameterError
 from stickslip.identify.draws import draw_models, sliding_torque
+from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.setting_trial import Plant
 from stickslip.model import Model
@@ -40,6 +41,8 @@ LOST_MOTION = (1e-4, 1e-2)
 """rad (a tenth of it in m), displacement over which it then comes."""
 MOST_STATIC = 2.0
 """Static over Coulomb torque at most, where the record does not tell it: contacts of machines have 1 to 2."""
+MOST_VISCOUS = 9.0
+"""Times the viscous friction found, where the record does not tell it."""
 GIVEN = 0.1
 """Part of an inertia to which a user knows it."""
 DAMPING = 0.3
@@ -77,7 +80,9 @@ def plants_of(
     misfit = next(
         (v for k, v in found.misfit.items() if k in ("force_rms", "drive_rms") and math.isfinite(v)), 0.0
     )
-    drawn = draw_models(found.model, found.estimates, found.correlation, count, seed, MOST_STATIC)
+    drawn = draw_models(
+        found.model, found.estimates, found.correlation, count, seed, plausible(found.estimates, seed)
+    )
     for model, named in drawn:
         here = {name: named.get(name, value) for name, value in known.items()}
         part = named.get("inertia", identified) / identified
@@ -90,6 +95,26 @@ def plants_of(
             ),
             **_late(rng),
         )  # fmt: skip
+
+
+def plausible(estimates: Sequence[Estimate], seed: int) -> Callable[[dict[str, float]], None]:
+    """Brings what no record told to what machines have.
+
+    Static torque lies between Coulomb's and `MOST_STATIC` times it; viscous friction anywhere from none to the upper
+    end of its interval: what one record puts on it may be another's Coulomb torque.
+    """
+    untold = {e.name: e for e in estimates if not e.identified}
+    rng = np.random.default_rng([seed, 1])
+
+    def change(named: dict[str, float]) -> None:
+        for name, e in untold.items():
+            level = named.get(name.replace("fs", "fc"), 0.0)
+            if name.startswith("fs") and level > 0.0:
+                named[name] = min(max(named[name], level), MOST_STATIC * level)
+            elif name.startswith("sigma2"):
+                named[name] = float(rng.uniform()) * min(e.upper, MOST_VISCOUS * e.value)
+
+    return change
 
 
 def _between(rng: np.random.Generator, low: float, high: float) -> float:

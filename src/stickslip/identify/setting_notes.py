@@ -62,6 +62,8 @@ def notes_on(
         yield "The law has no intervals: only its best estimate was simulated, and nothing is said about its error."
     elif unknown:
         static = ", fs up to twice fc" if any(n.startswith("fs") for n in unknown) else ""
+        if any(n.startswith("sigma2") for n in unknown):
+            static += ", sigma2 down to none, and it is fed forward at the lower end of its interval"
         yield (
             f"Not identified: {', '.join(unknown)}; the axes drawn cover at most a factor of 9 to each side for them"
             f"{static}."
