@@ -6,6 +6,8 @@ The public names below are loaded when first used, so that importing the package
 from __future__ import annotations
 
 import importlib
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -25,6 +27,11 @@ if TYPE_CHECKING:
     from stickslip.simulation.closed_loop import simulate
     from stickslip.simulation.open_loop import respond
     from stickslip.spec import Law, Mode, Par
+    from stickslip.verbs.compare import compare
+    from stickslip.verbs.doctor import doctor
+    from stickslip.verbs.identification import IdentificationResult
+    from stickslip.verbs.identify import identify
+    from stickslip.verbs.reading import read
 
 __version__ = "0.1.0"
 
@@ -36,6 +43,7 @@ _HOME = {
     "Feedback": "control.compensators.feedback",
     "Feedforward": "control.compensators.feedforward",
     "Gains": "control.linear",
+    "IdentificationResult": "verbs.identification",
     "InputError": "errors",
     "Law": "spec",
     "Mode": "spec",
@@ -48,14 +56,17 @@ _HOME = {
     "SimulationError": "errors",
     "StickslipError": "errors",
     "allow_code": "approval",
+    "compare": "verbs.compare",
     "control_law": "plugins",
     "control_law_names": "plugins",
+    "doctor": "verbs.doctor",
     "law": "plugins",
     "law_names": "plugins",
     "pd": "control.linear",
     "pid": "control.linear",
     "place": "control.linear",
     "pr": "control.linear",
+    "read": "verbs.reading",
     "respond": "simulation.open_loop",
     "simulate": "simulation.closed_loop",
 }
@@ -68,6 +79,7 @@ __all__ = [
     "Feedback",
     "Feedforward",
     "Gains",
+    "IdentificationResult",
     "InputError",
     "Law",
     "Mode",
@@ -80,20 +92,60 @@ __all__ = [
     "SimulationError",
     "StickslipError",
     "allow_code",
+    "compare",
     "control_law",
     "control_law_names",
+    "doctor",
+    "identify",
     "law",
     "law_names",
     "pd",
     "pid",
     "place",
     "pr",
+    "read",
     "respond",
     "simulate",
 ]
 
 
+_ROOMS = {"identify": "verbs.identify"}
+"""Functions with the name of a package that holds more (docs/decisions/0023)."""
+
+
+class _Room(ModuleType):
+    """A package that, called, is the function of its name."""
+
+    @property
+    def _function(self) -> Any:
+        name = self.__name__.rpartition(".")[2]
+        return getattr(importlib.import_module(f"stickslip.{_ROOMS[name]}"), name)
+
+    def __call__(self, *args: Any, **options: Any) -> Any:
+        return self._function(*args, **options)
+
+    @property
+    def __signature__(self) -> Any:
+        import inspect
+
+        return inspect.signature(self._function)
+
+
+class _Package(ModuleType):
+    """This module: a room becomes callable when the import system puts it here, whoever imports it first."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in _ROOMS and type(value) is ModuleType:
+            value.__class__ = _Room
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
+
+
 def __getattr__(name: str) -> Any:
+    if name in _ROOMS:
+        return importlib.import_module(f"stickslip.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'stickslip' has no attribute {name!r}")
     value = getattr(importlib.import_module(f"stickslip.{_HOME[name]}"), name)

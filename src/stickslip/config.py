@@ -9,7 +9,7 @@ import difflib
 import math
 import re
 import tomllib
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Any, Self, cast
 
 from stickslip.errors import ConfigError, InputError, suggestion
 
-__all__ = ["Document", "Table", "read_toml", "refuse_endless"]
+__all__ = ["Document", "Table", "named_numbers", "read_toml", "refuse_endless"]
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 RUN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,63}")
@@ -279,3 +279,23 @@ def _show(value: Any) -> str:
     """A value as a message shows it: in one line, not too long."""
     text = str(value).lower() if isinstance(value, bool) else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def named_numbers(pairs: Sequence[str]) -> dict[str, float]:
+    """Read NAME=VALUE.
+
+    Raises
+    ------
+    InputError
+        If one has no "=" or no number.
+    """
+    out: dict[str, float] = {}
+    for pair in pairs:
+        name, equals, number = pair.partition("=")
+        try:
+            out[name.strip()] = float(number)
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise InputError(f"{pair!r} must be NAME=VALUE with a number in SI units")
+    return out

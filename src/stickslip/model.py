@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip import plugins
-from stickslip.config import read_toml
+from stickslip.config import Table, read_toml
 from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
 from stickslip.spec import Law, ReferenceKind
 
@@ -73,8 +73,12 @@ class Model:
         InputError
             If there is no such file, it is no such model, or its law is code that nobody has approved.
         """
-        file = Path(path)
-        table = read_toml(file)
+        return cls.from_table(read_toml(Path(path)))
+
+    @classmethod
+    def from_table(cls, table: Table) -> Model:
+        """As `from_file`, of the content of a file; the path of a law's file is relative to the document's folder."""
+        file = table.document.name
         if table.values.get("format", MODEL_FORMAT) != MODEL_FORMAT:
             raise table.error(
                 "format", f"is of another version; this one reads {MODEL_FORMAT!r}: identify the axis again"
@@ -86,7 +90,7 @@ class Model:
             )
         name = table.text("law")
         if name.endswith(".py"):
-            name = str(file.parent / name)
+            name = str(table.document.folder / name)
         law = plugins.law(name, table.label("law"))
         choices = dict(table.table("choices").values) if table.has("choices") else dict[str, Any]()
         with table.blamed():
@@ -96,7 +100,7 @@ class Model:
             for key in values:
                 if key not in known:
                     raise parameters.error(key, f"is no parameter of this law; {suggestion(key, known)}")
-            return cls(law, choices, **values).warn(str(file))
+            return cls(law, choices, **values).warn(file)
 
     def having(self, **choices: str) -> Model:
         """This model under other options of its law; options that the law does not have are left out."""

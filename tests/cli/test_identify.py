@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import re
@@ -16,10 +15,11 @@ import pytest
 
 from stickslip import Model
 from stickslip.cli import main
-from stickslip.cli.identify import assumptions
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.methods.method import Options
 from stickslip.plugins import law_names
+from stickslip.verbs.identify import assumptions
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "identify"))
 import axis_cases as cases
@@ -367,14 +367,13 @@ def test_what_stays_at_a_laws_default_is_said(capsys: pytest.CaptureFixture[str]
     found = Identification("axis", law, fitted, np.eye(len(names)), {})
     assert found.assumed == {"delta_s": 2.0, "alpha[0]": 0.5, "alpha[1]": 0.5}
     assert found.as_dict()["assumed"] == found.assumed
-    args = argparse.Namespace(method="axis", set=[], freeze=[], model=None)
-    (said,) = assumptions(found, args)
+    (said,) = assumptions(found, Options(), "axis")
     assert said.startswith("Assumed, not fitted: ")
     assert "delta_s = 2" in said
     assert "alpha = 0.5, 0.5" in said
     assert "--free NAME" in said
-    args.freeze, args.set = ["delta_s=2"], ["alpha[0]=0.5", "alpha[1]=0.5"]
-    assert assumptions(found, args) == []
+    given = Options(values={"alpha[0]": 0.5, "alpha[1]": 0.5}, frozen=("delta_s",))
+    assert assumptions(found, given, "axis") == []
     assert replace(found, method="inverse dynamics").assumed == {}
 
 

@@ -4,38 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip.cli._kinds import require
-
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from stickslip.finding import Finding
-    from stickslip.readers import Drive
-    from stickslip.readers.profiles import Profile
     from stickslip.record import Record
+    from stickslip.verbs.reading import Opened, Reading
 
-__all__ = ["Opened", "add_arguments", "open_record", "print_columns", "read_record"]
-
-FORGET = "delete that file to forget it"
-
-
-@dataclass(frozen=True)
-class Opened:
-    """A record, the profile that was used, the one that was written, and what is to be said of them."""
-
-    record: Record
-    used: Path | None
-    written: Path | None
-    notes: tuple[Finding, ...] = ()
-
-    @property
-    def tells_numbers(self) -> bool:
-        """Whether a saved profile, which nobody named, brings numbers of the drive into the result."""
-        return any(f.code == "profile" and " = " in f.message for f in self.notes)
+__all__ = ["add_arguments", "print_columns", "read_record", "reading_of"]
 
 
 def add_arguments(parser: argparse.ArgumentParser, *, part: bool = False) -> None:
@@ -102,10 +78,8 @@ def _add_part(group: argparse._ArgumentGroup) -> None:  # type: ignore[reportPri
     )
 
 
-def read_record(
-    path: Path, args: argparse.Namespace, accept: Callable[[Record], object] = lambda _: None
-) -> Record:
-    """As `open_record`, for verbs that show no columns: stderr says where a saved profile had a part in it.
+def read_record(path: Path, args: argparse.Namespace) -> Record:
+    """The record of a file, for verbs that show no columns: stderr says where a saved profile had a part in it.
 
     Raises
     ------
@@ -113,143 +87,28 @@ def read_record(
     """
     import sys
 
-    opened = open_record(path, args, accept)
+    from stickslip.verbs.reading import open_log
+
+    opened = open_log(path, reading_of(args))
     for finding in opened.notes:
         print(f"stickslip: {path}: {finding.line()}", file=sys.stderr)
     return opened.record
 
 
-def open_record(
-    path: Path,
-    args: argparse.Namespace,
-    accept: Callable[[Record], object] = lambda _: None,
-    beside: Path | None = None,
-) -> Opened:
-    """Read a file as the options say, with the profile of its layout; keep what `--map` and the others say, unless
-    `accept` raises on the record: what reads it wrongly is not for the next file.
-
-    `beside` is a second file of the same motion, whose columns are taken along.
-
-    What a profile has done that the options do not say is among the record's findings.
-
-    Raises
-    ------
-    InputError
-        As `stickslip.readers.read`, but that ambiguous columns are left among the record's findings.
-    """
-    from stickslip.errors import InputError
-    from stickslip.readers import profiles
-    from stickslip.readers.reading import joined, open_table, record_of, with_source
-
-    require(path, "record")
-    table = open_table(path)
-    if beside is not None:
-        require(beside, "record")
-        table = joined(table, beside, args.map, args.sample_time)
-    used = args.profile if args.profile and args.profile.exists() else profiles.remembered(table)
-    used = used if args.profile is None or used == args.profile else None
-    kept = profiles.load(used) if used else None
-    drive = _drive(args)
-    record = record_of(table, args.map, drive=drive, profile=kept, sample_time=args.sample_time)
+def reading_of(args: argparse.Namespace) -> Reading:
+    """What the options say of reading; the mapping is kept for the next file with these columns."""
+    out: Reading = {
+        "map": args.map, "profile": args.profile, "sample_time": args.sample_time, "remember": True,
+        "side": args.side, "lead": None if args.lead is None else 1e-3 * args.lead,
+        "counts_per_rev": args.counts_per_rev, "rated_torque": args.rated_torque, "gear_ratio": args.gear_ratio,
+        "rated_current": args.rated_current, "torque_constant": args.torque_constant,
+    }  # fmt: skip
     if "leave_out" in args:
-        try:
-            record = part_of(record, args)
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
-    written = None
-    if (
-        args.map
-        or drive.known() != {"side": "motor"}
-        or args.sample_time is not None
-        or (args.profile and not used)
-    ):
-        accept(record)
-        merged = profiles.merged(args.map, drive, args.sample_time, kept)
-        if kept is None or not profiles.alike(merged, kept):
-            written = profiles.save(replace(merged, seen=profiles.sizes(record)), table, args.profile)
-    notes: tuple[Finding, ...] = ()
-    if args.profile is None:
-        said = profiles.merged(args.map, drive, args.sample_time, None)
-        notes = profile_notes(used, kept, said, written)
-        if kept and not written:
-            notes += tuple(profiles.misfits(kept, record, said.drive.known()))
-        record.meta["reading"]["findings"] += [note.as_data() for note in notes]
-        record.meta["reading"]["profile"] = str(used) if used and notes and not written else ""
-    return Opened(with_source(record, path), used, written, notes)
-
-
-def beside_of(args: argparse.Namespace, count: int) -> list[Path | None]:
-    """The file of `--with` for every LOG."""
-    from stickslip.errors import InputError
-
-    if len(args.beside) not in (0, count):
-        raise InputError(f"--with is given {len(args.beside)} times for {count} LOGs; give it once for each")
-    return list(args.beside) or [None] * count
-
-
-def part_of(record: Record, args: argparse.Namespace) -> Record:
-    """The part of a record that the options name, its position counted on if they say so."""
-    import math
-
-    from stickslip.readers.cut import Cut, cut, parse_rows, unwrapped
-
-    if args.unwrap:
-        record = unwrapped(record)
-    out = tuple(parse_rows("--leave-out", text) for text in args.leave_out if text != "spikes")
-    start = -math.inf if args.start is None else args.start
-    end = math.inf if args.end is None else args.end
-    rows = (1.0, math.inf) if args.rows is None else parse_rows("--rows", args.rows)
-    part = cut(record, Cut(start, end, rows, out))
-    if "spikes" in args.leave_out:
-        from stickslip.identify.doctor.spikes import spike_rows
-
-        part = cut(part, Cut(leave_out=tuple((n, n) for n in spike_rows(part).tolist())))
-    return part
-
-
-def profile_notes(
-    used: Path | None, kept: Profile | None, said: Profile, written: Path | None
-) -> tuple[Finding, ...]:
-    """That a profile which nobody named now says more than the options, and that one was written."""
-    from stickslip.finding import Finding
-
-    notes: list[Finding] = []
-    if kept:
-        now, before = said.drive.known(), kept.drive.known()
-        more = [f"{role}={text}" for role, text in kept.mapping.items() if role not in said.mapping]
-        more += [f"{name} = {value}" for name, value in before.items() if name not in now]
-        more += ["side = load"] if (before["side"], now["side"]) == ("load", "motor") else []
-        if kept.sample_time is not None and said.sample_time is None:
-            more.append(f"sample_time = {kept.sample_time:g} s")
-        if more:
-            words = f"read by the saved profile {used}, which says {', '.join(more)}"
-            notes.append(Finding("note", "profile", words, remedy=FORGET))
-    if written and not notes:
-        words = f"how to read files with these columns is kept in the profile {written}"
-        notes.append(Finding("note", "profile", words, remedy=FORGET))
-    return tuple(notes)
-
-
-def _drive(args: argparse.Namespace) -> Drive:
-    from stickslip.errors import InputError
-    from stickslip.readers import Drive
-
-    names = (
-        "counts_per_rev",
-        "rated_torque",
-        "rated_current",
-        "torque_constant",
-        "gear_ratio",
-        "side",
-        "lead",
-    )
-    given = {n: getattr(args, n) for n in names if getattr(args, n) is not None}
-    for name, value in given.items():
-        if value != value:  # to a `Drive`, NaN is a number that nobody gave
-            raise InputError(f"--{name.replace('_', '-')} {value} must be a number greater than 0")
-    if "lead" in given:
-        given["lead"] *= 1e-3
-    return Drive(**given)
+        out |= {
+            "start": args.start, "end": args.end, "rows": args.rows, "leave_out": args.leave_out,
+            "unwrap": args.unwrap, "beside": args.beside,
+        }  # fmt: skip
+    return out
 
 
 def print_columns(opened: Opened) -> None:

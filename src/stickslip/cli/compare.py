@@ -38,14 +38,13 @@ def run(args: argparse.Namespace) -> int:
     """Print the differences and the verdict."""
     from stickslip.cli import _output
     from stickslip.errors import InputError
-    from stickslip.identify.drift import compare_models
-    from stickslip.identify.identified_file import read_identified
+    from stickslip.verbs.compare import compare
 
     if args.plot and args.plot.suffix not in (".png", ".svg"):
         raise InputError(f"--plot {args.plot} must end in .png or .svg")
     if args.plot:
         _files.refuse_foreign([args.plot], args.force)
-    result = compare_models(read_identified(args.first), read_identified(args.second), top=args.top)
+    result = compare(args.first, args.second, top=args.top)
     if args.plot:
         from stickslip.report.identification import draw_picture_to
 

@@ -9,17 +9,9 @@ Errors make the record unusable (exit code 2), warnings make results doubtful, n
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from stickslip.cli import _reading
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from stickslip.finding import Finding
-    from stickslip.identify.doctor import Diagnosis
 
 SUMMARY = "check a record before anything is identified from it"
 
@@ -37,17 +29,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the columns and the findings; 2 if there is an error."""
     from stickslip.cli import _output
-    from stickslip.errors import InputError
-    from stickslip.identify.doctor import examine
-    from stickslip.readers.cut import pieces
+    from stickslip.verbs.doctor import doctor
+    from stickslip.verbs.reading import open_log
 
-    if args.stribeck_velocity is not None and not 0.0 < args.stribeck_velocity < float("inf"):
-        raise InputError(f"--stribeck-velocity {args.stribeck_velocity:g} must be greater than 0")
-    opened = _reading.open_record(args.file, args, beside=_reading.beside_of(args, 1)[0])
-    parts, short = pieces(opened.record)
-    every = [examine(part, stribeck_velocity=args.stribeck_velocity, accept=args.accept) for part in parts]
-    findings = _merged(every, short)
-    errors = sum(f.level == "error" for f in findings)
+    opened = open_log(args.file, _reading.reading_of(args))
+    found = doctor(opened.record, stribeck_velocity=args.stribeck_velocity, accept=args.accept)
+    errors = len(found.errors)
     if args.json:
         reading = {k: v for k, v in opened.record.meta["reading"].items() if k != "findings"}
         _output.print_json(
@@ -57,27 +44,11 @@ def run(args: argparse.Namespace) -> int:
                 "rows": len(opened.record),
                 "profile": str(opened.used) if opened.used else None,
                 "profile_written": str(opened.written) if opened.written else None,
-                "findings": [f.as_data() for f in findings],
+                "findings": [f.as_data() for f in found.findings],
             }
         )
         return 2 if errors else 0
     _reading.print_columns(opened)
     print()
-    for finding in findings:
-        print(f"{finding.level:<8}{finding.code:<24}{finding.line()}")
-    print(f"{errors} errors, {sum(f.level == 'warning' for f in findings)} warnings")
+    print(found)
     return 2 if errors else 0
-
-
-def _merged(every: Sequence[Diagnosis], more: Sequence[Finding]) -> list[Finding]:
-    """What was found in the pieces of a record; with the rows of the piece where it is not true of all."""
-    from stickslip.finding import sorted_findings
-    from stickslip.readers.cut import file_rows, range_words
-
-    said: dict[Finding, None] = {}
-    for diagnosis in every:
-        rows = f"rows {range_words(file_rows(diagnosis.record), 3)}"
-        for finding in diagnosis.findings:
-            everywhere = all(finding in other.findings for other in every)
-            said[finding if finding.where or everywhere else replace(finding, where=rows)] = None
-    return sorted_findings([*said, *more])

@@ -175,11 +175,11 @@ def loop_of(args: argparse.Namespace) -> tuple[Gains | Cascade, dict[str, float]
     InputError
         If a name is unknown, both kinds of loop are mixed, or a number is out of bounds.
     """
-    from stickslip.cli._methods import values
+    from stickslip.config import named_numbers
     from stickslip.control.linear import Cascade, Gains
     from stickslip.errors import InputError, UnknownName
 
-    given = values(args.loop.split(","))
+    given = named_numbers(args.loop.split(","))
     kind = Cascade if "kv" in given else Gains
     names = (*kind._fields, "filter", "limit")
     for name, value in given.items():

@@ -53,6 +53,11 @@ class Estimate:
     verdict: str = ""
 
     @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval, `lower` and `upper`."""
+        return self.lower, self.upper
+
+    @property
     def undetermined(self) -> bool:
         """Whether the interval of a positive number spans more than `DECADES`: its ends then tell nothing."""
         return self.lower > 0.0 and self.upper > 10.0**DECADES * self.lower

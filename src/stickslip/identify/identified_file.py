@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.config import read_toml
+from stickslip.config import Table, read_toml
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.motion import Motion, motion_in
 from stickslip.model import Model
 
-__all__ = ["Identified", "read_identified"]
+__all__ = ["Identified", "identified_in", "read_identified"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -29,6 +29,7 @@ class Identified:
     Attributes
     ----------
     path : Path
+        Of the file; only a name where there is none.
     model : Model
     estimates : tuple of Estimate
         Empty in a file that a person wrote.
@@ -44,6 +45,8 @@ class Identified:
         The motion of the record that it was identified on.
     speeds : mapping of str to array
         Quantiles (0, 0.1, ..., 1) of the recorded speeds, rad/s: "positive" and "negative"; empty where not known.
+    law_file : str
+        Path of the law's file; empty where the law is registered.
     """
 
     path: Path
@@ -56,6 +59,7 @@ class Identified:
     misfit: Mapping[str, float] = field(default_factory=dict[str, float])
     trajectory: Motion | None = None
     speeds: Mapping[str, Array] = field(default_factory=dict[str, Array])
+    law_file: str = ""
 
     def unit(self, angular: str) -> str:
         """A unit of the angular system in the axis's own."""
@@ -79,9 +83,14 @@ def read_identified(path: str | os.PathLike[str]) -> Identified:
     InputError
         If there is no such file, it is no model, or its tables are damaged.
     """
-    file = Path(path)
-    model = Model.from_file(file)
-    content = read_toml(file).values
+    return identified_in(read_toml(Path(path)))
+
+
+def identified_in(table: Table) -> Identified:
+    """As `read_identified`, of a file's content."""
+    file = Path(table.document.name)
+    model = Model.from_table(table)
+    content = table.values
     try:
         estimates = tuple(
             Estimate(
@@ -105,6 +114,7 @@ def read_identified(path: str | os.PathLike[str]) -> Identified:
         {k: float(v) for k, v in dict(content.get("misfit", {})).items() if isinstance(v, (int, float))},
         motion_in(content, str(file)),
         {k: np.abs(np.array(v, dtype=np.float64)) for k, v in dict(content.get("speeds", {})).items()},
+        str(table.document.folder / law) if (law := str(content["law"])).endswith(".py") else "",
     )  # fmt: skip
 
 

@@ -10,19 +10,21 @@ import importlib.metadata
 import math
 import os
 import platform
+import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from stickslip.config import Document, Table
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import MODEL_FORMAT
 
-__all__ = ["model_data", "write_model"]
+__all__ = ["in_memory", "model_content", "model_data", "versions", "write_model"]
 
 
 def write_model(
@@ -58,17 +60,27 @@ def write_model(
     draft = target.with_name(target.name + ".part")
     try:
         with draft.open("wb") as file:
-            tomli_w.dump(_beside(model_data(found, data, _relative(law, target)), more or {}), file)
+            tomli_w.dump(model_content(found, data, _relative(law, target), more), file)
         os.replace(draft, target)
     except OSError as error:
         raise InputError(f"{target} cannot be written ({error.strerror}); give another path") from None
     return target
 
 
-def _beside(content: dict[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """The content with further tables."""
-    axis = content.get("axis", {}) | dict(more.get("axis", {}))
-    return content | dict(more) | ({"axis": axis} if axis else {})
+def model_content(
+    found: Identification, data: Sequence[Mapping[str, Any]], law: str = "", more: Mapping[str, Any] | None = None
+) -> dict[str, Any]:  # fmt: skip
+    """All that `write_model` writes, as plain data; `law` as the file shall name it."""
+    content, further = model_data(found, data, law), dict(more or {})
+    axis = content.get("axis", {}) | dict(further.get("axis", {}))
+    return content | further | ({"axis": axis} if axis else {})
+
+
+def in_memory(content: Mapping[str, Any], name: str = "model.toml") -> Table:
+    """The table that reading such a file gives, where none is written; the law's path must be absolute."""
+    import tomli_w
+
+    return Table(tomllib.loads(tomli_w.dumps(content)), Document(name, Path()))
 
 
 def _relative(law: str, target: Path) -> str:

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from stickslip.config import read_toml
+from stickslip.config import Table
 from stickslip.control.recommended import Recommended
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.model_file import write_model
+from stickslip.identify.model_file import in_memory, model_content, write_model
 from stickslip.identify.recommend import Recommendation
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["write_setting"]
+__all__ = ["setting_table", "write_setting"]
 
 
 def write_setting(path: str | os.PathLike[str], found: Identified, advice: Recommendation) -> Path:
@@ -35,8 +36,30 @@ def write_setting(path: str | os.PathLike[str], found: Identified, advice: Recom
         If nothing is recommended, or it cannot be written.
     """
     target = Path(path)
-    if advice.chosen is None or advice.model is None:
+    if advice.chosen is None:
         raise InputError(f"no compensator is recommended, so that there is nothing to write to {target}")
+    result, law, more = _parts(found, advice)
+    return write_model(target, result, data=found.data, law=law, more=more)
+
+
+def setting_table(found: Identified, advice: Recommendation) -> Table:
+    """What `write_setting` writes, as the table that reading it gives.
+
+    Raises
+    ------
+    InputError
+        If nothing is recommended.
+    """
+    if advice.chosen is None:
+        raise InputError("no compensator is recommended, so that there is nothing to export")
+    result, law, more = _parts(found, advice)
+    return in_memory(model_content(result, found.data, str(Path(law).resolve()) if law else "", more))
+
+
+def _parts(found: Identified, advice: Recommendation) -> tuple[Identification, str, dict[str, Any]]:
+    """The law, the path of its file, and the further tables."""
+    assert advice.chosen is not None
+    assert advice.model is not None
     setting, drive = advice.chosen.setting, advice.drive
     own = drive.gains is not None or drive.linear != "PD"
     table = Recommended(
@@ -49,9 +72,6 @@ def write_setting(path: str | os.PathLike[str], found: Identified, advice: Recom
         "recommendation", advice.model, (), np.eye(0), {}, advice.notes,
         details={"axis": motion},
     )  # fmt: skip
-    written = str(read_toml(found.path).values["law"])
-    kept = written.endswith(".py") and advice.model.law.name == found.model.law.name
-    return write_model(
-        target, result, data=found.data, law=str(found.path.parent / written) if kept else "",
-        more={"axis": {**found.axis, "inertia": advice.inertia}, "recommended": table},
-    )  # fmt: skip
+    kept = found.law_file if advice.model.law.name == found.model.law.name else ""
+    more = {"axis": {**found.axis, "inertia": advice.inertia}, "recommended": table}
+    return result, kept, more

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from typing import Any, cast
 
 import numpy as np
@@ -67,6 +68,19 @@ class Diagnosis:
     def warnings(self) -> tuple[Finding, ...]:
         """What makes a result doubtful."""
         return tuple(f for f in self.findings if f.level == "warning")
+
+    def __str__(self) -> str:
+        lines = [f"{f.level:<8}{f.code:<24}{f.line()}" for f in self.findings]
+        return "\n".join([*lines, f"{len(self.errors)} errors, {len(self.warnings)} warnings"])
+
+    def _repr_html_(self) -> str:
+        """A table in a notebook."""
+        rows = "".join(
+            f"<tr><td>{f.level}</td><td>{escape(f.code)}</td><td>{escape(f.line())}</td></tr>"
+            for f in self.findings
+        )
+        tally = f"<p>{len(self.errors)} errors, {len(self.warnings)} warnings in {len(self.record)} usable rows</p>"
+        return f"<table><tbody>{rows}</tbody></table>{tally}"
 
     def raise_for_errors(self, name: str = "the record") -> None:
         """Refuse an unusable record.

@@ -1,0 +1,112 @@
+"""From records to trials of an axis, as the options say; and what is refused before anything is computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from stickslip.config import named_numbers
+from stickslip.errors import InputError, UnknownName
+from stickslip.identify.axis_trial import DRIVES, Trial, trial_of
+from stickslip.identify.methods.method import Options
+from stickslip.machines.servo import Motor, ServoAxis
+from stickslip.record import Record
+from stickslip.simulation.driven import Loop
+
+__all__ = ["driven", "loop_of", "trials_of"]
+
+LOOP_NAMES = ("kp", "ki", "kd", "kr", "limit", "period", "count", "span")
+NOT_NEGATIVE = ("kp", "ki", "kd", "kr", "period", "count")
+RANGES = {"limit": "greater than 0", **dict.fromkeys(NOT_NEGATIVE, "a finite number of 0 or more")}
+
+
+def trials_of(records: Sequence[Record], options: Options) -> tuple[ServoAxis, list[Trial]]:
+    """The axis and a trial for every record."""
+    axis = axis_of(records[0], options)
+    return axis, [trial(record, axis, options) for record in records]
+
+
+def driven(records: Sequence[Record], options: Options) -> None:
+    """Refuse records that lack what moves the axis, and numbers that nothing would be multiplied by."""
+    _, trials = trials_of(records, options)
+    refuse_unused(records, trials, options)
+
+
+def refuse_unused(records: Sequence[Record], trials: Sequence[Trial], options: Options) -> None:
+    """A motor's constant that nothing is multiplied by would be left out in silence."""
+    quantities = {t.quantity for t in trials} if options.drive_gain is None else {"gain"}
+    derived = any("motor_torque" in r.meta.get("derived", {}) for r in records)
+    unused: list[str] = []
+    if options.torque_constant is not None and not quantities & {"current", "voltage"} and not derived:
+        unused.append(f"--torque-constant {options.torque_constant:g}")
+    if options.resistance is not None and "voltage" not in quantities:
+        unused.append(f"--resistance {options.resistance:g}")
+    if unused:
+        instead = "; --drive-gain says all of it" if options.drive_gain is not None else ""
+        made = ", the loop's output" if any(t.drive is None for t in trials) else ""
+        raise InputError(
+            f"{' and '.join(unused)} would not be used: the drive's signal is a {' and a '.join(sorted(quantities))}"
+            f"{made}{instead}; leave it out, map the current or voltage (--map current=COLUMN), or say --loop-output"
+        )
+
+
+def axis_of(record: Record, options: Options) -> ServoAxis:
+    """The axis; the reader has brought the record to one side of the gearing already."""
+    known = record.meta.get("reading", {}).get("drive", {})  # a profile's, too
+    constant = options.torque_constant
+    return ServoAxis(
+        motion="linear" if record.units.get("position") == "m" else "rotary", drive_side="load",
+        gravity="pendulum" if options.pendulum else "constant", drive_gain=options.drive_gain,
+        motor=Motor(
+            torque_constant=constant if constant is not None else known.get("torque_constant"),
+            resistance=options.resistance,
+        ),
+    )  # fmt: skip
+
+
+def trial(record: Record, axis: ServoAxis, options: Options) -> Trial:
+    """The record as a trial."""
+    name = str(record.meta.get("reading", {}).get("file", "")) or "record"
+    loop = str(record.meta.get("loop", ""))
+    if loop and not {"position_reference", "reference"} & set(record.channels):
+        raise InputError(
+            f"{name}: --loop needs the reference position beside {', '.join(record.channels)}; map its column with "
+            "--map position_reference=COLUMN, or leave --loop out"
+        )
+    recorded = bool(set(DRIVES) & set(record.channels))
+    output = options.loop_output or ("torque" if options.resistance is None else "voltage")
+    if recorded or output != "voltage":  # a signal in V or A is what it is, whatever supplies it
+        record = replace(record, channels={k: v for k, v in record.channels.items() if k != "supply"})
+    if options.extra_torque:
+        record = with_extra(record, options.extra_torque, loop)
+    return trial_of(record, axis, loop=loop_of(loop) if loop else None, name=name, output=output)
+
+
+def with_extra(record: Record, channel: str, loop: str) -> Record:
+    """The record with a known torque added to the recorded one."""
+    if channel not in record.channels:
+        raise UnknownName("channel of --extra-torque", channel, sorted(record.channels))
+    if loop or "motor_torque" not in record.channels:
+        why = "the loop that --loop simulates would not make it" if loop else "no torque is recorded"
+        raise InputError(
+            f"--extra-torque {channel} is added to the recorded torque, but {why}; leave one out"
+        )
+    total = record["motor_torque"] + record[channel]
+    return replace(record, channels={**record.channels, "motor_torque": total})
+
+
+def loop_of(given: str | Mapping[str, float]) -> Loop:
+    """The sampled controller of ``kp=..,kd=..``, or of a mapping with these names."""
+    numbers = named_numbers(given.split(",")) if isinstance(given, str) else dict(given)
+    for name in numbers:
+        if name not in LOOP_NAMES:
+            raise UnknownName("number of --loop", name, LOOP_NAMES)
+    for name, value in numbers.items():
+        above = math.isfinite(value) or name == "limit"
+        if not above or (name in NOT_NEGATIVE and value < 0.0) or (name == "limit" and not value > 0.0):
+            raise InputError(f"--loop: {name} = {value:g} must be {RANGES.get(name, 'a finite number')}")
+    span = numbers.pop("span", 1.0)
+    if span not in (1.0, 2.0):
+        raise InputError(f"--loop: span = {span:g} must be 1 or 2 samples")
+    return Loop(velocity_span=int(span), **numbers)

@@ -1,0 +1,34 @@
+"""GMS's attraction parameter from a motion in one direction (`stickslip.identify.attraction`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from stickslip.errors import InputError
+from stickslip.identify.attraction import identify_attraction
+from stickslip.identify.estimate import Identification
+from stickslip.identify.hysteresis import Loop
+from stickslip.identify.methods._records import has_torque, single, torque_channel
+from stickslip.identify.methods.method import Method, Options
+from stickslip.record import Record
+
+__all__ = ["METHOD"]
+
+
+def identify(records: Sequence[Record], options: Options) -> Identification:
+    """The attraction parameter of the model given."""
+    record, model = single(records, "attraction"), options.model
+    if model is None or model.law.name != "gms":
+        raise InputError(
+            "--method attraction needs a GMS law with its elements; identify it with --method presliding and give "
+            "--model model.toml"
+        )
+    if "velocity" not in record.channels:
+        raise InputError("--method attraction needs the velocity; map a column with --map velocity=COLUMN")
+    loop = Loop.of(record, torque_channel(records, options, "attraction"), "velocity")
+    return identify_attraction(loop, model, noise=options.noise)
+
+
+METHOD = Method(
+    "attraction", "GMS's attraction from a motion in one direction", identify, has_torque("attraction")
+)

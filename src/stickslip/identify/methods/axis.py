@@ -1,0 +1,50 @@
+"""Inertia, offset or gravity and friction jointly, from any motion (`stickslip.identify.axis`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from stickslip.identify.axis import AUTOMATIC, identify_axis
+from stickslip.identify.axis_agreed import regressed
+from stickslip.identify.axis_inverse import inverse_dynamics
+from stickslip.identify.axis_output import Extras
+from stickslip.identify.axis_plain import inverse_identification
+from stickslip.identify.axis_trial import Trial
+from stickslip.identify.estimate import Identification
+from stickslip.identify.methods._trials import driven, trials_of
+from stickslip.identify.methods.method import Method, Options
+from stickslip.record import Record
+
+__all__ = ["METHOD"]
+
+
+def identify(records: Sequence[Record], options: Options) -> Identification:
+    """The whole axis; the last records judge where some are held out."""
+    axis, trials = trials_of(records, options)
+    count = len(trials) - options.held_out
+    fitted, held = trials[:count], trials[count:]
+    skew = skew_of(fitted, options)
+    if options.inverse:
+        plain = inverse_dynamics(
+            fitted, axis, per_direction=options.per_direction, harmonics=options.harmonics
+        )
+        sliding, _ = regressed(fitted, axis, skew, regress=options.regress)
+        return inverse_identification(plain, axis, sliding, held)
+    return identify_axis(
+        fitted, axis, options.laws or AUTOMATIC, validation=held, free=options.free, frozen=options.frozen,
+        values=dict(options.values), extras=Extras(harmonics=options.harmonics, load=options.load),
+        per_direction=options.per_direction, robust=options.robust, intervals=options.intervals, skew=skew,
+        regress=options.regress, progress=options.progress,
+    )  # fmt: skip
+
+
+def skew_of(trials: Sequence[Trial], options: Options) -> float | None:
+    """s by which the torque's column lies behind the torque that acted, if the options say so."""
+    if options.torque_is is None and options.delay is None:
+        return None
+    # A command acts half a row after its row, on average; a mean over the row before acted half a row before it.
+    rows = {"commanded": -0.5, "actual": 0.0, "mean": 0.5}[options.torque_is or "commanded"]
+    return rows * max(t.period for t in trials) - (options.delay or 0.0)
+
+
+METHOD = Method("axis", "inertia, offset or gravity and friction jointly", identify, driven, holds_out=True)

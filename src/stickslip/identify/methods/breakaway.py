@@ -1,0 +1,23 @@
+"""Torque at the break, per direction, from torque ramps (`stickslip.identify.breakaway`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from stickslip.identify.breakaway import identify_breakaway
+from stickslip.identify.estimate import Identification
+from stickslip.identify.methods._records import has_torque, torque_channel
+from stickslip.identify.methods.method import Method, Options
+from stickslip.record import Record
+
+__all__ = ["METHOD"]
+
+
+def identify(records: Sequence[Record], options: Options) -> Identification:
+    """Torque at the break, per direction."""
+    torque = torque_channel(records, options, "breakaway")
+    more = {} if options.threshold is None else {"threshold": options.threshold}
+    return identify_breakaway(records, torque=torque, **more)
+
+
+METHOD = Method("breakaway", "break-away torque from torque ramps", identify, has_torque("breakaway"))

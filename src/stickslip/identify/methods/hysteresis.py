@@ -1,0 +1,49 @@
+"""A law along the measured motion, from a measured friction: Dahl, per direction, or Maxwell-slip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.errors import UnknownName
+from stickslip.identify.estimate import Identification
+from stickslip.identify.hysteresis import Loop, choose_hysteresis, templates_for
+from stickslip.identify.methods._records import has_torque, single, torque_channel
+from stickslip.identify.methods.method import Method, Options
+from stickslip.record import Record
+
+__all__ = ["METHOD"]
+
+ROWS = 8000
+"""Rows that a loop is fitted to: of 25,000 the same values come in a tenth of the time."""
+
+
+def identify(records: Sequence[Record], options: Options) -> Identification:
+    """The law that says best what blocks left out hold."""
+    whole = Loop.of(single(records, "hysteresis"), torque_channel(records, options, "hysteresis"))
+    every = max(1, whole.time.size // ROWS)
+    loop = Loop(whole.time[::every], whole.position[::every], whole.torque[::every], whole.unit)
+    templates = templates_for(loop, np.arange(loop.time.size))
+    names = sorted({model.law.name for model in templates.values()})
+    asked = [law if isinstance(law, str) else law.name for law in options.laws]
+    for law in asked:
+        if law not in names:
+            raise UnknownName("law of --method hysteresis", law, names)
+    wanted = {k: m for k, m in templates.items() if not asked or m.law.name in asked}
+    chosen, found, table = choose_hysteresis(loop, wanted)
+    said = [
+        f"Chosen: {chosen}. Error on blocks left out: "
+        + "; ".join(f"{name} {100.0 * row['cross_validated']:.2g} %" for name, row in table.items())
+        + "."
+    ]
+    if every > 1:
+        said.append(f"One row of {every} was fitted, {loop.time.size} in all.")
+    details = {**found.details, "chosen": chosen}
+    return replace(found, notes=(*said, *found.notes), details=details)
+
+
+METHOD = Method(
+    "hysteresis", "a law along the motion, from measured friction", identify, has_torque("hysteresis")
+)

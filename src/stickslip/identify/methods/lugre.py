@@ -1,0 +1,27 @@
+"""LuGre's sigma0 and sigma1 from a stick-slip response (`stickslip.identify.lugre_dynamics`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from stickslip.errors import InputError
+from stickslip.identify.estimate import Identification
+from stickslip.identify.lugre_dynamics import Response, identify_lugre_dynamics
+from stickslip.identify.methods._records import curve_values, has_torque, single, torque_channel
+from stickslip.identify.methods.method import Method, Options
+from stickslip.record import Record
+
+__all__ = ["METHOD"]
+
+
+def identify(records: Sequence[Record], options: Options) -> Identification:
+    """sigma0 and sigma1 of one response; the inertia is among the values."""
+    record = single(records, "lugre")
+    if "inertia" not in options.values:
+        raise InputError("--method lugre needs the inertia in kg·m²; give --set inertia=...")
+    response = Response.of(record, torque_channel(records, options, "lugre"))
+    curve = curve_values(options, "lugre")
+    return identify_lugre_dynamics(response, options.values["inertia"], curve, noise=options.noise)
+
+
+METHOD = Method("lugre", "LuGre's stiffness and damping from stick-slip", identify, has_torque("lugre"))

@@ -1,0 +1,149 @@
+"""What a method of identification is: a name, what it needs, and a function of records and options."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from stickslip import plugins
+from stickslip.errors import InputError
+from stickslip.identify.estimate import Identification, silent
+from stickslip.identify.regression import regress_axis
+from stickslip.identify.regressions import Regress
+from stickslip.model import Model
+from stickslip.record import Record
+from stickslip.spec import Law
+
+__all__ = ["Method", "Options", "law_of"]
+
+LONGEST_DELAY = 1.0
+"""s"""
+TorqueIs = Literal["commanded", "actual", "mean"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What an identification is asked for; a method reads what concerns it.
+
+    Attributes
+    ----------
+    laws : tuple of str or Law
+        Names, paths of law files, or laws; empty: the method's own candidates.
+    values : mapping of str to float
+        Starting values and known values of parameters, by name, SI units.
+    frozen, free : tuple of str
+        Parameters that keep their value; that are fitted although they usually are not.
+    model : Model or None
+        What an earlier identification found.
+    noise : float or None
+        Standard deviation of what is fitted: N·m, or rad (method `lugre`).
+    torque : str
+        Channel of the torque; empty: the first known one. Not for the method `axis`.
+    elements : int
+        Of the GMS law (presliding); 0: chosen.
+    threshold : float or None
+        Velocity that counts as motion, rad/s (m/s), of the method `breakaway`.
+    held_out : int
+        How many of the records, the last ones, are not fitted but judge the result (axis).
+    inverse : bool
+        Linear least squares only, no simulation (axis).
+    per_direction : bool
+        Friction with parameters of its own for each direction (axis).
+    pendulum : bool
+        Gravity is m g l sin(q - q0), otherwise a constant torque (axis).
+    drive_gain : float or None
+        Torque per unit of the drive's signal.
+    torque_constant : float or None
+        N·m/A
+    resistance : float or None
+        Of the motor, ohm, where a voltage drives it.
+    loop_output : {"torque", "current", "voltage"} or None
+        What a simulated loop's output is where no drive signal is recorded.
+    extra_torque : str
+        Channel of a known torque that is added to the recorded one.
+    torque_is : {"commanded", "actual", "mean"} or None
+        What the torque's column holds: the command from this row to the next, the value at the row, or the mean over
+        the row before; None: found from the record.
+    delay : float or None
+        s from then until it acts.
+    harmonics : int
+        Of a torque over the position (axis).
+    load : bool
+        Friction that grows with the load of the gearing (axis).
+    intervals : {"prediction", "covariance"}
+        As in `stickslip.identify.axis.identify_axis`.
+    robust : bool
+        Outliers count linearly in the output error (axis).
+    regress : callable
+        The regression on certain sliding; a `stickslip.identify.regressions.Regressions` does not repeat the doctor's.
+    progress : callable
+        Is told what begins, in a few words.
+    """
+
+    laws: tuple[str | Law, ...] = ()
+    values: Mapping[str, float] = field(default_factory=dict[str, float])
+    frozen: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()
+    model: Model | None = None
+    noise: float | None = None
+    torque: str = ""
+    elements: int = 0
+    threshold: float | None = None
+    held_out: int = 0
+    inverse: bool = False
+    per_direction: bool = False
+    pendulum: bool = False
+    drive_gain: float | None = None
+    torque_constant: float | None = None
+    resistance: float | None = None
+    loop_output: Literal["torque", "current", "voltage"] | None = None
+    extra_torque: str = ""
+    torque_is: TorqueIs | None = None
+    delay: float | None = None
+    harmonics: int = 0
+    load: bool = False
+    intervals: Literal["prediction", "covariance"] = "prediction"
+    robust: bool = False
+    regress: Regress = regress_axis
+    progress: Callable[[str], None] = silent
+
+    def __post_init__(self) -> None:
+        for option, count in (("harmonics", self.harmonics), ("elements", self.elements)):
+            if count < 0:
+                raise InputError(f"--{option} {count} must be 0 or more")
+        for option, value in (("noise", self.noise), ("threshold", self.threshold)):
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"--{option} {value:g} must be greater than 0")
+        if self.delay is not None and not (math.isfinite(self.delay) and abs(self.delay) < LONGEST_DELAY):
+            raise InputError(
+                f"--delay {self.delay:g} s, the time until the torque acts, must lie between -1 and 1 s"
+            )
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to identify.
+
+    Attributes
+    ----------
+    name, title : str
+    identify : callable
+        ``identify(records, options) -> Identification``.
+    check : callable
+        ``check(records, options)`` refuses, before anything is computed, records that lack what it needs.
+    holds_out : bool
+        Whether records may judge the result instead of being fitted.
+    """
+
+    name: str
+    title: str
+    identify: Callable[[Sequence[Record], Options], Identification]
+    check: Callable[[Sequence[Record], Options], None]
+    holds_out: bool = False
+
+
+def law_of(given: str | Law) -> Law:
+    """The law of that name or file, or the law itself, with the choices that any law has."""
+    return plugins.law(given) if isinstance(given, str) else plugins.completed(given)

@@ -1,0 +1,49 @@
+"""A curve through the torques at constant velocities (`stickslip.identify.sliding`); of several laws one is chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.identify.axis_start import starts
+from stickslip.identify.estimate import Identification
+from stickslip.identify.methods._records import has_torque, torque_channel
+from stickslip.identify.methods.method import Method, Options, law_of
+from stickslip.identify.segments import sliding_points
+from stickslip.identify.sliding import Array, identify_sliding
+from stickslip.identify.sliding_choice import candidates, choose_sliding
+from stickslip.model import Model
+from stickslip.record import Record
+from stickslip.spec import Law
+
+__all__ = ["METHOD"]
+
+
+def identify(records: Sequence[Record], options: Options) -> Identification:
+    """A curve of the laws asked for; where none is named, of those of the thesis."""
+    points, notes = sliding_points(records, torque=torque_channel(records, options, "sliding"))
+    if options.laws:
+        laws = [law_of(given) for given in options.laws]
+        templates = {law.name: template(law, points.velocity, points.torque, options) for law in laws}
+    else:
+        templates = candidates(points.velocity, points.torque, dict(options.values))
+    frozen = list(options.frozen)
+    if len(templates) > 1:
+        found = choose_sliding(
+            points, templates, noise=options.noise, frozen=frozen, progress=options.progress
+        )[1]
+    else:
+        found = identify_sliding(points, next(iter(templates.values())), noise=options.noise, frozen=frozen)
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def template(law: Law, velocity: Array, torque: Array, options: Options) -> Model:
+    """A law on the scales of a sliding curve, where the search starts."""
+    speed = float(np.max(np.abs(velocity)))
+    known = {k: v for k, v in options.values.items() if k in {f.name for f in law.fields}}
+    return starts(law, float(np.median(np.abs(torque))), 0.0, speed, 1.0, known)[0]
+
+
+METHOD = Method("sliding", "sliding curve from constant velocities", identify, has_torque("sliding"))

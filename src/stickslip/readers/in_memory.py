@@ -1,0 +1,105 @@
+"""Signals that are in memory already: arrays by name, a mapping of arrays, a data frame, a structured array."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.readers._convert import LINEAR
+from stickslip.readers._flatten import table_of
+from stickslip.readers._names import ALIASES, KINDS
+from stickslip.readers._table import Column, Table
+from stickslip.readers._units import SI, parse_unit
+
+__all__ = ["digest_of", "table_in_memory", "table_of_signals"]
+
+FORMAT = "arrays"
+
+
+def table_of_signals(signals: Mapping[str, Any], units: Mapping[str, str]) -> tuple[Table, dict[str, str]]:
+    """A column for every signal, and the mapping that says which channel it is.
+
+    Parameters
+    ----------
+    signals : mapping of str to array_like, shape (n,)
+        By channel, or its short name (torque, reference, ...).
+    units : mapping of str to str
+        By the same names; SI where one has none, of a linear axis (m, N) where another is.
+
+    Raises
+    ------
+    InputError
+        If a signal is no vector of numbers, lengths differ, or a unit is given for what is no signal.
+    """
+    columns: list[Column] = []
+    for name, values in signals.items():
+        try:
+            numbers = np.asarray(values, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"{name} is no array of numbers; give one number a sample") from None
+        if numbers.ndim != 1:
+            raise InputError(f"{name} has shape {numbers.shape}; give one number a sample, shape (n,)")
+        columns.append(Column(name, numbers))
+    lengths = {c.name: c.values.size for c in columns}
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{name} {size}" for name, size in lengths.items())
+        raise InputError(f"the arrays differ in length ({listed}); give one number a sample in each")
+    for name in units:
+        if name not in signals:
+            raise InputError(f"units names {name!r}, which is none of {', '.join(signals) or 'no arrays'}")
+    stated = [parse_unit(unit) for unit in units.values()]
+    linear = any(unit is not None and unit.kind in LINEAR.values() for unit in stated)
+    channels: dict[str, str] = {}
+    for name in signals:
+        role = ALIASES.get(name, name)
+        kind = KINDS[role][0]
+        channels[role] = f"{name}:{units.get(name) or SI[LINEAR.get(kind, kind) if linear else kind]}"
+    # A channel that is not given must not be guessed from another's name.
+    left_out = {role: "none" for role in KINDS if role not in channels}
+    return Table(FORMAT, tuple(columns)), channels | left_out
+
+
+def table_in_memory(data: Any) -> Table:
+    """The columns of a mapping of arrays, a data frame or a structured array; their names say what they are.
+
+    Raises
+    ------
+    InputError
+        If it holds no columns of numbers.
+    """
+    tree = data
+    if hasattr(data, "columns") and hasattr(data, "to_numpy"):
+        tree = {str(name): data[name].to_numpy() for name in data.columns}
+        if data.index.name is not None:  # a plain row number says nothing
+            tree = {str(data.index.name): data.index.to_numpy(), **tree}
+    if isinstance(tree, Mapping):
+        tree = {str(name): _plain(x) for name, x in cast("Mapping[Any, Any]", tree).items()}
+    table = table_of(FORMAT, tree)
+    if not table.columns:
+        raise InputError(
+            f"a {type(data).__name__} without columns of numbers is no log; give a path, a data frame, a mapping of "
+            "arrays, a Record, or arrays by name (t=..., position=..., torque=...)"
+        )
+    return table
+
+
+def _plain(values: Any) -> Any:
+    """Arrays of whatever library as NumPy's, dates and durations in s; anything else as it is."""
+    if not hasattr(values, "__array__"):
+        return values
+    numbers: np.ndarray[Any, Any] = np.asarray(values)
+    if numbers.dtype.kind not in "Mm":
+        return numbers
+    return numbers.astype(f"{numbers.dtype.kind}8[ns]").astype(np.int64) * 1e-9
+
+
+def digest_of(table: Table) -> str:
+    """SHA-256 of all columns, so that a result names what it comes from."""
+    digest = hashlib.sha256()
+    for column in table.columns:
+        digest.update(column.name.encode() + b"\0" + np.ascontiguousarray(column.values).tobytes())
+    return digest.hexdigest()

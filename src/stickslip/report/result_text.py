@@ -1,0 +1,39 @@
+"""An identification in lines of text: the numbers, how far they hold, and the next command."""
+
+from __future__ import annotations
+
+import math
+
+from stickslip.identify.estimate import Estimate, Identification
+from stickslip.report.answers import Answers, meaning_of, one_number_each
+
+__all__ = ["interval_text", "result_lines"]
+
+JUDGED = ("force_relative", "inverse_dynamics_relative", "position_", "rms_Nm", "rms_N")
+"""Misfits that sentences say, or that say little (the position of an open loop drifts); all are in `as_dict`."""
+
+
+def result_lines(found: Identification, answers: Answers) -> list[str]:
+    """Estimates with 95 % intervals, what is not identified and why, how far the torque is off, and what to do now."""
+    law = f": law {found.model.law.name!r}" if found.model else ""
+    out = [f"{found.method.replace('_', ' ')}{law}", ""]
+    width = max(16, *(len(e.name) + 2 for e in found.estimates)) if found.estimates else 16
+    meanings = meaning_of(found)
+    for e in found.estimates:
+        value = f"{'not determined':<40}" if e.undetermined else f"{e.value:>12.5g}  {interval_text(e):<26}"
+        verdict = "identified" if e.identified else "not identified"
+        out.append(f"{e.name:<{width}}{value} {e.unit:<11} {verdict:<16}{meanings[e.name]}".rstrip())
+    out += ["", *one_number_each(found.estimates), f"trust: {answers.trust}", *answers.evidence]
+    for name, number in found.misfit.items():
+        if not any(name.removeprefix("held_out_").startswith(n) for n in JUDGED):
+            out.append(f"{name:<32}{number:>12.5g}  {found.misfit_unit(name)}".rstrip())
+    out += [sentence for sentence in found.notes if sentence not in answers.told]
+    out += [f"next: {s.command}" if s.command else f"measure next: {s.what}" for s in answers.steps]
+    return out
+
+
+def interval_text(e: Estimate) -> str:
+    """The 95 % interval."""
+    if math.isnan(e.lower) or math.isnan(e.upper):
+        return "[unknown]"
+    return f"[{e.lower:.5g}, {e.upper:.5g}]"

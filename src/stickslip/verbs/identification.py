@@ -1,0 +1,270 @@
+"""What `identify` hands back: parameters with intervals and verdicts, the model, the report; a table in a notebook."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from stickslip.approval import allow_code
+from stickslip.config import Table
+from stickslip.errors import InputError
+from stickslip.finding import Finding
+from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.identified_file import Identified, identified_in
+from stickslip.identify.model_file import in_memory, model_content, versions, write_model
+from stickslip.identify.motion import motion_of, speeds_of
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model
+from stickslip.report.answers import Answers, answers_of
+from stickslip.report.identified import Source, files_of, write_identification
+from stickslip.report.result_text import interval_text, result_lines
+from stickslip.study.files import prepared_folder
+
+if TYPE_CHECKING:
+    import pandas
+
+__all__ = ["IdentificationResult"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class IdentificationResult:
+    """Numbers with intervals, a verdict on each, a model; printed, it is what `stickslip identify` prints.
+
+    Attributes
+    ----------
+    identification : stickslip.identify.estimate.Identification
+        The result of the method, with its correlation, pictures and details.
+    sources : tuple of Source
+        The records as they were used, with what the doctor found.
+    law_file : str
+        Path of the law's file; empty where it is registered.
+    """
+
+    identification: Identification
+    sources: tuple[Source, ...]
+    law_file: str = ""
+
+    @property
+    def method(self) -> str:
+        """The method that was taken."""
+        return self.identification.method
+
+    @property
+    def parameters(self) -> Mapping[str, Estimate]:
+        """Every number by name: ``value``, ``unit``, ``interval`` (95 %), ``identified``, ``verdict``.
+
+        ``verdict`` says why a number is not identified, and is empty where it is.
+        """
+        return MappingProxyType({e.name: e for e in self.identification.estimates})
+
+    @property
+    def model(self) -> Model:
+        """The law with its parameters, for `simulate`, compensators and `export`.
+
+        Raises
+        ------
+        InputError
+            Where the method yields no whole law.
+        """
+        if self.identification.model is None:
+            raise InputError(
+                f"{self.method} yields no whole law, so there is no model; take method sliding or axis"
+            )
+        return self.identification.model
+
+    @property
+    def axis(self) -> RigidAxis:
+        """The axis to simulate: inertia and friction.
+
+        Raises
+        ------
+        InputError
+            Where no inertia was identified or no law.
+        """
+        mechanics: Any = self.identification.details.get("mechanics")
+        if mechanics is None:
+            raise InputError(
+                f"{self.method} yields no inertia; take method axis, or RigidAxis(inertia, model)"
+            )
+        return RigidAxis(inertia=float(mechanics.inertia), friction=self.model)
+
+    @property
+    def verdict(self) -> str:
+        """Whether the numbers can be trusted, in a line."""
+        return self.answers.trust
+
+    @property
+    def evidence(self) -> tuple[str, ...]:
+        """Why, a sentence each."""
+        return self.answers.evidence
+
+    @property
+    def misfit(self) -> Mapping[str, float]:
+        """How well it fits, by name."""
+        return self.identification.misfit
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user must know, one sentence each."""
+        return self.identification.notes
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the doctor found in the logs."""
+        return self.identification.findings
+
+    @cached_property
+    def answers(self) -> Answers:
+        """What the friction is, whether it can be trusted, what to do now."""
+        return self.answers_with("model.toml")
+
+    def answers_with(self, model_file: str | os.PathLike[str]) -> Answers:
+        """The same, its commands for a model that lies in this file."""
+        fitted = [s for s in self.sources if not s.held_out]
+        return answers_of(self.identification, [s.record for s in fitted], Path(model_file), files_of(fitted))
+
+    def __getitem__(self, name: str) -> Estimate:
+        return self.identification[name]
+
+    # ---- files ----------------------------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str] = "model.toml") -> Path:
+        """Write the model with axis, intervals, correlation and data, as `recommend`, `export` and `compare` take it.
+
+        Parameters
+        ----------
+        path : path
+            Of a file that ends in .toml, or a folder, which then holds model.toml.
+
+        Raises
+        ------
+        InputError
+            If there is no whole law, or the file cannot be written.
+        """
+        target = Path(path)
+        target = target if target.suffix == ".toml" else target / "model.toml"
+        prepared_folder(target.parent)
+        self.model.warn(str(target))
+        return write_model(
+            target, self.identification, data=self._data, law=self.law_file, more=self._recorded()
+        )
+
+    def report(
+        self, path: str | os.PathLike[str] = "report.html", model_file: str | os.PathLike[str] | None = None
+    ) -> Path:
+        """Write the report, one HTML file: what the friction is, whether it can be trusted, pictures, what to do.
+
+        Parameters
+        ----------
+        path : path
+        model_file : path, optional
+            As its commands name the model; model.toml beside the report unless given.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        prepared_folder(Path(path).parent)
+        return write_identification(
+            path, self.identification, self.sources, versions=versions(), model_file=model_file
+        )
+
+    def identified(self) -> Identified:
+        """What reading the saved model gives, without a file.
+
+        Raises
+        ------
+        InputError
+            If there is no whole law.
+        """
+        with allow_code(bool(self.law_file)):  # it was named, and has run
+            return identified_in(self.table())
+
+    def table(self) -> Table:
+        """The content of the model's file."""
+        law = str(Path(self.law_file).resolve()) if self.law_file else ""
+        return in_memory(model_content(self.identification, self._data, law, self._recorded()))
+
+    @property
+    def _data(self) -> list[Mapping[str, Any]]:
+        return [s.about for s in self.sources]
+
+    def _recorded(self) -> dict[str, Any]:
+        """Tables of what the records hold besides friction: the first motion, the speeds, the side of the gear."""
+        fitted = [s for s in self.sources if not s.held_out and "position" in s.record.channels]
+        out: dict[str, Any] = {}
+        if fitted and (speeds := speeds_of([s.record for s in fitted])):
+            out["speeds"] = speeds
+        for source in fitted:
+            try:
+                out["trajectory"] = motion_of(source.record, source.name).table()
+                break
+            except InputError:
+                continue
+        drive: dict[str, Any] = fitted[0].record.meta.get("reading", {}).get("drive", {}) if fitted else {}
+        if "gear_ratio" in drive:
+            out["axis"] = {"seen_from": drive.get("side", "motor"), "gear_ratio": float(drive["gear_ratio"])}
+        return out
+
+    # ---- words ----------------------------------------------------------------------------------------------------
+
+    def as_dict(self) -> dict[str, Any]:
+        """Law, estimates, correlation, misfit and sentences as plain data."""
+        return self.identification.as_dict()
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The parameters as a data frame: value, lower, upper, unit, identified, verdict.
+
+        Raises
+        ------
+        InputError
+            Without pandas, which `pip install 'stickslip[pandas]'` brings.
+        """
+        try:
+            import pandas
+        except ModuleNotFoundError:
+            raise InputError("to_pandas() needs pandas; run `pip install 'stickslip[pandas]'`") from None
+        columns = ("value", "lower", "upper", "std", "unit", "identified", "verdict")
+        rows = {e.name: [getattr(e, c) for c in columns] for e in self.identification.estimates}
+        return pandas.DataFrame.from_dict(rows, orient="index", columns=list(columns))
+
+    def summary(self) -> str:
+        """Estimates with 95 % intervals, what is not identified and why, how far the torque is off, what to do now."""
+        return "\n".join(result_lines(self.identification, self.answers))
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def __repr__(self) -> str:
+        law = f", law {self.identification.model.law.name!r}" if self.identification.model else ""
+        good = sum(e.identified for e in self.identification.estimates)
+        return f"<IdentificationResult: method {self.method!r}{law}, {good} of {len(self.parameters)} identified>"
+
+    def _repr_html_(self) -> str:
+        """A table in a notebook, and what it is worth."""
+        rows = "".join(_row(e) for e in self.identification.estimates)
+        law = f": law {self.identification.model.law.name}" if self.identification.model else ""
+        head = "".join(f"<th>{h}</th>" for h in ("parameter", "value", "95 % interval", "unit", "verdict"))
+        more = "".join(f"<li>{escape(s)}</li>" for s in (*self.evidence, *self.answers.friction))
+        return (
+            f"<div><b>{escape(self.method.replace('_', ' ') + law)}</b>"
+            f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+            f"<p>Trust: {escape(self.verdict)}</p><ul>{more}</ul></div>"
+        )
+
+
+def _row(e: Estimate) -> str:
+    value = "not determined" if e.undetermined or math.isnan(e.value) else f"{e.value:.5g}"
+    verdict = (
+        "identified" if e.identified else f"not identified: {e.verdict or 'the data do not determine it'}"
+    )
+    cells = (e.name, value, interval_text(e), e.unit, verdict)
+    return "<tr>" + "".join(f"<td>{escape(c)}</td>" for c in cells) + "</tr>"

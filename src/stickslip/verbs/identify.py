@@ -1,0 +1,306 @@
+"""From logs to inertia, friction law, intervals and verdicts: the verb `identify`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, Unpack, cast
+
+import numpy as np
+
+from stickslip import plugins
+from stickslip.errors import InputError
+from stickslip.identify.axis_trial import DRIVES
+from stickslip.identify.doctor import Diagnosis, examine
+from stickslip.identify.estimate import Identification, silent
+from stickslip.identify.methods import method_named
+from stickslip.identify.methods.method import Options
+from stickslip.identify.on_a_line import along_a_line
+from stickslip.identify.regressions import Regress, Regressions
+from stickslip.model import Model
+from stickslip.readers.cut import file_rows, pieces
+from stickslip.record import Record
+from stickslip.report.identified import Source
+from stickslip.spec import Law
+from stickslip.verbs.identification import IdentificationResult
+from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, named, open_log
+
+__all__ = ["assumptions", "identify"]
+
+Loops = str | Mapping[str, float] | Sequence[str | Mapping[str, float]] | None
+
+
+def identify(
+    *logs: Log,
+    method: str = "axis",
+    law: str | Law | Sequence[str | Law] | None = None,
+    hold_out: Log | Sequence[Log] = (),
+    inertia: float | None = None,
+    values: Mapping[str, float] | None = None,
+    frozen: Iterable[str] = (),
+    free: Iterable[str] = (),
+    model: Model | str | os.PathLike[str] | None = None,
+    noise: float | None = None,
+    torque_channel: str = "",
+    elements: int = 0,
+    threshold: float | None = None,
+    loop: Loops = None,
+    loop_output: Literal["torque", "current", "voltage"] | None = None,
+    inverse: bool = False,
+    per_direction: bool = False,
+    pendulum: bool = False,
+    drive_gain: float | None = None,
+    resistance: float | None = None,
+    extra_torque: str = "",
+    torque_is: Literal["commanded", "actual", "mean"] | None = None,
+    delay: float | None = None,
+    harmonics: int = 0,
+    load: bool = False,
+    intervals: Literal["prediction", "covariance"] = "prediction",
+    robust: bool = False,
+    accept: Sequence[str] = (),
+    progress: Callable[[str], None] = silent,
+    tell: Callable[[str], None] = silent,
+    **reading: Unpack[Reading],
+) -> IdentificationResult:
+    """Identify an axis or its friction: numbers with intervals, a verdict on each, a model and a report.
+
+    Parameters
+    ----------
+    *logs : path, data frame, mapping of arrays, or Record
+        Fitted together; none where arrays are given by name (`t`, `position`, `torque`, ...).
+    method : str
+        One of `stickslip.identify.methods.METHODS`: "axis" (inertia, offset or gravity and friction jointly, from any
+        motion), "sliding" (constant velocities), "breakaway" (torque ramps), "presliding" and "attraction" (GMS),
+        "hysteresis" (a measured friction along its motion), "lugre" (sigma0, sigma1), "inertia" (frequency response).
+    law : str, Law or sequence of these, optional
+        A law's name or file, or "all". Of several the error on data left out chooses; None: the method's candidates.
+    hold_out : log or sequence of logs
+        Not fitted, judge the result (axis).
+    inertia : float, optional
+        kg·m² (kg), where it is known: it is then not fitted.
+    values : mapping of str to float, optional
+        Starting values of parameters, and known ones of `frozen`, in SI units.
+    frozen, free : iterable of str
+        Parameters that keep their value; that are fitted although they usually are not.
+    model : Model or path, optional
+        What an earlier identification found.
+    noise : float, optional
+        Standard deviation of what is fitted: N·m, or rad (lugre).
+    torque_channel : str
+        "motor_torque", "sensor_torque", ...: which one, of several (not axis).
+    elements : int
+        Of GMS (presliding); 0: chosen.
+    threshold : float, optional
+        Velocity that is motion, rad/s or m/s (breakaway); 0.01.
+    loop : str or mapping, or a sequence of them, optional
+        The sampled controller that drove the log, ``{"kp": 8.0, "kd": 0.08, "limit": 3.0}`` (also ki, kr, period,
+        count, span): with it and a reference in the log the closed loop is simulated. One for all logs, or one each.
+    loop_output : {"torque", "current", "voltage"}, optional
+        What its output is where no drive signal is recorded.
+    inverse, per_direction, pendulum, drive_gain, resistance, extra_torque, torque_is, delay, harmonics, load, \
+intervals, robust
+        As in `stickslip.identify.methods.method.Options`.
+    accept : sequence of str
+        Codes of errors of the doctor that count as warnings, since you know better.
+    progress, tell : callable
+        Are told what begins; what is odd about a log. Everything odd is in ``findings`` of the result, too.
+    **reading
+        Arrays, and how logs are read: see `stickslip.verbs.reading.Reading`.
+
+    Returns
+    -------
+    IdentificationResult
+
+    Raises
+    ------
+    InputError
+        One line that names the thing, its value and the remedy; an error of the doctor, too.
+    """
+    kind = method_named(method)
+    refused_for(method, kind.holds_out, threshold, bool(_listed(hold_out)))
+    regress = Regressions()
+    laws, left_out = laws_of(law)
+    known = dict(values or {}) | ({} if inertia is None else {"inertia": inertia})
+    options = Options(
+        laws, known, (*frozen, *(["inertia"] if inertia is not None and method == "axis" else [])), tuple(free),
+        model if model is None or isinstance(model, Model) else Model.from_file(model), noise, torque_channel, elements,
+        threshold, 0, inverse, per_direction, pendulum, drive_gain, reading.get("torque_constant"), resistance,
+        loop_output, extra_torque, torque_is, delay, harmonics, load, intervals, robust, regress, progress,
+    )  # fmt: skip
+    examiner = Examiner(accept, regress, tell)
+    sources = sources_of(logs, _listed(hold_out), loop, reading, examiner)
+    records = [s.record for s in sources]
+    options = replace(options, held_out=sum(s.held_out for s in sources))
+    if method == "axis" and friction_alone(records, options):
+        kind = method_named("hysteresis")
+        why = "the friction itself is recorded, and no torque of a drive"
+        tell(f"{why}: --method hysteresis is taken, a law along the motion")
+    kind.check(records, options)
+    for s in sources:
+        for finding in s.findings:
+            if finding.level == "warning":
+                tell(f"{s.about['file'] or s.name}: {finding.line()}")
+    progress(f"method {kind.name}, {sum(len(r) for r in records)} samples")
+    found = kind.identify(records, options)
+    if kind.name not in ("axis", "inertia") and all(r.units.get("position") == "m" for r in records):
+        found = along_a_line(found)
+    notes = (*found.notes, *assumptions(found, options, kind.name), *load_note(records, found), *left_out)
+    found = replace(found, notes=notes, findings=tuple(f for s in sources for f in s.findings))
+    return IdentificationResult(found, tuple(sources), law_file(found, () if inverse else laws))
+
+
+def refused_for(method: str, holds_out: bool, threshold: float | None, hold_out: bool) -> None:
+    """Refuse what the method would not look at."""
+    if threshold is not None and method != "breakaway":
+        raise InputError(f"--threshold is for --method breakaway; --method {method} has none")
+    if hold_out and not holds_out:
+        raise InputError(f"--hold-out is for --method axis; --method {method} has none")
+
+
+def laws_of(law: str | Law | Sequence[str | Law] | None) -> tuple[tuple[str | Law, ...], list[str]]:
+    """The laws, and what is to be said of those that "all" leaves out."""
+    asked: list[str | Law] = [] if law is None else [law] if isinstance(law, (str, Law)) else list(law)
+    if "all" not in asked:
+        return tuple(asked), []
+    names = plugins.law_names()
+    tried = [name for name in names if plugins.law(name).steady]
+    left_out = ", ".join(name for name in names if name not in tried)
+    said = f"Not among all laws, as they say no torque at constant velocity: {left_out}; name one with --law."
+    return (*tried, *(x for x in asked if x != "all" and x not in tried)), [said] if left_out else []
+
+
+# ---- logs ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Examiner:
+    """The doctor of `identify`: an error ends it."""
+
+    accept: Sequence[str]
+    regress: Regress
+    tell: Callable[[str], None]
+
+    def pieces(self, record: Record, name: str) -> list[Diagnosis]:
+        """What it says of a record; several pieces where many rows in a row are left out."""
+        parts, short = pieces(record)
+        every = [examine(part, accept=self.accept, regress=self.regress) for part in parts]
+        for found in every:
+            if found.errors:
+                raise InputError(f"{name}: {found.errors[0].line()}; see `stickslip doctor {name}`")
+        return [replace(every[0], findings=(*every[0].findings, *short)), *every[1:]]
+
+
+def sources_of(
+    logs: Sequence[Log], held_out: Sequence[Log], loop: Loops, reading: Reading, examiner: Examiner
+) -> list[Source]:
+    """Every log read, looked at by the doctor, with its loop."""
+    given: list[Log | None] = [*(logs or [None]), *held_out]
+    fitted = len(given) - len(held_out)
+    loops, beside = loops_of(loop, len(given)), beside_of(reading, len(given))
+    out: list[Source] = []
+    for number, (log, text, more) in enumerate(zip(given, loops, beside, strict=True)):
+        own = cast("Reading", {k: v for k, v in reading.items() if number < fitted or k not in ARRAYS})
+        own["beside"] = more
+        name = named(log)
+
+        def doctor(record: Record, name: str = name) -> list[Diagnosis]:
+            return examiner.pieces(record, name)
+
+        opened = open_log(log, own, doctor)
+        if opened.written or opened.tells_numbers:
+            for finding in opened.notes[:1]:
+                examiner.tell(f"{name}: {finding.line()}")
+        every = doctor(opened.record)
+        short = Path(name).name if log is not None and name != "the log" else f"log {number + 1}"
+        names = [short]
+        if len(every) > 1:
+            ends = [file_rows(d.record)[[0, -1]] for d in every]
+            names = [f"{short} rows {first}:{last}" for first, last in ends]
+        out += [
+            Source(n, with_loop(d.record, text), d.findings, about(d.record), number >= fitted)
+            for n, d in zip(names, every, strict=True)
+        ]
+    return out
+
+
+def _listed(logs: Log | Sequence[Log]) -> list[Log]:
+    """One log or several."""
+    several: Any = logs
+    return list(several) if isinstance(logs, (list, tuple)) else [logs]
+
+
+def loops_of(loop: Loops, count: int) -> list[str]:
+    """The text of the loop of every log: one for all, or one for each."""
+    if loop is None or loop == []:
+        return [""] * count
+    every = [loop] if isinstance(loop, (str, Mapping)) else list(loop)
+    if len(every) > 1 and len(every) != count:
+        raise InputError(
+            f"--loop is given {len(every)} times for {count} LOGs; give it once, or once for each"
+        )
+    texts = [x if isinstance(x, str) else ",".join(f"{k}={v!r}" for k, v in x.items()) for x in every]
+    return texts if len(texts) > 1 else texts * count
+
+
+def with_loop(record: Record, loop: str) -> Record:
+    """The record, its loop's text in meta."""
+    return replace(record, meta={**record.meta, "loop": loop}) if loop else record
+
+
+def about(record: Record) -> dict[str, Any]:
+    """File, hash and size of a record."""
+    reading: dict[str, Any] = record.meta.get("reading", {})
+    said = {"file": str(reading.get("file", "")), "sha256": reading.get("sha256", ""), "rows": len(record)}
+    kept = ", ".join(f"{a}:{b}" for a, b in reading.get("kept_rows", [])[:20])
+    return {**said, "rows_of_file": kept} if kept else said
+
+
+def friction_alone(records: Sequence[Record], options: Options) -> bool:
+    """Whether a record holds what an axis has no equation of motion for: friction as a sensor measures it."""
+    channels = set[str]().union(*(r.channels for r in records))
+    asked = options.inverse or options.held_out or len(records) != 1 or records[0].meta.get("loop")
+    return not asked and "friction_torque" in channels and not channels & set(DRIVES)
+
+
+# ---- what is said of the result -----------------------------------------------------------------------------------
+
+
+def assumptions(found: Identification, options: Options, method: str) -> list[str]:
+    """That parameters of the law which nobody gave were not fitted, and their values."""
+    given = {*options.values, *options.frozen, *found.details.get("untouched", ())}
+    values: dict[str, list[float]] = {}
+    for name, value in found.assumed.items() if options.model is None else ():
+        if name not in given and name.partition("[")[0] not in given:
+            values.setdefault(name.partition("[")[0], []).append(value)
+    if not values:
+        return []
+    listed = ", ".join(f"{name} = {', '.join(f'{x:.4g}' for x in own)}" for name, own in values.items())
+    fit = "; --free NAME fits one" if method == "axis" else ""
+    return [f"Assumed, not fitted: {listed}{fit}, --set NAME=VALUE takes another."]
+
+
+def load_note(records: Sequence[Record], found: Identification) -> list[str]:
+    """What the recorded normal load means for the friction found; empty without one."""
+    loads = [r["load"] for r in records if "load" in r.channels and r.units["load"] == "N"]
+    if not loads:
+        return []
+    values = np.abs(np.concatenate(loads))
+    low, mean, high = np.nanpercentile(values, 5), np.nanmean(values), np.nanpercentile(values, 95)
+    said = f"Normal load recorded: {mean:.4g} N ({low:.4g} to {high:.4g} in 90 % of the rows); friction holds at it"
+    levels = {e.name: e.value for e in found.estimates}
+    linear = all(r.units.get("position") == "m" for r in records)
+    if linear and mean > 0.0 and levels.get("fc", 0.0) > 0.0:
+        each = [levels["fc"], levels.get("fc_negative", levels["fc"])]
+        said += f", a coefficient of friction F_C / N of {0.5 * sum(each) / mean:.3g}"
+    return [f"{said}. No fit here follows the load: identify records of other loads alone."]
+
+
+def law_file(found: Identification, laws: Sequence[str | Law]) -> str:
+    """The file of the law that was taken, if it came from one."""
+    if found.model is None:
+        return ""
+    files = (x for x in laws if isinstance(x, str) and Path(x).suffix == ".py")
+    return next((x for x in files if plugins.law(x).name == found.model.law.name), "")

@@ -1,0 +1,86 @@
+"""What kind of file somebody gives, so that who wants another one says which it is and what takes it."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+__all__ = ["kind_of", "require"]
+
+WORDS = {
+    "record": ("a record", "a record (CSV, MAT, HDF5, Parquet, ...)"),
+    "model": ("a model", "a model (what `stickslip identify` wrote)"),
+    "study": ("a study", "a study (tables [friction.NAME], [references.NAME], ...)"),
+    "sweep": ("a sweep", "a sweep (`study` and tables [vary.NAME])"),
+    "tuning": ("a sweep with a table [tune]", "a sweep with a table [tune]"),
+    "simulation": ("a simulation", "a simulation (tables [friction], [reference], [controller])"),
+    "rig": ("a rig", "a rig (a machine's name, its TOML file, or one with a table [rig])"),
+    "report": ("a report", "a report"),
+}
+"""Each kind in two or three words, and how one that is asked for is described."""
+TAKEN_BY = {
+    "record": "`stickslip identify {0}` makes a model of it, `stickslip doctor {0}` checks it",
+    "model": "`stickslip recommend {0}`, `stickslip export {0} --to ...` and `stickslip compare A.toml B.toml` take it",
+    "study": "`stickslip study {0}` runs it",
+    "sweep": "`stickslip sweep {0}` runs it",
+    "tuning": "`stickslip tune {0}` runs it",
+    "simulation": "`stickslip simulate {0}` runs it",
+    "rig": "`stickslip rig run NAME --rig {0}` runs a procedure on it",
+    "report": "a browser shows it",
+}
+RECORDS = {
+    ".csv", ".tsv", ".txt", ".dat", ".log", ".asc", ".mat", ".h5", ".hdf5", ".parquet", ".npy", ".npz", ".tdms",
+    ".mf4", ".mdf", ".bag", ".mcap", ".db3",
+}  # fmt: skip
+REPORTS = {".html", ".htm", ".png", ".svg", ".pdf"}
+
+
+def kind_of(path: Path) -> str:
+    """One of `WORDS`, from the name and, of TOML, from the tables; "" where these do not tell."""
+    suffix = path.suffix.lower()
+    if suffix in RECORDS | REPORTS:
+        return "record" if suffix in RECORDS else "report"
+    if suffix != ".toml" or not path.is_file():
+        return ""
+    try:
+        return kind_of_toml(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, RecursionError):
+        return ""
+
+
+def kind_of_toml(table: Mapping[str, Any]) -> str:
+    """One of `WORDS`; "" where the tables do not tell."""
+    if "law" in table and ("parameters" in table or "format" in table):
+        return "model"
+    if "study" in table:
+        return "tuning" if "tune" in table else "sweep"
+    if "rig" in table:
+        return "rig"
+    friction = table.get("friction")
+    if "reference" in table and "controller" in table:
+        return "simulation"
+    return "study" if isinstance(friction, dict) and {"references", "controllers"} & table.keys() else ""
+
+
+def require(path: Path | str, *wanted: str) -> None:
+    """Refuse a file that is clearly of another kind; one that is not there, or not known, is left to its reader.
+
+    Parameters
+    ----------
+    path : Path or str
+    *wanted : str
+        Kinds that will do (`WORDS`), the usual one first.
+
+    Raises
+    ------
+    InputError
+        That names both kinds and the verb that takes the file.
+    """
+    from stickslip.errors import InputError
+
+    kind = kind_of(Path(path))
+    if not kind or kind in wanted or not Path(path).exists():
+        return
+    raise InputError(f"{path} is {WORDS[kind][0]}, not {WORDS[wanted[0]][1]}: {TAKEN_BY[kind].format(path)}")

@@ -1,0 +1,328 @@
+"""A log from wherever it is: a file of any known format, a data frame, arrays by name, or a record."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, TypedDict, Unpack, cast
+
+from numpy.typing import ArrayLike
+
+from stickslip.errors import InputError, UnknownName
+from stickslip.finding import Finding
+from stickslip.readers import profiles
+from stickslip.readers._convert import Drive
+from stickslip.readers.cut import Cut, cut, parse_rows, unwrapped
+from stickslip.readers.in_memory import digest_of, table_in_memory, table_of_signals
+from stickslip.readers.reading import joined, open_table, record_of, with_source
+from stickslip.record import Record
+from stickslip.verbs.kinds import require
+
+__all__ = ["ARRAYS", "Log", "Opened", "Reading", "beside_of", "named", "open_log", "read"]
+
+Log = str | os.PathLike[str] | Record | Any
+"""A path, a `Record`, a data frame, a mapping of arrays, or a structured array."""
+
+FORGET = "delete that file to forget it"
+SHORT = {"t": "time", "normal_force": "load"}
+SIGNALS = (
+    "t", "position", "reference", "velocity", "velocity_reference", "torque", "current", "voltage", "supply",
+    "friction_torque", "sensor_torque", "compensation_torque", "normal_force", "temperature",
+)  # fmt: skip
+NUMBERS = ("counts_per_rev", "rated_torque", "rated_current", "torque_constant", "gear_ratio", "lead")
+ARRAYS = (*SIGNALS, "units")
+"""What says the signals themselves."""
+PART = ("start", "end", "rows", "leave_out", "unwrap")
+COLUMNS = ("map", "profile", "sample_time", "beside", *(n for n in NUMBERS if n != "torque_constant"), "side")
+"""What a record that is read already has no use for."""
+
+
+class Reading(TypedDict, total=False):
+    """How a log is read: what `read`, `doctor` and `identify` take besides the log.
+
+    Signals in arrays, shape (n,), in SI units (rad, N·m, s) unless `units` says otherwise: `t`, `position`,
+    `reference` (of the position), `velocity`, `velocity_reference`, `torque` (of the motor), `current`, `voltage`,
+    `supply`, `friction_torque`, `sensor_torque`, `compensation_torque`, `normal_force`, `temperature`. `units` has the
+    same names: ``units={"position": "deg", "torque": "mN·m"}``; a linear axis has "m" and "N".
+
+    Of a file or a data frame: `map` says which column is a channel, ``{"position": "q_deg:deg"}`` (`stickslip.readers.
+    read` has all forms), `profile` is a TOML file of such mappings, `sample_time` (s) is for logs without times,
+    `beside` a second file of the same motion and clock. `remember` keeps the mapping for the next file with these
+    columns in your configuration folder, and uses what is kept there, as the command line does.
+
+    Numbers of the data sheet, where units need them: `counts_per_rev`, `rated_torque` (N·m), `rated_current` (A),
+    `torque_constant` (N·m/A), `gear_ratio`, `side` ("motor" or "load"), `lead` (m a revolution).
+
+    Part of the log: `start` and `end` (s), `rows` (first, last; counted from 1, both included, also as "A:B"),
+    `leave_out` (such ranges, or "spikes"), `unwrap` (count the position on where it jumps by a turn).
+    """
+
+    t: ArrayLike
+    position: ArrayLike
+    reference: ArrayLike
+    velocity: ArrayLike
+    velocity_reference: ArrayLike
+    torque: ArrayLike
+    current: ArrayLike
+    voltage: ArrayLike
+    supply: ArrayLike
+    friction_torque: ArrayLike
+    sensor_torque: ArrayLike
+    compensation_torque: ArrayLike
+    normal_force: ArrayLike
+    temperature: ArrayLike
+    units: Mapping[str, str]
+    map: Mapping[str, str] | Sequence[str]
+    profile: str | os.PathLike[str] | None
+    sample_time: float | None
+    beside: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] | None
+    remember: bool
+    counts_per_rev: float | None
+    rated_torque: float | None
+    rated_current: float | None
+    torque_constant: float | None
+    gear_ratio: float | None
+    side: Literal["motor", "load"] | None
+    lead: float | None
+    start: float | None
+    end: float | None
+    rows: str | tuple[int, int] | None
+    leave_out: Sequence[str | tuple[int, int]]
+    unwrap: bool
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A record, the profile that was used, the one that was written, and what is to be said of them."""
+
+    record: Record
+    used: Path | None = None
+    written: Path | None = None
+    notes: tuple[Finding, ...] = ()
+
+    @property
+    def tells_numbers(self) -> bool:
+        """Whether a saved profile, which nobody named, brings numbers of the drive into the result."""
+        return any(f.code == "profile" and " = " in f.message for f in self.notes)
+
+
+def read(log: Log | None = None, **reading: Unpack[Reading]) -> Record:
+    """Read a log as a record in SI units.
+
+    Parameters
+    ----------
+    log : path, data frame, mapping of arrays, structured array or Record, optional
+        Columns are known by their names and units; `map` says what these do not. Left out where arrays are given by
+        name: ``read(t=t, position=q, torque=tau)``.
+    **reading
+        How: see `stickslip.verbs.reading.Reading`.
+
+    Returns
+    -------
+    Record
+        Channels named as those of simulated records (position, velocity, motor_torque, position_reference, ...). What
+        was read from where, and with which factor, is in ``record.meta["reading"]``.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, columns are missing or ambiguous, or a unit needs a number that nobody gave.
+    """
+    opened = open_log(log, reading)
+    for finding in cast("list[dict[str, Any]]", opened.record.meta.get("reading", {}).get("findings", [])):
+        if finding["level"] == "error":
+            raise InputError(f"{named(log)}: {finding['message']}; {finding['remedy']}")
+    return opened.record
+
+
+def named(log: Log | None) -> str:
+    """What messages call a log."""
+    return os.fspath(cast("str", log)) if isinstance(log, (str, os.PathLike)) else "the log"
+
+
+def check_reading(given: Mapping[str, Any]) -> None:
+    """Refuse a name that is none of `Reading`.
+
+    Raises
+    ------
+    UnknownName
+    """
+    for name in given:
+        if name not in Reading.__annotations__:
+            raise UnknownName("argument", name, tuple(Reading.__annotations__))
+
+
+def open_log(
+    log: Log | None, reading: Reading, accept: Callable[[Record], object] = lambda _: None
+) -> Opened:
+    """As `read`, with what a saved profile had to do with it; ambiguous columns are left among the record's findings.
+
+    With `remember`, what `map` and the numbers say is kept for the next file with these columns, unless `accept` raises
+    on the record: what reads it wrongly is not for the next file.
+
+    Raises
+    ------
+    InputError
+    """
+    check_reading(reading)
+    said = cast("Mapping[str, Any]", reading)
+    signals = {SHORT.get(n, n): said[n] for n in SIGNALS if said.get(n) is not None}
+    if signals:
+        if log is not None:
+            raise InputError(f"{', '.join(signals)} and a log are two records; give one of them")
+        return Opened(_part(_of_signals(signals, reading), reading, "the arrays"))
+    if reading.get("units"):
+        raise InputError("units belongs to arrays by name; say a column's unit in map, such as q:deg")
+    if log is None:
+        raise InputError("no log; give a path, a data frame, or arrays: t=..., position=..., torque=...")
+    if isinstance(log, Record):
+        for name in COLUMNS:
+            if reading.get(name):
+                raise InputError(f"{name} is for reading columns, and a Record is read already; leave it out")
+        return Opened(_part(log, reading, "the record"))
+    if isinstance(log, (str, os.PathLike)):
+        return _of_file(Path(cast("str", log)), reading, accept)
+    return Opened(_part(_of_data(log, reading), reading, "the log"))
+
+
+def _of_signals(signals: Mapping[str, ArrayLike], reading: Reading) -> Record:
+    for name in ("map", "profile", "beside"):
+        if reading.get(name):
+            raise InputError(
+                f"{name} is for columns of files and frames; arrays say by their names what they are"
+            )
+    units = {SHORT.get(n, n): unit for n, unit in reading.get("units", {}).items()}
+    table, mapping = table_of_signals(signals, units)
+    record = record_of(table, mapping, drive=_drive(reading), sample_time=reading.get("sample_time"))
+    return _with_digest(record, digest_of(table))
+
+
+def _of_data(data: Any, reading: Reading) -> Record:
+    if reading.get("beside"):
+        raise InputError("beside joins two files; put the columns of both into one table instead")
+    table = table_in_memory(data)
+    profile = reading.get("profile")
+    record = record_of(
+        table, reading.get("map", ()), drive=_drive(reading), sample_time=reading.get("sample_time"),
+        profile=profiles.load(Path(profile)) if profile else None,
+    )  # fmt: skip
+    return _with_digest(record, digest_of(table))
+
+
+def _with_digest(record: Record, digest: str) -> Record:
+    said: dict[str, Any] = {**record.meta["reading"], "file": "", "sha256": digest}
+    return replace(record, meta={**record.meta, "reading": said})
+
+
+def _of_file(path: Path, reading: Reading, accept: Callable[[Record], object]) -> Opened:
+    require(path, "record")
+    table, period = open_table(path), reading.get("sample_time")
+    asked = reading.get("map", ())
+    mapping = [f"{k}={v}" for k, v in asked.items()] if isinstance(asked, Mapping) else list(asked)
+    if (beside := beside_of(reading, 1)[0]) is not None:
+        require(Path(beside), "record")
+        table = joined(table, beside, mapping, period)
+    profile = Path(given) if (given := reading.get("profile")) else None
+    keeps = bool(reading.get("remember", False))
+    found = profiles.remembered(table) if keeps else None
+    used = profile if profile and (profile.exists() or not keeps) else found
+    used = used if profile is None or used == profile else None
+    kept = profiles.load(used) if used else None
+    drive = _drive(reading)
+    record = _part(
+        record_of(table, mapping, drive=drive, profile=kept, sample_time=period), reading, str(path)
+    )
+    written = None
+    told = mapping or drive.known() != {"side": "motor"} or period is not None or (profile and not used)
+    if keeps and told:
+        accept(record)
+        merged = profiles.merged(mapping, drive, period, kept)
+        if kept is None or not profiles.alike(merged, kept):
+            written = profiles.save(replace(merged, seen=profiles.sizes(record)), table, profile)
+    notes: tuple[Finding, ...] = ()
+    if profile is None:
+        said = profiles.merged(mapping, drive, period, None)
+        notes = _profile_notes(used, kept, said, written)
+        if kept and not written:
+            notes += tuple(profiles.misfits(kept, record, said.drive.known()))
+        record.meta["reading"]["findings"] += [note.as_data() for note in notes]
+        record.meta["reading"]["profile"] = str(used) if used and notes and not written else ""
+    return Opened(with_source(record, path), used, written, notes)
+
+
+def _part(record: Record, reading: Reading, name: str) -> Record:
+    """The part of a record that is asked for, its position counted on where that is."""
+    try:
+        return _cut(record, reading)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+
+
+def _cut(record: Record, reading: Reading) -> Record:
+    if not any(name in reading for name in PART):
+        return record
+    if reading.get("unwrap"):
+        record = unwrapped(record)
+    ranges = reading.get("leave_out", ())
+    out = tuple(_rows("--leave-out", r) for r in ranges if r != "spikes")
+    start, end, rows = reading.get("start"), reading.get("end"), reading.get("rows")
+    part = cut(
+        record,
+        Cut(
+            -math.inf if start is None else start,
+            math.inf if end is None else end,
+            (1.0, math.inf) if rows is None else _rows("--rows", rows),
+            out,
+        ),
+    )
+    if "spikes" in ranges:
+        from stickslip.identify.doctor.spikes import spike_rows
+
+        part = cut(part, Cut(leave_out=tuple((n, n) for n in spike_rows(part).tolist())))
+    return part
+
+
+def _rows(option: str, given: str | tuple[int, int]) -> tuple[float, float]:
+    return parse_rows(option, given if isinstance(given, str) else f"{given[0]}:{given[1]}")
+
+
+def _profile_notes(
+    used: Path | None, kept: profiles.Profile | None, said: profiles.Profile, written: Path | None
+) -> tuple[Finding, ...]:
+    """That a profile which nobody named now says more than the options, and that one was written."""
+    notes: list[Finding] = []
+    if kept:
+        now, before = said.drive.known(), kept.drive.known()
+        more = [f"{role}={text}" for role, text in kept.mapping.items() if role not in said.mapping]
+        more += [f"{name} = {value}" for name, value in before.items() if name not in now]
+        more += ["side = load"] if (before["side"], now["side"]) == ("load", "motor") else []
+        if kept.sample_time is not None and said.sample_time is None:
+            more.append(f"sample_time = {kept.sample_time:g} s")
+        if more:
+            words = f"read by the saved profile {used}, which says {', '.join(more)}"
+            notes.append(Finding("note", "profile", words, remedy=FORGET))
+    if written and not notes:
+        words = f"how to read files with these columns is kept in the profile {written}"
+        notes.append(Finding("note", "profile", words, remedy=FORGET))
+    return tuple(notes)
+
+
+def _drive(reading: Reading) -> Drive:
+    said = cast("Mapping[str, Any]", reading)
+    given: dict[str, Any] = {n: said[n] for n in (*NUMBERS, "side") if said.get(n) is not None}
+    for name, value in given.items():
+        if value != value:  # to a `Drive`, NaN is a number that nobody gave
+            raise InputError(f"--{name.replace('_', '-')} {value} must be a number greater than 0")
+    return Drive(**given)
+
+
+def beside_of(reading: Reading, count: int) -> list[str | os.PathLike[str] | None]:
+    """The second file of every log."""
+    given = reading.get("beside")
+    every = [given] if isinstance(given, (str, os.PathLike)) else list(given or [])
+    if len(every) not in (0, count):
+        raise InputError(f"--with is given {len(every)} times for {count} LOGs; give it once for each")
+    return list(every) or [None] * count

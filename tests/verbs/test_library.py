@@ -1,0 +1,213 @@
+"""The library's functions: arrays, frames, files and records give the numbers that the command line gives."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+
+import stickslip as ss
+from stickslip.cli import main
+from stickslip.identify.identified_file import read_identified
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "identify"))
+import axis_cases as cases
+
+LOOP = {"kp": 8.0, "kd": 0.08, "kr": 0.08, "limit": 3.0}
+
+
+@pytest.fixture(scope="module")
+def signals() -> dict[str, np.ndarray]:
+    """An axis of known friction, as its numbers are in the file too."""
+    t = cases.trial("coulomb", noise=2e-3)
+    columns = {"t": t.time, "position": t.position, "torque": t.drive, "reference": t.reference}
+    return {name: np.array([float(f"{x:.9f}") for x in values]) for name, values in columns.items()}
+
+
+@pytest.fixture(scope="module")
+def log(signals: dict[str, np.ndarray], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("library") / "log.csv"
+    head = "time [s],position [rad],motor_torque [N·m],position_reference [rad]"
+    np.savetxt(path, np.stack(list(signals.values()), axis=1), "%.9f", ",", header=head, comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def result(signals: dict[str, np.ndarray]) -> ss.IdentificationResult:
+    return ss.identify(**signals, law="coulomb", loop=LOOP)
+
+
+def numbers(found: ss.IdentificationResult) -> dict[str, tuple[float, float, float]]:
+    return {e.name: (e.value, *e.interval) for e in found.parameters.values()}
+
+
+def test_the_same_log_gives_the_same_numbers_from_the_command_line_and_from_python(
+    log: Path, result: ss.IdentificationResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = ",".join(f"{k}={v}" for k, v in LOOP.items())
+    out = str(tmp_path / "axis")
+    options = ["--law", "coulomb", "--loop", text, "--out", out, "--no-report", "--json"]
+    assert main(["identify", str(log), *options]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    said = {e["name"]: (e["value"], e["lower"], e["upper"]) for e in printed["estimates"]}
+    from_file = ss.identify(log, law="coulomb", loop=LOOP)
+    assert numbers(from_file) == said
+    assert numbers(result) == said
+    assert from_file.misfit == printed["misfit"]
+    saved = read_identified(tmp_path / "axis" / "model.toml")
+    assert {e.name: (e.value, *e.interval) for e in saved.estimates} == said
+
+
+def test_a_data_frame_and_a_record_are_logs_too(
+    signals: dict[str, np.ndarray], result: ss.IdentificationResult
+) -> None:
+    frame = pandas.DataFrame({
+        "time [s]": signals["t"], "position [rad]": signals["position"], "torque [Nm]": signals["torque"],
+        "position_reference [rad]": signals["reference"],
+    })  # fmt: skip
+    for log in (frame, frame.set_index("time [s]"), ss.read(frame), dict(frame)):
+        assert numbers(ss.identify(log, law="coulomb", loop=LOOP)) == numbers(result)
+
+
+def test_a_result_has_parameters_with_interval_and_verdict(result: ss.IdentificationResult) -> None:
+    fc = result.parameters["fc"]
+    assert fc.interval[0] < cases.FC < fc.interval[1]
+    assert fc.identified
+    assert fc.verdict == ""
+    assert result.verdict.startswith(("Yes", "With care"))
+    assert result.model.law.name == "coulomb"
+    assert result.axis.inertia == pytest.approx(result.parameters["inertia"].value, rel=1e-12)
+    assert result.axis.friction.parameters == result.model.parameters
+    assert str(result).splitlines()[0] == "axis: law 'coulomb'"
+    assert repr(result) == "<IdentificationResult: method 'axis', law 'coulomb', 4 of 4 identified>"
+    assert result.to_pandas().loc["fc", "value"] == fc.value
+    with pytest.raises(ss.InputError, match="did you mean 'fc'"):
+        result["fcc"]
+
+
+def test_a_notebook_shows_a_table_in_which_nothing_of_the_user_is_markup(
+    result: ss.IdentificationResult,
+) -> None:
+    shown = result._repr_html_()
+    assert shown.count("<tr>") == 1 + len(result.parameters)
+    assert f"{result.parameters['fc'].value:.5g}" in shown
+    assert "Trust:" in shown
+    odd = ss.doctor({"t": np.arange(10.0), "position": np.arange(10.0), "<b>torque</b>": np.arange(10.0)})
+    assert "<b>" not in odd._repr_html_()
+
+
+def test_report_and_model_are_written_and_read_back(result: ss.IdentificationResult, tmp_path: Path) -> None:
+    model = result.save(tmp_path / "new" / "axis.toml")
+    assert result.save(tmp_path) == tmp_path / "model.toml"
+    saved, here = read_identified(model), result.identified()
+    assert saved.estimates == here.estimates
+    assert dict(saved.axis) == dict(here.axis)
+    assert saved.trajectory is not None
+    assert here.trajectory is not None
+    assert np.array_equal(saved.trajectory.position, here.trajectory.position)
+    page = result.report(tmp_path / "page.html", model)
+    assert "axis.toml" in page.read_text(encoding="utf-8")
+
+
+def test_what_is_known_is_not_fitted(signals: dict[str, np.ndarray]) -> None:
+    known = ss.identify(
+        **signals, law="coulomb", loop=LOOP, inertia=5e-4, values={"offset": 0.0}, frozen=["offset"]
+    )
+    assert set(known.parameters) == {"fc", "sigma2"}
+    assert known.axis.inertia == 5e-4
+
+
+def test_units_of_arrays_are_converted_and_named(signals: dict[str, np.ndarray]) -> None:
+    turned = np.degrees(signals["position"])
+    record = ss.read(t=signals["t"], position=turned, torque=1e3 * signals["torque"],
+                     units={"position": "deg", "torque": "mNm"})  # fmt: skip
+    assert np.allclose(record["position"], signals["position"], rtol=1e-12)
+    assert np.allclose(record["motor_torque"], signals["torque"], rtol=1e-12)
+    along = ss.read(t=signals["t"], position=turned, torque=turned, velocity=turned, units={"position": "mm"})
+    assert dict(along.units) == {"position": "m", "motor_torque": "N", "velocity": "m/s"}
+    assert not [f for f in ss.doctor(record).findings if f.code == "assumed-unit"]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, "no log; give a path"),
+        ({"t": [0.0, 1.0], "position": [0.0]}, "differ in length"),
+        ({"t": [0.0, 1.0], "position": ["a", "b"]}, "position is no array of numbers"),
+        ({"t": [[0.0]], "position": [0.0]}, "shape"),
+        ({"t": [0.0], "position": [0.0], "units": {"torque": "Nm"}}, "units names 'torque'"),
+        ({"t": [0.0], "position": [0.0], "units": {"position": "furlong"}}, "is not a unit that is known"),
+        ({"t": [0.0], "position": [0.0], "map": {"position": "q"}}, "map is for columns"),
+        ({"tork": [0.0]}, "did you mean 'torque'"),
+    ],
+)
+def test_bad_arrays_are_refused_in_one_line(given: dict[str, object], said: str) -> None:
+    with pytest.raises(ss.InputError, match=said):
+        ss.read(**given)  # type: ignore[arg-type]
+
+
+def test_two_logs_in_one_call_and_columns_of_a_record_are_refused(signals: dict[str, np.ndarray]) -> None:
+    record = ss.read(**signals)
+    with pytest.raises(ss.InputError, match="are two records"):
+        ss.read(record, **signals)
+    with pytest.raises(ss.InputError, match="read already"):
+        ss.read(record, map={"position": "q"})
+    with pytest.raises(ss.InputError, match="without columns of numbers"):
+        ss.read(object())
+
+
+def test_the_doctor_says_the_same_from_python(
+    log: Path, signals: dict[str, np.ndarray], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["doctor", str(log), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)["findings"]
+    assert [f.as_data() for f in ss.doctor(log).findings] == printed
+    broken = {**signals, "t": np.zeros_like(signals["t"])}
+    found = ss.doctor(**broken)
+    assert found.errors
+    with pytest.raises(ss.InputError):
+        found.raise_for_errors()
+
+
+def test_a_mapping_is_kept_only_where_that_is_asked_for(
+    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("STICKSLIP_CONFIG", str(tmp_path / "config"))
+    mapping = {"position": "position [rad]:deg"}
+    once = ss.read(log, map=mapping)
+    assert not (tmp_path / "config").exists()
+    ss.read(log, map=mapping, remember=True)
+    assert np.array_equal(ss.read(log, remember=True)["position"], once["position"])
+    assert np.allclose(ss.read(log)["position"], np.degrees(once["position"]))
+
+
+def test_an_unchanged_axis_compares_as_unchanged(result: ss.IdentificationResult, tmp_path: Path) -> None:
+    twice = ss.compare(result, result)
+    assert not [c for c in twice.changes if c.changed]
+    assert twice.as_dict() == ss.compare(result.save(tmp_path), result).as_dict()
+
+
+@pytest.mark.parametrize(
+    "first",
+    ["import stickslip.identify.axis", "from stickslip.identify import doctor", "import stickslip.verbs.identify"],
+)  # fmt: skip
+def test_the_function_is_there_whatever_was_imported_first(first: str) -> None:
+    code = (
+        f"{first}\nimport stickslip as ss, inspect\n"
+        "assert callable(ss.identify) and 'inertia' in inspect.signature(ss.identify).parameters\n"
+        "import stickslip.identify.axis as axis\nassert axis.identify_axis\n"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert out.returncode == 0, out.stderr
+
+
+def test_signatures_are_those_of_the_functions() -> None:
+    from stickslip.verbs.identify import identify
+
+    assert inspect.signature(ss.identify) == inspect.signature(identify)
