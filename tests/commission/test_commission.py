@@ -220,14 +220,14 @@ def test_what_is_recommended_is_run_as_it_was_measured_and_nothing_beside_it_is_
     )
     options = {"compensator": "recommended", "model": str(file)}
     rig = VirtualRig(replace(OTHER, filter=10.0))
-    using = Track(**options).controller(rig)
+    using = Track(**options).made(rig)
     assert using.compensator.filter_hz is None  # not the machine's own: it was measured without one
     assert using.gains == place("PD", 1e-3, 8.0, 1.0)
     for name in RECOMMENDED:
         with pytest.raises(InputError, match=f"{name} = .* beside compensator = recommended"):
             Track.with_options({**options, name: str(getattr(Track, name))})
     with pytest.raises(InputError, match="bandwidth = 12"):
-        Track(**options, bandwidth=12.0).controller(rig)
+        Track(**options, bandwidth=12.0).made(rig)
     file.write_text(file.read_text() + f"machine = {rig.name!r}\n")
     Track(**options).controller(VirtualRig(OTHER.without("cogging")))
     with pytest.raises(

@@ -146,7 +146,7 @@ def test_the_mean_torque_of_a_map_of_the_angle_leaves(file, tmp_path, capsys):
 def test_a_rig_runs_what_is_recommended_with_offset_and_inertia(file):
     """Behind an open position loop the compensator's torque is all there is."""
     rig = virtual_rig("ideal")
-    loop = Track(compensator="recommended", model=file(RECOMMENDED.format(more=FED))).controller(rig)
+    loop = Track(compensator="recommended", model=file(RECOMMENDED.format(more=FED))).made(rig)
     alone = Controller(Gains(kp=0.0), loop.compensator, sample_time=rig.sample_time)
     with Loop(rig) as run:
         run.run(setpoints(5, velocity=1.0, acceleration=100.0, closed=1.0), alone)

@@ -153,7 +153,7 @@ def test_track_divides_the_laws_step_as_it_is_told():
     given = {"compensator": "feedforward", "model": "lugre", "duration": "1", "filter": "400"}
     for parts in (1, 4):
         chosen = procedure("track").with_options({**given, "substeps": str(parts)})
-        controller = chosen.controller(rig)
+        controller = chosen.made(rig)
         assert controller.compensator.substeps == parts
         assert ("4 steps a sample" in chosen.plan(rig).text[0]) == (parts == 4)
         record = perform(chosen, rig).record

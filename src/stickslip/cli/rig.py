@@ -4,6 +4,7 @@ stickslip rig list
 stickslip rig run breakaway --rig thesis-dry --out breakaway.npz
 stickslip rig run sliding --rig thesis-grease --set velocities=5,1,0.2 --without cogging
 stickslip rig run track --rig thesis-dry --set compensator=feedforward --set model=lugre
+stickslip rig run track --rig thesis-dry --set controller=my_controller.toml      # made of control laws
 stickslip rig run inertia --rig my_machine.toml --dry-run
 stickslip rig run breakaway --rig drive.toml --limit torque=0.5 --stream breakaway.stream
 stickslip rig commission --rig thesis-dry --out commissioned      # the same again goes on where it was interrupted

@@ -78,7 +78,7 @@ class Following(Track):
     using: Controller | None = None
     over: AngleMap = NOTHING
 
-    def controller(self, rig: Rig) -> Controller:
+    def made(self, rig: Rig) -> Controller:
         """The one that was given."""
         assert self.using is not None
         return self.using

@@ -19,6 +19,7 @@ import numpy as np
 
 from stickslip.capacity import insist_on_memory
 from stickslip.control.controller import Controller
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, RigError, suggestion
 from stickslip.record import Record
 from stickslip.rigs._control import COLUMNS, UNITS
@@ -114,7 +115,7 @@ class Step:
     """
 
     wanted: Array
-    controller: Controller | None = None
+    controller: Controller | SampledController | None = None
     keep: bool = False
     average: int = 1
     pause: float = 0.0

@@ -1,4 +1,4 @@
-"""Track: the thesis's three references with any linear controller and compensator (4.3.1.2, 4.3.2.2)."""
+"""Track: the thesis's three references with any controller (4.3.1.2, 4.3.2.2)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ import numpy as np
 
 from stickslip.config import read_toml
 from stickslip.control.controller import Controller
+from stickslip.control.files import read_controller
 from stickslip.control.linear import LINEAR, Gains, place
 from stickslip.control.recommended import KINDS, read_recommended
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, UnknownName
 from stickslip.machines.angle import AngleMap
 from stickslip.model import Model, Reference
@@ -34,6 +36,8 @@ REFERENCES = {
 RECOMMENDED = ("linear", "bandwidth", "damping", "inertia", "gain", "filter", "lead", "deadband", "offset",
                "inertia_feedforward")  # fmt: skip
 """Options that a recommendation sets: it was simulated and measured with these, and with no others."""
+BESIDE_FILE = ("linear", "bandwidth", "damping", "compensator", "model", *RECOMMENDED[4:], "substeps")
+"""Options of what the file of a controller says itself."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,10 @@ class Track(Procedure):
     (rad/s), ``offset`` (N·m) and ``inertia_feedforward`` (kg·m²); or recommended: all of that from the ``model``, a
     recommended.toml of `stickslip rig commission` (of this machine) or `stickslip recommend`, and none of it given
     beside it. ``substeps`` divide the law's step over a sample, whichever compensator it is. What a file knows of the
-    angle (``[angle]``) is compensated as well. ``duration`` in s (0: the reference's own).
+    angle (``[angle]``) is compensated as well. Instead of all of it ``controller`` may be a TOML file with a table
+    ``[controller]`` that is made of control laws (`stickslip.control.files`; ``friction`` in it may name a model of the
+    machine); ``inertia`` is that of the axis where the file has no ``[axis]``. ``duration`` in s (0: the reference's
+    own).
     """
 
     name: ClassVar[str] = "track"
@@ -54,6 +61,7 @@ class Track(Procedure):
     signed: ClassVar[tuple[str, ...]] = ("gain", "offset")
 
     reference: str = "low"
+    controller: str = ""
     linear: str = "PD"
     bandwidth: float = 25.0
     damping: float = 1.0
@@ -76,6 +84,12 @@ class Track(Procedure):
         beside = [name for name in RECOMMENDED if name in given]
         if beside and given.get("compensator") == "recommended":
             raise InputError(beside_recommended(beside[0], given[beside[0]]))
+        beside = [name for name in BESIDE_FILE if name in given]
+        if beside and given.get("controller"):
+            raise InputError(
+                f"{beside[0]} = {given[beside[0]]} beside controller = {given['controller']}, which says all of it; "
+                "leave it out, or write it into the file"
+            )
         return super().with_options(given)
 
     @property
@@ -86,18 +100,28 @@ class Track(Procedure):
         reference, seconds = REFERENCES[self.reference]
         return reference, self.duration or seconds
 
-    def controller(self, rig: Rig) -> Controller:
-        """The controller with its compensator.
+    def made(self, rig: Rig) -> Controller | SampledController:
+        """The controller, with what it has room for below the rig's limit.
 
         Raises
         ------
         InputError
-            If a name is unknown or the model is missing.
+            If a name is unknown, the model is missing, or the file has no controller made of control laws.
         """
+        if not self.controller:
+            return self.compensated(rig)
+        machine: Any = getattr(rig, "machine", None)
+        known: dict[str, Model] = dict(machine.models) if machine is not None else {}
+        found = read_controller(self.controller, self.inertia, known)
+        limit = ROOM * rig.limits.torque
+        return dataclasses.replace(found, torque_limit=min(found.torque_limit, limit))
+
+    def compensated(self, rig: Rig) -> Controller:
+        """The controller with a compensator that the options describe."""
         if self.compensator == "recommended":
             loop = read_recommended(self.model)
             return dataclasses.replace(
-                self.recommended(rig.name).controller(rig), gains=loop.linear,
+                self.recommended(rig.name).compensated(rig), gains=loop.linear,
                 velocity_filter=loop.velocity_filter,
             )  # fmt: skip
         if self.linear not in LINEAR:
@@ -182,8 +206,10 @@ class Track(Procedure):
     def plan(self, rig: Rig) -> Plan:
         """The reference."""
         samples = self.samples(rig)
-        self.controller(rig)
+        self.made(rig)
         words = f"{self.linear} {self.bandwidth:g} Hz"
+        if self.controller:
+            words = f"by the controller of {self.controller}"
         if self.compensator == "recommended":
             words = f"as {self.model} recommends"
         elif self.compensator != "none":
@@ -209,7 +235,7 @@ class Track(Procedure):
             torque=self.angle().torque(position),
             closed=1.0,
         )
-        yield Step(wanted, self.controller(rig), keep=True, label=self.reference)
+        yield Step(wanted, self.made(rig), keep=True, label=self.reference)
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
         """The error and the torque's saturation; both are what is looked for, so that neither fails."""

@@ -8,27 +8,52 @@
     feedforward = {law = "friction_feedforward", friction = "lugre", gain = 0.9}
     observer = {law = "disturbance_observer", corner = 400.0}
 
+In a file of its own, `read_controller` reads it with the tables that it names: ``[laws.NAME]``, ``[axis]`` with the
+inertia, ``plugins``; what else the file holds (it may be one of `stickslip simulate`) is left alone.
+
 A place may hold a list of tables. Gains that are left out are placed; an inertia that is left out is the axis's.
 """
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, cast
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
 
 from stickslip import plugins
-from stickslip.config import Table
+from stickslip.config import Table, read_toml
 from stickslip.control.block import ControlBlock
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.errors import ConfigError, suggestion
 from stickslip.model import Model
+from stickslip.model_tables import law_files, models
 
-if TYPE_CHECKING:
-    from stickslip.study.build import Placement
+__all__ = ["Placement", "composed", "is_composed", "placement", "read_controller"]
 
-__all__ = ["composed", "is_composed"]
+NUMERICS = ("integrator", "tolerance", "time_step", "output")
+"""Keys of a controller's table that are not the controller's: how a simulation integrates it."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the poles of the loop without friction lie."""
+
+    bandwidth: float
+    """Natural frequency, Hz"""
+    damping: float
+    """Damping ratio of the pair"""
+
+
+def placement(table: Table) -> Placement | None:
+    """Read ``placement = {bandwidth_hz, damping}``, if it is there."""
+    if not table.has("placement"):
+        return None
+    with table.table("placement") as poles:
+        return Placement(poles.positive("bandwidth_hz", "Hz"), poles.positive("damping", ""))
 
 
 def is_composed(table: Table) -> bool:
@@ -36,11 +61,47 @@ def is_composed(table: Table) -> bool:
     return any(isinstance(table.values.get(place), (dict, list)) for place in PLACES)
 
 
+def read_controller(
+    path: str | os.PathLike[str], inertia: float, known: Mapping[str, Model] | None = None
+) -> SampledController:
+    """Read the controller of a file.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file with a table ``[controller]``.
+    inertia : float
+        Of the axis, kg·m², where the file has no ``[axis]``.
+    known : mapping of str to Model, optional
+        What ``friction`` may name besides the file's own ``[laws.NAME]``.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read, or its controller names no control laws.
+    """
+    whole = read_toml(Path(path))
+    files = law_files(whole)
+    own = models(whole.tables("laws"), files)
+    if whole.has("axis"):
+        inertia = whole.table("axis").positive("inertia", "kg·m²")
+    default = placement(whole.table("reference")) if whole.has("reference") else None
+    with whole.table("controller") as table:
+        for key in NUMERICS:
+            table.has(key)
+        if not is_composed(table):
+            raise ConfigError(
+                f'{table.label()} names no control laws; give it a loop, `loop = {{law = "pd"}}`'
+            )
+        laws = {name: law for name, law in files.items() if isinstance(law, ControlLaw)}
+        return composed(table, inertia, placement(table) or default, {**(known or {}), **own}, laws)
+
+
 def composed(
     table: Table,
     inertia: float,
     poles: Placement | None,
-    models: Mapping[str, Model],
+    known: Mapping[str, Model],
     laws: Mapping[str, ControlLaw],
 ) -> SampledController:
     """Read a controller made of control laws.
@@ -52,7 +113,7 @@ def composed(
         Of the axis, kg·m².
     poles : Placement or None
         Where gains that are left out place the poles.
-    models : mapping of str to Model
+    known : mapping of str to Model
         What ``friction`` may name.
     laws : mapping of str to ControlLaw
         Control laws from files, by name; the registered ones are known anyway.
@@ -63,7 +124,7 @@ def composed(
         One line that names the key, its value and what is allowed.
     """
     places: dict[str, Any] = {
-        place: [block(t, inertia, poles, models, laws) for t in listed(table, place)] for place in PLACES
+        place: [block(t, inertia, poles, known, laws) for t in listed(table, place)] for place in PLACES
     }
     estimator = places.pop("estimator")
     if len(estimator) > 1:
@@ -95,13 +156,13 @@ def block(
     table: Table,
     inertia: float,
     poles: Placement | None,
-    models: Mapping[str, Model],
+    known: Mapping[str, Model],
     laws: Mapping[str, ControlLaw],
 ) -> ControlBlock:
     """Read a control law, its choices, its friction law and its parameters."""
     with table, table.blamed():
         law = law_of(table, laws)
-        friction = models[table.choice("friction", models, family="laws")] if law.holds_friction else None
+        friction = known[table.choice("friction", known, family="laws")] if law.holds_friction else None
         options = {c.name for c in law.choices}
         given = table.rest()
         choices = {k: v for k, v in given.items() if k in options and isinstance(v, str)}

@@ -1,0 +1,128 @@
+"""From tables of a TOML file to friction models, and the laws in the files that it names as plugins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from stickslip import plugins
+from stickslip.config import Table
+from stickslip.control_spec import ControlLaw
+from stickslip.errors import ConfigError, suggestion
+from stickslip.model import Model
+from stickslip.spec import Described, Law
+
+__all__ = ["friction_laws", "law_files", "model", "models", "refuse_unknown"]
+
+
+def law_files(table: Table) -> dict[str, Law | ControlLaw]:
+    """The laws and control laws in the files that ``plugins`` lists, by name."""
+    found: dict[str, Law | ControlLaw] = {}
+    for path in table.files("plugins"):
+        with table.blamed():
+            named_by = table.label("plugins")
+            law = plugins.law_or_control_law(str(path), named_by) if path.suffix == ".py" else None
+            if law is None:
+                raise ConfigError(
+                    f"{table.label('plugins')}: {path.name} is no law's file; its name ends in .py"
+                )
+            if law.name in found or law.name in (*plugins.law_names(), *plugins.control_law_names()):
+                raise ConfigError(
+                    f"{table.label('plugins')}: {path.name} defines {law.name!r}, a name taken already"
+                )
+        found[law.name] = law
+    return found
+
+
+def models(tables: Mapping[str, Table], laws: Mapping[str, Law | ControlLaw]) -> dict[str, Model]:
+    """Read named models; one may be ``like`` another of them, with other values or scaled ones.
+
+    Parameters
+    ----------
+    tables : mapping of str to Table
+    laws : mapping of str to Law
+        Laws from files, by name; the registered ones are known anyway.
+    """
+    done: dict[str, Model] = {}
+    own = friction_laws(laws)
+    for name in tables:
+        _resolve(name, tables, own, done, ())
+    return {name: done[name] for name in tables}
+
+
+def friction_laws(laws: Mapping[str, Law | ControlLaw]) -> dict[str, Law]:
+    """Those of the laws that are friction laws."""
+    return {name: law for name, law in laws.items() if isinstance(law, Law)}
+
+
+def _resolve(
+    name: str,
+    tables: Mapping[str, Table],
+    laws: Mapping[str, Law],
+    done: dict[str, Model],
+    chain: tuple[str, ...],
+) -> Model:
+    if name not in done:
+        with tables[name] as table:
+            base: Model | None = None
+            if table.has("like"):
+                like = table.choice(
+                    "like", [n for n in tables if n != name], family=".".join(table.path[:-1])
+                )
+                if like in chain:
+                    raise table.error(
+                        "like", f"closes a circle ({' -> '.join((*chain, name, like))}); give a law"
+                    )
+                base = _resolve(like, tables, laws, done, (*chain, name))
+            done[name] = model(table, laws, base)
+    return done[name]
+
+
+def model(table: Table, laws: Mapping[str, Law], base: Model | None = None) -> Model:
+    """Read a law, its choices and its parameters; `base` fills what the table leaves out."""
+    scale: dict[str, Any] = {}
+    if table.has("scale"):
+        with table.table("scale") as factors:
+            scale = {key: factors.number(key, "") for key in factors.values}
+    with table.blamed():
+        if isinstance(table.values.get("law"), dict):
+            with table.table("law") as file:
+                base = Model.from_file(file.document.locate(file.text("model")))
+        law = base.law if base else _law(table, laws)
+        options = {c.name for c in law.choices}
+        given = table.rest()
+        choices = {k: v for k, v in given.items() if k in options and isinstance(v, str)}
+        if "slip_rule" in choices:
+            raise table.error("slip_rule", "belongs to the whole run; give it at the top of the file")
+        variant = law.having(**choices)
+        kept = {
+            f.name for f in variant.fields
+        }  # another curve leaves the parameters of the former one behind
+        inherited: dict[str, Any] = base.parameters._asdict() if base else {}
+        values = {k: v for k, v in inherited.items() if k in kept}
+        values.update({k: v for k, v in given.items() if k not in choices})
+        refuse_unknown(table, values, variant, options)
+        found = Model(law, choices, **values)
+        found = found.scaled(**scale) if scale else found
+        # A model that a file holds has been remarked upon as it was read.
+        return found if base and found.parameters == base.parameters else found.warn(table.label())
+
+
+def refuse_unknown(
+    table: Table, values: Mapping[str, Any], described: Described, others: Iterable[str] = ()
+) -> None:
+    """Refuse what is no parameter, before Python takes it for an argument of its own."""
+    names = [f.name for f in described.fields]
+    for key in values:
+        if key not in names:
+            remedy = suggestion(key, [*names, *others])
+            raise ConfigError(f"{table.label(key)}: {described.name} has no parameter {key!r}; {remedy}")
+
+
+def _law(table: Table, laws: Mapping[str, Law]) -> Law:
+    name = table.text("law")
+    if name.endswith(".py"):
+        return plugins.law(str(table.document.locate(name)), table.label("law"))
+    if name in laws:
+        return laws[name]
+    return plugins.law(table.choice("law", (*plugins.law_names(), *laws)))
