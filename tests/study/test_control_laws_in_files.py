@@ -161,7 +161,10 @@ def test_a_run_of_a_file_is_exported_to_c_as_it_is(tmp_path, capsys, monkeypatch
     if shutil.which("gcc") or shutil.which("clang"):
         assert "at most 0 N·m off the definition" in said
     assert Path("run-c99/run.c").read_text().count("loop_integral") > 2
-    assert main(["export", "run.toml", "--to", "st", "--controller"]) == 2
+    for target in ("arduino", "python", "matlab", "st", "fmu"):
+        assert main(["export", "run.toml", "--to", target, "--controller", "--check"]) == 0
+        assert Path(f"run-{target}", "README.md").exists()
+    assert main(["export", "run.toml", "--to", "urdf", "--controller"]) == 2
 
 
 def test_the_law_of_the_documentation_keeps_its_contract():

@@ -249,8 +249,14 @@ def _written(blocks: Mapping[str, ControlBlock]) -> dict[str, Callable[..., floa
     scope: dict[str, Any] = {}
     for name, (place, about) in SUMS.items():
         parts = [part for part, block in blocks.items() if block.law.place == place]
-        calls = " + ".join(f"{part}_sample(m, z.{part}, p.{part}, u)" for part in parts)
-        lines += [f"def {name}(m, z, p, u):", f'    """{about}"""', f"    return {calls or '0.0'}", ""]
+        calls = [f"{part}_sample(m, z.{part}, p.{part}, u)" for part in parts]
+        # One call a line: languages that pass structures by value have no other place for it.
+        lines += [
+            f"def {name}(m, z, p, u):",
+            f'    """{about}"""',
+            f"    torque = {calls[0] if calls else '0.0'}",
+        ]
+        lines += [*(f"    torque += {call}" for call in calls[1:]), "    return torque", ""]
         scope |= {f"{part}_sample": blocks[part].function("sample") for part in parts}
     able = [part for part, block in blocks.items() if block.law.take_over]
     scope |= {f"{part}_take_over": blocks[part].function("take_over") for part in able}

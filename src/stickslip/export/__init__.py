@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from stickslip.errors import UnknownName
 
 if TYPE_CHECKING:
+    from stickslip.export._controllers import ControllerTarget
     from stickslip.export.target import Target
 
-__all__ = ["TARGETS", "target_named"]
+__all__ = ["CONTROLLER_TARGETS", "TARGETS", "controller_target", "target_named"]
 
 TARGETS = (
     "c99",
@@ -42,4 +43,21 @@ def target_named(name: str) -> Target:
     if name not in TARGETS:
         raise UnknownName("export target", name, TARGETS)
     found: Target = importlib.import_module(f"stickslip.export.{name.replace('-', '_')}").TARGET
+    return found
+
+
+CONTROLLER_TARGETS = ("c99", "arduino", "python", "matlab", "st", "fmu")
+"""Those that carry a controller made of control laws: one file each, ``NAME_controller.py``."""
+
+
+def controller_target(name: str) -> ControllerTarget:
+    """What the target of that name does with a controller made of control laws.
+
+    Raises
+    ------
+    UnknownName
+    """
+    if name not in CONTROLLER_TARGETS:
+        raise UnknownName("target for a controller", name, CONTROLLER_TARGETS)
+    found: ControllerTarget = importlib.import_module(f"stickslip.export.{name}_controller").CONTROLLER
     return found

@@ -27,7 +27,18 @@ from stickslip.export._text import ascii_only, render
 from stickslip.export.job import Job
 from stickslip.spec import Field, Surroundings
 
-__all__ = ["VERSIONS", "Variable", "archive", "law_variables", "numbered", "surroundings_read", "units_of"]
+__all__ = [
+    "VERSIONS",
+    "Contents",
+    "Variable",
+    "archive",
+    "contents_of",
+    "field_variables",
+    "law_variables",
+    "numbered",
+    "surroundings_read",
+    "units_of",
+]
 
 VERSIONS = {"2.0": "fmi2", "3.0": "fmi3"}
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-builtin", "-fPIC", "-shared", "-fvisibility=hidden")
@@ -116,25 +127,36 @@ def unit_named(unit: str) -> str:
 def law_variables(job: Job) -> Iterable[Variable]:
     """Parameters and state of the law."""
     law, p = job.model.law, job.model.parameters
-    for f in law.fields:
-        value: Any = getattr(p, f.name)
-        values = value if f.per_element else (value,)
-        for i, v in enumerate(values):
+    elements = law.elements_in(p)
+    sizes = {f.name: elements for f in law.state_fields if f.per_element}
+    return field_variables(law.fields, p._asdict(), law.state_fields, sizes)
+
+
+def field_variables(
+    fields: Iterable[Field],
+    values: Mapping[str, Any],
+    states: Iterable[Field],
+    sizes: Mapping[str, int],
+    whose: str = ", of the contact",
+) -> Iterable[Variable]:
+    """Parameters with their values, and states, ``whose`` is said; those that are lists with their ``sizes``."""
+    for f in fields:
+        value: Any = values[f.name]
+        for i, v in enumerate(value if f.per_element else (value,)):
             yield _of_field(f, "p", i, "parameter", float(v))
-    for f in law.state_fields:
-        for i in range(law.elements_in(p) if f.per_element else 1):
-            yield _of_field(f, "z", i, "local", None)
+    for f in states:
+        for i in range(sizes[f.name] if f.per_element else 1):
+            yield _of_field(f, "z", i, "local", None, whose)
 
 
-def _of_field(f: Field, owner: str, i: int, causality: str, start: float | None) -> Variable:
+def _of_field(f: Field, owner: str, i: int, causality: str, start: float | None, whose: str = "") -> Variable:
     """The variable of a field, or of one of its elements (counted from 1, as the structured names are)."""
     name, place = f.name, f"{owner}.{safe(f.name)}"
     if f.per_element:
         name, place = f"{name}[{i + 1}]", f"{place}[{i}]"
     finite = {k: v for k, v in (("lower", f.par.lower), ("upper", f.par.upper)) if abs(v) < float("inf")}
     bounds: Mapping[str, Any] = {**finite, "positive": f.par.positive} if causality == "parameter" else {}
-    meaning = f"{f.par.meaning}, of the contact" if causality == "local" else f.par.meaning
-    return Variable(name, place, causality, unit_named(f.par.unit), meaning, start, **bounds)
+    return Variable(name, place, causality, unit_named(f.par.unit), f.par.meaning + whose, start, **bounds)
 
 
 def surroundings_read(job: Job) -> Iterable[Variable]:
@@ -166,8 +188,46 @@ def numbered(variables: Iterable[Variable]) -> list[Variable]:
     return out
 
 
+@dataclass(frozen=True)
+class Contents:
+    """What a unit holds besides its interface.
+
+    Attributes
+    ----------
+    name : str
+    title : str
+    sources : mapping of str to str
+        ``NAME.c`` and ``NAME.h``.
+    wholes : sequence of sequence of str
+        For every parameter whose elements share a whole, where they lie in the C structure of all values.
+    shared : str
+        The names of these parameters.
+    holding : bool
+        Whether the sources have a function that says whether the contact holds.
+    """
+
+    name: str
+    title: str
+    sources: Mapping[str, str]
+    wholes: Sequence[Sequence[str]] = ()
+    shared: str = ""
+    holding: bool = False
+
+
+def contents_of(job: Job) -> Contents:
+    """A law and its C."""
+    x, law = job.name, job.model.law
+    return Contents(
+        x, ascii_only(law.title),
+        {name: str(text) for name, text in c99.write(job).files.items() if name in (f"{x}.c", f"{x}.h")},
+        wholes_of(law.fields, job.model.parameters._asdict()),
+        ", ".join(f.name for f in law.fields if f.par.shares),
+        "_holding" in analyse(c99.translated(job)),
+    )  # fmt: skip
+
+
 def units_of(
-    job: Job, core: str, variables: Sequence[Variable], about: str, **more: Any
+    contents: Contents, core: str, variables: Sequence[Variable], about: str, **more: Any
 ) -> tuple[dict[str, bytes], tuple[str, ...]]:
     """The unit of each version by its file's name (2.0 has the plain one, most importers read it), and what to say.
 
@@ -176,8 +236,8 @@ def units_of(
     files: dict[str, bytes] = {}
     compiled = True
     for fmi, kind in VERSIONS.items():
-        name = f"{job.name}.fmu" if fmi == "2.0" else f"{job.name}_{kind}.fmu"
-        files[name], binary = archive(job, fmi, core, variables, about, **more)
+        name = f"{contents.name}.fmu" if fmi == "2.0" else f"{contents.name}_{kind}.fmu"
+        files[name], binary = archive(contents, fmi, core, variables, about, **more)
         compiled = compiled and binary
     missing = (
         "no compiler for Linux on x86-64 here, so the units hold sources only; `fmpy compile` builds them"
@@ -186,13 +246,13 @@ def units_of(
 
 
 def archive(
-    job: Job, fmi: str, core: str, variables: Sequence[Variable], about: str, **more: Any
+    contents: Contents, fmi: str, core: str, variables: Sequence[Variable], about: str, **more: Any
 ) -> tuple[bytes, bool]:
     """One unit as the bytes of its file, and whether it holds a binary.
 
     Parameters
     ----------
-    job : Job
+    contents : Contents
     fmi : {"2.0", "3.0"}
     core : str
         Template of the values and of a step.
@@ -202,17 +262,15 @@ def archive(
     **more
         For the template.
     """
-    kind, x = VERSIONS[fmi], job.name
-    c_files = {name: text for name, text in c99.write(job).files.items() if name in (f"{x}.c", f"{x}.h")}
+    kind, x, c_files = VERSIONS[fmi], contents.name, dict(contents.sources)
     sources = [f"{x}.c", f"{x}_{kind}.c"]
     units = [
         {"name": u, "base": BASE_UNITS.get(u)} for u in sorted({"s", *(v.unit for v in variables)} - {""})
     ]
     values: dict[str, Any] = {
         "x": x, "fmi": fmi, "core": core, "variables": variables, "about": about, "sources": sources, "units": units,
-        "title": ascii_only(job.model.law.title), "surroundings": ", ".join(repr(u) for u in Surroundings()),
-        "wholes": wholes_of(job), "shared": ", ".join(f.name for f in job.model.law.fields if f.par.shares),
-        "holding": "_holding" in analyse(c99.translated(job)), **more,
+        "title": contents.title, "surroundings": ", ".join(repr(u) for u in Surroundings()),
+        "wholes": contents.wholes, "shared": contents.shared, "holding": contents.holding, **more,
     }  # fmt: skip
     described = render(f"fmu_{kind}.xml.j2", token="", **values)
     token = str(uuid.uuid5(uuid.NAMESPACE_URL, described + "".join(map(str, c_files.values()))))
@@ -229,12 +287,11 @@ def archive(
     return _zipped(files), bool(binary)
 
 
-def wholes_of(job: Job) -> list[list[str]]:
+def wholes_of(fields: Iterable[Field], values: Mapping[str, Any]) -> list[list[str]]:
     """For every parameter whose elements share a whole, where they lie in the C structure of all values."""
-    law, p = job.model.law, job.model.parameters
     return [
-        [f"p.{safe(f.name)}[{i}]" for i in range(len(getattr(p, f.name)))]
-        for f in law.fields
+        [f"p.{safe(f.name)}[{i}]" for i in range(len(values[f.name]))]
+        for f in fields
         if f.par.shares and f.per_element
     ]
 

@@ -14,7 +14,7 @@ from stickslip.export._analysis import Facts, analyse
 from stickslip.export._hoist import hoisted
 from stickslip.export._language import ATOM, Language
 
-__all__ = ["HELPERS", "functions", "local", "safe"]
+__all__ = ["functions", "local", "safe", "with_helpers"]
 
 MATH = {"fabs": "abs", "pow": "power"} | {
     n: n for n in ("exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
@@ -179,6 +179,12 @@ def safe(name: str) -> str:
 def local(name: str) -> str:
     """A name that MATLAB allows: none begins with an underscore."""
     return name.strip("_") + "_"
+
+
+def with_helpers(lines: Sequence[str]) -> list[str]:
+    """The lines of a file with those functions that it uses and MATLAB lacks."""
+    used = "\n".join(lines)
+    return [*lines, *(code for name, code in HELPERS.items() if f"{name}(" in used)]
 
 
 def functions(trees: Mapping[str, ast.FunctionDef]) -> list[tuple[str, str, list[str]]]:

@@ -20,7 +20,7 @@ from stickslip.export._st_names import RESERVED, named_in_st
 
 __all__ = ["HELPERS", "Names", "functions", "number"]
 
-TYPES = ("parameters", "state", "surroundings")
+TYPES = ("parameters", "state", "surroundings", "settings", "memory")
 IGNORED = {"BOOL": "done", "LREAL": "left_out"}
 """What takes a result that nobody wants."""
 

@@ -8,15 +8,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from types import SimpleNamespace
 from typing import Any
 
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.sampled_controller import SampledController
-from stickslip.errors import InputError
-from stickslip.export._analysis import Facts, analyse, merged
+from stickslip.export._analysis import Facts, analyse
 from stickslip.export._c import Dialect, functions, head, safe
 from stickslip.export._c_control import rows_of
+from stickslip.export._controllers import (
+    ControllerTarget,
+    checked_name,
+    counts_of,
+    golden_samples,
+    laws_of,
+    settings_of,
+    table_of,
+    trees_of,
+)
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.c99 import (
     SINGLE_BOUND,
@@ -28,12 +36,11 @@ from stickslip.export.c99 import (
     scale_of,
     structure,
 )
-from stickslip.export.golden import Samples, as_csv, changing, random_motion, sampled_torques
-from stickslip.export.job import IDENTIFIER, Check, Export
+from stickslip.export.golden import as_csv
+from stickslip.export.job import Check, Export
 from stickslip.spec import Field, Surroundings, fields_of
-from stickslip.subset import named
 
-__all__ = ["check", "golden_samples", "write"]
+__all__ = ["CONTROLLER", "check", "write"]
 
 PUBLIC = ("_sample", "_sample_turns", "_follow", "_follow_turns")
 NARROW = "float turns, float position, float reference_turns, float reference, "
@@ -43,7 +50,7 @@ WIDE = {
 }
 
 
-def write(controller: SampledController, name: str, *, single: bool = False) -> Export:
+def write(controller: SampledController, name: str, single: bool = False) -> Export:
     """Header, source, golden samples, a program that checks them, and how to use it.
 
     Parameters
@@ -59,9 +66,7 @@ def write(controller: SampledController, name: str, *, single: bool = False) -> 
     InputError
         If `name` is none in C.
     """
-    if not IDENTIFIER.fullmatch(name):
-        raise InputError(f"{name!r} is no name in C; use letters, digits and _, a letter first (--name)")
-    dialect = Dialect(name, single, STRUCTURES)
+    dialect = Dialect(checked_name(name), single, STRUCTURES)
     common = {**code_of(controller, dialect), **numbers_of(controller, dialect)}
     samples = golden_samples(controller)
     common |= {
@@ -85,27 +90,13 @@ def check(export: Export, name: str) -> Check:
     return checked(export, name)
 
 
-def golden_samples(controller: SampledController, count: int = 400, seed: int = 1) -> Samples:
-    """Random samples and the torque of plain Python, from the first sample on, while load and temperature change."""
-    stiffness = controller.values().get("loop_kp", 0.0)
-    reach = controller.torque_limit / stiffness if stiffness else 1.0
-    inputs = random_motion(controller.sample_time, reach, count, seed)
-    n, m = controller.settings._replace(clock=1.0), controller.memory()
-    z, p, u = controller.state(), controller.parameters, SimpleNamespace(**Surroundings()._asdict())
-    sample, change = controller.functions["sample"], changing(Surroundings(), count, seed)
-    torque = sampled_torques(lambda *row: sample(*row, n, m, z, p, u), u, inputs, change)
-    return Samples(*inputs, torque, *change)
-
-
 # ---- what the templates are filled with ----------------------------------------------------------------------------
 
 
 def code_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
     """Names, structures and functions."""
-    found = controller.functions
     # In single precision the ones with whole positions are `wide`.
-    entries = {n: found[n[1:]] for n in PUBLIC if n.endswith("_turns") or not dialect.single}
-    trees = merged(named(entries, controller.layouts))
+    trees = trees_of(controller, [n for n in PUBLIC if n.endswith("_turns") or not dialect.single])
     known, public = analyse(trees), [n for n in PUBLIC if n in trees]
     written = functions(trees, dialect, public)
     about = {n: ascii_only(first_line(doc)) for n, doc, _ in written}
@@ -116,34 +107,28 @@ def code_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
         "X": x.upper(),
         "real": dialect.real,
         "title": "Sampled controller",
-        "laws": [
-            ascii_only(f"{part}: {block.law.title}; {', '.join(block.law.source)}")
-            for part, block in controller.blocks.items()
-        ],
+        "laws": laws_of(controller),
         "structures": list(structures(controller, dialect)),
         "public": [{"about": about[n], "head": head(n, known[n], dialect)} for n in public],
         "wide": list(wide(known, dialect)),
         "functions": [{"about": about[n], "lines": lines} for n, _, lines in written],
+        "small": [n for n in ("expm1f", "log1pf") if f"{n}(" in text],
         "extremes": [n for n in ("min", "max") if f"{x}_{n}(" in text],
     }
 
 
 def numbers_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
     """Values of the structures."""
-    values, settings = controller.values(), controller.settings._replace(clock=1.0)._asdict()
-    lists = [f for f in controller.fields if f.per_element]
+    values = controller.values()
     return {
         "sample_time": controller.sample_time,
         "unlimited": math.isinf(controller.torque_limit),
-        "counts": {dialect.count(f"{f.par.per}s_"): len(values[f.name]) for f in lists},
+        "counts": {dialect.count(name): size for name, size in counts_of(controller).items()},
         "designed": [*initial(controller.fields, values, dialect)],
-        "settings": [*given(fields_of(Settings), settings, "n", dialect)],
+        "settings": [*given(fields_of(Settings), settings_of(controller), "n", dialect)],
         "reset": [*cleared(MEMORY, "m", dialect), *cleared(controller.state_fields, "z", dialect)],
         "surroundings": ", ".join(dialect.number(x) for x in Surroundings()),
-        "table": [
-            {"name": f.name, "value": values[f.name], "unit": f.par.unit, "meaning": f.par.meaning}
-            for f in controller.fields
-        ],
+        "table": [*table_of(controller)],
     }
 
 
@@ -182,3 +167,6 @@ def cleared(fields: tuple[Field, ...], owner: str, dialect: Dialect) -> Iterable
             yield f"{owner}->{safe(f.name)} = {zero};"
     if not fields:
         yield f"{owner}->none = 0;"
+
+
+CONTROLLER = ControllerTarget(write, check)

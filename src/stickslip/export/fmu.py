@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.export._fmu import Variable, law_variables, numbered, surroundings_read, units_of
+from stickslip.export._fmu import Variable, contents_of, law_variables, numbered, surroundings_read, units_of
 from stickslip.export._fmu_run import played
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import render
@@ -55,7 +55,7 @@ def write(job: Job) -> Export:
     variables = variables_of(job)
     about = f"Friction torque of a contact: {job.model.law.title}"
     slope = {"of": variables[0].reference, "place": variables[1].place}
-    files, notes = units_of(job, "fmu_contact.c.j2", variables, about, slope=slope)
+    files, notes = units_of(contents_of(job), "fmu_contact.c.j2", variables, about, slope=slope)
     readme = render(
         "fmu_readme.md.j2",
         x=job.name,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.export._fmu import Variable, law_variables, numbered, surroundings_read, units_of
+from stickslip.export._fmu import Variable, contents_of, law_variables, numbered, surroundings_read, units_of
 from stickslip.export._fmu_run import played
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import render
@@ -78,7 +78,7 @@ def write(job: Job) -> Export:
     about = f"Axis with friction: {job.model.law.title}"
     variables = variables_of(job)
     files, notes = units_of(
-        job,
+        contents_of(job),
         "fmu_axis.c.j2",
         variables,
         about,

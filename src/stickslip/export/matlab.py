@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from stickslip.export._matlab import HELPERS, functions, local, safe
+from stickslip.export._matlab import functions, local, safe, with_helpers
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import PACE, as_csv, golden_around
@@ -17,7 +17,7 @@ from stickslip.export.target import Target
 from stickslip.spec import Surroundings
 from stickslip.subset import law_layouts, named
 
-__all__ = ["BOUND", "TARGET"]
+__all__ = ["BOUND", "TARGET", "in_octave"]
 
 BOUND = 1e-12
 """Largest relative error in Octave, whose exp and power are not the C library's."""
@@ -67,11 +67,7 @@ def _file(job: Job, entry: str, parts: list[tuple[str, str, list[str]]]) -> str:
     text = [*lines, ""]
     for _, doc, code in inner:
         text += [code[0], f"    % {first_line(doc)}", *code[1:], ""]
-    used = "\n".join(text)
-    for name, code in HELPERS.items():
-        if f"{name}(" in used:
-            text.append(code)
-    return "\n".join(text)
+    return "\n".join(with_helpers(text))
 
 
 def _parameters(job: Job) -> Iterable[str]:
@@ -108,13 +104,18 @@ def _surroundings(job: Job) -> Iterable[str]:
 
 def check(job: Job, export: Export) -> Check:
     """Run the golden vectors in Octave."""
+    return in_octave(export, job.name)
+
+
+def in_octave(export: Export, x: str) -> Check:
+    """Run the script that checks the export of that name in Octave."""
     tool = shutil.which("octave-cli") or shutil.which("octave")
     if tool is None:
         return Check(None, "Octave is not installed")
     with TemporaryDirectory() as folder:
         for name, content in export.files.items():
             Path(folder, name).write_text(str(content), encoding="utf-8")
-        command = [tool, "--no-gui", "--norc", "--quiet", "--eval", f"{job.name}_check"]
+        command = [tool, "--no-gui", "--norc", "--quiet", "--eval", f"{x}_check"]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     try:
         error = float(done.stdout.split()[-1])

@@ -17,8 +17,7 @@ from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
-__all__ = ["TARGET"]
-
+__all__ = ["TARGET", "alone", "constant", "count_by_constant", "indent_docstring"]
 
 SUBSTEPS = "`contact.step(v0, v1, dt, substeps=4)` divides a step, the velocity linear in between."
 
@@ -28,8 +27,8 @@ def write(job: Job) -> Export:
     law, p = job.model.law, job.model.parameters
     trees = named({"step": law.step, **({"steady": law.steady} if law.steady else {})}, law_layouts(law))
     for tree in trees.values():
-        _count_by_constant(tree, counts_in(job.model))
-        _indent_docstring(tree)
+        count_by_constant(tree, counts_in(job.model))
+        indent_docstring(tree)
     text = render(
         "python.py.j2",
         x=job.name,
@@ -58,14 +57,14 @@ def constant(name: str) -> str:
     return name.strip("_").upper()
 
 
-def _count_by_constant(tree: ast.FunctionDef, counts: Iterable[str]) -> None:
+def count_by_constant(tree: ast.FunctionDef, counts: Iterable[str]) -> None:
     """Call the numbers of elements by the names of the module's constants."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and node.id in counts:
             node.id = constant(node.id)
 
 
-def _indent_docstring(tree: ast.FunctionDef) -> None:
+def indent_docstring(tree: ast.FunctionDef) -> None:
     """Set the docstring in, which the unparser leaves as it is."""
     text = ast.get_docstring(tree)
     if text and "\n" in text:
@@ -86,10 +85,15 @@ def _cleared(fields: Iterable[Field]) -> Iterable[str]:
 
 def check(job: Job, export: Export) -> Check:
     """Run the file by itself, away from this package, on its golden vectors."""
+    return alone(export, job.name, "golden.csv")
+
+
+def alone(export: Export, name: str, vectors: str) -> Check:
+    """Run the file of that name by itself, away from this package, on the golden vectors of that file."""
     with TemporaryDirectory() as folder:
-        for name, content in export.files.items():
-            Path(folder, name).write_text(str(content), encoding="utf-8")
-        command = [sys.executable, "-I", f"{job.name}.py", "golden.csv"]
+        for file, content in export.files.items():
+            Path(folder, file).write_text(str(content), encoding="utf-8")
+        command = [sys.executable, "-I", f"{name}.py", vectors]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode not in (0, 1) or not done.stdout:
         return Check(False, f"the file does not run: {done.stderr.strip().splitlines()[-1:]}")

@@ -1,0 +1,46 @@
+"""Arduino: the C of a controller made of control laws as a library with an example, in single precision."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from stickslip.control.sampled_controller import SampledController
+from stickslip.export import c99_controller
+from stickslip.export._controllers import ControllerTarget, laws_of, table_of
+from stickslip.export._text import render
+from stickslip.export.arduino import tried
+from stickslip.export.job import Export
+from stickslip.spec import Surroundings
+
+__all__ = ["CONTROLLER"]
+
+
+def write(controller: SampledController, name: str, single: bool = True) -> Export:
+    """Sources, an example, the library's properties, and the check of the C export."""
+    c = c99_controller.write(controller, name, single=True).files
+    values: dict[str, Any] = {
+        "x": name,
+        "title": "Sampled controller",
+        "laws": laws_of(controller),
+        "table": [*table_of(controller)],
+        "surroundings": ", ".join(f"{u!r}f" for u in Surroundings()),
+        "sample_time": controller.sample_time,
+        "controller": True,
+        "sentence": "Controller of a servo axis.",
+    }
+    return Export(
+        {
+            f"src/{name}.h": c[f"{name}.h"],
+            f"src/{name}.cpp": str(c[f"{name}.c"]).replace(
+                f"see {name}.h.", f"see {name}.h. C that C++ compilers read too."
+            ),
+            "examples/Step/Step.ino": render("arduino_controller.ino.j2", **values),
+            "library.properties": render("arduino.properties.j2", **values),
+            f"extras/{name}_check.c": c[f"{name}_check.c"],
+            "extras/golden_samples.csv": c["golden_samples.csv"],
+            "README.md": render("arduino_controller_readme.md.j2", **values),
+        }
+    )
+
+
+CONTROLLER = ControllerTarget(write, tried)

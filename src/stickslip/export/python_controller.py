@@ -1,0 +1,88 @@
+"""Python: a controller made of control laws as one file without dependencies; its functions are the laws' own."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from stickslip.control.composition import MEMORY, Settings
+from stickslip.control.sampled_controller import SampledController
+from stickslip.export._controllers import (
+    ControllerTarget,
+    checked_name,
+    counts_of,
+    golden_samples,
+    laws_of,
+    settings_of,
+    table_of,
+    trees_of,
+)
+from stickslip.export._text import render
+from stickslip.export.golden import as_csv
+from stickslip.export.job import Check, Export
+from stickslip.export.python import alone, constant, count_by_constant, indent_docstring
+from stickslip.spec import Field, Surroundings, fields_of
+
+__all__ = ["CONTROLLER"]
+
+PUBLIC = ("sample", "sample_turns", "follow", "follow_turns")
+
+
+def write(controller: SampledController, name: str, single: bool = False) -> Export:
+    """One module, golden samples, and how to use it."""
+    counts, trees = counts_of(controller), trees_of(controller, PUBLIC)
+    for tree in trees.values():
+        count_by_constant(tree, counts)
+        indent_docstring(tree)
+    common: dict[str, Any] = {
+        "x": checked_name(name),
+        "laws": laws_of(controller),
+        "sample_time": controller.sample_time,
+        "table": [*table_of(controller)],
+    }
+    text = render(
+        "python_controller.py.j2",
+        counts={constant(n): size for n, size in counts.items()},
+        parameters=[*assigned(controller.fields, controller.values())],
+        settings=[*assigned(fields_of(Settings), settings_of(controller))],
+        states=[*cleared(controller.state_fields)],
+        memory=[*cleared(MEMORY)],
+        around=[f"{n}={value!r}" for n, value in Surroundings()._asdict().items()],
+        functions=[ast.unparse(tree) for tree in trees.values()],
+        **common,
+    )
+    return Export(
+        {
+            f"{name}.py": text,
+            "golden_samples.csv": as_csv(golden_samples(controller)),
+            "README.md": render("python_controller_readme.md.j2", **common),
+        }
+    )
+
+
+def number(value: Any) -> str:
+    """A number, or a list of them, as Python writes it."""
+    return "math.inf" if value == math.inf else repr(value)
+
+
+def assigned(fields: Iterable[Field], values: Mapping[str, Any]) -> Iterable[str]:
+    """Arguments with their values and what they mean."""
+    for f in fields:
+        yield f"{f.name}={number(values[f.name])},  # {f.par.meaning}, {f.par.unit}"
+
+
+def cleared(fields: Iterable[Field]) -> Iterable[str]:
+    """The same, at the start."""
+    for f in fields:
+        zero = f"[0.0] * {constant(f'{f.par.per}s_')}" if f.per_element else "0.0"
+        yield f"{f.name}={zero},  # {f.par.meaning}, {f.par.unit}"
+
+
+def check(export: Export, name: str) -> Check:
+    """Run the file by itself, away from this package, on its golden samples."""
+    return alone(export, name, "golden_samples.csv")
+
+
+CONTROLLER = ControllerTarget(write, check)

@@ -1,0 +1,116 @@
+"""Controllers made of control laws in every language that carries them, against plain Python sample by sample."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from structured_text import Program
+
+from stickslip import plugins
+from stickslip.contract.control_laws import Plain
+from stickslip.control.block import ControlBlock
+from stickslip.control.sampled_controller import SampledController
+from stickslip.errors import UnknownName
+from stickslip.export import CONTROLLER_TARGETS, controller_target
+from stickslip.export._controllers import golden_samples
+from stickslip.export._fmu_run import played
+from stickslip.export.st_controller import GIVEN
+from stickslip.model import Model
+
+OWN = Path(__file__).parents[1] / "study" / "sliding_mode.py"
+T = 1e-3
+PD = ControlBlock("pd", kp=6.099, kd=0.097067)
+PID = ControlBlock(
+    "pid", None, {"anti_windup": "back_calculation", "at_rest": "reset"}, kp=18.297, ki=766.4, kd=0.1456,
+    tracking_time=0.02,
+)  # fmt: skip
+OBSERVER = ControlBlock("disturbance_observer", None, {"order": "second"}, inertia=3.8623e-4, corner=300.0)
+GMS = Model("gms", **plugins.law("gms").example)
+LUGRE = Model("lugre", **plugins.law("lugre").example)
+CONTROLLERS = {
+    "PD": SampledController(PD, T),
+    "PID and observer": SampledController(
+        PID, T, ControlBlock("inertia_feedforward", inertia=3.8e-4), OBSERVER,
+        ControlBlock("butterworth_difference", corner=900.0), torque_limit=1.0,
+    ),
+    "two held laws": SampledController(
+        PD, T, [ControlBlock("friction_feedforward", LUGRE), ControlBlock("inertia_feedforward", inertia=3.8e-4)],
+        ControlBlock("friction_feedback", GMS), torque_limit=0.8,
+    ),
+    "own law": SampledController(
+        ControlBlock(str(OWN), inertia=3.8e-4, slope=60.0, torque=0.4, layer=0.5), T, torque_limit=1.0
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS.values(), ids=CONTROLLERS)
+@pytest.mark.parametrize("name", [n for n in CONTROLLER_TARGETS if n != "st"])
+def test_it_gives_the_torque_of_plain_python(name, controller):
+    target = controller_target(name)
+    export = target.write(controller, "axis", False)
+    result = target.check(export, "axis")
+    if result.passed is None:
+        pytest.skip(result.text)
+    assert result.passed, result.text
+    assert "README.md" in export.files
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS.values(), ids=CONTROLLERS)
+@pytest.mark.parametrize("name", ["axis", "reference"])  # the second is a word of the language
+def test_the_function_block_gives_the_torque_of_plain_python(name, controller):
+    export = controller_target("st").write(controller, name, False)
+    program = Program(export.files[f"{name}.st"])
+    block = next(pou for pou in program.pous if "elsewhere" in program.instance(pou))
+    v, samples = program.instance(block), golden_samples(controller)
+    for row in zip(*(column.tolist() for column in samples)):
+        *given, torque, v["load"], v["temperature"] = row
+        v.update(zip(GIVEN, given))
+        program.run(block, v)
+        assert v["torque"] == pytest.approx(torque, abs=1e-11 * max(abs(samples.torque)))
+        assert (v["fault"] > 0.0) == any(math.isnan(x) for x in given)
+
+
+def test_the_function_block_takes_over_and_restarts():
+    controller = CONTROLLERS["PID and observer"]
+    program = Program(controller_target("st").write(controller, "axis", False).files["axis.st"])
+    v = program.instance("axis")
+    v.update(position=0.0, reference_position=0.02, reference_velocity=0.0, reference_acceleration=0.0)
+    first = [program.run("axis", v) or v["torque"] for _ in range(3)]
+    v.update(elsewhere=True, held=0.3)
+    for _ in range(20):
+        program.run("axis", v)
+    v["elsewhere"] = False
+    program.run("axis", v)
+    assert v["torque"] == pytest.approx(0.3, abs=1e-12)
+    v["restart"] = True
+    program.run("axis", v)
+    assert v["torque"] == first[0] != 0.3
+
+
+def test_what_carries_no_controller_is_told():
+    with pytest.raises(UnknownName, match="urdf"):
+        controller_target("urdf")
+
+
+@pytest.mark.parametrize("steps", [5, 1, 0.25], ids=["five steps a sample", "one", "four samples a step"])
+def test_the_unit_samples_by_itself_whatever_the_communication_step(steps):
+    """With inputs that stand still over a sample (or over a step, where that is longer) the torque is Python's."""
+    pytest.importorskip("fmpy")
+    controller = CONTROLLERS["PID and observer"]
+    unit = controller_target("fmu").write(controller, "axis", False).files["axis.fmu"]
+    count, h = 40 * max(1, round(steps)), T / steps
+    time = 0.5 + h * np.arange(count)
+    sample = np.maximum(np.floor((time - 0.5) / T + 1e-6), np.arange(count) if steps < 1 else 0)
+    given = {"position": 1e-3 * np.sin(0.3 * sample), "reference": 2e-3 * np.cos(0.3 * sample)}
+    answer = played(unit, time, np.full(count, h), given, ("torque",))
+    if not isinstance(answer, np.ndarray):
+        pytest.skip(answer.text)
+    plain, expected = Plain(controller), []
+    for k in range(count):
+        due = 1 if steps == 1 else (4 if steps < 1 else int(k % steps == 0))
+        row = (float(given["position"][k]), float(given["reference"][k]), 0.0, 0.0)
+        expected.append([plain(row) for _ in range(due)][-1] if due else expected[-1])
+    assert answer[:, 0] == pytest.approx(expected, abs=0.0)
