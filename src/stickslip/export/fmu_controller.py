@@ -39,7 +39,7 @@ from stickslip.spec import Surroundings
 
 __all__ = ["CONTROLLER"]
 
-GIVEN = ("position", "reference", "reference_velocity", "reference_acceleration")
+GIVEN: tuple[str, ...] = ("position", "reference", "reference_velocity", "reference_acceleration")
 MEANING = ("Measured position", "Reference position", "Reference velocity", "Reference acceleration")
 UNITS = ("rad", "rad", "rad/s", "rad/s2")
 UNLIMITED = 1e308
@@ -123,7 +123,7 @@ def timed(samples: Samples, sample_time: float) -> str:
 def check(export: Export, name: str) -> Check:
     """Validate the units in FMPy and play the samples in it, a communication step each."""
     rows = np.genfromtxt(str(export.files["golden_samples.csv"]).splitlines()[1:], delimiter=",")
-    names: tuple[str, ...] = (*GIVEN, "torque", "load", "temperature")
+    names = (*GIVEN, "torque", "load", "temperature")
     time, given = rows[:, 0], dict(zip(names, rows.T[1:]))
     wanted, dt = given.pop("torque"), np.full(len(rows), rows[1, 0])
     errors: dict[str, float] = {}
