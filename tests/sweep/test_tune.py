@@ -75,6 +75,56 @@ def test_the_command_writes_and_draws(tmp_path, capsys):
     assert (tmp_path / "out" / "figures" / "trade-off-FF-lugre.png").exists()
 
 
+COMPOSED = """
+slip_rules = ["signed"]
+time_step = 5e-4
+[axis]
+inertia = 3.8623e-4
+[friction.nominal]
+law = "coulomb"
+fc = 0.2
+[references.sine]
+kind = "sine"
+amplitude = 0.05
+frequency = 2.0
+duration = 0.25
+placement = {bandwidth_hz = 15.0, damping = 1.0}
+[controllers.observed]
+sample_time = 1e-3
+torque_limit = 1.0
+loop = {law = "pd"}
+observer = {law = "disturbance_observer", corner = 20.0}
+"""
+OF_COMPOSED = """
+study = "study.toml"
+cases = 2
+metrics = ["position_rms_rad", "torque_rms_Nm"]
+percentile = 50
+[vary."friction.fc"]
+scale = [0.9, 1.1]
+[tune."controller.observer_corner"]
+range = [10.0, 300.0]
+[tune."controller.bandwidth_hz"]
+range = [10.0, 25.0]
+"""
+
+
+def test_a_controller_made_of_control_laws_is_tuned_by_its_numbers(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(tuning, "GENERATIONS", 2)
+    Path("study.toml").write_text(COMPOSED)
+    Path("mine.toml").write_text(OF_COMPOSED)
+    assert main(["tune", "mine.toml", "--out", "out", "--no-report"]) == 0
+    chosen = json.loads(Path("out/signed-sine-nominal-observed-tuned.json").read_text())
+    name = "position_rms_rad"
+    assert chosen["metrics"][name] < 0.5 * chosen["metrics_before"][name]
+    settings, gains = chosen["settings"], chosen["gains"]
+    assert gains["observer_corner"] == settings["controller.observer_corner"] > 100.0
+    w = 2.0 * np.pi * settings["controller.bandwidth_hz"]
+    assert gains["loop_kp"] == pytest.approx(3.8623e-4 * w**2)
+    assert gains["loop_kd"] == pytest.approx(2.0 * 3.8623e-4 * w)
+
+
 def test_what_cannot_be_tuned(tmp_path, capsys):
     assert main(["sweep", str(SMALL)]) == 2
     assert "stickslip tune" in capsys.readouterr().err

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from stickslip.errors import ParameterError
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
-__all__ = ["Axis", "Contact", "Drive", "Loop", "Poles", "Train", "describing"]
+__all__ = ["Axis", "Contact", "Drive", "Loop", "Poles", "Sampled", "Train", "describing"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -194,6 +194,24 @@ def _with_lag(a: Array, b: Array, c: Array, corner: float) -> tuple[Array, Array
     return wide, into, np.hstack([c, np.zeros((1, 1))])
 
 
+class Sampled(Protocol):
+    """What a loop needs of a controller."""
+
+    @property
+    def sample_time(self) -> float:
+        """s"""
+        ...
+
+    @property
+    def delay(self) -> float:
+        """By how much of a sample time, or of several, the torque comes late."""
+        ...
+
+    def state_space(self) -> tuple[Array, Array, Array, float]:
+        """A, B, C, D from measured angle to torque."""
+        ...
+
+
 @dataclass(frozen=True)
 class Drive:
     """The sampled controller.
@@ -312,13 +330,13 @@ class Loop:
     Attributes
     ----------
     train : Train
-    drive : Drive
+    drive : Drive, or another `Sampled`
     measured : float
         Factor on the measured angle: 1, or what a quantiser's describing function makes of it.
     """
 
     train: Train
-    drive: Drive
+    drive: Sampled
     measured: float = 1.0
 
     def matrix(self) -> Array:

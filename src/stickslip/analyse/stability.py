@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyse.presliding_loop import Axis, Contact, Drive, Loop, Poles, Train, describing
+from stickslip.analyse.presliding_loop import Axis, Contact, Drive, Loop, Poles, Sampled, Train, describing
 from stickslip.analyse.stability_result import (
     FILTERS,
     GAINS,
@@ -40,7 +40,7 @@ from stickslip.control.controller import highest_corner
 from stickslip.control.linear import Gains
 from stickslip.model import Model
 
-__all__ = ["COUNTED", "SLOW", "gain_margin", "stability", "with_law"]
+__all__ = ["AMPLITUDES", "COUNTED", "SLOW", "edge", "gain_margin", "stability", "stable", "with_law"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -62,12 +62,12 @@ SLOW = 5.0
 # ---- one loop ------------------------------------------------------------------------------------------------------
 
 
-def stable(train: Train, drive: Drive, measured: float = 1.0) -> bool:
+def stable(train: Train, drive: Sampled, measured: float = 1.0) -> bool:
     """Whether the loop is stable."""
     return Loop(train, drive, measured).poles().stable
 
 
-def _edge(good: Callable[[float], bool], points: Array) -> float:
+def edge(good: Callable[[float], bool], points: Array) -> float:
     """The end of the stretch from the first point on in which `good` holds; NaN if not even there."""
     if not good(float(points[0])):
         return math.nan
@@ -85,7 +85,7 @@ def gain_margin(train: Train, drive: Drive, law: Contact) -> float:
     """The loop is stable for all gains from 0 to this, at most `MOST_GAIN`; NaN where it is unstable without any."""
     # Steep laws go unstable at tiny gains: the first points are close together.
     points = np.concatenate([[0.0], np.geomspace(1e-4, 0.1, 10), np.linspace(0.2, MOST_GAIN, 29)])
-    return _edge(lambda g: stable(train, replace(drive, law=law, gain=g)), points)
+    return edge(lambda g: stable(train, replace(drive, law=law, gain=g)), points)
 
 
 def _linear_limit(train: Train, drive: Drive) -> float:
@@ -94,7 +94,7 @@ def _linear_limit(train: Train, drive: Drive) -> float:
         scaled = Gains(g.kp * s * s, g.ki * s**3, g.kd * s, g.kr * s)
         return stable(train, replace(drive, gains=scaled, law=Contact(0.0)))
 
-    return _edge(good, np.geomspace(0.02, 20.0, 61))
+    return edge(good, np.geomspace(0.02, 20.0, 61))
 
 
 def with_law(
@@ -142,9 +142,9 @@ def _margins(name: str, axis: Axis, drive: Drive, model: Model | None) -> Margin
     train, there = with_law(axis, drive, model, axis.amplitude, frequency)
     softer = counts = math.nan
     if at_one.stable:
-        lost = _edge(lambda s: stable(train.softer(1.0 - s), there), np.linspace(0.0, 1.0, 51))
+        lost = edge(lambda s: stable(train.softer(1.0 - s), there), np.linspace(0.0, 1.0, 51))
         softer = lost
-        counts = _edge(lambda n: stable(train, there, n), np.linspace(1.0, MOST_GAIN, 41))
+        counts = edge(lambda n: stable(train, there, n), np.linspace(1.0, MOST_GAIN, 41))
         if not all(stable(train, there, n) for n in np.linspace(0.05, 1.0, 20)):
             counts = 0.0
     law = there.law

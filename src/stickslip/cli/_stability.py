@@ -24,6 +24,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--without", default="", metavar="NAMES", help="imperfections switched off, with commas between them"
     )
+    parser.add_argument(
+        "--controller",
+        metavar="FILE.toml",
+        help="a controller made of control laws (table [controller]) instead of a linear one with compensators",
+    )
     parser.add_argument("--linear", choices=("PR", "PD", "PID"), default="PD", help="default PD")
     for option, default, unit, what in (
         ("--bandwidth", 36.0, "HZ", "of its poles"),
@@ -56,6 +61,9 @@ def work(
     args: argparse.Namespace, show: Callable[[argparse.Namespace, list[Any], Callable[[], Any]], None]
 ) -> None:
     """Reckon and show."""
+    if args.controller:
+        composed(args, show)
+        return
     found = reckoned(args)
     tried: Confirmed | None = None
     if args.confirm:
@@ -72,15 +80,57 @@ def work(
     show(args, [found, tried] if tried else [found], picture)
 
 
+BESIDE: dict[str, Any] = {
+    "linear": "PD", "bandwidth": 36.0, "damping": 1.0, "sample_time": None, "filter": [], "law": [], "confirm": False,
+}  # fmt: skip
+"""Options of a linear controller and its compensators, and what they are where they are not given."""
+
+
+def composed(
+    args: argparse.Namespace, show: Callable[[argparse.Namespace, list[Any], Callable[[], Any]], None]
+) -> None:
+    """The same of a controller made of control laws."""
+    from stickslip.analyse.controller_margins import controller_stability
+    from stickslip.analyse.machine_axis import axis_of
+    from stickslip.control.files import read_controller
+    from stickslip.errors import InputError
+
+    for name, usual in BESIDE.items():
+        if getattr(args, name) != usual:
+            raise InputError(
+                f"--{name.replace('_', '-')} beside --controller {args.controller}, which says all of it; leave it out"
+            )
+    plant = machine_of(args)
+    controller = read_controller(
+        args.controller, plant.inertia if args.inertia is None else args.inertia, plant.models
+    )
+    delay = plant.delay if args.delay is None else args.delay
+    found = controller_stability(axis_of(plant, args.amplitude), controller, delay)
+
+    def picture() -> Any:
+        from stickslip.report.stability_pictures import picture_of_controller
+
+        return picture_of_controller(found)
+
+    show(args, [found], picture)
+
+
+def machine_of(args: argparse.Namespace) -> Machine:
+    """The machine without what is switched off."""
+    from stickslip.errors import InputError
+    from stickslip.machines.machine import machine
+
+    if args.amplitude < 0.0 or any(f < 0.0 for f in args.filter):
+        raise InputError("--amplitude and --filter must be 0 or greater")
+    return machine(args.rig).without(*(n.strip() for n in args.without.split(",") if n.strip()))
+
+
 def described(args: argparse.Namespace) -> tuple[Machine, Gains, dict[str, Model]]:
     """The machine, the linear controller and the compensators' laws that the options describe."""
     from stickslip.control.linear import place
     from stickslip.errors import InputError
-    from stickslip.machines.machine import machine
 
-    plant = machine(args.rig).without(*(n.strip() for n in args.without.split(",") if n.strip()))
-    if args.amplitude < 0.0 or any(f < 0.0 for f in args.filter):
-        raise InputError("--amplitude and --filter must be 0 or greater")
+    plant = machine_of(args)
     inertia = plant.inertia if args.inertia is None else args.inertia
     if args.confirm and (args.sample_time is not None or args.delay is not None):
         raise InputError(

@@ -7,18 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.analyse.controller_margins import ControllerStability
 from stickslip.analyse.stability import SLOW
 from stickslip.analyse.stability_result import FILTERS, GAINS, TIMES, Map, Stability
 from stickslip.report.plots import Curve, Panel, Style
 from stickslip.study.stability_map import FINE, FINE_GAINS, OPEN, Confirmed
 
-__all__ = ["picture_of_confirmed", "picture_of_stability"]
+__all__ = ["picture_of_confirmed", "picture_of_controller", "picture_of_stability"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 ONE = Style("#000000", (0, (1, 1.5)), 1.2)
 NOW = Style("#000000", (0, (4, 1.5)), 1.0)
-SAFE = Style("#000000", "-", 1.0)
+SAFE = LINE = Style("#000000", "-", 1.0)
 AREAS = {
     "stable": Style("#56B4E9"), "unstable: rings": Style("#E69F00"), "unstable: creeps away": Style("#CC79A7"),
 }  # fmt: skip
@@ -45,6 +46,23 @@ def picture_of_stability(found: Stability) -> tuple[str, str, Sequence[Panel], f
     )  # fmt: skip
     title = f"Which gain feedback of the {name} law bears"
     return title, _message(found, name), panels, 2.0
+
+
+def picture_of_controller(found: ControllerStability) -> tuple[str, str, Sequence[Panel], float]:
+    """The transfer function of a controller made of control laws."""
+    f = found.frequency
+    ends = (float(f[0]), float(f[-1]))
+    size, turn = np.abs(found.response), np.degrees(np.unwrap(np.angle(found.response)))
+    panels = (
+        Panel([Curve(f, size, "", LINE)], "gain (N·m/rad)", x_limits=ends, x_scale="log", y_scale="log"),
+        Panel([Curve(f, turn, "", LINE)], "phase (°)", "frequency (Hz)", ends, x_scale="log"),
+    )
+    said = "; ".join(
+        f"{loop.name}: {'stable' if loop.poles.stable else 'unstable'}, {loop.poles.growth:+.0f}/s at "
+        f"{loop.poles.frequency:.0f} Hz"
+        for loop in found.loops
+    )
+    return "From error to torque, while the contact sticks", said, panels, 2.0
 
 
 def picture_of_confirmed(found: Confirmed) -> tuple[str, str, Sequence[Panel], float]:

@@ -21,6 +21,7 @@ from stickslip.analyse.stability_result import Map, Recommended
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import RigError
 from stickslip.machines.machine import Machine
 from stickslip.model import Model
@@ -29,7 +30,7 @@ from stickslip.rigs.loop import Loop as RigLoop
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import VirtualRig
 
-__all__ = ["FILTERS", "FINE", "FINE_GAINS", "GAINS", "OPEN", "Confirmed", "Point", "confirmed"]
+__all__ = ["FILTERS", "FINE", "FINE_GAINS", "GAINS", "OPEN", "Confirmed", "Point", "confirmed", "moved"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -217,7 +218,7 @@ def _background(machine: Machine, gains: Gains, name: str, model: Model, most: f
     return Map(name, growth, frequency)
 
 
-def moved(machine: Machine, controller: Controller) -> float:
+def moved(machine: Machine, controller: Controller | SampledController) -> float:
     """Motion at the end of a push and a rest, rad."""
     dt = machine.sample_time
     before, after = round(0.2 / dt), round(REST / dt)

@@ -2,7 +2,8 @@
 
 ``axis.inertia``, ``friction.NAME``, ``law.NAME`` (of the compensator's law), ``reference.NAME`` and, of the controller,
 ``controller.gain``, ``filter_hz``, ``bandwidth_hz``, ``damping``, ``kp``, ``ki``, ``kd``, ``kr``, ``torque_limit``,
-``sample_time``. An element of a list is ``friction.k[0]``. The machine varies under the controller as it was designed:
+``sample_time``; of one made of control laws its numbers by whole names (``controller.observer_corner``). An element of
+a list is ``friction.k[0]``. The machine varies under the controller as it was designed:
 gains follow ``bandwidth_hz`` and ``damping``, not the inertia.
 """
 
@@ -55,11 +56,24 @@ def known(run: PlannedRun) -> dict[str, Any]:
     found |= {f"friction.{k}": v for k, v in run.axis.friction.parameters._asdict().items()}
     if isinstance(control, SampledController):
         found |= {f"controller.{k}": v for k, v in control.values().items()}
+        found |= _of_loop(control, run.axis.inertia)
     else:
         found |= _of_gains(control, run.axis.inertia)
     found["controller.torque_limit"] = run.control.torque_limit
     found["controller.sample_time"] = run.control.sample_time
     return found | {f"reference.{k}": v for k, v in run.motion.parameters._asdict().items()}
+
+
+def _of_loop(control: SampledController, inertia: float) -> dict[str, Any]:
+    """Bandwidth (Hz) and damping of a loop that can be placed by them."""
+    block = control.blocks.get("loop")
+    if block is None or block.law.placed is None or block.law.continuous is None:
+        return {}
+    gains = block.law.continuous(block.parameters)
+    if not gains.kp > 0.0:
+        return {}
+    _, bandwidth, damping = poles(gains, inertia)
+    return {"controller.bandwidth_hz": bandwidth, "controller.damping": damping}
 
 
 def _of_gains(control: Controller, inertia: float) -> dict[str, Any]:
@@ -139,7 +153,9 @@ def _control(run: PlannedRun, settings: Mapping[str, Any], law: Mapping[str, Any
     control = run.control
     if isinstance(control, SampledController):
         both = {k: float(settings[k]) for k in ("torque_limit", "sample_time") if k in settings}
-        return replace(control.with_values(settings), **both)
+        return replace(
+            control.with_values({**_placed(control, run.axis.inertia, settings), **settings}), **both
+        )
     helper = control.compensator
     own = {k: float(v) for k, v in settings.items()}
     if helper:
@@ -153,6 +169,16 @@ def _control(run: PlannedRun, settings: Mapping[str, Any], law: Mapping[str, Any
         torque_limit=own.get("torque_limit", control.torque_limit),
         sample_time=own.get("sample_time", control.sample_time),
     )  # fmt: skip
+
+
+def _placed(control: SampledController, inertia: float, settings: Mapping[str, Any]) -> dict[str, float]:
+    """Gains of a loop made of a control law, by bandwidth and damping, under their whole names."""
+    place_by = control.blocks["loop"].law.placed if any(name in settings for name in POLES) else None
+    if place_by is None:
+        return {}
+    asked = {**_of_loop(control, inertia), **{f"controller.{name}": float(v) for name, v in settings.items()}}
+    gains = place_by(inertia, asked["controller.bandwidth_hz"], asked["controller.damping"])
+    return {f"loop_{name}": value for name, value in gains.items()}
 
 
 def _gains(control: Controller, inertia: float, settings: Mapping[str, float]) -> Gains | Cascade:

@@ -1,0 +1,273 @@
+"""A controller made of control laws as a linear sampled system about rest: matrices, transfer function, margins.
+
+The matrices are taken from the text that runs: what one sample of the composition makes of a small change of every
+number that it remembers, and of the measured angle. A friction law that a block holds is the spring and damper that it
+is for motion of that amplitude (`stickslip.analyse.presliding_loop.describing`), and nothing while it slides. What a
+law does only at its torque limit, or only while the reference rests, does not enter. A law that is not smooth about
+rest is refused.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Annotated, Any, NamedTuple, cast
+
+import numpy as np
+
+from stickslip.analyse.presliding_loop import Contact, describing
+from stickslip.control.block import ControlBlock
+from stickslip.control.sampled_controller import SampledController
+from stickslip.control_spec import PLACES
+from stickslip.errors import InputError
+from stickslip.model import Model
+from stickslip.spec import Law, Par, Surroundings
+
+__all__ = ["LinearController", "linearised"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+CARRIED = (
+    "position",
+    "velocity",
+    "slow_velocity",
+    "error",
+    "applied",
+    "commanded",
+    "residual",
+    "feedforward",
+    "others",
+)
+"""Of the composition's memory, what a sample hands to the next; the rest are flags and clocks."""
+SMALL = 1e-6
+"""Change of a number by which the matrices are found, in its unit."""
+BENT = 1e-4
+"""Part by which answers to changes of other sizes may differ where a law is linear about rest."""
+
+LONG = 200
+"""Samples over which numbers are compared in size."""
+SPANNED = 1e-9
+"""Part of a vector that has to be new for a motion of its own."""
+
+
+class Params(NamedTuple):
+    """Spring and damper."""
+
+    stiffness: Annotated[float, Par("N·m/rad", "k", "stiffness", lower=0.0)]
+    damping: Annotated[float, Par("N·m·s/rad", "d", "damping")]
+
+
+class State(NamedTuple):
+    """What the spring remembers."""
+
+    angle: Annotated[float, Par("rad", "x", "angle of the spring")]
+
+
+def spring(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
+    """Torque, N·m."""
+    z.angle += 0.5 * (v0 + v1) * dt
+    return p.stiffness * z.angle + p.damping * v1
+
+
+SPRING = Law(
+    "spring_and_damper", Params, spring, title="Spring and damper", equation=r"F = k x + d v",
+    source=("thesis 5.2",), example={"stiffness": 100.0, "damping": 0.01}, State=State,
+)  # fmt: skip
+"""What a held friction law is about rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearController:
+    """From measured angle (rad) to torque (N·m), sample by sample: x' = A x + B angle, torque = C x + D angle.
+
+    Attributes
+    ----------
+    matrices : tuple of arrays
+        A, B, C and the number D.
+    sample_time : float
+        s
+    delay : float
+        By how much of a sample time, or of several, the torque comes late.
+    factor : float
+        On the torque.
+    """
+
+    matrices: tuple[Array, Array, Array, float]
+    sample_time: float
+    delay: float = 0.0
+    factor: float = 1.0
+
+    def state_space(self) -> tuple[Array, Array, Array, float]:
+        """A, B, C, D."""
+        a, b, c, d = self.matrices
+        return a, b, self.factor * c, self.factor * d
+
+    def response(self, frequency: Array) -> Any:
+        """The transfer function from measured angle to torque at frequencies in Hz, N·m/rad, complex.
+
+        Its sign is that of a controller: a stiffness gives -k.
+        """
+        a, b, c, d = self.state_space()
+        turn = np.exp(2j * math.pi * np.asarray(frequency) * self.sample_time)
+        unit = np.eye(a.shape[0])
+        late = turn ** (-self.delay)
+        found = [float_of(c @ np.linalg.solve(z * unit - a, b)) + d for z in turn]
+        return np.array(found) * late
+
+
+def float_of(one: Any) -> complex:
+    """The one number of a matrix."""
+    return complex(one[0, 0])
+
+
+def linearised(
+    controller: SampledController, amplitude: float, frequency: float, delay: float = 0.0
+) -> LinearController:
+    """The controller about rest.
+
+    Parameters
+    ----------
+    controller : SampledController
+    amplitude, frequency : float
+        Of the small motion that held friction laws see, rad and Hz; an infinite amplitude for laws that slide.
+    delay : float
+        Of the torque, samples.
+
+    Raises
+    ------
+    InputError
+        If a law is not smooth about rest.
+    """
+    sticking = with_springs(replace(controller, torque_limit=math.inf), amplitude, frequency)
+    run = _Sample(sticking)
+    found = [run.answers(SMALL * row) / SMALL for row in np.eye(run.size + 1)]
+    for row, answer in zip(np.eye(run.size + 1), found):
+        for size in (-SMALL, 10.0 * SMALL):
+            off = np.abs(run.answers(size * row) / size - answer).max()
+            if not off <= BENT * max(float(np.abs(answer).max()), 1.0):
+                raise InputError(
+                    f"controller: {_suspects(controller)} is not smooth about rest, so that there is no linear loop; "
+                    "simulate it instead (`stickslip simulate`, `stickslip rig run track`)"
+                )
+    whole = np.array(found).T  # what every number becomes, and the torque, by what changed it
+    n = run.size
+    # A friction law's spring and the last angle are the same number but for a constant: that one is no motion.
+    matrices = moved_and_felt(whole[:n, :n], whole[:n, n:], whole[n:, :n])
+    return LinearController((*matrices, float(whole[n, n])), controller.sample_time, delay)
+
+
+def moved_and_felt(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array]:
+    """The part of a system that its input moves and its output feels."""
+    for _ in range(2):  # the second time of the transposed system, which turns it back too
+        sizes = _sizes(a, b)
+        moves = sizes > 0.0
+        scale, a, b, c = sizes[moves], a[np.ix_(moves, moves)], b[moves], c[:, moves]
+        a, b, c = a * scale / scale[:, None], b / scale[:, None], c * scale
+        base = _krylov(a, b)
+        a, b, c = base.T @ a @ base, base.T @ b, c @ base
+        a, b, c = a.T, c.T, b.T
+    return a, b, c
+
+
+def _sizes(a: Array, b: Array) -> Array:
+    """The largest value of every number after an impulse, shape (n,)."""
+    x, largest = b[:, 0], np.abs(b[:, 0])
+    for _ in range(LONG):
+        x = a @ x
+        largest = np.maximum(largest, np.abs(x))
+        if not float(largest.max()) < 1e100:
+            break
+    return largest
+
+
+def _krylov(a: Array, b: Array) -> Array:
+    """An orthonormal base of what b, A b, A A b, ... span, shape (n, rank)."""
+    base = np.zeros((len(a), 0))
+    v = b[:, 0]
+    while base.shape[1] < len(a):
+        size = float(np.linalg.norm(v))
+        for _ in range(2):  # once is not enough to full precision
+            v = v - base @ (base.T @ v)
+        left = float(np.linalg.norm(v))
+        if not left > SPANNED * size or left == 0.0:
+            break
+        base = np.column_stack([base, v / left])
+        v = a @ base[:, -1]
+    return base
+
+
+def with_springs(controller: SampledController, amplitude: float, frequency: float) -> SampledController:
+    """The controller with a spring and damper for every friction law that it holds."""
+    places: dict[str, list[ControlBlock]] = {place: [] for place in PLACES}
+    for block in controller.blocks.values():
+        places[block.law.place].append(_stuck(block, amplitude, frequency))
+    return replace(controller, estimator=places.pop("estimator")[0], **places)
+
+
+def _stuck(block: ControlBlock, amplitude: float, frequency: float) -> ControlBlock:
+    if block.friction is None:
+        return block
+    found = Contact(0.0) if math.isinf(amplitude) else describing(block.friction, amplitude, frequency)
+    own = {f.name: getattr(block.parameters, f.name) for f in block.law.fields}
+    return ControlBlock(block.law, Model(SPRING, stiffness=found.stiffness, damping=found.damping), **own)
+
+
+def _suspects(controller: SampledController) -> str:
+    """The laws that are not declared linear, or all of them."""
+    names = [
+        b.law.name for b in controller.blocks.values() if not b.law.is_linear and not b.law.holds_friction
+    ]
+    return " and ".join(dict.fromkeys(names or [b.law.name for b in controller.blocks.values()]))
+
+
+class _Sample:
+    """One sample of a controller about rest, from small changes of what it remembers and measures."""
+
+    def __init__(self, controller: SampledController) -> None:
+        self.n, self.p = controller.settings, controller.parameters
+        self.m, self.z = controller.memory(), controller.state()
+        self.u = SimpleNamespace(**Surroundings()._asdict())
+        self.run = controller.functions["sample"]
+        for _ in range(3):  # flags of a first sample are set
+            self.run(0.0, 0.0, 0.0, 0.0, self.n, self.m, self.z, self.p, self.u)
+        self.rest = self._flat(self.m, self.z)
+        self.size = len(self.rest)
+
+    def answers(self, change: Array) -> Array:
+        """What the sample makes of a change, shape (size + 1,): of every number, and of the torque."""
+        m, z, u = copy.deepcopy((self.m, self.z, self.u))
+        self._set(m, z, self.rest + change[:-1])
+        torque = self.run(float(change[-1]), 0.0, 0.0, 0.0, self.n, m, z, self.p, u)
+        return np.append(self._flat(m, z) - self.rest, torque)
+
+    def _flat(self, m: Any, z: Any) -> Array:
+        return np.array([*(getattr(m, name) for name in CARRIED), *_numbers(z)])
+
+    def _set(self, m: Any, z: Any, values: Array) -> None:
+        numbers = iter(values.tolist())
+        for name in CARRIED:
+            setattr(m, name, next(numbers))
+        _fill(z, numbers)
+
+
+def _numbers(part: Any) -> list[float]:
+    """The numbers of a state, its parts' too."""
+    out: list[float] = []
+    for value in cast("dict[str, Any]", vars(part)).values():
+        if isinstance(value, SimpleNamespace):
+            out += _numbers(value)
+        else:
+            out += value if isinstance(value, list) else [value]
+    return out
+
+
+def _fill(part: Any, numbers: Any) -> None:
+    """Write numbers into a state, in the order of `_numbers`."""
+    for name, value in cast("dict[str, Any]", vars(part)).items():
+        if isinstance(value, SimpleNamespace):
+            _fill(value, numbers)
+        elif isinstance(value, list):
+            setattr(part, name, [next(numbers) for _ in value])  # type: ignore[reportUnknownVariableType]
+        else:
+            setattr(part, name, next(numbers))

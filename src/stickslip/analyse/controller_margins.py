@@ -1,0 +1,235 @@
+"""How far a controller made of control laws is from instability on a machine, while its contact sticks and slides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.analyse.controller_loop import LinearController, linearised
+from stickslip.analyse.presliding_loop import Axis, Contact, Loop, Poles, Train
+from stickslip.analyse.stability import AMPLITUDES, SLOW, edge, stable
+from stickslip.analyse.stability_result import Cycle
+from stickslip.control.sampled_controller import SampledController
+from stickslip.errors import ParameterError
+
+__all__ = ["ControllerStability", "LoopMargins", "controller_stability"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+MOST, LEAST = 100.0, 0.01
+"""Factors on the torque between which the loop is looked at."""
+LATEST = 20.0
+"""Samples of delay that are looked at."""
+FAST = 50.0
+"""Times the velocity over which friction changes: fast sliding."""
+DRAWN = 200
+
+
+@dataclass(frozen=True)
+class LoopMargins:
+    """One loop: while the contact sticks, or while it slides.
+
+    Attributes
+    ----------
+    name : str
+    poles : Poles
+        The least stable one.
+    torque : tuple of float
+        The loop is stable for all factors on the controller's torque between these, of which 1 is one; NaN where it is
+        not stable.
+    delay : float
+        Samples by which the torque may come later besides; NaN where it is not stable.
+    """
+
+    name: str
+    poles: Poles
+    torque: tuple[float, float]
+    delay: float
+
+    def line(self) -> str:
+        """A row of the table."""
+        verdict = "stable" if self.poles.stable else "unstable"
+        pole = f"{self.poles.growth:+9.1f}/s at {self.poles.frequency:5.1f} Hz"
+        if not self.poles.stable:
+            return f"{self.name:<10}{verdict:<10}{pole}"
+        low, high = self.torque
+        least = f"{low:.2g}" if low > LEAST else "0"
+        most = f"{high:.2g}" if high < MOST else f"> {MOST:g}"
+        late = f"{self.delay:.2g}" if self.delay < LATEST else f"> {LATEST:g}"
+        return f"{self.name:<10}{verdict:<10}{pole}  {f'{least} to {most}':>14}{late:>16}"
+
+
+@dataclass(frozen=True, eq=False)
+class ControllerStability:
+    """A controller on a machine.
+
+    Attributes
+    ----------
+    laws : tuple of str
+        What it is made of, ``observer: disturbance_observer``.
+    loops : tuple of LoopMargins
+        Sticking, sliding.
+    amplitude : float
+        Of the small motion at the encoder, rad.
+    stiffness : float
+        Of the contact as the encoder sees it, N·m/rad.
+    estimator_delay : float
+        Of the velocity, s.
+    softer : float
+        The part of the contact that may be missing while it sticks; NaN where the loop is unstable anyway.
+    cycle : Cycle or None
+        Where an unstable loop ends while it sticks.
+    frequency, response : arrays, shape (n,)
+        Hz, and the transfer function from error to torque while the contact sticks, N·m/rad, complex.
+    """
+
+    laws: tuple[str, ...]
+    loops: tuple[LoopMargins, ...]
+    amplitude: float
+    stiffness: float
+    sample_time: float
+    estimator_delay: float
+    softer: float
+    cycle: Cycle | None
+    frequency: Array
+    response: Any
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "laws": list(self.laws), "amplitude": self.amplitude, "contact_stiffness": self.stiffness,
+            "sample_time": self.sample_time, "estimator_delay": self.estimator_delay, "softer": self.softer,
+            "cycle": vars(self.cycle) if self.cycle else None,
+            "loops": [
+                {
+                    "name": loop.name, "stable": loop.poles.stable, "growth": loop.poles.growth,
+                    "frequency": loop.poles.frequency, "torque": list(loop.torque), "delay": loop.delay,
+                }
+                for loop in self.loops
+            ],
+            "frequency": self.frequency.tolist(),
+            "gain": np.abs(self.response).tolist(), "phase": np.unwrap(np.angle(self.response)).tolist(),
+        }  # fmt: skip
+
+    def lines(self) -> Iterator[str]:
+        """What people read."""
+        yield f"controller: {'; '.join(self.laws)}"
+        yield (
+            f"sample time {1e3 * self.sample_time:g} ms, velocity {1e3 * self.estimator_delay:.3g} ms late; motion of "
+            f"{1e6 * self.amplitude:.3g} µrad at the encoder, contact {self.stiffness:.1f} N·m/rad"
+        )
+        yield f"{'':<10}{'':<10}{'least stable pole':<22}{'torque times':>16}{'samples later':>16}"
+        for loop in self.loops:
+            yield loop.line()
+        if math.isfinite(self.softer):
+            yield f"sticking, {100.0 * self.softer:.0f} % of the contact may be missing"
+        if self.cycle:
+            yield (
+                "sticking, the motion grows on"
+                if math.isinf(self.cycle.amplitude)
+                else f"sticking, it ends in a cycle of {1e6 * self.cycle.amplitude:.0f} µrad at "
+                f"{self.cycle.frequency:.0f} Hz"
+            )
+
+
+def controller_stability(
+    axis: Axis, controller: SampledController, delay: float = 0.0
+) -> ControllerStability:
+    """Poles and margins of a controller on an axis.
+
+    Parameters
+    ----------
+    axis : Axis
+    controller : SampledController
+    delay : float
+        Of the torque, samples.
+
+    Raises
+    ------
+    InputError
+        If a law is not smooth about rest.
+    ParameterError
+        If `delay` is out of bounds.
+    """
+    if not 0.0 <= delay <= 100.0:
+        raise ParameterError(f"stability: delay = {delay:g} samples must be from 0 to 100")
+    train, drive = about(axis, controller, delay, axis.amplitude)
+    free = linearised(controller, math.inf, axis.ringing, delay)
+    sticking = margins("sticking", train, drive)
+    softer = math.nan
+    if sticking.poles.stable:
+        softer = edge(lambda s: stable(train.softer(1.0 - s), drive), np.linspace(0.0, 1.0, 51))
+    frequency = np.geomspace(0.1, 0.5 / drive.sample_time, DRAWN)
+    estimator = controller.blocks["estimator"]
+    late = estimator.law.delay(estimator.parameters, drive.sample_time) if estimator.law.delay else math.nan
+    return ControllerStability(
+        tuple(f"{part}: {block.law.name}" for part, block in controller.blocks.items()),
+        (sticking, margins("sliding", slid(axis), free)), axis.amplitude, train.visible, drive.sample_time, late,
+        softer, cycle_of(axis, controller, delay, sticking.poles), frequency, -drive.response(frequency),
+    )  # fmt: skip
+
+
+def slid(axis: Axis) -> Train:
+    """The train while its contact slides fast: friction is a constant torque, and a damper by its viscous part."""
+    law, p = axis.friction.law, axis.friction.parameters
+    slope = 0.0
+    if law.steady:
+        fast = FAST * (float(law.velocity_scale(p)) if law.velocity_scale else 0.1)
+        slope = float(law.steady(1.1 * fast, p) - law.steady(fast, p)) / (0.1 * fast)
+    bearings = replace(axis.train.bearings, stiffness=0.0)
+    return replace(axis.train, contact=Contact(0.0, slope), bearings=bearings)
+
+
+def about(
+    axis: Axis, controller: SampledController, delay: float, amplitude: float
+) -> tuple[Train, LinearController]:
+    """Train and controller at an amplitude of the encoder, with the laws as they are at the loop's own frequency."""
+
+    def at(frequency: float) -> tuple[Train, LinearController]:
+        return axis.at(amplitude, frequency), linearised(controller, amplitude, frequency, delay)
+
+    found = at(axis.ringing)
+    for _ in range(2):
+        frequency = Loop(*found).poles().frequency
+        if frequency < SLOW:
+            break
+        found = at(frequency)
+    return found
+
+
+def margins(name: str, train: Train, drive: LinearController) -> LoopMargins:
+    """Poles, and how much more torque and delay the loop bears."""
+    poles = Loop(train, drive).poles()
+    if not poles.stable:
+        return LoopMargins(name, poles, (math.nan, math.nan), math.nan)
+
+    def with_torque(factor: float) -> bool:
+        return stable(train, replace(drive, factor=factor))
+
+    high = edge(with_torque, np.geomspace(1.0, MOST, 81))
+    low = edge(with_torque, np.geomspace(1.0, LEAST, 81))
+    late = edge(lambda d: stable(train, replace(drive, delay=drive.delay + d)), np.linspace(0.0, LATEST, 201))
+    return LoopMargins(name, poles, (low, high), late)
+
+
+def cycle_of(axis: Axis, controller: SampledController, delay: float, first: Poles) -> Cycle | None:
+    """Where the growth of a loop that is unstable at the small amplitude ends as the amplitude rises."""
+    if first.stable:
+        return None
+
+    def poles(amplitude: float) -> Poles:
+        return Loop(*about(axis, controller, delay, amplitude)).poles()
+
+    low = axis.amplitude
+    for factor in AMPLITUDES[1:]:
+        high = float(factor) * axis.amplitude
+        if poles(high).stable:
+            for _ in range(8):
+                middle = math.sqrt(low * high)
+                low, high = (low, middle) if poles(middle).stable else (middle, high)
+            return Cycle(poles(low).frequency, low)
+        low = high
+    return Cycle(first.frequency, math.inf)

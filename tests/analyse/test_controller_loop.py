@@ -1,0 +1,162 @@
+"""Controllers made of control laws about rest: their matrices against the samples, known loops, and the virtual rig."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip import plugins
+from stickslip.analyse.controller_loop import linearised
+from stickslip.analyse.controller_margins import controller_stability
+from stickslip.analyse.machine_axis import axis_of
+from stickslip.analyse.presliding_loop import Drive, Loop, describing
+from stickslip.cli import main
+from stickslip.contract.control_laws import Plain, block_of, specimen
+from stickslip.control.block import ControlBlock
+from stickslip.control.linear import place
+from stickslip.control.sampled_controller import SampledController
+from stickslip.errors import InputError
+from stickslip.machines.machine import machine
+from stickslip.study.stability_map import moved
+
+T = 1e-3
+DRY = machine("thesis-dry")
+AXIS = axis_of(DRY)
+RIGID = axis_of(DRY.without("flexibility", "encoder-mode", "bearings", "direction", "bandwidth"))
+OWN = Path(__file__).parents[1] / "study" / "sliding_mode.py"
+LINEAR = [n for n in plugins.control_law_names() if plugins.control_law(n).is_linear]
+
+
+def placed(kind, bandwidth, **more):
+    gains = place(kind, 3.8623e-4, bandwidth, 1.0)
+    values = {"kp": gains.kp, "kd": gains.kd, **({"ki": gains.ki} if gains.ki else {})}
+    return SampledController(ControlBlock(kind.lower(), **values), T, **more), gains
+
+
+@pytest.mark.parametrize("name", LINEAR)
+def test_the_matrices_give_the_torque_of_the_samples(name):
+    """Of every linear law, along random angles about rest."""
+    controller = specimen(plugins.control_law(name), math.inf, T)
+    a, b, c, d = linearised(controller, 1e-6, 100.0).state_space()
+    plain = Plain(controller)
+    for _ in range(3):
+        plain((0.0, 0.0, 0.0, 0.0))
+    angles = 1e-6 * np.random.default_rng(3).standard_normal(300).cumsum()
+    told = [plain((x, 0.0, 0.0, 0.0)) for x in angles.tolist()]
+    state, found = np.zeros((a.shape[0], 1)), []
+    for x in angles.tolist():
+        found.append((c @ state).item() + d * x)
+        state = a @ state + b * x
+    assert found == pytest.approx(told, rel=1e-6, abs=1e-9 * max(map(abs, told)))
+
+
+@pytest.mark.parametrize("kind", ["PD", "PID"])
+def test_the_loop_is_that_of_the_gains(kind):
+    controller, gains = placed(kind, 20.0)
+    train = AXIS.at(AXIS.amplitude, AXIS.ringing)
+    found = Loop(train, linearised(controller, 1e-6, 100.0, DRY.delay)).poles()
+    assert found.growth == pytest.approx(
+        Loop(train, Drive(gains, sample_time=T, delay=DRY.delay)).poles().growth, rel=1e-6
+    )
+
+
+def test_a_held_friction_law_is_its_spring_and_damper():
+    law = DRY.models["gms"]
+    controller, gains = placed("PD", 36.0, observer=ControlBlock("friction_feedback", law, gain=0.8))
+    train = AXIS.at(AXIS.amplitude, AXIS.ringing)
+    drive = Drive(gains, describing(law, 1e-6, 100.0), 0.8, 0.0, T, DRY.delay)
+    found = Loop(train, linearised(controller, 1e-6, 100.0, DRY.delay)).poles()
+    assert found.growth == pytest.approx(Loop(train, drive).poles().growth, rel=1e-6)
+    assert found.growth < 0.0
+    # While everything slides its torque is constant.
+    alone = linearised(placed("PD", 36.0)[0], math.inf, 100.0)
+    assert linearised(controller, math.inf, 100.0).response(np.array([5.0])) == pytest.approx(
+        alone.response(np.array([5.0]))
+    )
+
+
+def test_the_transfer_function_is_that_of_the_continuous_law_at_low_frequency():
+    f = np.array([0.5, 2.0, 8.0])
+    s = 2j * math.pi * f
+    controller, gains = placed("PID", 20.0)
+    late = np.exp(-0.5 * T * s)  # of the velocity
+    wanted = gains.kp + gains.ki / s + gains.kd * s * late
+    assert -linearised(controller, 1e-6, 100.0).response(f) == pytest.approx(wanted, rel=3e-3)
+
+
+def test_margins_are_where_the_loop_goes_unstable():
+    controller, gains = placed("PD", 20.0)
+    found = controller_stability(RIGID, controller)
+    sliding = found.loops[1]
+    assert [loop.name for loop in found.loops] == ["sticking", "sliding"]
+    assert sliding.poles.stable
+    _, high = sliding.torque
+    for factor, good in ((0.98 * high, True), (1.02 * high, False)):
+        scaled = SampledController(ControlBlock("pd", kp=factor * gains.kp, kd=factor * gains.kd), T)
+        assert controller_stability(RIGID, scaled).loops[1].poles.stable == good
+    assert found.softer == 1.0  # a PD holds the axis alone
+    late = controller_stability(RIGID, controller, sliding.delay + 0.15).loops[1]
+    assert not late.poles.stable
+
+
+def test_the_virtual_rig_does_what_the_poles_say():
+    calm, _ = placed("PD", 20.0)
+    shaken, _ = placed(
+        "PD", 20.0, observer=ControlBlock("disturbance_observer", inertia=4.2757e-4, corner=150.0)
+    )
+    quiet, restless = (controller_stability(AXIS, c, DRY.delay) for c in (calm, shaken))
+    assert quiet.loops[0].poles.stable
+    assert quiet.cycle is None
+    assert not restless.loops[0].poles.stable
+    limit = 1.0
+    moves = [
+        moved(DRY, SampledController(c.loop, T, None, c.observer, torque_limit=limit)) for c in (calm, shaken)
+    ]
+    assert moves[1] > 5.0 * moves[0]
+    said = restless.cycle.amplitude / math.sqrt(2.0)  # by the first harmonic of a contact that slips
+    assert said / 3.0 < moves[1] < 3.0 * said
+
+
+def test_what_is_not_smooth_about_rest_is_refused():
+    smooth = block_of(plugins.control_law(str(OWN)))
+    assert (
+        linearised(SampledController(smooth, T), 1e-6, 100.0).state_space()[3] < 0.0
+    )  # inside its boundary layer
+    sharp = ControlBlock(smooth.law, **{**smooth.parameters._asdict(), "layer": 1e-9})
+    with pytest.raises(InputError, match="sliding_mode is not smooth about rest"):
+        linearised(SampledController(sharp, T), 1e-6, 100.0)
+
+
+FILE = """
+[controller]
+sample_time = 1e-3
+placement = {bandwidth_hz = 20.0, damping = 1.0}
+loop = {law = "pd"}
+observer = {law = "friction_feedback", friction = "gms", gain = 0.8}
+"""
+
+
+def test_the_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("c.toml").write_text(FILE)
+    line = ["analyse", "stability", "--rig", "thesis-dry", "--controller", "c.toml"]
+    assert main([*line, "--plot", "c.png"]) == 0
+    said = capsys.readouterr().out
+    assert "observer: friction_feedback" in said
+    assert "sticking  stable" in said
+    assert Path("c.png").stat().st_size > 10_000
+    assert main([*line, "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["loops"][0]["stable"] is True
+    assert len(data["gain"]) == len(data["frequency"])
+    for wrong, words in (
+        (["--bandwidth", "20"], "--bandwidth beside --controller c.toml, which says all of it"),
+        (["--confirm"], "--confirm beside --controller"),
+        (["--delay", "-1"], "delay = -1 samples must be from 0 to 100"),
+    ):
+        assert main([*line, *wrong]) == 2
+        assert words in capsys.readouterr().err
