@@ -177,9 +177,14 @@ def refuse_controllers(args: argparse.Namespace, chosen: Target) -> None:
 
 def composed_in(file: Path) -> SampledController | None:
     """The controller of a file, where it is made of control laws."""
+    from stickslip.config import read_toml
+    from stickslip.control.files import read_controller
     from stickslip.control.sampled_controller import SampledController
     from stickslip.study.study import load_run
 
+    whole = read_toml(file)
+    if whole.has("controller") and not whole.has("reference"):
+        return read_controller(file)  # of `stickslip recommend --controller`, or written by hand
     control = load_run(file).control
     return control if isinstance(control, SampledController) else None
 

@@ -63,6 +63,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "with filter (Hz, low-pass on its velocity) and limit (N·m)",
     )  # fmt: skip
     parser.add_argument(
+        "--controller", type=Path, metavar="FILE.toml",
+        help="the drive's own loop made of control laws instead (table [controller]), observers and all, but without "
+        "friction laws",
+    )  # fmt: skip
+    parser.add_argument(
         "--motion", type=Path, metavar="FILE",
         help="log or CSV (time, position) of the motion that matters (default: that of the log, kept in MODEL.toml)",
     )  # fmt: skip
@@ -121,7 +126,7 @@ def run(args: argparse.Namespace) -> int:
             f"--confirm {args.confirm} must be at least 0, which confirms nothing; leave it out for 39"
         )
     found = read_identified(args.model)
-    drive = drive_of(args)
+    drive = drive_of(args, found)
     with _output.progress_bar("simulating") as progress:
         result = recommend(
             found,
@@ -141,11 +146,12 @@ def run(args: argparse.Namespace) -> int:
     show(result, found.unit)
     if written:
         print(f"recommended: {written}")
-        print(f"next: stickslip export {shlex.quote(str(written))} --to c99 --compensator recommended")
+        what = "--controller" if args.controller else "--compensator recommended"
+        print(f"next: stickslip export {shlex.quote(str(written))} --to c99 {what}")
     return 0
 
 
-def drive_of(args: argparse.Namespace) -> Drive:
+def drive_of(args: argparse.Namespace, found: Identified) -> Drive:
     """The drive and the motion that the options describe."""
     from stickslip.errors import InputError
     from stickslip.identify.setting_trial import Drive
@@ -158,12 +164,45 @@ def drive_of(args: argparse.Namespace) -> Drive:
         raise InputError(
             f"--linear {args.linear} beside --loop, which gives the gains themselves; leave it out"
         )
+    motion = motion_from(args.motion) if args.motion else None
+    if args.controller:
+        return drive_with(args, args.inertia or found.axis.get("inertia"), motion)
     gains, own = loop_of(args) if args.loop else (None, dict[str, float]())
     limit = own["limit"] if "limit" in own else float(args.torque_limit)
     return Drive(
         args.bandwidth, args.damping, args.sample_time, args.counts_per_rev, limit,
         args.amplitude, args.frequency or 0.5, args.linear, gains, own.get("filter", 0.0),
-        motion_from(args.motion) if args.motion else None,
+        motion,
+    )  # fmt: skip
+
+
+def drive_with(args: argparse.Namespace, inertia: float | None, motion: Motion | None) -> Drive:
+    """The drive whose loop is made of control laws; sample time, limit and counts are the file's.
+
+    Raises
+    ------
+    InputError
+    """
+    from stickslip.control.files import read_controller
+    from stickslip.errors import InputError
+    from stickslip.identify.setting_trial import Drive
+
+    for option, usual in (
+        ("loop", None),
+        ("linear", "PD"),
+        ("bandwidth", 10.0),
+        ("damping", 1.0),
+        ("sample_time", 1e-3),
+    ):
+        if getattr(args, option) != usual:
+            raise InputError(
+                f"--{option.replace('_', '-')} beside --controller {args.controller}, which says it; leave it out"
+            )
+    made = read_controller(args.controller, inertia)
+    return Drive(
+        sample_time=made.sample_time, encoder_counts=args.counts_per_rev or made.encoder_counts,
+        torque_limit=args.torque_limit, amplitude=args.amplitude, frequency=args.frequency or 0.5, motion=motion,
+        controller=made,
     )  # fmt: skip
 
 

@@ -62,7 +62,7 @@ def is_composed(table: Table) -> bool:
 
 
 def read_controller(
-    path: str | os.PathLike[str], inertia: float, known: Mapping[str, Model] | None = None
+    path: str | os.PathLike[str], inertia: float | None = None, known: Mapping[str, Model] | None = None
 ) -> SampledController:
     """Read the controller of a file.
 
@@ -70,8 +70,8 @@ def read_controller(
     ----------
     path : path
         A TOML file with a table ``[controller]``.
-    inertia : float
-        Of the axis, kg·m², where the file has no ``[axis]``.
+    inertia : float, optional
+        Of the axis, kg·m², where the file has no ``[axis]``; without it the file must have one.
     known : mapping of str to Model, optional
         What ``friction`` may name besides the file's own ``[laws.NAME]``.
 
@@ -83,7 +83,7 @@ def read_controller(
     whole = read_toml(Path(path))
     files = law_files(whole)
     own = models(whole.tables("laws"), files)
-    if whole.has("axis"):
+    if inertia is None or whole.has("axis"):
         inertia = whole.table("axis").positive("inertia", "kg·m²")
     default = placement(whole.table("reference")) if whole.has("reference") else None
     with whole.table("controller") as table:

@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.control.controller import Controller
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.identify.draws import sliding_torque, with_values
 from stickslip.identify.identified_file import Identified
@@ -64,7 +66,7 @@ class Recommendation:
     model : Model or None
         The law to run, with its parameters.
     gains : mapping
-        Of the PD.
+        Of the linear controller; of a loop made of control laws the parameters of all of them.
     linear_error : float
         RMS error of the linear controller alone on the best estimate, rad.
     margin : float
@@ -181,7 +183,9 @@ def recommend(
     offset = float(found.axis.get("offset", 0.0) or 0.0)
     settings = [
         replace(setting, offset=offset)
-        for setting in settings_of(laws, drive, float(j) if feed_inertia else 0.0)
+        for setting in settings_of(
+            laws, drive, float(j) if feed_inertia and not feeds_inertia(linear) else 0.0
+        )
     ]
     # Each with the linear controller alone; then leads, the guard and the gains beyond.
     more = (axes + 1) * (len(LEADS) + 1 + len(BEYOND)) + (confirm + 1) * (3 + len(BEYOND))
@@ -189,7 +193,7 @@ def recommend(
     refuse_endless(account.total, drive, axes, confirm)
 
     def drawn(count: int, seed: int) -> Bench:
-        own = drive.gains is not None  # Only of a loop that somebody runs is it known that it holds the axis.
+        own = drive.given  # Only of a loop that somebody runs is it known that it holds the axis.
         plants = plants_of(found, float(j), (TRIES if own else 1) * count, seed, start, inertia is not None)
         return (Bench.held(plants, count, linear, drive, laws, account.one) if own
                 else Bench(list(plants), linear, drive, laws, account.one))  # fmt: skip
@@ -217,10 +221,22 @@ def recommend(
         *notes_on(found, chosen, candidates, weak_on([*bench.plants, *others.plants[1:]], drive)),
     ]  # fmt: skip
     return Recommendation(
-        chosen, laws[chosen.setting.law] if chosen else None, dict(linear.gains._asdict()),
+        chosen, laws[chosen.setting.law] if chosen else None, numbers_of(linear),
         first.moving["position_rms_rad"], margin, unsafe_gain, tuple(candidates), len(bench.plants),
         tuple(notes), drive, rung, float(j),
     )  # fmt: skip
+
+
+def feeds_inertia(loop: Controller | SampledController) -> bool:
+    """Whether the loop feeds the inertia forward itself."""
+    return isinstance(loop, SampledController) and any(
+        block.law.name == "inertia_feedforward" for block in loop.blocks.values()
+    )
+
+
+def numbers_of(loop: Controller | SampledController) -> dict[str, float]:
+    """Gains of a linear controller; of one made of control laws the parameters of all of them."""
+    return loop.values() if isinstance(loop, SampledController) else dict(loop.gains._asdict())
 
 
 def with_motion(found: Identified, drive: Drive) -> Drive:

@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.control.block import ControlBlock
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.compensators.feedforward import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
+from stickslip.control.sampled_controller import SampledController
 from stickslip.identify.draws import sliding_torque
 from stickslip.identify.setting_trial import Drive, Trial, dangers, rings, run
 from stickslip.machines.rigid import RigidAxis
@@ -28,6 +30,8 @@ TRIES = 4
 LOOKED_AT = 16
 """Axes on which the linear controller alone is judged: the best estimate and some drawn ones."""
 KINDS = {"feedforward": Feedforward, "feedback": Feedback}
+Alone = Controller | SampledController
+"""The controller without a compensator."""
 SLOWER = (0.7, 0.5, 0.35, 0.25, 0.1)
 """Of the bandwidth: where a linear controller that rings alone is tried for one that is calm."""
 
@@ -59,13 +63,31 @@ class Setting:
     inertia_feedforward: float = 0.0
     offset: float = 0.0
 
-    def on(self, linear: Controller, model: Model) -> Controller:
+    def on(self, linear: Alone, model: Model) -> Alone:
         """The linear controller with this compensator."""
+        if isinstance(linear, SampledController):
+            return self.beside(linear, model)
         helper = KINDS[self.kind](
             model, self.gain, lead=self.lead, deadband=self.deadband,
             inertia_feedforward=self.inertia_feedforward, offset=self.offset,
         )  # fmt: skip
         return replace(linear, compensator=helper)
+
+    def beside(self, loop: SampledController, model: Model) -> SampledController:
+        """The loop made of control laws with this compensator's beside its own."""
+        own = {
+            place: [b for b in loop.blocks.values() if b.law.place == place]
+            for place in ("feedforward", "observer")
+        }
+        if self.inertia_feedforward or self.offset:
+            block = ControlBlock("inertia_feedforward", inertia=self.inertia_feedforward, offset=self.offset)
+            own["feedforward"].append(block)
+        numbers: dict[str, Any] = {"gain": self.gain, "deadband": self.deadband}
+        if self.kind == "feedforward":
+            own["feedforward"].append(ControlBlock("friction_feedforward", model, lead=self.lead, **numbers))
+        else:
+            own["observer"].append(ControlBlock("friction_feedback", model, **numbers))
+        return replace(loop, feedforward=own["feedforward"], observer=own["observer"])
 
 
 @dataclass(frozen=True)
@@ -137,7 +159,7 @@ class Bench:
     """
 
     def __init__(
-        self, plants: Sequence[RigidAxis], linear: Controller, drive: Drive, laws: dict[str, Model],
+        self, plants: Sequence[RigidAxis], linear: Alone, drive: Drive, laws: dict[str, Model],
         ran: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self.plants, self.linear, self.drive, self.laws, self.ran = plants, linear, drive, laws, ran
@@ -146,7 +168,7 @@ class Bench:
 
     @staticmethod
     def held(
-        drawn: Iterator[RigidAxis], count: int, linear: Controller, drive: Drive, laws: dict[str, Model],
+        drawn: Iterator[RigidAxis], count: int, linear: Alone, drive: Drive, laws: dict[str, Model],
         ran: Callable[[], None] = lambda: None,
     ) -> Bench:  # fmt: skip
         """The best estimate, which is drawn first, and the first `count` others that the linear controller holds."""
@@ -236,6 +258,8 @@ def rings_alone(bench: Bench, inertia: float, torque: str) -> str:
     drive, count = bench.drive, len(bench.plants[:LOOKED_AT])
     where = " and ".join(sorted({where for _, where in ringing}))
     on = f"on {len(ringing)} of {count} axes" if count > 1 else "on the best estimate"
+    if isinstance(bench.linear, SampledController):
+        return f"{where} {on}; lower its gains, or take a finer encoder or a shorter sample time"
     kick = bench.linear.linear.kd * drive.deadband(1.0)
     why = f": a count of the encoder makes it push {kick:.2g} {torque} for a sample" if kick else ""
     plants = [plant for plant, _ in ringing]

@@ -9,12 +9,16 @@ from typing import Any
 import numpy as np
 
 from stickslip.config import Table
+from stickslip.control.controller import Controller
 from stickslip.control.recommended import Recommended
+from stickslip.control.sampled_controller import SampledController
+from stickslip.control.written import tables_of
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.model_file import in_memory, model_content, write_model
 from stickslip.identify.recommend import Recommendation
+from stickslip.identify.setting_bench import Setting
 from stickslip.machines.servo import ServoAxis
 
 __all__ = ["setting_table", "write_setting"]
@@ -22,6 +26,8 @@ __all__ = ["setting_table", "write_setting"]
 
 def write_setting(path: str | os.PathLike[str], found: Identified, advice: Recommendation) -> Path:
     """Write what is recommended: the same form as that of `stickslip rig commission`, without a machine's name.
+
+    Beside a loop made of control laws: the whole controller, as `stickslip.control.files` reads it.
 
     Parameters
     ----------
@@ -61,17 +67,27 @@ def _parts(found: Identified, advice: Recommendation) -> tuple[Identification, s
     assert advice.chosen is not None
     assert advice.model is not None
     setting, drive = advice.chosen.setting, advice.drive
-    own = drive.gains is not None or drive.linear != "PD"
-    table = Recommended(
-        setting.kind, setting.gain, drive.bandwidth, drive.damping, advice.inertia, setting.lead, setting.deadband,
-        sample_time=drive.sample_time, offset=setting.offset, inertia_feedforward=setting.inertia_feedforward,
-        gains=drive.loop(advice.inertia).gains if own else None, velocity_filter=drive.velocity_filter,
-    ).table()  # fmt: skip
+    loop = drive.loop(advice.inertia)
+    if isinstance(loop, SampledController):
+        further = tables_of(setting.beside(loop, advice.model))
+    else:
+        further = {"recommended": _recommended(advice, setting, loop)}
     motion = ServoAxis(motion="linear") if found.motion == "linear" else ServoAxis()
     result = Identification(
         "recommendation", advice.model, (), np.eye(0), {}, advice.notes,
         details={"axis": motion},
     )  # fmt: skip
     kept = found.law_file if advice.model.law.name == found.model.law.name else ""
-    more = {"axis": {**found.axis, "inertia": advice.inertia}, "recommended": table}
+    more = {"axis": {**found.axis, "inertia": advice.inertia}, **further}
     return result, kept, more
+
+
+def _recommended(advice: Recommendation, setting: Setting, loop: Controller) -> dict[str, Any]:
+    """The table of a setting beside a linear controller."""
+    drive = advice.drive
+    own = drive.gains is not None or drive.linear != "PD"
+    return Recommended(
+        setting.kind, setting.gain, drive.bandwidth, drive.damping, advice.inertia, setting.lead, setting.deadband,
+        sample_time=drive.sample_time, offset=setting.offset, inertia_feedforward=setting.inertia_feedforward,
+        gains=loop.gains if own else None, velocity_filter=drive.velocity_filter,
+    ).table()  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
 from stickslip.identify.motion import HOLD, Motion, sinusoid
 from stickslip.jit import kernel
@@ -110,6 +111,9 @@ class Drive:
         Corner of the first-order low-pass on the velocity that the linear controller sees, Hz; 0 for none.
     motion : Motion or None
         None: that of the log, or the sinusoid.
+    controller : SampledController or None
+        The loop as it is where it is made of control laws, without friction laws: gains, placement and filter are not
+        used then, and its sample time is the drive's.
     """
 
     bandwidth: float = 10.0
@@ -123,6 +127,7 @@ class Drive:
     gains: Gains | Cascade | None = None
     velocity_filter: float = 0.0
     motion: Motion | None = None
+    controller: SampledController | None = None
 
     def __post_init__(self) -> None:
         for name in ("bandwidth", "damping", "sample_time", "torque_limit", "amplitude", "frequency"):
@@ -137,13 +142,15 @@ class Drive:
                 f"drive: amplitude = {self.amplitude:g} must be at least {SMALLEST:g} rad (m)"
             )
         for name in ("bandwidth", "frequency"):
-            used = self.gains is None if name == "bandwidth" else self.amplitude is not None
+            used = not self.given if name == "bandwidth" else self.amplitude is not None
             if used and getattr(self, name) * self.sample_time > 0.1:
                 raise ParameterError(
                     f"drive: {name} = {getattr(self, name):g} Hz is more than a tenth of the sample rate "
                     f"{1.0 / self.sample_time:g} Hz; take a lower one, or a shorter sample time"
                 )
-        if self.gains is None and self.bandwidth < SLOWEST * self.frequency:
+        if self.controller is not None:
+            refuse_unfit(self.controller, self.sample_time)
+        if not self.given and self.bandwidth < SLOWEST * self.frequency:
             raise ParameterError(
                 f"drive: bandwidth = {self.bandwidth:g} Hz is less than {SLOWEST:g} of the motion's "
                 f"{self.frequency:g} Hz, which the loop would not follow at all; give a higher one"
@@ -158,8 +165,16 @@ class Drive:
         """The velocity of so many counts of the encoder per sample time, rad/s; 0 where it measures exactly."""
         return counts * 2.0 * math.pi / self.encoder_counts / self.sample_time if self.encoder_counts else 0.0
 
-    def loop(self, inertia: float) -> Controller:
-        """The linear controller alone."""
+    @property
+    def given(self) -> bool:
+        """Whether the loop is somebody's own, and not placed by bandwidth and damping."""
+        return self.gains is not None or self.controller is not None
+
+    def loop(self, inertia: float) -> Controller | SampledController:
+        """The linear controller, or the one made of control laws, alone."""
+        if self.controller is not None:
+            limit = min(self.torque_limit, self.controller.torque_limit)
+            return replace(self.controller, torque_limit=limit, encoder_counts=self.encoder_counts)
         gains = self.gains or place(self.linear, inertia, self.bandwidth, self.damping)
         return Controller(
             gains, None, self.torque_limit, self.sample_time, self.encoder_counts, self.velocity_filter
@@ -202,12 +217,35 @@ class Drive:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        out = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("gains", "motion")}
+        out = {
+            f.name: getattr(self, f.name)
+            for f in fields(self)
+            if f.name not in ("gains", "motion", "controller")
+        }
         path = self.path
         return out | {
             "gains": self.gains._asdict() if self.gains else None,
+            "controller": self.controller.as_dict() if self.controller else None,
             "motion": {"source": path.source, "amplitude": path.amplitude, "duration": path.duration},
         }
+
+
+def refuse_unfit(controller: SampledController, sample_time: float) -> None:
+    """Refuse a loop made of control laws that the drive cannot be.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if controller.sample_time != sample_time:
+        raise ParameterError(
+            f"drive: sample_time = {sample_time:g} s, the controller's is {controller.sample_time:g} s; give the same"
+        )
+    for part, block in controller.blocks.items():
+        if block.friction is not None:
+            raise ParameterError(
+                f"drive: {part} = {block.law.name!r} holds a friction law, which is what is looked for; leave it out"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,7 +281,7 @@ class Trial:
         return max(SWINGS[0] * count, SWINGS[1] * self.moving["position_rms_rad"])
 
 
-def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
+def run(plant: RigidAxis, controller: Controller | SampledController, drive: Drive) -> Trial | str:
     """The motion and the rest behind it; the reason where it cannot be run to its end."""
     wanted = drive.wanted_backward if isinstance(plant, Plant) and plant.backward else drive.wanted
     position = simulated(plant, controller, wanted)
@@ -262,7 +300,9 @@ def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
     )  # fmt: skip
 
 
-def simulated(plant: RigidAxis, controller: Controller, wanted: Array, start: float = 0.0) -> Array | None:
+def simulated(
+    plant: RigidAxis, controller: Controller | SampledController, wanted: Array, start: float = 0.0
+) -> Array | None:
     """Positions of the axis itself at every sample along a reference, rad; None where it diverges.
 
     The axis starts at rest at `start`, rad.
@@ -342,7 +382,7 @@ def above(velocity: Array, corner: float, sample_time: float) -> float:
     return math.sqrt(2.0 * float(np.sum(np.abs(spectrum[fast]) ** 2))) / velocity.size
 
 
-def rings(plant: RigidAxis, linear: Controller, drive: Drive, alone: Trial | str) -> str:
+def rings(plant: RigidAxis, linear: Controller | SampledController, drive: Drive, alone: Trial | str) -> str:
     """Where the linear controller alone rings on an axis, "at rest" or "in motion"; empty where it is calm.
 
     `alone` is its trial. Besides, it holds a position between two counts, from near it: whether it happens to stop

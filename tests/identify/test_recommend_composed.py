@@ -1,0 +1,156 @@
+"""A recommendation beside a loop made of control laws, written as the whole controller and read again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+from test_recommend_axes import INERTIA, PD, identified
+
+from stickslip.approval import allow_code
+from stickslip.cli import main
+from stickslip.control.block import ControlBlock
+from stickslip.control.files import read_controller
+from stickslip.control.sampled_controller import SampledController
+from stickslip.control.written import tables_of
+from stickslip.errors import ParameterError
+from stickslip.identify import recommend as recommending
+from stickslip.identify.recommend import Drive, recommend
+from stickslip.identify.setting_bench import Setting
+from stickslip.model import Model
+
+T = 1e-3
+LAW = Model("coulomb", fc=0.285, sigma2=0.018)
+LOOP = ControlBlock("pd", kp=PD.kp, kd=PD.kd)
+OBSERVER = ControlBlock("disturbance_observer", inertia=INERTIA, corner=40.0)
+
+
+@pytest.fixture
+def few(monkeypatch):
+    monkeypatch.setattr(recommending, "GAINS", (0.8,))
+    monkeypatch.setattr(recommending, "LEADS", (0.0,))
+    monkeypatch.setattr(recommending, "BEYOND", ())
+
+
+def test_a_pd_made_of_control_laws_gets_what_a_pd_gets(few):
+    given = {"sample_time": T, "torque_limit": 2.0, "amplitude": 0.2, "frequency": 0.5}
+    old = recommend(identified(), Drive(gains=PD, **given), axes=1, confirm=2)
+    new = recommend(identified(), Drive(controller=SampledController(LOOP, T), **given), axes=1, confirm=2)
+    assert new.linear_error == pytest.approx(old.linear_error, rel=1e-6)
+    assert new.gains == {"loop_kp": PD.kp, "loop_kd": PD.kd}
+    assert new.chosen.setting == old.chosen.setting
+    assert np.allclose(new.chosen.errors, old.chosen.errors, rtol=1e-3)
+
+
+def test_what_an_observer_leaves_is_what_a_compensator_is_worth(few):
+    given = {"sample_time": T, "torque_limit": 2.0, "amplitude": 0.2, "frequency": 0.5}
+    alone = recommend(identified(), Drive(controller=SampledController(LOOP, T), **given), axes=1, confirm=2)
+    observed = SampledController(LOOP, T, None, OBSERVER)
+    found = recommend(identified(), Drive(controller=observed, **given), axes=1, confirm=2)
+    assert found.linear_error < 0.5 * alone.linear_error
+    assert found.chosen is not None
+    assert found.chosen.errors[0] < 0.7
+
+
+def test_settings_stand_beside_the_loops_own_laws():
+    loop = SampledController(LOOP, T, ControlBlock("inertia_feedforward", inertia=2e-4), OBSERVER)
+    ahead = Setting("coulomb", "feedforward", 0.9, 1e-3, 0.0, INERTIA, 0.02).on(loop, LAW)
+    assert list(ahead.blocks) == [
+        "estimator", "feedforward", "feedforward_2", "feedforward_3", "observer", "loop"
+    ]  # fmt: skip
+    values = ahead.values()
+    assert (values["feedforward_2_offset"], values["feedforward_3_lead"], values["feedforward_3_gain"]) == (
+        0.02,
+        1e-3,
+        0.9,
+    )
+    back = Setting("coulomb", "feedback", 0.7, deadband=0.01).on(loop, LAW)
+    assert [b.law.name for b in back.blocks.values()][-3:] == [
+        "disturbance_observer",
+        "friction_feedback",
+        "pd",
+    ]
+    assert recommending.feeds_inertia(loop)
+    assert not recommending.feeds_inertia(SampledController(LOOP, T))
+
+
+def test_the_tables_of_a_controller_are_that_controller(tmp_path):
+    own = Path(__file__).parents[1] / "study" / "sliding_mode.py"
+    sliding = ControlBlock(str(own), inertia=INERTIA, slope=60.0, torque=0.4, layer=0.5)
+    pid = ControlBlock("pid", None, {"at_rest": "reset"}, kp=1.0, ki=2.0, kd=0.01)
+    ahead = ControlBlock("friction_feedforward", LAW, {"velocity": "held"}, gain=0.9)
+    inertia = ControlBlock("inertia_feedforward", inertia=INERTIA)
+    estimator = ControlBlock("luenberger", corner=900.0)
+    made = SampledController([sliding, pid], T, [ahead, inertia], OBSERVER, estimator, 1.5, 65536.0)
+    file = tmp_path / "c.toml"
+    file.write_bytes(tomli_w.dumps(tables_of(made)).encode())
+    with allow_code():
+        again = read_controller(file, 1.0)
+    assert again.as_dict() == made.as_dict()
+    assert again.values() == made.values()
+
+
+@pytest.mark.parametrize(
+    ("controller", "words"),
+    [
+        (SampledController(LOOP, 2e-3), "sample_time = 0.001 s, the controller's is 0.002 s"),
+        (
+            SampledController(LOOP, T, ControlBlock("friction_feedforward", LAW)),
+            "'friction_feedforward' holds a friction law",
+        ),
+    ],
+)
+def test_a_loop_that_the_drive_cannot_be_is_refused(controller, words):
+    with pytest.raises(ParameterError, match=words):
+        Drive(controller=controller, amplitude=0.1)
+
+
+MODEL = """
+law = "coulomb"
+[parameters]
+fc = 0.285
+sigma2 = 0.018
+[axis]
+inertia = 4e-4
+"""
+LOOPS = """
+[controller]
+sample_time = 1e-3
+torque_limit = 2.0
+placement = {bandwidth_hz = 20.0, damping = 1.0}
+loop = {law = "pd"}
+observer = {law = "disturbance_observer", corner = 40.0}
+"""
+
+
+def test_the_command_writes_a_controller_that_runs_and_is_exported(tmp_path, monkeypatch, capsys, few):
+    monkeypatch.chdir(tmp_path)
+    Path("model.toml").write_text(MODEL)
+    Path("loop.toml").write_text(LOOPS)
+    line = [
+        "recommend",
+        "model.toml",
+        "--controller",
+        "loop.toml",
+        "--amplitude",
+        "0.2",
+        "--axes",
+        "1",
+        "--confirm",
+        "0",
+    ]
+    assert main([*line, "--out", "out.toml", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    made = read_controller("out.toml")
+    assert made.blocks["observer"].law.name == "disturbance_observer"
+    held = [b for b in made.blocks.values() if b.friction]
+    assert [b.parameters.gain for b in held] == [data["chosen"]["gain"]]
+    assert main(["export", "out.toml", "--to", "python", "--controller", "--check"]) == 0
+    assert "at most 0 N·m" in capsys.readouterr().out
+    track = ["rig", "run", "track", "--rig", "thesis-dry", "--set", "controller=out.toml", "--dry-run"]
+    assert main(track) == 0
+    assert main([*line, "--bandwidth", "20"]) == 2
+    assert "--bandwidth beside --controller loop.toml" in capsys.readouterr().err
