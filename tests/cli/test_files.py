@@ -87,3 +87,39 @@ def test_a_picture_that_cannot_be_written_is_one_line(folder, capsys):
         complaint = capsys.readouterr().err
         assert complaint.startswith("stickslip: cannot write file/x.png (")
         assert complaint.endswith("choose another place with --plot\n")
+
+
+RESULTS = [
+    (["study", "s.toml", "--no-report", "--out", "."], "metrics.csv"),
+    (["study", "s.toml", "--no-report", "--out", "."], "manifest.json"),
+    (["study", "s.toml", "--no-report", "--out", "."], "report.html"),
+    (["study", "s.toml", "--no-report", "--out", "."], "inputs/s.toml"),
+    (["study", "thesis-rig", "--out", "."], "metrics.csv"),
+    (["sweep", "thesis-robustness", "--cases", "2", "--no-report", "--out", "."], "summary.csv"),
+]
+
+
+@pytest.mark.parametrize(("words", "file"), RESULTS, ids=[f"{w[1]} {f}" for w, f in RESULTS])
+def test_results_go_into_no_folder_that_holds_other_files_of_their_names(folder, capsys, words, file):
+    (folder / "s.toml").write_text((DATA / "small_study.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    (folder / "motion.csv").write_bytes((DATA / "motion.csv").read_bytes())
+    (folder / file).parent.mkdir(exist_ok=True)
+    (folder / file).write_bytes(FOREIGN)
+    assert main(words) == 2
+    complaint = capsys.readouterr().err
+    assert complaint.count("\n") == 1
+    assert f"holds {file.split('/')[0]} already" in complaint
+    assert (folder / file).read_bytes() == FOREIGN
+
+
+def test_a_study_goes_on_in_its_own_folder_and_no_other_does(folder, capsys):
+    (folder / "s.toml").write_text((DATA / "small_study.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    (folder / "motion.csv").write_bytes((DATA / "motion.csv").read_bytes())
+    words = ["study", "s.toml", "--no-report", "--out", "found"]
+    assert main(words) == 0
+    (folder / "found" / "manifest.json").unlink()  # as where it was interrupted
+    assert main(words) == 0
+    capsys.readouterr()
+    (folder / "t.toml").write_text((folder / "s.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    assert main(["study", "t.toml", "--no-report", "--out", "found"]) == 2
+    assert "found holds the study 's'" in capsys.readouterr().err

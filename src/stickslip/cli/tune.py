@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     """Search, print the settings, draw the trade-off."""
     from stickslip.cli import _output
     from stickslip.errors import InputError
-    from stickslip.study.files import prepared_folder
+    from stickslip.study.files import claim_folder
     from stickslip.study.study import interrupts_between_runs
     from stickslip.sweep.plan import load
     from stickslip.sweep.tune import tune
@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
         )
     if sweep.left_out:
         _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(sweep.left_out)}")
-    out: Path = prepared_folder(args.out or Path(f"tune-{sweep.name}"))
+    out: Path = claim_folder(args.out or Path(f"tune-{sweep.name}"), sweep.name, "tune")
     found: list[dict[str, Any]] = []
     for planned in sweep.runs:
         with _output.progress_bar(planned.key) as progress, interrupts_between_runs(STOPPING) as check:

@@ -9,7 +9,7 @@ import math
 import os
 import shutil
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,6 +39,14 @@ __all__ = [
 ]
 
 KEYS = ("slip_rule", "reference", "friction", "controller")
+KINDS = ("study", "sweep", "tune")
+MARK = ".stickslip-results"
+"""File that says whose results a folder holds, from before the first of them"""
+PLACES = (
+    "manifest.json", "metrics.csv", "metrics.parquet", "summary.csv", "report.html", "inputs", "figures", "records", "data",
+    "variants",
+)  # fmt: skip
+"""Where results go: what lies there and is not ours is not written over"""
 
 
 def prepared_folder(folder: Path) -> Path:
@@ -63,20 +71,56 @@ def unwritable(path: Path, error: OSError) -> InputError:
     return InputError(f"cannot write {path} ({error.strerror or error}); choose another place with --out")
 
 
-def claim_folder(folder: Path, study: Study) -> Path:
-    """Prepare the folder for a study, unless another one's results lie there.
+def claim_folder(folder: Path, name: str, kind: str = "study") -> Path:
+    """Prepare the folder for results, unless other results or files of somebody else lie where they go.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+        Of the study, sweep or tuning; the same one goes on in its folder.
+    kind : str
+        ``"study"``, ``"sweep"`` or ``"tune"``.
 
     Raises
     ------
     InputError
+        That names what lies there.
     """
+    found = _owner(folder)
+    if found is None:
+        for place in PLACES:
+            if (folder / place).is_file() or any(_inside(folder / place)):
+                raise InputError(
+                    f"{folder} holds {place} already, which no {kind} of stickslip wrote; choose another place with "
+                    "--out, or move it away"
+                )
+    elif found != (kind, name):
+        raise InputError(
+            f"{folder} holds the {found[0]} {found[1]!r}; choose another place with --out, or delete it"
+        )
+    prepared_folder(folder)
     try:
-        other = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["study"]
-    except (OSError, ValueError, KeyError, TypeError):
-        other = study.name
-    if other != study.name:
-        raise InputError(f"{folder} holds the study {other!r}; choose another place with --out, or delete it")
-    return prepared_folder(folder)
+        (folder / MARK).write_text(json.dumps({kind: name}), encoding="utf-8")
+    except OSError as error:
+        raise unwritable(folder, error) from None
+    return folder
+
+
+def _owner(folder: Path) -> tuple[str, str] | None:
+    """Kind and name of the results in a folder; None where no file of ours says so."""
+    for file in (MARK, "manifest.json"):
+        try:
+            told: Any = json.loads((folder / file).read_text(encoding="utf-8"))
+            return next((kind, str(told[kind])) for kind in KINDS if kind in told)
+        except (OSError, ValueError, TypeError, StopIteration):
+            continue
+    return None
+
+
+def _inside(folder: Path) -> Iterator[Path]:
+    """What a folder holds; nothing where there is none."""
+    return folder.iterdir() if folder.is_dir() else iter(())
 
 
 # ---- records -----------------------------------------------------------------------------------------------

@@ -200,13 +200,13 @@ def run_rig_study(
     InputError
         If a name is unknown or the folder cannot be written.
     """
-    from stickslip.study.files import prepared_folder
+    from stickslip.study.files import claim_folder, prepared_folder
 
     cases = all_cases(only)
     names = [NOMINAL]
     names += [f"without {name}" for name in IMPERFECTIONS] if ablation else []
     names += [f"seed {i}" for i in range(1, seeds + 1)]
-    folder = Path(out)
+    folder = claim_folder(Path(out), "thesis-rig")
     prepared_folder(folder / "records")
     prepared_folder(folder / "variants")
     clock, runs = time.perf_counter(), list[RigRun]()

@@ -95,7 +95,7 @@ def run(
     insist_on_jobs(jobs)
     everything = [*study.runs, *study.extras]
     wanted = select(everything, only or ())
-    folder = files.claim_folder(Path(out), study)
+    folder = files.claim_folder(Path(out), study.name)
     clock, cpu = time.perf_counter(), time.process_time()
     results: dict[str, Run] = {}
     with interrupts_between_runs() as check:

@@ -25,7 +25,7 @@ from stickslip.approval import allow_code
 from stickslip.capacity import insist_on_jobs, insist_on_memory
 from stickslip.errors import InputError
 from stickslip.simulation import lanes
-from stickslip.study.files import copy_inputs, prepared_folder, unwritable
+from stickslip.study.files import claim_folder, copy_inputs, unwritable
 from stickslip.study.provenance import engine_hash, versions
 from stickslip.study.study import interrupts_between_runs
 from stickslip.sweep import dataset
@@ -86,7 +86,7 @@ def run(
         insist_on_jobs(jobs)
     ready(sweep, scheduler)
     dataset.room_for(Path(out), sweep)
-    folder = claim(Path(out), sweep)
+    folder = claim_folder(Path(out), sweep.name, "sweep")
     dataset.refuse_strays(folder, sweep)
     integrators = [integrator_of(sweep, i) for i in range(len(sweep.runs))]
     if say:
@@ -151,22 +151,6 @@ def departures(sweep: Sweep, integrators: Sequence[tuple[str, str]]) -> list[str
         f" integrator {name}, not {wanted}: {why}"
         for (name, why), keys in groups.items()
     ]
-
-
-def claim(folder: Path, sweep: Sweep) -> Path:
-    """Prepare the folder, unless another sweep's results lie there.
-
-    Raises
-    ------
-    InputError
-    """
-    try:
-        other = json.loads((folder / "manifest.json").read_text(encoding="utf-8")).get("sweep")
-    except (OSError, ValueError, AttributeError):
-        other = sweep.name
-    if other != sweep.name:
-        raise InputError(f"{folder} holds other results; choose another place with --out, or delete it")
-    return prepared_folder(folder)
 
 
 def _passes(check: Callable[[], None]) -> bool:
