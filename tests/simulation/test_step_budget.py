@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import stickslip as ss
-from stickslip.errors import StepFailure
+from stickslip.errors import InputError, StepFailure
 from stickslip.simulation import adaptive, exact
 from stickslip.simulation._case import TOO_STIFF, StepBudget
 from stickslip.simulation.closed_loop import prepare
@@ -63,3 +63,21 @@ def test_the_budget_grows_with_the_motion_and_holds_what_the_thesis_takes():
         first, rate = module.STEPS.pace(long)
         assert first + rate * 60.0 == pytest.approx(module.STEPS.of(long))
         assert first == module.STEPS.base
+
+
+def test_a_step_whose_metrics_would_take_hours_ends_the_run():
+    """Of a loop of 1 GHz a single step has half a million e-folds; nothing hears Ctrl-C inside it."""
+    axis = ss.RigidAxis(4e-4, ss.Model("lugre", **LUGRE))
+    fast = ss.Controller(ss.place("PD", 4e-4, 1e9, 1.0))
+    with pytest.raises(StepFailure, match="so fast that its metrics .* lower the controller's gains"):
+        ss.simulate(axis, fast, ss.Reference("sine", amplitude=0.01, frequency=0.4), 1.0, integrator="exact")
+
+
+def test_more_samples_than_memory_holds_are_refused_before_the_run(monkeypatch):
+    monkeypatch.setattr("stickslip.capacity.free_memory", lambda: 1e9)
+    axis, _, reference = loop(4e-4, 1.0)
+    sampled = ss.Controller(ss.place("PD", 4e-4, 10.0, 1.0), sample_time=1e-8)
+    with pytest.raises(
+        InputError, match=r"1e\+08 steps of sample_time = 1e-08 s need 10 GB .* use a longer one"
+    ):
+        prepare(axis, sampled, reference, 1.0)

@@ -47,7 +47,7 @@ UNITS = {
 }  # fmt: skip
 
 # ---- how a kernel ended ------------------------------------------------------------------------------------------
-DONE, DIVERGED, NOT_FINITE, STORM, NO_STEP, ROWS_FULL, TOO_STIFF = range(7)
+DONE, DIVERGED, NOT_FINITE, STORM, NO_STEP, ROWS_FULL, TOO_STIFF, TOO_FAST = range(8)
 
 # ---- entries of Case.numbers -------------------------------------------------------------------------------------
 (

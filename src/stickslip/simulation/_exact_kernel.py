@@ -20,6 +20,7 @@ from stickslip.simulation._case import (
     STORM_EVENTS,
     STORM_TIME,
     TOLERANCE,
+    TOO_FAST,
     TOO_STIFF,
     VELOCITY_LIMIT,
 )
@@ -235,8 +236,8 @@ def solve(
             write_grid(lin, plan, loop, stretch, grid, count, out, h, 0.1 * tol, spaced, generation)
         if full:
             write_rows(lin, parameters, plan, cells, sides, loop, stretch, grid, count, rows, h)
-        if metered:
-            measure(lin, parameters, plan, cells, sides, loop, stretch, h, acc, turns, nodes)
+        if metered and not measure(lin, parameters, plan, cells, sides, loop, stretch, h, acc, turns, nodes):
+            return TOO_FAST
         if happens:
             cross(parameters, plan, cells, elements, sides, loop, stretch, count, rows, h, tol, held, full)
             slow_again = growth_of(lin) * FIRST_STEP > MOST_GROWTH

@@ -49,6 +49,8 @@ SHORTEST_WINDOW = 1e-10
 
 FINEST_NODES = 0.03
 """Half a window in radians (or e-folds) of the free motion, that need not be undercut."""
+MOST_WINDOWS = 250_000
+"""Of a step, each of four nodes: half a second of work, in which nothing hears a wish to end."""
 UNSEEN = 1e-8
 """Free motion slower than this (rad/s) adds nothing to a metric; the nodes need not follow it."""
 UNSEEN_COARSE = 1e-4
@@ -220,18 +222,20 @@ def windows_of(lin: Linear, stretch: Any, h: float, longest: float) -> int:
             windows_for(fast, abs(fast * (q - slow * p)) * share, h, unseen),
             windows_for(slow, abs(slow * (q - fast * p)) * share, h, unseen),
         )
-    return math.ceil(max(most, h / longest) * (1.0 - 1e-9))
+    return math.ceil(min(max(most, h / longest), MOST_WINDOWS + 1.0) * (1.0 - 1e-9))
 
 
 @kernel(exact=False)
 def measure(
     lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, stretch: Any, h: float, acc: Any,
     turns: Any, nodes: Any,
-) -> None:  # fmt: skip
-    """Hand the first h of the stretch to the meter, in windows of five nodes."""
+) -> bool:  # fmt: skip
+    """Hand the first h of the stretch to the meter, in windows of five nodes; False where they are too many."""
     if h < SHORTEST_WINDOW:
-        return
+        return True
     windows = windows_of(lin, stretch, h, acc[WINDOW])
+    if windows > MOST_WINDOWS:
+        return False
     width = h / windows
     c = cubic_of(stretch)
     m = flow(lin, 0.25 * width)
@@ -250,6 +254,7 @@ def measure(
             fill(parameters, plan, cells, sides, loop, stretch, x, theta, v, nodes, k)
         meter(
             acc, turns, loop[TIME] + w * width, width, nodes)  # fmt: skip
+    return True
 
 
 @kernel(exact=False)

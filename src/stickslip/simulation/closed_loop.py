@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import stickslip
+from stickslip.capacity import insist_on_memory
 from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import (
@@ -35,6 +36,8 @@ INTEGRATORS = ("exact", "adaptive", "fixed")
 
 MOST_STEPS = 1e9
 """Of a fixed length"""
+SAMPLE = 100.0
+"""Bytes that the schedule of one sample takes while it is made"""
 SHORTEST = 1e-9
 """s, of a run: one-sided limits are taken a thousandth of it beside kinks and ends."""
 
@@ -50,6 +53,11 @@ REASONS: dict[int, tuple[type[SimulationError], str]] = {
     _case.TOO_STIFF: (
         StepFailure,
         "far more steps than a motion of its length takes",
+    ),
+    _case.TOO_FAST: (
+        StepFailure,
+        "a part of the motion is so fast that its metrics take more than a million nodes of a single step; lower "
+        "the controller's gains or bandwidth, or raise the inertia",
     ),
 }
 
@@ -199,6 +207,11 @@ def prepare(
         raise ParameterError(f"simulate: initial = {initial} must be two finite numbers")
     if controller.sample_time > 0.0:
         _insist_on_steps("sample_time", controller.sample_time, duration)
+        samples = duration / controller.sample_time
+        insist_on_memory(
+            SAMPLE * samples, f"simulate: {samples:.3g} steps of sample_time = {controller.sample_time:g} s",
+            "use a longer one or a shorter duration",
+        )  # fmt: skip
     return lay_out(
         axis, controller, reference, float(duration),
         tolerance=tolerance, grid=_grid(output, duration), slip_rule=slip_rule, initial=initial, metered=metered,
