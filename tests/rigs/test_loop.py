@@ -244,3 +244,36 @@ def test_a_rig_that_does_not_open_leaves_nothing_behind(tmp_path):
     with pytest.raises(RigError, match="no power"), Loop(rig, path=tmp_path / "run.stream"):
         pass
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("column", Setpoint._fields)
+def test_setpoints_that_are_no_numbers_are_refused_before_any_torque(column):
+    rig = AxisRig()
+    wanted = setpoints(100, torque=0.1)
+    wanted[50, Setpoint._fields.index(column)] = np.nan
+    with (
+        pytest.raises(InputError, match=f"setpoint 50 has {column} = nan, which must be a finite number"),
+        Loop(rig) as loop,
+    ):
+        loop.run(wanted)
+    assert not any(rig.torques)
+
+
+def test_a_clock_that_counts_from_1970_runs_a_controller():
+    """Its times are beyond what a position or a torque may be."""
+
+    class Unix(AxisRig):
+        def exchange(self, torque: float) -> Measurement:
+            found = super().exchange(torque)
+            return found._replace(time=1.76e9 + found.time)
+
+        def open(self) -> Measurement:
+            found = super().open()
+            return found._replace(time=1.76e9 + found.time)
+
+    t = 1e-3 * np.arange(1, 501)
+    with Loop(Unix(blocks=False)) as loop:
+        wanted = setpoints(500, position=0.1 * t, velocity=0.1, closed=1.0)
+        rows = loop.run(wanted, Controller(pd(2.0, 0.05)))
+    assert len(rows) == 500
+    assert not rows[:, COLUMNS.index("reason")].any()

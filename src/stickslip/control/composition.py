@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 TURN = 2.0 * math.pi  # rad
-LARGEST = 1e9  # rad, rad/s, N·m, s: an input beyond it is no measurement
+LARGEST = 1e9  # rad, rad/s, N·m: an input beyond it is no measurement
 STILL = 1e-6  # rad/s: a reference that moves slower stands still
 
 
@@ -110,7 +110,8 @@ def unusable(
     """1 where an input is no number, or one that no machine has; else 0."""
     size = abs(turns) + abs(position) + abs(reference_turns) + abs(reference) + abs(reference_velocity)
     size += abs(reference_acceleration)
-    size += abs(u.load) + abs(u.temperature) + abs(u.time) + abs(u.applied)
+    # Clocks that count from 1970 are beyond 1e9 s.
+    size += abs(u.load) + abs(u.temperature) + 1e-6 * abs(u.time) + abs(u.applied)
     if size < LARGEST:
         return 0.0
     return 1.0

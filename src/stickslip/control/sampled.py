@@ -43,7 +43,7 @@ __all__ = [
 
 NO_COMPENSATOR, FROM_REFERENCE, FROM_MEASUREMENT = 0.0, 1.0, 2.0
 TURN = 2.0 * math.pi  # rad
-LARGEST = 1e9  # rad, rad/s, N·m, s: an input beyond it is no measurement
+LARGEST = 1e9  # rad, rad/s, N·m: an input beyond it is no measurement
 FADE = 0.1
 """s, over which a torque that was taken over fades."""
 
@@ -225,7 +225,8 @@ def unusable(
     """1 where an input is no number, or one that no machine has; else 0."""
     size = abs(turns) + abs(position) + abs(wanted_turns) + abs(wanted) + abs(wanted_velocity)
     size += abs(wanted_acceleration)
-    size += abs(u.load) + abs(u.temperature) + abs(u.time) + abs(u.applied)
+    # Clocks that count from 1970 are beyond 1e9 s.
+    size += abs(u.load) + abs(u.temperature) + 1e-6 * abs(u.time) + abs(u.applied)
     if size < LARGEST:
         return 0.0
     return 1.0

@@ -31,7 +31,7 @@ from stickslip.rigs.budget import BUDGET, Budget
 from stickslip.rigs.declared import FIELDS, answer, blamed, checked
 from stickslip.rigs.pace import TIMES, Account, Pace, soft_real_time
 from stickslip.rigs.reasons import crossed, told
-from stickslip.rigs.rig import BlockRig, Limits, Measurement, Rig, Setpoint, setpoints
+from stickslip.rigs.rig import BlockRig, Limits, Measurement, Rig, Setpoint, insist_on_setpoints, setpoints
 from stickslip.rigs.safety import ASKED, RUNNING, STOPPED, STOPPING, Bounds, Safety
 from stickslip.rigs.signals import Signals
 from stickslip.rigs.step import Step
@@ -214,16 +214,15 @@ class Loop:
 
         Raises
         ------
+        InputError
+            If setpoints have another shape, or are no numbers.
         RigError
             After the torque was ramped to zero: why.
         """
         stream = self._open_stream()
         if wanted.ndim == 2 and wanted.shape[1] == len(Setpoint._fields) - 1:
             wanted = np.column_stack([wanted, np.zeros(len(wanted))])  # without an acceleration
-        if wanted.ndim != 2 or wanted.shape[1] != len(Setpoint._fields):
-            raise InputError(
-                f"setpoints have shape {wanted.shape}; give (n, {len(Setpoint._fields)}), see setpoints()"
-            )
+        insist_on_setpoints(wanted)
         self._take_over(self.prepare(controller), travel)
         begin = stream.count
         self._pace.restart()

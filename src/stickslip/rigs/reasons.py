@@ -20,6 +20,8 @@ def crossed(rig: str, limits: Limits, reason: int, value: float, at: float) -> R
         return DriveFault(f"{rig} reports fault 0x{code:04X} {where}")
     if limit := limits.text(name):
         return LimitCrossed(f"{name} = {value:g} {LIMIT_UNITS[name]} is beyond its limit {limit} {where}")
+    if math.isfinite(value):
+        return LimitCrossed(f"an input of the controller, or the torque it computed, is {name} {where}")
     return LimitCrossed(f"position or torque is {value:g}, {name}, {where}")
 
 

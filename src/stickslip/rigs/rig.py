@@ -100,6 +100,26 @@ def setpoints(
     return table
 
 
+def insist_on_setpoints(wanted: Array) -> None:
+    """Refuse setpoints that no loop can follow, before any of them is given.
+
+    Raises
+    ------
+    InputError
+        For another shape, or the first that is no number.
+    """
+    names = Setpoint._fields
+    if wanted.ndim != 2 or wanted.shape[1] != len(names):
+        raise InputError(f"setpoints have shape {wanted.shape}; give (n, {len(names)}), see setpoints()")
+    wrong = np.argwhere(~np.isfinite(wanted))
+    if wrong.size:
+        row, column = wrong[0].tolist()
+        raise InputError(
+            f"setpoint {row} has {names[column]} = {wanted[row, column]:g}, which must be a finite number; mend what "
+            "made it"
+        )
+
+
 @dataclass(frozen=True)
 class Limits:
     """What a rig allows. Crossing any of them ramps the torque to zero (`stickslip.rigs.safety`).

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from stickslip.errors import InputError
 from stickslip.record import Record
 from stickslip.rigs._control import COLUMNS
 from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, samples, speed_up
@@ -93,6 +94,11 @@ class Resonance(Procedure):
         count = samples(rig, self.duration)
         f = np.fft.rfftfreq(count, rig.sample_time)
         inside = (f >= self.lowest) & (f <= self.highest / rig.sample_time)
+        if not np.any(inside):
+            raise InputError(
+                f"resonance: duration = {self.duration:g} s has no frequency from lowest = {self.lowest:g} Hz to "
+                f"{self.highest / rig.sample_time:g} Hz; record for longer, or widen the band"
+            )
         rng = np.random.default_rng((self.seed, place))
         noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(count)) * inside, count)
         noise /= float(np.sqrt(np.mean(noise**2)))
