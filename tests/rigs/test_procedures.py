@@ -247,5 +247,5 @@ def test_command_line(tmp_path, capsys, monkeypatch):
 
 def test_noise_too_short_for_its_band_is_refused_before_any_torque():
     rig = virtual_rig("thesis-dry")
-    with pytest.raises(InputError, match="duration = 0.001 s has no frequency from lowest = 5 Hz"):
+    with pytest.raises(InputError, match=r"duration = 0\.001 s has no frequency from lowest = 5 Hz"):
         run("resonance", rig, duration="0.001")

@@ -69,7 +69,7 @@ def test_a_step_whose_metrics_would_take_hours_ends_the_run():
     """Of a loop of 1 GHz a single step has half a million e-folds; nothing hears Ctrl-C inside it."""
     axis = ss.RigidAxis(4e-4, ss.Model("lugre", **LUGRE))
     fast = ss.Controller(ss.place("PD", 4e-4, 1e9, 1.0))
-    with pytest.raises(StepFailure, match="so fast that its metrics .* lower the controller's gains"):
+    with pytest.raises(StepFailure, match=r"so fast that its metrics .* lower the controller's gains"):
         ss.simulate(axis, fast, ss.Reference("sine", amplitude=0.01, frequency=0.4), 1.0, integrator="exact")
 
 

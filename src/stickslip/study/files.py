@@ -43,8 +43,8 @@ KINDS = ("study", "sweep", "tune")
 MARK = ".stickslip-results"
 """File that says whose results a folder holds, from before the first of them"""
 PLACES = (
-    "manifest.json", "metrics.csv", "metrics.parquet", "summary.csv", "report.html", "inputs", "figures", "records", "data",
-    "variants",
+    "manifest.json", "metrics.csv", "metrics.parquet", "summary.csv", "report.html", "inputs", "figures", "records",
+    "data", "variants",
 )  # fmt: skip
 """Where results go: what lies there and is not ours is not written over"""
 
