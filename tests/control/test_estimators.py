@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_discrete_are
 
 from stickslip import plugins
 from stickslip.control.block import ControlBlock
@@ -57,3 +58,29 @@ def test_more_filter_is_more_delay_and_less_noise():
     for wide in (1, 3, 5):
         assert spread[0] > spread[wide] > spread[wide + 1]
         assert delay[0] < delay[wide] < delay[wide + 1]
+
+
+def test_the_kalman_filters_gains_are_those_of_the_riccati_equation():
+    """Of a random acceleration that is constant over a sample, and a position measured with noise."""
+    for acceleration, noise in ((2000.0, 1e-5), (20.0, 1e-4)):
+        block = ControlBlock("kalman", acceleration=acceleration, noise=noise)
+        a, c = np.array([[1.0, TIME], [0.0, 1.0]]), np.array([[1.0, 0.0]])
+        g = acceleration * np.array([[0.5 * TIME**2], [TIME]])
+        p = solve_discrete_are(a.T, c.T, g @ g.T, np.array([[noise**2]]))
+        gains = (p @ c.T / (c @ p @ c.T + noise**2)).ravel()
+        # A jump of the measured position, from rest: the first velocity is the second gain times it.
+        found = velocities(block, np.array([0.0, 1e-3]))
+        assert found[1] == pytest.approx(1e-3 * gains[1], rel=1e-6)
+
+
+def test_the_tracking_differentiator_follows_a_jump_with_its_acceleration_and_stops_there():
+    block = ControlBlock("tracking_differentiator", acceleration=100.0, window=0.004)
+    jump = np.concatenate([np.zeros(5), np.full(600, 0.1)])
+    speed = velocities(block, jump)
+    assert np.abs(np.diff(speed)).max() <= 100.0 * TIME * (1.0 + 1e-12)
+    moved = np.cumsum(speed) * TIME
+    assert moved[-1] == pytest.approx(0.1, rel=1e-3)
+    assert moved.max() < 0.1 * 1.01
+    # The shortest time with that acceleration is 2 sqrt(0.1 / 100) s.
+    late = np.flatnonzero(moved > 0.098)[0] * TIME
+    assert late < 1.3 * 2.0 * np.sqrt(0.1 / 100.0)

@@ -3,4 +3,11 @@
 To add an estimator, write its file and add its name to this tuple.
 """
 
-ESTIMATORS = ("backward_difference", "filtered_difference", "butterworth_difference", "luenberger")
+ESTIMATORS = (
+    "backward_difference",
+    "filtered_difference",
+    "butterworth_difference",
+    "luenberger",
+    "kalman",
+    "tracking_differentiator",
+)

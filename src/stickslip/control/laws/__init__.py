@@ -4,8 +4,10 @@ To add a control law, write its file and add its name to this tuple.
 """
 
 CONTROL_LAWS = (
+    "pr",
     "pd",
     "pid",
+    "cascade",
     "friction_feedforward",
     "inertia_feedforward",
     "friction_feedback",
