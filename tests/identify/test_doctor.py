@@ -100,6 +100,15 @@ def test_good_records_have_no_errors(name, tmp_path):
     assert "assumed-unit" in {f.code for f in bare.warnings}
 
 
+def test_a_log_with_a_velocity_and_no_position_is_looked_at_as_far_as_it_goes(tmp_path, capsys):
+    table = turned()
+    path = tmp_path / "log.csv"
+    data = np.column_stack([table["time"], 60.0 / (2.0 * np.pi) * table["velocity"], table["torque"]])
+    np.savetxt(path, data, delimiter=",", header="time_s,speed_rpm,torque_Nm", comments="")
+    assert main(["doctor", str(path)]) == 0
+    assert "0 errors" in capsys.readouterr().out
+
+
 def test_simulated_records_with_events_have_no_errors():
     axis = RigidAxis(INERTIA, Model("coulomb", fc=0.2, sigma2=0.01))
     record = simulate(

@@ -254,6 +254,23 @@ def test_times_since_1970_are_told_by_their_size(tmp_path, factor, start):
     np.testing.assert_allclose(read(table(tmp_path, text)).time, np.arange(5) * 0.01, atol=1e-6)
 
 
+@pytest.mark.parametrize(("delimiter", "comma"), [(",", False), (";", True), ("\t", False)])
+def test_a_column_of_words_is_left_out_and_told(tmp_path, delimiter, comma):
+    """The state of the drive, as most of them log it."""
+    rows = [[f"{t:.6f}", "RUN" if t < 0.2 else "STOP", f"{q:.6f}", f"{m:.6f}"] for t, q, m in zip(T, Q, M)]
+    if comma:
+        rows = [[cell.replace(".", ",") for cell in row] for row in rows]
+    lines = ["exported by a drive", delimiter.join(("time [s]", "state", "position [deg]", "torque [mNm]"))]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([*lines, *(delimiter.join(row) for row in rows)]) + "\n", encoding="utf-8")
+    table = open_table(path)
+    assert [c.name for c in table.columns] == ["time [s]", "position [deg]", "torque [mNm]"]
+    assert np.allclose(table.columns[1].values, Q, atol=1e-6)
+    assert [f.message for f in table.findings] == [
+        "left out as they hold words, not numbers: 'state' (first 'RUN')"
+    ]
+
+
 def test_missing_cells_are_nan_and_words_are_told(tmp_path):
     record = read(table(tmp_path, "time,position\n0,1\n1,\n2,NaN\n3,oops\n4,5\n"))
     assert np.isnan(record["position"]).tolist() == [False, True, True, True, False]

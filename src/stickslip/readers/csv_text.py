@@ -7,7 +7,7 @@ import io
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -25,6 +25,8 @@ DIALECTS = (("\t", "."), ("\t", ","), (";", "."), (";", ","), (",", "."), ("|", 
 """Delimiter and decimal sign, in the order in which ties are decided."""
 SAMPLE = 400
 """Lines from which the dialect is told."""
+USUAL = 0.8
+"""Part of the lines of a sample in which a column of numbers holds one: header and footer are the rest"""
 NO_VALUE = frozenset(
     (
         "",
@@ -56,6 +58,8 @@ class Dialect:
     decimal: str
     width: int
     start: int
+    words: frozenset[int] = frozenset()
+    """Columns that hold words, such as the state of the drive"""
 
     def split(self, line: str) -> list[str]:
         """The cells of a line."""
@@ -93,7 +97,15 @@ def read(path: Path) -> Table:
     columns = tuple(
         Column(name or f"column {i + 1}", np.ascontiguousarray(values[:, i]), unit)
         for i, (name, unit) in enumerate(zip(names[: values.shape[1]], units, strict=False))
+        if i not in dialect.words
     )
+    if dialect.words and body:
+        first = dialect.split(body[0])
+        left = ", ".join(
+            f"{names[i] or f'column {i + 1}'!r} (first {first[i].strip()[:30]!r})"
+            for i in sorted(dialect.words)
+        )
+        findings.append(Finding("note", "words", f"left out as they hold words, not numbers: {left}"))
     return Table("csv", columns, _constants(header, dialect), tuple(findings))
 
 
@@ -131,11 +143,46 @@ def _sniff(path: Path, lines: Sequence[str]) -> Dialect:
         if merit > score * 1.001:
             best, score = Dialect(delimiter, decimal, width, 0), merit
     if best is None:
+        best = _sniff_among_words(filled, sample)
+    if best is None:
         raise InputError(f"{path} holds no table of numbers; give a file with one row of numbers a sample")
+    if best.words:
+        return best
     start = next(
         i for i, line in filled if len(c := best.split(line)) == best.width and _is_row(c, best.decimal)
     )
     return Dialect(best.delimiter, best.decimal, best.width, start)
+
+
+def _sniff_among_words(
+    filled: Sequence[tuple[int, str]], sample: Sequence[tuple[int, str]]
+) -> Dialect | None:
+    """The dialect under which at least two columns hold numbers, and others words, in nearly every line."""
+    best, score = None, 0
+    for delimiter, decimal in DIALECTS:
+        trial = Dialect(delimiter, decimal, 0, 0)
+        rows = [trial.split(line) for _, line in sample]
+        widths = [len(row) for row in rows]
+        width = max(set(widths), key=widths.count, default=0)
+        found = [[cell(text, decimal) for text in row] for row in rows if len(row) == width]
+        due = [j for j in range(width) if sum(row[j] is not None for row in found) >= USUAL * len(found)]
+        full = sum(2 * sum(_is_number(row[j]) for row in found) >= len(found) for j in due)
+        if full >= 2 and len(found) * min(full, 3) > score:
+            score = len(found) * min(full, 3)
+            best = Dialect(delimiter, decimal, width, 0, frozenset(range(width)).difference(due))
+    start = next((i for i, line in filled if best is not None and _numbers_where_due(best, line)), None)
+    return None if best is None or start is None else replace(best, start=start)
+
+
+def _numbers_where_due(dialect: Dialect, line: str) -> bool:
+    """Whether a line has numbers, or signs for none, in every column that does not hold words."""
+    cells = dialect.split(line)
+    found = [cell(text, dialect.decimal) for j, text in enumerate(cells) if j not in dialect.words]
+    return len(cells) == dialect.width and None not in found and any(map(_is_number, found))
+
+
+def _is_number(value: float | None) -> bool:
+    return value is not None and not math.isnan(value)
 
 
 def _is_row(cells: Sequence[str], decimal: str) -> bool:
@@ -227,6 +274,8 @@ def _values_one_by_one(body: Sequence[str], dialect: Dialect) -> tuple[Array, li
         elif any(c.strip() for c in cells[dialect.width :]):
             long.append(i)
         for j, text in enumerate(cells[: dialect.width]):
+            if j in dialect.words:
+                continue
             value = cell(text, dialect.decimal)
             if value is None:
                 words.append((i, j, text.strip()))

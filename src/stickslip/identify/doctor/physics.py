@@ -113,9 +113,9 @@ def _braking(smooth: Smooth, *, measured: bool) -> tuple[float, float]:
 def skew(view: View) -> Iterator[Finding]:
     """When the torque acted: a note from a tenth of a row on, a warning from where no drive does so."""
     smooth = _usable(view)
-    if smooth is None or view.torque_channel != "motor_torque":
-        return
     record = view.record
+    if smooth is None or view.torque_channel != "motor_torque" or "position" not in record.channels:
+        return
     linear = record.units.get("position") == "m"
     position, torque = (record[n][view.usable] for n in ("position", "motor_torque"))
     axis = ServoAxis(motion="linear" if linear else "rotary", drive_side="load")
