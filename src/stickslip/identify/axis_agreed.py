@@ -232,12 +232,12 @@ def fall_together(e: Estimate, found: Regression, p: Parameter) -> tuple[Estimat
 
 
 def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tuple[Estimate, ...]:
-    """The estimates of a record without certain sliding: nothing is identified where inertia or level contradicts the
-    plain inverse dynamics, since nothing decides between the two."""
+    """The estimates of a record without certain sliding: nothing is identified where inertia, level or slope
+    contradicts the plain inverse dynamics, since nothing decides between the two."""
     out = tuple(estimates)
     for e in out:
         other = plain_value(e.name, inverse)
-        if e.name not in ("inertia", "fc") or other is None:
+        if e.name not in ("inertia", "fc", "sigma2") or other is None:
             continue
         apart = abs(other[0] - e.value) > math.hypot(0.5 * (e.upper - e.lower), other[1])
         if apart and abs(other[0] - e.value) > SAME * abs(e.value):
