@@ -237,7 +237,7 @@ def _module_of(path: str, code: bytes) -> ModuleType:
         exec(compile(code, path, "exec", dont_inherit=True), module.__dict__)
     except InputError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise LawError(
             f"{path} cannot be imported: {type(error).__name__}: {error}; mend the file"
         ) from error

@@ -135,7 +135,11 @@ def test_the_loop_stops_it_like_any_other(rig, tmp_path):
 
 
 def test_a_file_that_is_no_rig(tmp_path):
-    for text, message in (("x = 1", "defines no rig"), ("x = ", "cannot be imported")):
+    for text, message in (
+        ("x = 1", "defines no rig"),
+        ("x = ", "cannot be imported"),
+        ("raise SystemExit(3)", "cannot be imported"),
+    ):
         (tmp_path / "own.py").write_text(text)
         (tmp_path / "rig.toml").write_text('[rig]\nkind = "own.py"\n')
         with pytest.raises(InputError, match=message), allow_code():

@@ -38,6 +38,8 @@ RECOMMENDED = ("linear", "bandwidth", "damping", "inertia", "gain", "filter", "l
 """Options that a recommendation sets: it was simulated and measured with these, and with no others."""
 BESIDE_FILE = ("linear", "bandwidth", "damping", "compensator", "model", *RECOMMENDED[4:], "substeps")
 """Options of what the file of a controller says itself."""
+HIGHEST = 0.1
+"""Of the sample rate, that a bandwidth may be"""
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,11 @@ class Track(Procedure):
             )  # fmt: skip
         if self.linear not in LINEAR:
             raise UnknownName("linear controller", self.linear, LINEAR)
+        if self.bandwidth * rig.sample_time > HIGHEST:
+            raise InputError(
+                f"bandwidth = {self.bandwidth:g} Hz is more than a tenth of the sample rate "
+                f"{1.0 / rig.sample_time:g} Hz: the torque would jump from limit to limit; take a lower one"
+            )
         gains: Gains = place(self.linear, self.inertia, self.bandwidth, self.damping)
         limit = ROOM * rig.limits.torque - self.angle().largest
         if self.compensator == "none":
