@@ -37,6 +37,32 @@ def observer(corner, **choices):
     return ControlBlock("disturbance_observer", None, choices, inertia=INERTIA, corner=corner)
 
 
+def extended(corner):
+    return ControlBlock("extended_state_observer", inertia=INERTIA, corner=corner)
+
+
+def coulomb(direction, smooth):
+    return ControlBlock(
+        "coulomb_observer", None, {"direction": direction}, inertia=INERTIA, sigma2=0.018, corner=200.0, deadband=0.01,
+        smooth=smooth, largest=0.6,
+    )  # fmt: skip
+
+
+def late(model):
+    return ControlBlock("friction_observer", model, correction=0.0)
+
+
+def twisting(form):
+    return ControlBlock("super_twisting", None, {"form": form}, inertia=INERTIA, slope=60.0, rate=2e4)
+
+
+def layer(width):
+    return ControlBlock("boundary_layer", inertia=INERTIA, slope=0.5 * W, torque=0.45, layer=width)
+
+
+PUSH = ControlBlock("stiction_push", torque=0.9 * 0.335, error=2e-3, speed=0.02)
+DITHER = ControlBlock("dither", torque=0.2, samples=4.0)
+
 ROWS = {
     "PD": controller(pd()),
     "PID": controller(pid()),
@@ -64,4 +90,16 @@ ROWS = {
     "PD + FF LuGre .9 + DOB 400 residual reset at rest": controller(
         pd(), compensation(LUGRE), observer(400.0, at_rest="reset")
     ),
+    "PD + ESO 400": controller(pd(), None, extended(400.0)),
+    "PD + ESO 800": controller(pd(), None, extended(800.0)),
+    "PD + Friedland-Park 200 on v_d": controller(pd(), None, coulomb("reference", 1e-3)),
+    "PD + Friedland-Park 200 on v_f": controller(pd(), None, coulomb("measured", 0.01)),
+    "PD + GMS3 feedback on v_f k=0": controller(pd(), None, late(GMS)),
+    "sliding mode phi .05": controller(layer(0.05)),
+    "sliding mode phi .5": controller(layer(0.5)),
+    "super-twisting 2e4": controller(twisting("explicit")),
+    "super-twisting 2e4 implicit": controller(twisting("implicit")),
+    "PD + stiction push": controller(pd(), None, PUSH),
+    "PD + dither .2": controller(pd(), DITHER),
+    "PID + dither .2": controller(pid(), DITHER),
 }

@@ -201,3 +201,15 @@ def test_a_control_law_in_a_file_of_ones_own(tmp_path):
     empty.write_text("")
     with pytest.raises(LawError, match="defines no control law"):
         ControlBlock(str(empty))
+
+
+def test_a_friction_observers_correction_is_a_velocity_besides():
+    law = Model("viscous", sigma2=0.5)
+    late, corrected = (
+        SampledController(pd(), TIME, observer=ControlBlock("friction_observer", law, gain=0.8, correction=k))
+        for k in (0.0, 3.0)
+    )
+    inputs = motion()[:200]
+    error = inputs[:, 1] - inputs[:, 0]
+    apart = torques_of(corrected, inputs) - torques_of(late, inputs)
+    assert apart == pytest.approx(0.8 * 0.5 * 3.0 * error, abs=1e-14)

@@ -99,9 +99,11 @@ class Plain:
         return self.controller.packed_state(self.z)
 
 
-def torques(controller: SampledController, inputs: Array) -> Array:
-    """The torques of plain Python, N·m."""
+def torques(controller: SampledController, inputs: Array, slow: float | None = None) -> Array:
+    """The torques of plain Python, N·m; ``slow`` is the share by which the slow velocity moves in a sample."""
     plain = Plain(controller)
+    if slow is not None:
+        plain.n = plain.n._replace(slow=slow)
     return np.array([plain(row) for row in inputs])
 
 
@@ -244,7 +246,10 @@ def units(law: ControlLaw) -> Verdict:
     if strange:
         return not_tried("units", f"the unit {strange[0]!r} is not understood")
     inputs = clean_motion()  # how a fault fades is a setting of its own, s
-    here = torques(specimen(law), inputs)
+    here, slow = (
+        torques(specimen(law), inputs),
+        specimen(law).settings.slow,
+    )  # so is its slow velocity's corner
     for what, factors in (
         ("torque", (4.0, 1.0, 1.0)),
         ("angle", (1.0, 4.0, 1.0)),
@@ -253,7 +258,7 @@ def units(law: ControlLaw) -> Verdict:
         torque, angle, time = factors
         block, loop = scaled(block_of(law), factors), scaled(ControlBlock("pd", **PD), factors)
         there = inputs * np.array([angle, angle, angle / time, angle / time**2])
-        found = torques(around(block, loop, LIMIT * torque, TIME * time), there) / torque
+        found = torques(around(block, loop, LIMIT * torque, TIME * time), there, slow) / torque
         apart = float(np.abs(found - here).max())
         if not apart <= 1e-9:
             return failed("units", f"in other units of {what} the torque is {apart:.2g} N·m off; mend a unit")
