@@ -13,10 +13,11 @@ from stickslip.control.controller import Controller
 from stickslip.control.sampled import Memory, Settings, sampled_by, settings
 from stickslip.control.sampled_controller import SampledController
 from stickslip.jit import call_sample, compiled_sample, flat, kernel, pointer
+from stickslip.simulation._case import Side
 from stickslip.spec import Law, Surroundings, fields_of
 from stickslip.subset import Layout, law_layouts
 
-__all__ = ["Sampled", "compiled", "measured_position", "replay", "sampled_with"]
+__all__ = ["Sampled", "compiled", "measured_position", "replay", "sampled_of", "sampled_with"]
 
 COMPENSATION, FAULT, MEMORY = *map(Memory._fields.index, ("compensation", "fault")), len(Memory._fields)
 """Places of the compensating torque and of the fault in the memory, and its size; the law's state follows it."""
@@ -93,6 +94,13 @@ def compiled(controller: SampledController) -> Sampled:
 
 
 _compiled: dict[Any, int] = {}
+
+
+def sampled_of(controller: Controller | SampledController, compensator: Side) -> Sampled:
+    """Compile a controller (one in continuous time is laid out, and never called)."""
+    if isinstance(controller, SampledController):
+        return compiled(controller)
+    return sampled_with(controller, compensator.state, compensator.parameters)
 
 
 @kernel()

@@ -10,12 +10,13 @@ random cases.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.simulation import adaptive, exact
+from stickslip.simulation import adaptive, exact, sampled
 from stickslip.simulation._case import DONE, KICK, POSITION_0, TOLERANCE, Case, Outcome
 
 __all__ = ["BESIDE", "Accuracy", "branches", "estimate", "start_apart"]
@@ -24,12 +25,17 @@ KICKS = (2.0, -2.0)
 """Over what a step may be wrong by."""
 WELL = 10.0
 """Largest error of a well-conditioned run, over the tolerance."""
-LOOSER = 10.0
+LOOSER = {"adaptive": 10.0, "sampled": 100.0}
+"""Of the tolerance. Of order 8, ten times the tolerance may be the same steps."""
+LEAST = 0.01
+"""Of the tolerance: what two runs that agree may still have in common."""
 BESIDE = 1e-9
 """Distance of the starts that are tried beside a run's own, rad."""
 BRANCHES = 1e4
 """Growth of that distance from which another branch was taken; motions that are but sensitive stay below 2e3."""
 POSITION, EVENT = 3, 8
+RUNS: dict[str, Callable[[Case], Outcome]] = {"adaptive": adaptive.run, "sampled": sampled.run}
+"""Integrators that take a tolerance and are held to it by a looser one."""
 
 
 class Accuracy(NamedTuple):
@@ -55,14 +61,14 @@ class Accuracy(NamedTuple):
 
 
 def estimate(case: Case, integrator: str = "exact") -> Accuracy:
-    """Repeat a run with wrong steps (exact) or at ten times the tolerance (adaptive), and from starts beside its own;
-    about four times its price.
+    """Repeat a run with wrong steps (exact) or at a looser tolerance (adaptive, sampled), and from starts beside its
+    own; about four times its price.
 
     Parameters
     ----------
     case : Case
         What `stickslip.simulation.closed_loop.prepare` returns; positions are compared on its grid.
-    integrator : {"exact", "adaptive"}
+    integrator : {"exact", "adaptive", "sampled"}
 
     Raises
     ------
@@ -71,8 +77,8 @@ def estimate(case: Case, integrator: str = "exact") -> Accuracy:
     """
     if integrator == "exact":
         error = _kicked(case)
-    elif integrator == "adaptive":
-        error = _looser(case)
+    elif integrator in RUNS:
+        error = max(_looser(case, integrator), LEAST * float(case.numbers[TOLERANCE]))
     else:
         raise ValueError(f"the {integrator} integrator has no tolerance to be held to")
     start = start_apart(case, integrator)
@@ -94,7 +100,7 @@ def start_apart(case: Case, integrator: str = "exact") -> float:
         codes = [code for _, code, _ in runs]
         positions = [motion[:, 0] for motion, _, _ in runs]
     else:
-        outcomes = [adaptive.run(_beside(case, side)) for side in (0.0, BESIDE, -BESIDE)]
+        outcomes = [RUNS[integrator](_beside(case, side)) for side in (0.0, BESIDE, -BESIDE)]
         codes, positions = [o.code for o in outcomes], [_positions(o) for o in outcomes]
     if any(code != DONE for code in codes):
         return math.inf
@@ -124,10 +130,11 @@ def _kicked(case: Case) -> float:
     return worst
 
 
-def _looser(case: Case) -> float:
+def _looser(case: Case, integrator: str) -> float:
+    run = RUNS[integrator]
     numbers = case.numbers.copy()
-    numbers[TOLERANCE] *= LOOSER
-    one, other = adaptive.run(case), adaptive.run(replace(case, numbers=numbers))
+    numbers[TOLERANCE] *= LOOSER[integrator]
+    one, other = run(case), run(replace(case, numbers=numbers))
     return _apart(_positions(one), _positions(other), one.code == other.code == DONE)
 
 

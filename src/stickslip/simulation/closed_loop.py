@@ -31,7 +31,7 @@ from stickslip.simulation._meter import metrics
 
 __all__ = ["INTEGRATORS", "Choice", "integrator_for", "prepare", "run_case", "simulate"]
 
-INTEGRATORS = ("exact", "adaptive", "fixed")
+INTEGRATORS = ("exact", "adaptive", "sampled", "fixed")
 """In the order in which `integrator="auto"` tries them."""
 
 MOST_STEPS = 1e9
@@ -86,10 +86,10 @@ def simulate(
     reference : Reference
     duration : float
         s
-    integrator : {"auto", "exact", "adaptive", "fixed"}
+    integrator : {"auto", "exact", "adaptive", "sampled", "fixed"}
         "auto" takes the first that can run the case.
     tolerance : float
-        Position error that a well-conditioned run may gather, rad (exact and adaptive).
+        Position error that a well-conditioned run may gather, rad (exact, adaptive and sampled).
     time_step : float
         Longest step of the fixed integrator, s.
     slip_rule : {"signed", "literal"}, optional
@@ -102,7 +102,7 @@ def simulate(
     metered : bool
         Whether metrics and energies are accumulated during the run.
     check : bool
-        Whether the error of the run is estimated (exact and adaptive), at about four times its price.
+        Whether the error of the run is estimated (exact, adaptive and sampled), at about four times its price.
 
     Returns
     -------

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
 from stickslip.jit import call_sample, kernel, pointer
 from stickslip.simulation._case import (
@@ -82,7 +81,7 @@ from stickslip.simulation._meter import (
     new_meter,
     settle_band_of,
 )
-from stickslip.simulation._sampled import Sampled, compiled, measured_position, sampled_with
+from stickslip.simulation._sampled import measured_position, sampled_of
 from stickslip.spec import Surroundings
 from stickslip.waiting import Reached, watched
 
@@ -170,7 +169,7 @@ def loop_of(case: Case, dt: float) -> Loop:
         case.compensator.parameters,
         case.profile,
         case.reference_parameters,
-        sampled_of(case),
+        sampled_of(case.controller, case.compensator),
         case.plant.state.size,
         bool(dt * contact_slope(case.plant, dt) > RESOLVED * n[INERTIA]),
         steep,
@@ -184,13 +183,6 @@ def loop_of(case: Case, dt: float) -> Loop:
         np.zeros(size),
         np.zeros((8, 5)),
     )
-
-
-def sampled_of(case: Case) -> Sampled:
-    """The sampled controller of the case, compiled (one in continuous time is laid out, and never called)."""
-    if isinstance(case.controller, SampledController):
-        return compiled(case.controller)
-    return sampled_with(case.controller, case.compensator.state, case.compensator.parameters)
 
 
 def contact_slope(side: Side, dt: float) -> float:

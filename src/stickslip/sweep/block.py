@@ -54,7 +54,7 @@ class Block:
     failures : list of str
         Why a case ended early or could not be run, else "".
     integrators : list of str
-        What ran a case: "exact", "adaptive", "fixed" or "lanes"; "" where it could not be run.
+        What ran a case: "exact", "adaptive", "sampled", "fixed" or "lanes"; "" where it could not be run.
     """
 
     run: int
