@@ -162,7 +162,7 @@ def integrate(
 ) -> tuple[Any, int]:  # fmt: skip
     """Run from 0 to the last stop; returns rows and code."""
     axis, z = axes[0], states[0]
-    befores = states.copy()
+    starts = states.copy()
     rows = np.zeros((grid.size + 256, len(COLUMNS)))
     storm = np.full(STORM_EVENTS, -1.0)
     code = DONE
@@ -173,13 +173,13 @@ def integrate(
         while left > 0.0 and code == DONE:
             happened = z.events
             if axis.metered:
-                befores[0] = z
+                starts[0] = z
             taken = advance(axis, z, springs, parameters, left)
             time = stops[i, 0] - left
             left = left - taken if left - taken > 1e-12 * axis.sample_time else 0.0
             z.steps += 1
             if axis.metered and taken > 0.0:
-                measure(control, axis, befores[0], z, time, taken, nodes, acc, turns)
+                measure(control, axis, starts[0], z, time, taken, nodes, acc, turns)
             if z.events != happened:
                 rows = write(control, axis, z, parameters, time + taken, 1.0, rows, counts[ROWS])
                 counts[ROWS] += 1
