@@ -10,7 +10,7 @@ import pytest
 from structured_text import Program
 
 from stickslip import plugins
-from stickslip.contract.control_laws import Plain
+from stickslip.contract.control_laws import Plain, specimen
 from stickslip.control.block import ControlBlock
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import UnknownName
@@ -71,6 +71,22 @@ def test_the_function_block_gives_the_torque_of_plain_python(name, controller):
         program.run(block, v)
         assert v["torque"] == pytest.approx(torque, abs=1e-11 * max(abs(samples.torque)))
         assert (v["fault"] > 0.0) == any(math.isnan(x) for x in given)
+
+
+@pytest.mark.parametrize("name", plugins.control_law_names())
+def test_every_control_law_goes_to_the_languages_without_a_c_compiler(name):
+    controller = specimen(plugins.control_law(name))
+    for language in ("python", "matlab"):
+        target = controller_target(language)
+        result = target.check(target.write(controller, "axis", False), "axis")
+        assert result.passed is not False, f"{language}: {result.text}"
+    program = Program(controller_target("st").write(controller, "axis", False).files["axis.st"])
+    v, samples = program.instance("axis"), golden_samples(controller, 150)
+    for row in zip(*(column.tolist() for column in samples)):
+        *given, torque, v["load"], v["temperature"] = row
+        v.update(zip(GIVEN, given))
+        program.run("axis", v)
+        assert v["torque"] == pytest.approx(torque, abs=1e-10 * max(abs(samples.torque)))
 
 
 def test_the_function_block_takes_over_and_restarts():
