@@ -2,8 +2,8 @@
 
     python benchmarks/sampled_engine.py
 
-The thesis's axis under a PD of 20 Hz at 1 kHz with LuGre feedforward and a torque limit, at low and at high velocity. The
-error is the largest distance in position from the sampled engine at a tolerance of 1e-12 rad, which
+The thesis's axis under a PD of 20 Hz at 1 kHz with LuGre feedforward and a torque limit, at low and at high velocity.
+The error is the largest distance in position from the sampled engine at a tolerance of 1e-12 rad, which
 `tests/simulation/test_sampled.py` holds against independent results. Times are the least of several runs, without
 metrics, a row at every sample.
 """
