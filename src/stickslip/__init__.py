@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from stickslip.verbs.identification import IdentificationResult
     from stickslip.verbs.identify import identify
     from stickslip.verbs.reading import read
+    from stickslip.verbs.recommend import RecommendationResult, recommend
 
 __version__ = "0.1.0"
 
@@ -49,6 +50,7 @@ _HOME = {
     "Mode": "spec",
     "Model": "model",
     "Par": "spec",
+    "RecommendationResult": "verbs.recommend",
     "Record": "record",
     "Reference": "model",
     "RigidAxis": "machines.rigid",
@@ -67,6 +69,7 @@ _HOME = {
     "place": "control.linear",
     "pr": "control.linear",
     "read": "verbs.reading",
+    "recommend": "verbs.recommend",
     "respond": "simulation.open_loop",
     "simulate": "simulation.closed_loop",
 }
@@ -85,6 +88,7 @@ __all__ = [
     "Mode",
     "Model",
     "Par",
+    "RecommendationResult",
     "Record",
     "Reference",
     "RigidAxis",
@@ -104,12 +108,13 @@ __all__ = [
     "place",
     "pr",
     "read",
+    "recommend",
     "respond",
     "simulate",
 ]
 
 
-_ROOMS = {"identify": "verbs.identify"}
+_ROOMS = {"export": "verbs.export", "identify": "verbs.identify", "sweep": "verbs.sweep"}
 """Functions with the name of a package that holds more (docs/decisions/0023)."""
 
 
@@ -123,6 +128,10 @@ class _Room(ModuleType):
 
     def __call__(self, *args: Any, **options: Any) -> Any:
         return self._function(*args, **options)
+
+    @property
+    def __doc__(self) -> str | None:  # type: ignore[reportIncompatibleVariableOverride]
+        return self._function.__doc__
 
     @property
     def __signature__(self) -> Any:

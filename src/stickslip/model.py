@@ -77,7 +77,8 @@ class Model:
 
     @classmethod
     def from_table(cls, table: Table) -> Model:
-        """As `from_file`, of the content of a file; the path of a law's file is relative to the document's folder."""
+        """As `from_file`, of the content of a file: a `table` in which the path of a law's file is relative to its
+        document's folder."""
         file = table.document.name
         if table.values.get("format", MODEL_FORMAT) != MODEL_FORMAT:
             raise table.error(

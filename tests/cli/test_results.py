@@ -17,7 +17,6 @@ import tomli_w
 
 from stickslip import Model
 from stickslip.cli import _output, main
-from stickslip.cli.recommend import parameters, percent
 from stickslip.control.linear import Cascade
 from stickslip.control.recommended import read_recommended
 from stickslip.identify.drift import compare_models
@@ -26,6 +25,7 @@ from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
 from stickslip.identify.motion import sinusoid
 from stickslip.report.identification import panel_of
+from stickslip.report.recommendation_text import parameters, percent
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.virtual import virtual_rig
 

@@ -211,3 +211,30 @@ def test_signatures_are_those_of_the_functions() -> None:
     from stickslip.verbs.identify import identify
 
     assert inspect.signature(ss.identify) == inspect.signature(identify)
+
+
+def test_a_recommendation_is_that_of_the_command_line_and_runs_in_a_simulation(
+    result: ss.IdentificationResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, options = (
+        tmp_path / "recommended.toml",
+        {"bandwidth": 20.0, "counts_per_rev": 65536.0, "axes": 1, "confirm": 2},
+    )
+    advice = ss.recommend(result, **options)
+    words = [w for k, v in options.items() for w in (f"--{k.replace('_', '-')}", str(v))]
+    assert main(["recommend", str(result.save(tmp_path)), *words, "--out", str(out), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["chosen"] == advice.as_dict()["chosen"]
+    assert printed["model"] == advice.as_dict()["model"]
+    assert advice.chosen is not None
+    assert advice.save(tmp_path / "own.toml").read_text() == out.read_text()
+    controller = ss.Controller(advice.linear, advice.compensator, sample_time=1e-3, encoder_counts=65536.0)
+    alone = ss.Controller(advice.linear, sample_time=1e-3, encoder_counts=65536.0)
+    slow = ss.Reference("sine", amplitude=0.1, frequency=0.4)
+    errors = [
+        ss.simulate(result.axis, c, slow, duration=2.5).meta["metrics"]["position_rms_rad"]
+        for c in (controller, alone)
+    ]
+    assert errors[0] < 0.5 * errors[1]
+    assert "Error reduction" in advice._repr_html_()
+    assert str(advice).startswith("law")

@@ -57,63 +57,39 @@ def announce(sweep: Sweep, jobs: int) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run, print the summary, draw the figures."""
-    from dataclasses import replace
-
-    from stickslip.capacity import insist_on_jobs
     from stickslip.cli import _output
     from stickslip.errors import InputError
     from stickslip.sweep import execute
-    from stickslip.sweep.gains import too_few
-    from stickslip.sweep.plan import MOST_CASES, load
-    from stickslip.sweep.summary import summarise, write_summary
+    from stickslip.sweep.plan import load
+    from stickslip.verbs.sweep import sweep, sweep_of
 
-    sweep = load(args.sweep)
     if args.print:
-        print(sweep.source.read_text(encoding="utf-8"), end="")
+        print(load(args.sweep).source.read_text(encoding="utf-8"), end="")
         return 0
-    if sweep.tuned:
-        raise InputError(f"{args.sweep} has a table [tune]; run `stickslip tune {args.sweep}`")
-    if args.cases is not None:
-        if args.cases < 1:
-            raise InputError(f"--cases {args.cases} must be at least 1")
-        if sweep.drawn.method == "grid":
-            raise InputError(
-                f"--cases {args.cases}: {args.sweep} is a grid, whose points make its {sweep.drawn.cases} cases; "
-                "change `points` or `values` in it, or its `method` to sobol"
-            )
-        if args.cases > MOST_CASES:
-            raise InputError(f"--cases {args.cases} are too many; keep below {MOST_CASES}")
-        sweep = replace(sweep, drawn=replace(sweep.drawn, cases=args.cases))
     if args.jobs is not None and args.jobs < 1:
         raise InputError(f"--jobs {args.jobs} must be at least 1; leave it out for one block a core")
-    insist_on_jobs(args.jobs or 1)
-    if sweep.left_out:
-        _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(sweep.left_out)}")
-    out: Path = args.out or Path(f"sweep-{sweep.name}")
-    execute.ready(sweep, args.scheduler)
-    announce(sweep, args.jobs or os.cpu_count() or 1)
+    planned = sweep_of(args.sweep, args.cases)
+    if planned.left_out:
+        _output.warn(
+            f"not varied, as the model's law has no such parameters: {', '.join(planned.left_out)}"
+        )
+    out: Path = args.out or Path(f"sweep-{planned.name}")
+    execute.ready(planned, args.scheduler)
+    announce(planned, args.jobs or os.cpu_count() or 1)
     try:
-        with _output.progress_bar(sweep.name) as progress:
-            backend = "processes" if args.processes else "threads"
-            manifest = execute.run(
-                sweep, out, args.jobs or 0, backend, args.scheduler, progress, _output.warn
-            )
-        rows = summarise(out, sweep)
-        if why := too_few(sweep.drawn):
-            _output.warn(why)
-        written = [write_summary(out, sweep, rows), out / "manifest.json"]
-        if not args.no_report:
-            from stickslip.report.sweep_pictures import draw
-
-            _output.say("drawing figures ...")
-            written += draw(out, sweep)
+        with _output.progress_bar(planned.name) as progress:
+            found = sweep(
+                planned, out, jobs=args.jobs or 0, processes=args.processes, scheduler=args.scheduler,
+                figures=not args.no_report, progress=progress, tell=_output.warn,
+            )  # fmt: skip
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
             f"finished blocks are kept in {out}; run the same command again to go on"
         ) from None
     if args.json:
-        _output.print_json({"folder": str(out), "timings": manifest["timings"], "runs": rows,
-                            "model_estimates_left_out": list(sweep.left_out)})  # fmt: skip
+        _output.print_json({"folder": str(out), "timings": found.manifest["timings"], "runs": found.rows,
+                            "model_estimates_left_out": list(planned.left_out)})  # fmt: skip
     else:
-        _output.print_sweep(rows, sweep.metrics[0], manifest["timings"]["wall_s"], written)
+        wall = found.manifest["timings"]["wall_s"]
+        _output.print_sweep(found.rows, planned.metrics[0], wall, found.files)
     return 0

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,41 +37,23 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Search, print the settings, draw the trade-off."""
     from stickslip.cli import _output
-    from stickslip.errors import InputError
     from stickslip.study.files import claim_folder
     from stickslip.study.study import interrupts_between_runs
-    from stickslip.sweep.plan import load
-    from stickslip.sweep.tune import tune
-    from stickslip.sweep.tuned_files import write
+    from stickslip.verbs.tune import tune, tuning_of, written
 
-    sweep = load(args.tune)
-    if not sweep.tuned:
-        raise InputError(
-            f'{args.tune} has no table [tune]; give at least one [tune."controller.bandwidth_hz"]'
-        )
+    sweep = tuning_of(args.tune)
     if sweep.left_out:
         _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(sweep.left_out)}")
     out: Path = claim_folder(args.out or Path(f"tune-{sweep.name}"), sweep.name, "tune")
     found: list[dict[str, Any]] = []
     for planned in sweep.runs:
         with _output.progress_bar(planned.key) as progress, interrupts_between_runs(STOPPING) as check:
-            tuned = tune(sweep, planned, _stopped_by(progress, check))
-        written = write(out, sweep, tuned)
-        if not args.no_report and len(sweep.metrics) > 1:
-            from stickslip.report.sweep_pictures import trade_off
-
-            written.append(trade_off(out / "figures" / f"trade-off-{planned.controller}", sweep, tuned))
-        data: dict[str, Any] = {
-            "run": planned.key,
-            "settings": dict(zip(tuned.names, tuned.after.tolist())),
-            "before": dict(zip(tuned.names, tuned.before.tolist())),
-            "metrics": dict(zip(sweep.metrics, tuned.scores_after.tolist())),
-            "metrics_before": dict(zip(sweep.metrics, tuned.scores_before.tolist())),
-            "tried": len(tuned.tried),
-        }
+            (tuned,) = tune(replace(sweep, runs=[planned]), progress=_stopped_by(progress, check))
+        files = written(out, sweep, tuned, figures=not args.no_report)
+        data = tuned.as_dict()
         found.append(data)
         if not args.json:
-            _output.print_tuned(data, sweep.percentile, written)
+            _output.print_tuned(data, sweep.percentile, files)
     if args.json:
         _output.print_json(found)
     return 0

@@ -20,7 +20,7 @@ from stickslip.errors import InputError
 from stickslip.model import Model
 from stickslip.spec import fields_of
 
-__all__ = ["KINDS", "Recommended", "read_recommended"]
+__all__ = ["KINDS", "Recommended", "read_recommended", "recommended_in"]
 
 KINDS: dict[str, type[Compensator]] = {"feedforward": Feedforward, "feedback": Feedback}
 
@@ -108,12 +108,15 @@ def read_recommended(path: str | os.PathLike[str]) -> Recommended:
     InputError
         If the file has none, or its numbers are out of bounds.
     """
-    file = Path(path)
-    whole = read_toml(file)
+    return recommended_in(read_toml(Path(path)))
+
+
+def recommended_in(whole: Table) -> Recommended:
+    """As `read_recommended`, of the content of a file."""
     if not whole.has("recommended"):
         raise InputError(
-            f"{file} recommends nothing (it has no table [recommended]); give what `stickslip recommend --out` or "
-            "`stickslip rig commission` wrote"
+            f"{whole.document.name} recommends nothing (it has no table [recommended]); give what "
+            "`stickslip recommend --out` or `stickslip rig commission` wrote"
         )
     with whole.table("recommended") as given:
         own = _loop(given) if given.has("loop") else None

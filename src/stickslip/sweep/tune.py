@@ -45,6 +45,8 @@ class Tuned:
         Percentiles of the sweep's metrics.
     tried, scores : array, shape (n, names), (n, metrics)
         Every setting, and its percentiles.
+    measured : tuple of str
+        The sweep's metrics.
     """
 
     run: PlannedRun
@@ -55,6 +57,25 @@ class Tuned:
     scores_after: Array
     tried: Array
     scores: Array
+    measured: tuple[str, ...] = ()
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """The best setting, by name."""
+        return dict(zip(self.names, self.after.tolist()))
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Its percentiles, by metric."""
+        return dict(zip(self.measured, self.scores_after.tolist()))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, without the settings tried."""
+        return {
+            "run": self.run.key, "settings": self.settings, "before": dict(zip(self.names, self.before.tolist())),
+            "metrics": self.metrics, "metrics_before": dict(zip(self.measured, self.scores_before.tolist())),
+            "tried": len(self.tried),
+        }  # fmt: skip
 
 
 def tune(sweep: Sweep, run: PlannedRun, progress: Callable[[int, int], None] | None = None) -> Tuned:
@@ -111,7 +132,7 @@ def tune(sweep: Sweep, run: PlannedRun, progress: Callable[[int, int], None] | N
     as_it_was = measured(run, uncertain, sweep.metrics, sweep.drawn.cases).metrics
     return Tuned(
         run, tuple(s.name for s in spreads), before, tried[best], percentiles(as_it_was, sweep.percentile), every[best],
-        np.array(tried), every,
+        np.array(tried), every, tuple(sweep.metrics),
     )  # fmt: skip
 
 

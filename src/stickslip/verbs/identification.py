@@ -126,7 +126,7 @@ class IdentificationResult:
         return self.answers_with("model.toml")
 
     def answers_with(self, model_file: str | os.PathLike[str]) -> Answers:
-        """The same, its commands for a model that lies in this file."""
+        """The same, its commands for a model that lies in `model_file`."""
         fitted = [s for s in self.sources if not s.held_out]
         return answers_of(self.identification, [s.record for s in fitted], Path(model_file), files_of(fitted))
 

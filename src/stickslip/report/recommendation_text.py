@@ -1,0 +1,105 @@
+"""A recommendation in lines of text: what was tried, what to switch on, what to expect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from stickslip.identify.recommend import WORTH, Candidate, Recommendation
+from stickslip.model import Model
+
+__all__ = ["parameters", "percent", "recommendation_lines", "reduction", "safety"]
+
+
+def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str]:
+    """The setting, what to expect, and what was tried; `unit` turns an angular unit into the axis's own."""
+    out = [
+        f"{'law':<16}{'structure':<13}{'gain':>5}  {'deadband':>8}  {'error left':>10}  {'worst':>7}  safe"
+    ]
+    for c in result.candidates:
+        x = c.setting
+        mark = "<- " if result.chosen and (x.law, x.kind, x.gain, x.deadband) == same(result.chosen) else ""
+        out.append(f"{x.law:<16}{x.kind:<13}{x.gain:>5.3g}  {x.deadband:>8.3g}  {100 * c.errors[0]:>8.1f} %  "
+              f"{100 * c.worst:>5.1f} %  {mark}{safety(c)}")  # fmt: skip
+    out.append("")
+    path = result.drive.path
+    out.append(
+        f"motion:            {path.source}; {path.duration:.3g} s, up to {path.top_speed:.3g} {unit('rad/s')}"
+    )
+    gains = ", ".join(f"{k} {v:.5g}" for k, v in result.gains.items() if v)
+    out.append(f"linear controller: {gains}; RMS error alone {result.linear_error:.3g} {unit('rad')}")
+    if result.rings:
+        out.append(f"it rings alone:    {result.rings}")
+    c = result.chosen
+    if c and result.model:
+        out.append(
+            f"switch on:         {c.setting.kind} of law {result.model.law.name!r}, gain {c.setting.gain:g}"
+        )
+        out.append(f"parameters:        {parameters(result.model, unit)}")
+        out.append(f"lead:              {c.setting.lead:.4g} s")
+        out.append(f"deadband:          {c.setting.deadband:.4g} {unit('rad/s')}")
+        inertia = c.setting.inertia_feedforward
+        said = f"{inertia:.4g} {unit('kg·m²')} times the acceleration" if inertia else "not fed forward"
+        out.append(f"inertia:           {said}")
+        out.append(f"error reduction:   {reduction(result)}")
+        out.append(f"margin of gain:    {margin(c, result)}")
+    for note in result.notes:
+        out.append(note)
+    return out
+
+
+def safety(c: Candidate) -> str:
+    """Whether it is safe; why it is not, or not worth it."""
+    if c.unsafe:
+        return f"no: {', '.join(c.unsafe)}"
+    useless = c.useless or ("hardly less error" if c.worst > WORTH else "")
+    return f"yes, but {useless}" if useless else "yes"
+
+
+def margin(chosen: Candidate, result: Recommendation) -> str:
+    """How many times the gain is safe, and the gains of the table that tell so."""
+    last = f"{result.margin:.3g} (safe at gain {result.margin * chosen.setting.gain:.3g}"
+    return (
+        f"{last}, not at {result.unsafe_gain:.3g})"
+        if math.isfinite(result.unsafe_gain)
+        else f"{last}, the highest tried)"
+    )
+
+
+def same(chosen: Candidate) -> tuple[str, str, float, float]:
+    """What tells the row of the chosen setting: its lead was found later."""
+    x = chosen.setting
+    return x.law, x.kind, x.gain, x.deadband
+
+
+def reduction(result: Recommendation) -> str:
+    """What to expect of the setting as it is recommended."""
+    assert result.chosen
+    best = percent(1.0 - result.chosen.errors[0], 1.0 - result.chosen.errors[0])
+    if result.confirmed_on < 2:
+        return f"{best} on the best estimate; no interval"
+    return (
+        f"{best} on the best estimate; {100.0 * result.confidence:.0f} % interval {percent(*result.reduction)}, "
+        f"safe on all {result.confirmed_on} axes drawn for it"
+    )
+
+
+def parameters(model: Model, unit: Callable[[str], str]) -> str:
+    """A law's parameters to four digits, with their units; --json has all digits."""
+    parts: list[str] = []
+    for f in model.law.fields:
+        value = getattr(model.parameters, f.name)
+        numbers = ", ".join(f"{v:.4g}" for v in value) if f.per_element else f"{value:.4g}"
+        own = "" if f.par.unit == "-" else f" {unit(f.par.unit)}"
+        parts.append(f"{f.name} {f'[{numbers}]' if f.per_element else numbers}{own}")
+    return "; ".join(parts)
+
+
+def percent(low: float, high: float) -> str:
+    """A range of parts of 1, as one number where both ends read alike; never 100 % for what is less."""
+
+    def shown(part: float) -> str:
+        return f"{math.floor(1000.0 * part) / 10.0:.1f}" if 0.995 <= part < 1.0 else f"{100.0 * part:.0f}"
+
+    a, b = shown(low), shown(high)
+    return f"{a} %" if a == b else f"{a} to {b} %"

@@ -1,0 +1,183 @@
+"""A study over many cases: the verb `sweep`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from stickslip.capacity import insist_on_jobs
+from stickslip.errors import InputError
+from stickslip.identify.estimate import silent
+from stickslip.sweep import dataset, execute
+from stickslip.sweep.gains import too_few
+from stickslip.sweep.plan import MOST_CASES, Sweep, load
+from stickslip.sweep.summary import summarise, write_summary
+
+if TYPE_CHECKING:
+    import pandas
+
+__all__ = ["SweepResult", "sweep", "sweep_of"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SweepResult:
+    """A finished sweep.
+
+    Attributes
+    ----------
+    sweep : stickslip.sweep.plan.Sweep
+    folder : Path
+        Where the data set, manifest.json and summary.csv are.
+    rows : sequence of mapping
+        One a run: its slip rule, reference, friction and controller, cases, flagged ones, and percentiles of every metric
+        (``position_rms_rad_p95``).
+    manifest : mapping
+        What was run, with which versions, and how long it took.
+    files : tuple of Path
+        The summary, the manifest and the figures.
+    """
+
+    sweep: Sweep
+    folder: Path
+    rows: Sequence[Mapping[str, Any]]
+    manifest: Mapping[str, Any]
+    files: tuple[Path, ...]
+
+    def columns(self, row: int = 0) -> Mapping[str, Array]:
+        """What every case of a run varied and gave, by name, shape (cases,).
+
+        Parameters
+        ----------
+        row : int
+            Of `rows`.
+        """
+        names = [*self.sweep.metrics, "flagged"]
+        return dataset.read(self.folder, self.sweep, self.sweep.runs[row], names)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """`rows` as a data frame.
+
+        Raises
+        ------
+        InputError
+            Without pandas, which `pip install 'stickslip[pandas]'` brings.
+        """
+        try:
+            import pandas
+        except ModuleNotFoundError:
+            raise InputError("to_pandas() needs pandas; run `pip install 'stickslip[pandas]'`") from None
+        return pandas.DataFrame([dict(row) for row in self.rows])
+
+    def __repr__(self) -> str:
+        return f"<SweepResult: {self.sweep.name}, {sum(r['cases'] for r in self.rows)} closed loops in {self.folder}>"
+
+    def _repr_html_(self) -> str:
+        """A table in a notebook: percentiles of the first metric."""
+        metric, heads = self.sweep.metrics[0], ("5 %", "50 %", "95 %", "worst", "cases")
+        head = "".join(f"<th>{escape(h)}</th>" for h in (metric, *heads))
+        body = ""
+        for row in self.rows:
+            name = "/".join(str(row[part]) for part in ("slip_rule", "reference", "friction", "controller"))
+            cells = [f"{row[f'{metric}_p{p}']:.4g}" for p in (5, 50, 95, 100)] + [str(row["cases"])]
+            body += f"<tr><td>{escape(name)}</td>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>"
+        return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def sweep(
+    file: str | os.PathLike[str] | Sweep,
+    folder: str | os.PathLike[str] | None = None,
+    *,
+    cases: int | None = None,
+    jobs: int = 0,
+    processes: bool = False,
+    scheduler: str = "",
+    figures: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+    tell: Callable[[str], None] = silent,
+) -> SweepResult:
+    """Run a study over many cases: numbers varied on a grid, by Sobol or Latin points, or as an identification has them.
+
+    Finished blocks are kept in the folder: the same call goes on where another was interrupted.
+
+    Parameters
+    ----------
+    file : path or Sweep
+        A TOML file, "thesis-robustness" or "thesis-gain", or what `stickslip.sweep.plan.load` gave.
+    folder : path, optional
+        Where to write; sweep-NAME here unless given.
+    cases : int, optional
+        Another number of cases than the file's.
+    jobs : int
+        Blocks at a time; 0: one a core.
+    processes : bool
+        Processes instead of threads.
+    scheduler : str
+        URL of a Dask scheduler, tcp://host:8786, whose workers run it.
+    figures : bool
+        Whether figures are drawn.
+    progress : callable, optional
+        ``progress(finished, all)``
+    tell : callable
+        Is told what a reader of the results must know.
+
+    Returns
+    -------
+    SweepResult
+
+    Raises
+    ------
+    InputError
+        One line that names the key, its value and what is allowed.
+    """
+    planned = sweep_of(file, cases)
+    if jobs < 0:
+        raise InputError(f"--jobs {jobs} must be at least 1; leave it out for one block a core")
+    insist_on_jobs(jobs or 1)
+    out = Path(folder) if folder is not None else Path(f"sweep-{planned.name}")
+    execute.ready(planned, scheduler)
+    manifest = execute.run(
+        planned, out, jobs, "processes" if processes else "threads", scheduler, progress, tell
+    )
+    rows = summarise(out, planned)
+    if why := too_few(planned.drawn):
+        tell(why)
+    files = [write_summary(out, planned, rows), out / "manifest.json"]
+    if figures:
+        from stickslip.report.sweep_pictures import draw
+
+        files += draw(out, planned)
+    return SweepResult(planned, out, rows, manifest, tuple(files))
+
+
+def sweep_of(file: str | os.PathLike[str] | Sweep, cases: int | None = None) -> Sweep:
+    """The sweep of a file, with another number of cases.
+
+    Raises
+    ------
+    InputError
+        If the file is not a sweep's, or the number cannot be.
+    """
+    found = file if isinstance(file, Sweep) else load(os.fspath(file))
+    name = found.name if isinstance(file, Sweep) else os.fspath(file)
+    if found.tuned:
+        raise InputError(f"{name} has a table [tune]; run `stickslip tune {name}`")
+    if cases is None:
+        return found
+    if cases < 1:
+        raise InputError(f"--cases {cases} must be at least 1")
+    if found.drawn.method == "grid":
+        raise InputError(
+            f"--cases {cases}: {name} is a grid, whose points make its {found.drawn.cases} cases; "
+            "change `points` or `values` in it, or its `method` to sobol"
+        )
+    if cases > MOST_CASES:
+        raise InputError(f"--cases {cases} are too many; keep below {MOST_CASES}")
+    return replace(found, drawn=replace(found.drawn, cases=cases))

@@ -1,0 +1,81 @@
+"""Settings of a controller for an uncertain machine: the verb `tune`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from stickslip.errors import InputError
+from stickslip.study.files import claim_folder
+from stickslip.sweep.plan import Sweep, load
+from stickslip.sweep.tune import Tuned
+from stickslip.sweep.tune import tune as search
+from stickslip.sweep.tuned_files import write
+
+__all__ = ["tune", "tuning_of"]
+
+
+def tune(
+    file: str | os.PathLike[str] | Sweep,
+    folder: str | os.PathLike[str] | None = None,
+    *,
+    figures: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[Tuned, ...]:
+    """Choose bandwidth, gain, filter, ... for a machine that is not quite what was believed.
+
+    Found is, for every run of the study, the setting with the least percentile of the first metric over all cases.
+
+    Parameters
+    ----------
+    file : path or Sweep
+        A sweep's TOML file with a table [tune], or what `stickslip.sweep.plan.load` made of it.
+    folder : path, optional
+        Where tables and figures are written; nothing is written without it.
+    figures : bool
+        Whether the trade-off between the first two metrics is drawn.
+    progress : callable, optional
+        ``progress(tried, about)``; what it raises ends the search.
+
+    Returns
+    -------
+    tuple of Tuned
+        One a run: ``settings`` and ``metrics`` by name, before and after, and every setting tried.
+
+    Raises
+    ------
+    InputError
+        One line that names the key, its value and what is allowed.
+    """
+    planned = tuning_of(file)
+    out = None if folder is None else claim_folder(Path(folder), planned.name, "tune")
+    found = tuple(search(planned, run, progress) for run in planned.runs)
+    if out is not None:
+        for tuned in found:
+            written(out, planned, tuned, figures)
+    return found
+
+
+def tuning_of(file: str | os.PathLike[str] | Sweep) -> Sweep:
+    """The sweep of a file with a table [tune].
+
+    Raises
+    ------
+    InputError
+    """
+    found = file if isinstance(file, Sweep) else load(os.fspath(file))
+    if not found.tuned:
+        name = found.name if isinstance(file, Sweep) else os.fspath(file)
+        raise InputError(f'{name} has no table [tune]; give at least one [tune."controller.bandwidth_hz"]')
+    return found
+
+
+def written(folder: Path, planned: Sweep, tuned: Tuned, figures: bool) -> list[Path]:
+    """Write tables and the figure of one run."""
+    files = write(folder, planned, tuned)
+    if figures and len(planned.metrics) > 1:
+        from stickslip.report.sweep_pictures import trade_off
+
+        files.append(trade_off(folder / "figures" / f"trade-off-{tuned.run.controller}", planned, tuned))
+    return files
