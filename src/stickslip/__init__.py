@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from stickslip.control.sampled_controller import SampledController
     from stickslip.control_spec import ControlLaw
     from stickslip.errors import InputError, SimulationError, StickslipError
+    from stickslip.machines.machine import Machine, load_machine
     from stickslip.machines.rigid import RigidAxis
     from stickslip.model import Model, Reference
     from stickslip.plugins import control_law, control_law_names, law, law_names
@@ -29,10 +30,13 @@ if TYPE_CHECKING:
     from stickslip.spec import Law, Mode, Par
     from stickslip.verbs.compare import compare
     from stickslip.verbs.doctor import doctor
+    from stickslip.verbs.export import ExportResult, export
     from stickslip.verbs.identification import IdentificationResult
     from stickslip.verbs.identify import identify
     from stickslip.verbs.reading import read
     from stickslip.verbs.recommend import RecommendationResult, recommend
+    from stickslip.verbs.sweep import SweepResult, sweep
+    from stickslip.verbs.tune import tune
 
 __version__ = "0.1.0"
 
@@ -41,12 +45,14 @@ _HOME = {
     "ControlBlock": "control.block",
     "ControlLaw": "control_spec",
     "Controller": "control.controller",
+    "ExportResult": "verbs.export",
     "Feedback": "control.compensators.feedback",
     "Feedforward": "control.compensators.feedforward",
     "Gains": "control.linear",
     "IdentificationResult": "verbs.identification",
     "InputError": "errors",
     "Law": "spec",
+    "Machine": "machines.machine",
     "Mode": "spec",
     "Model": "model",
     "Par": "spec",
@@ -57,6 +63,7 @@ _HOME = {
     "SampledController": "control.sampled_controller",
     "SimulationError": "errors",
     "StickslipError": "errors",
+    "SweepResult": "verbs.sweep",
     "allow_code": "approval",
     "compare": "verbs.compare",
     "control_law": "plugins",
@@ -64,6 +71,7 @@ _HOME = {
     "doctor": "verbs.doctor",
     "law": "plugins",
     "law_names": "plugins",
+    "load_machine": "machines.machine",
     "pd": "control.linear",
     "pid": "control.linear",
     "place": "control.linear",
@@ -72,6 +80,7 @@ _HOME = {
     "recommend": "verbs.recommend",
     "respond": "simulation.open_loop",
     "simulate": "simulation.closed_loop",
+    "tune": "verbs.tune",
 }
 
 __all__ = [
@@ -79,12 +88,14 @@ __all__ = [
     "ControlBlock",
     "ControlLaw",
     "Controller",
+    "ExportResult",
     "Feedback",
     "Feedforward",
     "Gains",
     "IdentificationResult",
     "InputError",
     "Law",
+    "Machine",
     "Mode",
     "Model",
     "Par",
@@ -95,14 +106,17 @@ __all__ = [
     "SampledController",
     "SimulationError",
     "StickslipError",
+    "SweepResult",
     "allow_code",
     "compare",
     "control_law",
     "control_law_names",
     "doctor",
+    "export",
     "identify",
     "law",
     "law_names",
+    "load_machine",
     "pd",
     "pid",
     "place",
@@ -111,6 +125,8 @@ __all__ = [
     "recommend",
     "respond",
     "simulate",
+    "sweep",
+    "tune",
 ]
 
 

@@ -111,7 +111,7 @@ def test_a_recommendation_leaves_with_its_offset_and_inertia(file, tmp_path, cap
 def test_a_recommendation_without_the_offset_of_its_axis_says_so(file, capsys):
     said = exported(capsys, file(RECOMMENDED.format(more="offset = -0.01")), "--to", "c99",
                     "--compensator", "recommended")  # fmt: skip
-    assert "the constant torque of -0.07 N·m that acts beside friction is not in the export" in said
+    assert "the constant torque of -0.07 N·m that acts in addition to friction is not in the export" in said
 
 
 @pytest.mark.parametrize("target", ["c99", "st", "python", "linuxcnc"])
@@ -119,7 +119,7 @@ def test_the_law_alone_of_a_recommendation_says_what_is_left_out(target, file, c
     said = exported(capsys, file(RECOMMENDED.format(more=FED)), "--to", target)
     left = "feedforward with gain 0.8, lead 0.0005 s, offset -0.07 N·m, inertia feedforward 0.0004 kg·m²"
     assert left in said
-    assert "the constant torque of -0.07 N·m that acts beside friction is not in the export" in said
+    assert "the constant torque of -0.07 N·m that acts in addition to friction is not in the export" in said
 
 
 def test_a_models_compensator_has_the_offset_and_inertia_of_its_axis(file, tmp_path, capsys):
@@ -131,7 +131,7 @@ def test_a_models_compensator_has_the_offset_and_inertia_of_its_axis(file, tmp_p
     assert "gravity, up to 0.4 N·m over the angle" in said
     said = exported(capsys, *call, "--offset", "0", "--inertia-feedforward", "0")
     assert "no constant torque" in said
-    assert "the constant torque of -0.07 N·m that acts beside friction is not in the export" in said
+    assert "the constant torque of -0.07 N·m that acts in addition to friction is not in the export" in said
 
 
 def test_the_mean_torque_of_a_map_of_the_angle_leaves(file, tmp_path, capsys):

@@ -214,8 +214,11 @@ def test_signatures_are_those_of_the_functions() -> None:
 
 
 def test_a_recommendation_is_that_of_the_command_line_and_runs_in_a_simulation(
-    result: ss.IdentificationResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    result: ss.IdentificationResult, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    for name, few in (("GAINS", (0.9,)), ("LEADS", (0.5,)), ("BEYOND", (1.5,))):
+        monkeypatch.setattr(f"stickslip.identify.recommend.{name}", few)
     out, options = (
         tmp_path / "recommended.toml",
         {"bandwidth": 20.0, "counts_per_rev": 65536.0, "axes": 1, "confirm": 2},
@@ -228,13 +231,73 @@ def test_a_recommendation_is_that_of_the_command_line_and_runs_in_a_simulation(
     assert printed["model"] == advice.as_dict()["model"]
     assert advice.chosen is not None
     assert advice.save(tmp_path / "own.toml").read_text() == out.read_text()
-    controller = ss.Controller(advice.linear, advice.compensator, sample_time=1e-3, encoder_counts=65536.0)
-    alone = ss.Controller(advice.linear, sample_time=1e-3, encoder_counts=65536.0)
     slow = ss.Reference("sine", amplitude=0.1, frequency=0.4)
     errors = [
         ss.simulate(result.axis, c, slow, duration=2.5).meta["metrics"]["position_rms_rad"]
-        for c in (controller, alone)
+        for c in (advice.controller, advice.loop)
     ]
     assert errors[0] < 0.5 * errors[1]
     assert "Error reduction" in advice._repr_html_()
     assert str(advice).startswith("law")
+
+
+def test_an_export_is_that_of_the_command_line(
+    result: ss.IdentificationResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = result.save(tmp_path / "model.toml")
+    for options, own in (
+        ([], {}),
+        (["--compensator", "ff", "--gain", "0.9"], {"compensator": "ff", "gain": 0.9}),
+    ):
+        folder = tmp_path / f"c{len(options)}"
+        assert main(["export", str(model), "--to", "c99", *options, "--out", str(folder), "--json"]) == 0
+        printed = json.loads(capsys.readouterr().out)
+        for source in (model, result):
+            made = ss.export(source, to="c99", **own)
+            assert list(made.notes) == printed["notes"]
+            assert {n: (folder / n).read_text() for n in made.files} == made.files
+    written = ss.export(result.model, to="python", folder=tmp_path / "python")
+    assert [p.name for p in written.paths] == list(written.files)
+    assert all(p.exists() for p in written.paths)
+
+
+def test_a_controller_is_exported_from_memory_and_what_a_target_lacks_is_refused() -> None:
+    lugre = ss.Model("lugre", sigma0=3.5e4, sigma1=0.1, sigma2=0.018, fs=0.335, fc=0.285, vs=0.01)
+    pd = ss.place("PD", inertia=4e-4, bandwidth=10.0)
+    made = ss.export(ss.Controller(pd, ss.Feedforward(lugre), sample_time=1e-3), to="c99", name="axis1")
+    assert any("axis1" in name for name in made.files)
+    with pytest.raises(ss.InputError, match="has no controller"):
+        ss.export(lugre, to="c99", controller=True)
+    with pytest.raises(ss.InputError, match="no compensator"):
+        ss.export(ss.Controller(pd, sample_time=1e-3), to="c99")
+    with pytest.raises(ss.InputError, match="belongs to --compensator"):
+        ss.export(lugre, to="c99", gain=0.9)
+    with pytest.raises(ss.InputError, match="carries the law alone"):
+        ss.export(lugre, to="urdf", compensator="ff")
+    with pytest.raises(ss.InputError, match="unknown"):
+        ss.export(lugre, to="c98")
+
+
+SMALL = Path(__file__).parents[1] / "sweep"
+
+
+@pytest.mark.slow
+def test_a_sweep_is_that_of_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, out = str(SMALL / "small.toml"), str(tmp_path / "cli")
+    assert main(["sweep", file, "--cases", "4", "--no-report", "--out", out, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)["runs"]
+    found = ss.sweep(file, tmp_path / "library", cases=4, figures=False)
+    assert [dict(row) for row in found.rows] == printed
+    assert len(found.to_pandas()) == len(printed)
+    assert found.columns(0)[found.sweep.metrics[0]].shape == (4,)
+    assert found._repr_html_().count("<tr>") == 1 + len(printed)
+    with pytest.raises(ss.InputError, match="at least 1"):
+        ss.sweep(file, tmp_path, cases=0)
+    with pytest.raises(ss.InputError, match="has no table"):
+        ss.tune(file)
+
+
+def test_machines_are_loaded_by_name_or_file() -> None:
+    assert ss.load_machine("thesis-dry").name == "thesis-dry"
+    with pytest.raises(ss.InputError, match="thesis-dry"):
+        ss.load_machine("thesis-dri")

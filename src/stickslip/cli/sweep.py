@@ -70,9 +70,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--jobs {args.jobs} must be at least 1; leave it out for one block a core")
     planned = sweep_of(args.sweep, args.cases)
     if planned.left_out:
-        _output.warn(
-            f"not varied, as the model's law has no such parameters: {', '.join(planned.left_out)}"
-        )
+        _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(planned.left_out)}")
     out: Path = args.out or Path(f"sweep-{planned.name}")
     execute.ready(planned, args.scheduler)
     announce(planned, args.jobs or os.cpu_count() or 1)

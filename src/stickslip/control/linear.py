@@ -73,7 +73,7 @@ def pid(kp: float, ki: float, kd: float) -> Gains:
     return Gains(kp=kp, ki=ki, kd=kd, kr=kd)
 
 
-def place(kind: str, inertia: float, bandwidth: float, damping: float) -> Gains:
+def place(kind: str, inertia: float, bandwidth: float, damping: float = 1.0) -> Gains:
     """Gains that place the poles of the loop without friction; thesis eqs. 3.10 and 3.15.
 
     Parameters

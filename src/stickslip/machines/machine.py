@@ -22,7 +22,7 @@ from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
 from stickslip.model import Model
 
-__all__ = ["IMPERFECTIONS", "Machine", "Sensor", "library", "machine"]
+__all__ = ["IMPERFECTIONS", "Machine", "Sensor", "library", "load_machine", "machine"]
 
 LEVEL_SPEED = 0.3
 """rad/s at which the ripple of a contact is given (thesis 4.3.1.1.2 shows it there)."""
@@ -239,6 +239,21 @@ def machine(name: str | os.PathLike[str]) -> Machine:
     if text.endswith(".toml"):
         return _read(Path(text))
     raise UnknownName("machine", text, library())
+
+
+def load_machine(name: str | os.PathLike[str]) -> Machine:
+    """The machine of that name (`library`), or of the TOML file at that path.
+
+    Parameters
+    ----------
+    name : str or path
+
+    Raises
+    ------
+    UnknownName, ConfigError
+        If there is none; a key or value that cannot be used, by name.
+    """
+    return machine(name)
 
 
 def _read(path: Path) -> Machine:

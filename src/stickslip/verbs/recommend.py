@@ -246,7 +246,7 @@ def recommend(
     if frequency is not None and amplitude is None:
         raise InputError(f"--frequency {frequency:g} belongs to a sinusoid; give its --amplitude too")
     if loop and linear != "PD":
-        raise InputError(f"--linear {linear} and --loop, which gives the gains themselves; leave it out")
+        raise InputError(f"--linear {linear} beside --loop, which gives the gains themselves; leave it out")
     found = identified_of(model)
     path = None if motion is None else motion_in(motion)
     if controller is not None:
@@ -257,7 +257,13 @@ def recommend(
             if value != usual:
                 raise InputError(f"--{option} beside --controller {controller}, which says it; leave it out")
         drive = drive_with(
-            controller, inertia or found.axis.get("inertia"), counts_per_rev, torque_limit, amplitude, frequency, path
+            controller,
+            inertia or found.axis.get("inertia"),
+            counts_per_rev,
+            torque_limit,
+            amplitude,
+            frequency,
+            path,
         )
     else:
         gains, own = loop_of(loop) if loop else (None, dict[str, float]())
@@ -284,7 +290,11 @@ def drive_with(
     ------
     InputError
     """
-    made = controller if isinstance(controller, SampledController) else read_controller(Path(controller), inertia)
+    made = (
+        controller
+        if isinstance(controller, SampledController)
+        else read_controller(Path(controller), inertia)
+    )
     return Drive(
         sample_time=made.sample_time, encoder_counts=counts or made.encoder_counts, torque_limit=limit,
         amplitude=amplitude, frequency=frequency or 0.5, motion=motion, controller=made,

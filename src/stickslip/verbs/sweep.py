@@ -37,8 +37,8 @@ class SweepResult:
     folder : Path
         Where the data set, manifest.json and summary.csv are.
     rows : sequence of mapping
-        One a run: its slip rule, reference, friction and controller, cases, flagged ones, and percentiles of every metric
-        (``position_rms_rad_p95``).
+        One a run: its slip rule, reference, friction and controller, cases, flagged ones, and percentiles of every
+        metric (``position_rms_rad_p95``).
     manifest : mapping
         What was run, with which versions, and how long it took.
     files : tuple of Path
@@ -103,7 +103,7 @@ def sweep(
     progress: Callable[[int, int], None] | None = None,
     tell: Callable[[str], None] = silent,
 ) -> SweepResult:
-    """Run a study over many cases: numbers varied on a grid, by Sobol or Latin points, or as an identification has them.
+    """Run a study over many cases: numbers varied on a grid, by Sobol or Latin points, or within identified intervals.
 
     Finished blocks are kept in the folder: the same call goes on where another was interrupted.
 

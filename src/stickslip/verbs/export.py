@@ -1,0 +1,370 @@
+"""A law, a compensator or a controller as text for another machine or simulator: the verb `export`."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from stickslip.config import Document, Table, read_toml
+from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.controller import Controller
+from stickslip.control.files import read_controller
+from stickslip.control.linear import Gains
+from stickslip.control.recommended import recommended_in
+from stickslip.control.sampled_controller import SampledController
+from stickslip.errors import InputError
+from stickslip.export import CONTROLLER_TARGETS, controller_target, target_named
+from stickslip.export.job import Check, Export, Job
+from stickslip.export.target import Target, settings_of
+from stickslip.model import Model
+from stickslip.spec import Surroundings
+from stickslip.study.files import prepared_folder, unwritable
+from stickslip.study.study import load_run
+from stickslip.verbs.export_notes import around_of, axis_of, constant_torque, notes_on
+from stickslip.verbs.identification import IdentificationResult
+from stickslip.verbs.kinds import require
+from stickslip.verbs.recommend import RecommendationResult
+
+__all__ = ["CompensatorOptions", "ExportResult", "export"]
+
+Source = (
+    IdentificationResult | RecommendationResult | Model | Controller | SampledController | str | os.PathLike[str]
+)  # fmt: skip
+"""What can be exported; a path is that of a model.toml, a recommended.toml or a `stickslip simulate` file."""
+
+NUMBERS = ("gain", "lead", "deadband", "offset", "inertia_feedforward", "filter_hz")
+"""Of a compensator: what "ff" or "fb" is given, and a recommendation sets."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExportResult:
+    """Files for another machine or simulator.
+
+    Attributes
+    ----------
+    target : Target
+    name : str
+        Prefix of every name in the target's language.
+    files : mapping of str to str or bytes
+        Contents by file name.
+    notes : tuple of str
+        What the user must know, one sentence each.
+    check : Check or None
+        What trying the export in its own tool showed, where that was asked for and the tool is installed.
+    paths : tuple of Path
+        Where the files were written; empty where they were not.
+    """
+
+    target: Target
+    name: str
+    files: Mapping[str, str | bytes]
+    notes: tuple[str, ...] = ()
+    check: Check | None = None
+    paths: tuple[Path, ...] = ()
+
+    def save(self, folder: str | os.PathLike[str]) -> ExportResult:
+        """Write the files.
+
+        Parameters
+        ----------
+        folder : path
+            It is made.
+
+        Raises
+        ------
+        InputError
+            If a file cannot be written.
+        """
+        prepared_folder(Path(folder))
+        written: list[Path] = []
+        for name, content in self.files.items():
+            path = Path(folder) / name
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content if isinstance(content, bytes) else content.encode())
+            except OSError as error:
+                raise unwritable(path, error) from None
+            written.append(path)
+        return replace(self, paths=tuple(written))
+
+    def __str__(self) -> str:
+        lines = [f"{self.target.title}:", *(f"  {path}" for path in self.paths or self.files)]
+        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+
+    def __repr__(self) -> str:
+        return f"<ExportResult: {self.target.name}, {', '.join(self.files)}>"
+
+
+@dataclass(frozen=True)
+class CompensatorOptions:
+    """Numbers of a compensator; None leaves each at what the source says, or its default."""
+
+    sample_time: float | None = None
+    substeps: int | None = None
+    gain: float | None = None
+    lead: float | None = None
+    deadband: float | None = None
+    offset: float | None = None
+    inertia_feedforward: float | None = None
+    filter_hz: float | None = None
+
+    @property
+    def given(self) -> list[str]:
+        """Names of those that are given."""
+        return [f.name for f in fields(self) if getattr(self, f.name) is not None]
+
+
+def export(
+    source: Source,
+    to: str,
+    folder: str | os.PathLike[str] | None = None,
+    *,
+    name: str | None = None,
+    single: bool = False,
+    controller: bool = False,
+    compensator: Literal["ff", "fb", "recommended"] | None = None,
+    sample_time: float | None = None,
+    substeps: int | None = None,
+    gain: float | None = None,
+    lead: float | None = None,
+    deadband: float | None = None,
+    offset: float | None = None,
+    inertia_feedforward: float | None = None,
+    filter_hz: float | None = None,
+    nearest: bool = False,
+    top_speed: float | None = None,
+    settings: Mapping[str, str | float] | None = None,
+    check: bool = False,
+) -> ExportResult:
+    """Write a model, a compensator or a controller as C, structured text, MATLAB, Python, ...
+
+    Parameters
+    ----------
+    source : IdentificationResult, RecommendationResult, Model, Controller, SampledController or path
+        A path is that of model.toml, recommended.toml or, with `controller`, a `stickslip simulate` file.
+    to : str
+        The target, one of `stickslip.export.TARGETS`: "c99", "arduino", "st", "fmu", ...
+    folder : path, optional
+        Where the files are written; without it they are in ``files`` of the result alone.
+    name : str, optional
+        Prefix of every name in the target's language; that of the file unless given.
+    single : bool
+        Single precision, where the target has it.
+    controller : bool
+        The whole sampled controller of a simulation's file; a `Controller` is exported so anyway.
+    compensator : {"ff", "fb", "recommended"}, optional
+        The law as a compensator that is called every sample: feedforward of the reference velocity, feedback of the
+        measured one, or what was recommended (of a `RecommendationResult` the default, where the target carries it).
+    sample_time : float, optional
+        Of the compensator, s; 0.001, or the recommended one.
+    substeps : int, optional
+        Steps of the compensator's law in a sample; 1.
+    gain, lead, deadband, offset, inertia_feedforward, filter_hz : float, optional
+        Of the compensator "ff" or "fb": factor on its torque, s ahead of the reference, rad/s below which its law sees
+        rest, N·m in addition to friction, kg·m² times the reference's acceleration, Hz of a low-pass on its velocity.
+    nearest : bool
+        Where the target cannot hold the law, the nearest that it can.
+    top_speed : float, optional
+        Greatest velocity of the application, rad/s.
+    settings : mapping, optional
+        What only the target asks for, by name.
+    check : bool
+        Try the export in its own tool, where that is installed.
+
+    Returns
+    -------
+    ExportResult
+
+    Raises
+    ------
+    InputError
+        One line that names what the target cannot carry, or what is missing, and the remedy.
+    """
+    chosen = target_named(to)
+    if single and not chosen.precision:
+        raise InputError(f"--single: {chosen.name} has one precision; leave it out")
+    options = CompensatorOptions(
+        sample_time, substeps, gain, lead, deadband, offset, inertia_feedforward, filter_hz
+    )
+    if (
+        isinstance(source, RecommendationResult)
+        and compensator is None
+        and chosen.controller
+        and not options.given
+    ):
+        compensator = "recommended"
+    controller = controller or isinstance(source, (Controller, SampledController)) or own_loop(source)
+    refuse_controllers(chosen, controller, compensator)
+    content = content_of(source)
+    own = name or re.sub(r"[^A-Za-z0-9_]+", "_", Path(content.document.name).stem)
+    if controller:
+        made = controller_in(source)
+        if isinstance(made, SampledController):
+            return saved(composed(made, chosen, own, single, check), folder)
+        if not chosen.controller:
+            raise InputError(
+                f"--controller: {chosen.name} carries controllers made of control laws (a loop, "
+                f'`loop = {{law = "pd"}}`), and that of {content.document.name} is none; take --to c99'
+            )
+    job = job_of(source, content, own, chosen, options, controller, compensator)
+    job = replace(
+        job,
+        single=single,
+        nearest=nearest,
+        top_speed=top_speed,
+        settings={**job.settings, **(settings or {})},
+    )
+    if job.nearest and not chosen.forms:
+        raise InputError(f"--nearest: {chosen.name} carries {chosen.carries}; leave it out")
+    settings_of(chosen, job.settings)
+    files = chosen.write(job)
+    notes = (*files.notes, *around_of(chosen, job), *notes_on(content, job, controller, compensator))
+    tried = chosen.check(job, files) if check and chosen.check else None
+    return saved(ExportResult(chosen, own, files.files, notes, tried), folder)
+
+
+def own_loop(source: Source) -> bool:
+    """Whether a recommendation is the whole controller, made of control laws."""
+    return isinstance(source, RecommendationResult) and isinstance(source.loop, SampledController)
+
+
+def saved(result: ExportResult, folder: str | os.PathLike[str] | None) -> ExportResult:
+    """The result, written where a folder is given."""
+    return result if folder is None else result.save(folder)
+
+
+def refuse_controllers(chosen: Target, controller: bool, compensator: str | None) -> None:
+    """Refuse a controller or compensator where the target carries the law alone.
+
+    Raises
+    ------
+    InputError
+    """
+    carried = {
+        "controller": (controller, chosen.controller or chosen.name in CONTROLLER_TARGETS),
+        "compensator": (compensator, chosen.controller),
+    }
+    for option, (asked, possible) in carried.items():
+        if asked and not possible:
+            raise InputError(
+                f"--{option}: {chosen.name} carries the law alone; leave it out, or take --to c99"
+            )
+    if controller and compensator:
+        raise InputError("--controller takes the compensator of its file; leave --compensator out")
+
+
+def content_of(source: Source) -> Table:
+    """What is known besides the law: the content of the source's file, empty for a model or a controller."""
+    if isinstance(source, (IdentificationResult, RecommendationResult)):
+        return source.table()
+    if isinstance(source, Model):
+        return Table({}, Document("friction", Path()))
+    if isinstance(source, (Controller, SampledController)):
+        return Table({}, Document("controller", Path()))
+    require(Path(source), "model", "simulation")
+    return read_toml(Path(source))
+
+
+def model_of(source: Source, content: Table) -> Model:
+    """The law and its parameters."""
+    if isinstance(source, (Model, IdentificationResult, RecommendationResult)):
+        return source if isinstance(source, Model) else source.model
+    return Model.from_table(content)
+
+
+def controller_in(source: Source) -> Controller | SampledController:
+    """The controller given, or that of a file for `stickslip simulate`."""
+    if isinstance(source, (Controller, SampledController)):
+        return source
+    if isinstance(source, (Model, IdentificationResult, RecommendationResult)):
+        raise InputError(
+            f"a {type(source).__name__} has no controller; give a Controller, or leave controller out"
+        )
+    whole = read_toml(Path(source))
+    if whole.has("controller") and not whole.has("reference"):
+        return read_controller(source)  # of `stickslip recommend --controller`, or written by hand
+    return load_run(Path(source)).control
+
+
+def composed(made: SampledController, chosen: Target, name: str, single: bool, check: bool) -> ExportResult:
+    """A controller made of control laws."""
+    target = controller_target(chosen.name)
+    files: Export = target.write(made, name, single)
+    tried = target.check(files, name) if check and target.check else None
+    return ExportResult(chosen, name, files.files, tuple(files.notes), tried)
+
+
+def job_of(
+    source: Source, content: Table, name: str, chosen: Target, options: CompensatorOptions, controller: bool,
+    compensator: str | None,
+) -> Job:  # fmt: skip
+    """The model, or the model and the controller that holds it, with what the file knows of its axis."""
+    if compensator is None and options.given:
+        option = options.given[0].replace("_", "-")
+        raise InputError(f"--{option} belongs to --compensator; give both or neither")
+    known = axis_of(content)
+    settings: dict[str, str | float] = {s.name: known[s.name] for s in chosen.settings if s.name in known}
+    if not controller:
+        model = model_of(source, content)
+        return Job(model, name, compensator_of(content, model, options, compensator), settings=settings)
+    around, made = Surroundings(), cast("Controller", controller_in(source))
+    if made.compensator is None:
+        raise InputError(
+            f"{content.document.name}: [controller] has no compensator; add one, or export the law alone"
+        )
+    if isinstance(source, (str, os.PathLike)):
+        axis = load_run(Path(source)).axis
+        around = Surroundings(load=axis.load, temperature=axis.temperature)
+    return Job(made.compensator.model, name, made, surroundings=around, settings=settings)
+
+
+def compensator_of(
+    content: Table, model: Model, options: CompensatorOptions, compensator: str | None
+) -> Controller | None:
+    """A sampled controller that has nothing but the compensator asked for, with what the file knows of its axis."""
+    if compensator is None:
+        return None
+    if compensator == "recommended":
+        return recommended_on(content, model, options)
+    kinds = {"ff": Feedforward, "fb": Feedback}
+    if compensator not in kinds:
+        raise InputError(f"--compensator {compensator} is not known; choose from ff, fb, recommended")
+    axis = axis_of(content)
+    known: dict[str, Any] = {
+        "offset": axis.get("offset", 0.0), "inertia_feedforward": axis.get("inertia", 0.0)
+    }  # fmt: skip
+    known |= {n: getattr(options, n) for n in options.given if n != "sample_time"}
+    time = 1e-3 if options.sample_time is None else options.sample_time
+    return Controller(Gains(kp=0.0), kinds[compensator](model, **known), sample_time=time)
+
+
+def recommended_on(content: Table, model: Model, options: CompensatorOptions) -> Controller:
+    """What the file recommends, and nothing that it was not tried with.
+
+    Raises
+    ------
+    InputError
+    """
+    found = recommended_in(content)
+    for option in options.given:
+        if option in NUMBERS:
+            raise InputError(
+                f"--{option.replace('_', '-')} and --compensator recommended, which sets it; leave it out, or give "
+                "--compensator ff or fb"
+            )
+    tried, asked = found.sample_time, options.sample_time
+    if tried and asked is not None and not math.isclose(tried, asked):
+        raise InputError(
+            f"--sample-time {asked:g}: {content.document.name} is recommended for {tried:g} s; leave it out, or "
+            "ask `stickslip recommend` with that sample time"
+        )
+    if not found.offset:
+        found = replace(found, offset=constant_torque(content))
+    made = replace(found.on(model), substeps=1 if options.substeps is None else options.substeps)
+    return Controller(Gains(kp=0.0), made, sample_time=tried or asked or 1e-3)

@@ -1,0 +1,102 @@
+"""What a file holds besides the law, and what its user must know of an export."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, cast
+
+from stickslip.config import Table
+from stickslip.control.recommended import Recommended, recommended_in
+from stickslip.export._c_control import given_by
+from stickslip.export._nearest import read_by
+from stickslip.export.job import Job
+from stickslip.export.target import Target
+from stickslip.machines.angle import AngleMap
+
+__all__ = ["around_of", "axis_of", "constant_torque", "notes_on"]
+
+SLOW = 0.02
+"""s: sample times above it are told; a tenth of a period of 5 Hz."""
+
+
+def axis_of(content: Table) -> dict[str, float]:
+    """The numbers that a file holds of its axis: inertia, offset, gravity, ..."""
+    axis: object = content.values.get("axis", {})
+    known = cast("dict[str, Any]", axis) if isinstance(axis, dict) else {}
+    return {k: float(v) for k, v in known.items() if isinstance(v, (int, float)) and math.isfinite(v)}
+
+
+def constant_torque(content: Table) -> float:
+    """The constant torque, in addition to friction, that a file holds of its axis or, where it is a map of the angle,
+    its mean over a revolution, N·m."""
+    if content.has("angle"):
+        return AngleMap.of(content.table("angle").values).offset
+    return axis_of(content).get("offset", 0.0)
+
+
+def notes_on(content: Table, job: Job, controller: bool, compensator: str | None) -> Iterator[str]:
+    """What the user must know of a compensator besides what the target says, and of what is not in the export."""
+    name = content.document.name
+    if not controller and compensator != "recommended" and content.has("recommended"):
+        yield (
+            f"{name} recommends {in_words(recommended_in(content))}: that is not in this export; "
+            "`--to c99 --compensator recommended` (or `--to arduino`) writes it"
+        )
+    if not controller:
+        yield from other_torques(content, job)
+    if job.controller is None or compensator is None:
+        return
+    time = job.controller.sample_time
+    yield f"it gives {given_by(job.controller)}"
+    if time > SLOW:
+        yield (
+            f"a sample time of {time:g} s compensates a reversal up to {time:g} s late, and a loop bears it up to some "
+            f"{0.1 / time:.2g} Hz only; give --sample-time in seconds"
+        )
+    if compensator == "recommended":
+        found = recommended_in(content)
+        what = "the loop of" if found.gains else f"a PD of {found.bandwidth:.4g} Hz:"
+        gains = ", ".join(f"{k} {v:.5g}" for k, v in found.linear._asdict().items() if v or k == "feed")
+        yield f"it was tried beside {what} {gains}; the linear controller is not in the export"
+        if content.has("angle"):
+            yield (
+                "what the file knows of the angle ([angle]) is not in the export but for the mean of the torque beside "
+                "friction: `stickslip rig run track` runs it"
+            )
+
+
+def around_of(chosen: Target, job: Job) -> Iterator[str]:
+    """Where the target finds what the law depends on."""
+    if (read := read_by(job.model)) and chosen.around:
+        yield f"friction depends on {read}: {chosen.around}"
+
+
+def in_words(found: Recommended) -> str:
+    """What a file recommends, with its numbers."""
+    units = {
+        "lead": " s",
+        "deadband": " rad/s",
+        "filter": " Hz",
+        "offset": " N·m",
+        "inertia_feedforward": " kg·m²",
+    }
+    more = [
+        f", {k.replace('_', ' ')} {getattr(found, k):.4g}{u}" for k, u in units.items() if getattr(found, k)
+    ]
+    return f"{found.compensator} with gain {found.gain:.4g}{''.join(more)}"
+
+
+def other_torques(content: Table, job: Job) -> Iterator[str]:
+    """Torques besides friction that the file holds and that are not in the export."""
+    known = axis_of(content)
+    offset, gravity = constant_torque(content), known.get("gravity", 0.0)
+    made = job.controller.compensator if job.controller else None
+    missing = made.offset != offset if made else "offset" not in job.settings
+    if offset and missing:
+        yield f"the constant torque of {offset:.4g} N·m that acts in addition to friction is not in the export"
+    if gravity and "gravity" not in job.settings:
+        yield (
+            f"gravity, up to {gravity:.4g} N·m over the angle, acts in addition to friction and is not in the "
+            "export: add gravity sin(q - gravity_angle) of the file's [axis] to the drive's torque"
+        )
