@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from stickslip.config import Document, Table, read_toml
-from stickslip.errors import ConfigError, InputError
+from stickslip.errors import ConfigError, InputError, ModelRemark
 from stickslip.study.plan import load, load_run
 
 DATA = Path(__file__).parent / "data"
@@ -34,6 +34,18 @@ def test_values_are_handed_out() -> None:
         assert t.texts("l", ("a", "b")) == ["a"]
         assert t.table("t").table("u").number("v", "rad") == 1.0
         assert t.rest() == {"k": [1.0, 2.5]}
+
+
+def test_truth_values_are_true_and_false_and_yes_and_no_are_read_with_a_hint() -> None:
+    t = table('a = true\nb = false\nc = "yes"\nd = "no"\ne = "maybe"\nf = 1')
+    assert (t.flag("a", False), t.flag("b", True), t.flag("missing", True)) == (True, False, True)
+    with pytest.warns(ModelRemark, match="a.toml: c = 'yes' is read as true; write c = true"):
+        assert t.flag("c", False) is True
+    with pytest.warns(ModelRemark, match="write d = false"):
+        assert t.flag("d", True) is False
+    for key, shown in (("e", "'maybe'"), ("f", "1")):
+        with pytest.raises(ConfigError, match=f"a.toml: {key} = {shown} must be true or false"):
+            t.flag(key, True)
 
 
 @pytest.mark.parametrize(

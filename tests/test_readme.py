@@ -24,13 +24,29 @@ def blocks(text: str, kind: str) -> list[str]:
 
 def test_python_examples_run_in_order(tmp_path, capsys):
     """As one session, from top to bottom, in a folder of their own."""
-    script = "\n".join(blocks(README, "python"))
+    _, *rest = blocks(README, "python")
+    script = "\n".join(["import stickslip as ss", *rest])
     out = subprocess.run(
         [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert out.returncode == 0, out.stderr
     assert float(out.stdout.split()[0]) == pytest.approx(0.00995, rel=1e-3)
     assert (tmp_path / "move.npz").exists()
+
+
+@pytest.mark.slow
+def test_the_first_example_in_python_gives_the_numbers_of_its_commands(tmp_path):
+    """From the log that ships to C, as printed; the friction that the log was made with lies in the interval."""
+    script = blocks(README, "python")[0]
+    run_as_printed(["stickslip demo --log log.csv"], tmp_path)
+    out = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert out.returncode == 0, out.stderr
+    low, high = (float(x) for x in re.findall(r"0\.\d+", out.stdout)[:2])
+    assert low < 0.285 < high
+    assert (tmp_path / "report.html").exists()
+    assert (tmp_path / "c" / "model.c").exists()
 
 
 def run_as_printed(commands: list[str], folder: Path) -> None:

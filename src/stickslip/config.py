@@ -9,13 +9,14 @@ import difflib
 import math
 import re
 import tomllib
+import warnings
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self, cast
 
-from stickslip.errors import ConfigError, InputError, suggestion
+from stickslip.errors import ConfigError, InputError, ModelRemark, suggestion
 
 __all__ = ["Document", "Table", "named_numbers", "read_toml", "refuse_endless"]
 
@@ -47,7 +48,7 @@ class Document:
     def locate(self, written: str) -> Path:
         """Where the file written as `written` lies; it is remembered as an input."""
         if not written.isprintable() or not written.strip():
-            raise ConfigError(f"{self.name}: {written!r} is no path of a file; mend it")
+            raise ConfigError(f"{self.name}: {written!r} is no path of a file; correct it")
         self.files[written] = self.moved.get(written, self.folder / written)
         return self.files[written]
 
@@ -84,7 +85,7 @@ def read_toml(path: Path, name: str = "", moved: Mapping[str, Path] | None = Non
     except RecursionError:
         raise ConfigError(f"{shown}: arrays or tables are nested too deeply; flatten them") from None
     except ValueError as error:
-        raise ConfigError(f"{shown}: not TOML: {error}; mend the file there") from None
+        raise ConfigError(f"{shown}: not TOML: {error}; correct the file there") from None
     return Table(values, Document(shown, path.parent, moved or {}))
 
 
@@ -192,6 +193,20 @@ class Table:
         value = self._get(key, "a string")
         if not isinstance(value, str):
             raise self.error(key, "must be a string in quotes")
+        return value
+
+    def flag(self, key: str, default: bool) -> bool:
+        """true or false; "yes" and "no" are read too, with a remark."""
+        if not self.has(key):
+            return default
+        value = self.values[key]
+        if value in ("yes", "no") and not isinstance(value, bool):
+            meant = "true" if value == "yes" else "false"
+            said = f"{self.label(key)} = {_show(value)} is read as {meant}; write {key} = {meant}"
+            warnings.warn(said, ModelRemark, stacklevel=2)
+            return value == "yes"
+        if not isinstance(value, bool):
+            raise self.error(key, "must be true or false")
         return value
 
     def choice(self, key: str, allowed: Iterable[str], default: str | None = None, family: str = "") -> str:

@@ -3,7 +3,7 @@
 The tree of exceptions::
 
     StickslipError                    everything this package raises on purpose
-    ├── InputError                    the user can mend it; the command line prints one line and exits with 2
+    ├── InputError                    the user can correct it; the command line prints one line and exits with 2
     │   ├── ParameterError            a parameter is missing, unknown or out of bounds
     │   ├── UnknownName               a law, compensator, reference, integrator, ... that is not registered
     │   ├── ConfigError               a key or value of a TOML file

@@ -238,7 +238,7 @@ def monotone_velocities(time: Sequence[float], position: Sequence[float]) -> tup
         )
     h = np.diff(t)
     if not np.all(np.isfinite(x)) or not np.all(np.isfinite(t)) or np.any(h <= 0.0):
-        raise ParameterError("table: time must ascend and every number must be finite; mend the table")
+        raise ParameterError("table: time must ascend and every number must be finite; correct the table")
     slope = np.diff(x) / h
     before, after = slope[:-1], slope[1:]
     same = before * after > 0.0

@@ -207,7 +207,7 @@ def _tried(law: Law, origin: str) -> Law:
     functions = ("step", "rate", "guards", "switch", "steady", "holding", "stored")
     lower({n: getattr(law, n) for n in functions if getattr(law, n)}, law_layouts(law))
     if wrong := trial.complaint(law):
-        raise LawError(f"{origin}: law {law.name!r}: {wrong}; mend it (`stickslip law FILE.py --check`)")
+        raise LawError(f"{origin}: law {law.name!r}: {wrong}; correct it (`stickslip law FILE.py --check`)")
     return completed(law)
 
 
@@ -239,6 +239,6 @@ def _module_of(path: str, code: bytes) -> ModuleType:
         raise
     except (Exception, SystemExit) as error:
         raise LawError(
-            f"{path} cannot be imported: {type(error).__name__}: {error}; mend the file"
+            f"{path} cannot be imported: {type(error).__name__}: {error}; correct the file"
         ) from error
     return module

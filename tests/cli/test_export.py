@@ -90,7 +90,7 @@ def test_the_inertia_comes_from_the_models_file(model, tmp_path):
         (["--to", "c98"], "did you mean 'c99'"),
         ([], "--list"),
         (["--to", "python", "--single"], "one precision"),
-        (["--to", "matlab", "--controller"], "law alone"),
+        (["--to", "urdf", "--controller"], "law alone"),
         (["--to", "matlab", "--compensator", "ff"], "law alone"),
         (["--to", "c99", "--compensator", "fb", "--filter-hz", "0"], "filter_hz"),
         (["--to", "c99", "--compensator", "fb", "--sample-time", "0"], "sample_time"),

@@ -212,12 +212,12 @@ def test_the_margin_that_is_printed_is_what_the_table_says(
     model = written(tmp_path / "m.toml", law="coulomb")
     assert main(["recommend", str(model), "--bandwidth", "20", "--axes", "1", "--confirm", "0"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    said = next(line for line in lines if line.startswith("margin of gain:"))
+    said = next(line for line in lines if line.startswith("gain margin:"))
     rows = [line.split() for line in lines if line.startswith("coulomb         feedforward")]
     unsafe = [float(row[2]) for row in rows if " no: " in f" {' '.join(row)}"]
     safe = [float(row[2]) for row in rows if float(row[2]) < min(unsafe)]
     assert (
-        said == f"margin of gain:    {max(safe):.3g} (safe at gain {max(safe):.3g}, not at {min(unsafe):.3g})"
+        said == f"gain margin:       {max(safe):.3g} (safe at gain {max(safe):.3g}, not at {min(unsafe):.3g})"
     )
 
 
@@ -256,7 +256,7 @@ def test_what_is_recommended_is_exported_and_run_by_the_commands_that_are_printe
     )
     assert (found.offset, found.inertia_feedforward) == (0.03, 4e-4)
     assert (
-        Track(compensator="recommended", model=str(out)).controller(virtual_rig("ideal")).compensator.gain
+        Track(compensator="recommended", model=str(out)).compensated(virtual_rig("ideal")).compensator.gain
         == 0.9
     )
     for beside in (["--gain", "1"], ["--sample-time", "0.01"]):
@@ -360,7 +360,7 @@ def test_the_loop_that_the_user_has_goes_all_the_way(
     found = read_recommended(out)
     assert found.linear == Cascade(30.0, 0.08, 1.2, 0.5)
     assert found.offset == 0.03
-    loop_run = Track(compensator="recommended", model=str(out)).controller(virtual_rig("ideal"))
+    loop_run = Track(compensator="recommended", model=str(out)).compensated(virtual_rig("ideal"))
     assert loop_run.gains == found.linear
     assert loop_run.velocity_filter == 200.0
     export = ["export", str(out), "--to", "c99", "--compensator", "recommended", "--out", str(tmp_path / "c")]

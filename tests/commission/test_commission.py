@@ -160,7 +160,7 @@ def the_model_is_known_to_sweeps_recommendations_and_comparisons(folder):
     """A sweep varies the friction and says what it leaves out, and so do a recommendation and a comparison."""
     (folder / "study.toml").write_text(STUDY)
     (folder / "sweep.toml").write_text(
-        'study = "study.toml"\nmodel = "model.toml"\ncases = 16\ncheck = "no"\n'
+        'study = "study.toml"\nmodel = "model.toml"\ncases = 16\ncheck = false\n'
     )
     sweep = load(folder / "sweep.toml")
     names = set(sweep.drawn.names)
@@ -229,11 +229,11 @@ def test_what_is_recommended_is_run_as_it_was_measured_and_nothing_beside_it_is_
     with pytest.raises(InputError, match="bandwidth = 12"):
         Track(**options, bandwidth=12.0).made(rig)
     file.write_text(file.read_text() + f"machine = {rig.name!r}\n")
-    Track(**options).controller(VirtualRig(OTHER.without("cogging")))
+    Track(**options).compensated(VirtualRig(OTHER.without("cogging")))
     with pytest.raises(
         InputError, match=r"recommended for 'virtual .*', and this is 'virtual thesis-dry'.*commission"
     ):
-        Track(**options).controller(virtual_rig("thesis-dry"))
+        Track(**options).compensated(virtual_rig("thesis-dry"))
 
 
 def write_model_text(folder):

@@ -275,7 +275,7 @@ def test_from_a_file(drive, tmp_path):
         bus = {{interface = "udp_multicast", channel = "{CHANNEL}", port = {drive.port}, hop_limit = 0}}
         watchdog_time = 0.2
         timeout = 0.1
-        reset_fault = "yes"
+        reset_fault = true
         [rig.limits]
         torque = 1.0
         speed = 60.0

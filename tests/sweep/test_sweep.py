@@ -106,7 +106,7 @@ def test_a_sweep_says_which_estimates_of_its_model_it_leaves_out(tmp_path, capsy
         "amplitude = 0.01\nfrequency = 4.0\nduration = 0.02\nplacement = {bandwidth_hz = 20.0, damping = 1.0}\n"
         '[controllers.PD]\nlinear = "PD"\n'
     )
-    (tmp_path / "s.toml").write_text('study = "study.toml"\nmodel = "model.toml"\ncases = 2\ncheck = "no"\n')
+    (tmp_path / "s.toml").write_text('study = "study.toml"\nmodel = "model.toml"\ncases = 2\ncheck = false\n')
     assert load(tmp_path / "s.toml").drawn.names == ("friction.fs",)
     assert main(["sweep", str(tmp_path / "s.toml"), "--out", str(tmp_path / "out"), "--no-report"]) == 0
     assert (
@@ -532,7 +532,7 @@ def test_lanes_are_within_a_percent_or_flagged(tmp_path):
 
 
 def test_a_step_with_more_switches_than_were_followed_is_flagged(tmp_path, monkeypatch):
-    sweep = load(in_lanes(tmp_path, 'check = "no"'))
+    sweep = load(in_lanes(tmp_path, "check = false"))
     assert not block.compute(sweep, 0, 0).flagged.any()
 
     def run(many, *args, run=lanes.Lanes.run, **more):

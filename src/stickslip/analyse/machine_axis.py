@@ -1,4 +1,4 @@
-"""A machine of the library as the linear axis that stability is reckoned on."""
+"""A machine of the library as the linear axis that stability is computed on."""
 
 from __future__ import annotations
 

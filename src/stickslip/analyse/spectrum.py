@@ -138,7 +138,7 @@ def evenly(record: Record, values: Array) -> tuple[Array, Array]:
         count = float((time[-1] - time[0]) / spacing * (1.0 + 1e-9))
     if not 0.0 < count <= MOST:
         raise InputError(
-            f"spectrum: {time.size} times from {time[0]:g} to {time[-1]:g} s make no even grid of up to {MOST}; mend "
+            f"spectrum: {time.size} times from {time[0]:g} to {time[-1]:g} s make no even grid of up to {MOST}; fix "
             "them"
         )
     count = math.floor(count) + 1

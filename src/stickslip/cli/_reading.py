@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser, *, part: bool = False) -> Non
         help="where the mapping is kept (default: by the file's columns, in your configuration folder)",
     )
     group.add_argument(
-        "--sample-time", type=float, metavar="S", help="distance of the samples, for files without times"
+        "--sample-time", type=float, metavar="S", help="sample interval, for files without times"
     )
     for option, unit, what in (
         ("--counts-per-rev", "N", "encoder counts a revolution"),

@@ -60,11 +60,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def work(
     args: argparse.Namespace, show: Callable[[argparse.Namespace, list[Any], Callable[[], Any]], None]
 ) -> None:
-    """Reckon and show."""
+    """Compute and show."""
     if args.controller:
         composed(args, show)
         return
-    found = reckoned(args)
+    found = computed(args)
     tried: Confirmed | None = None
     if args.confirm:
         from stickslip.study.stability_map import confirmed
@@ -140,7 +140,7 @@ def described(args: argparse.Namespace) -> tuple[Machine, Gains, dict[str, Model
     return plant, gains, {name: plant.models[name] for name in _chosen(plant, args.law)}
 
 
-def reckoned(args: argparse.Namespace) -> Stability:
+def computed(args: argparse.Namespace) -> Stability:
     """The stability of what the options describe."""
     from stickslip.analyse.machine_axis import axis_of
     from stickslip.analyse.presliding_loop import Drive

@@ -261,7 +261,9 @@ def units(law: ControlLaw) -> Verdict:
         found = torques(around(block, loop, LIMIT * torque, TIME * time), there, slow) / torque
         apart = float(np.abs(found - here).max())
         if not apart <= 1e-9:
-            return failed("units", f"in other units of {what} the torque is {apart:.2g} N·m off; mend a unit")
+            return failed(
+                "units", f"in other units of {what} the torque is {apart:.2g} N·m off; correct a unit"
+            )
     return held("units", "the same controller in other units gives the same torque")
 
 

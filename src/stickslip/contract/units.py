@@ -88,13 +88,13 @@ def units(law: Law) -> Verdict:
         if apart > ROUNDING and what == "torque":
             return failed(
                 name,
-                f"with every N·m four times as large the torque is {apart:.2g} off; mend a parameter's unit",
+                f"with every N·m four times as large the torque is {apart:.2g} off; correct a parameter's unit",
             )
         if apart > ROUNDING:
             said.append(what)
     if said:
         kinds = " and ".join(said)
-        remedy = "mend a parameter's unit, unless a number of the file has one"
+        remedy = "correct a parameter's unit, unless a number of the file has one"
         return held(name, f"the torque scales with its units, but not with those of {kinds}: {remedy}")
     return held(name, "the same contact in other units gives the same torque")
 

@@ -37,8 +37,8 @@ BLOCKS = 20
 CLEARLY = 0.75
 """Times the held-out misfit of a simpler law, that a law of more parameters must stay below: parts of one record, and
 records of one machine, then have the same law."""
-FORETOLD = 2.0
-"""Standard deviations of the lowest held-out misfit above which no law is said to foretell what was held out."""
+PREDICTED = 2.0
+"""Standard deviations of the lowest held-out misfit above which no law is said to predict what was held out."""
 COMPARABLE = 1e-2
 """Relative decrease of the sum of squares at which the fits that are compared end: laws differ by more."""
 
@@ -232,12 +232,12 @@ def sentence_on(candidates: Sequence[Candidate], chosen: str) -> str:
         for c in candidates
     ]
     said = (
-        f"Law {chosen!r} is the simplest of those that foretell what was held out about as well as any: no other's "
+        f"Law {chosen!r} is the simplest of those that predict what was held out about as well as any: no other's "
         f"held-out misfit is below it by a standard error and a quarter (in standard deviations: {', '.join(parts)})."
     )
-    if min(math.sqrt(float(np.mean(c.score))) for c in candidates) > FORETOLD:
+    if min(math.sqrt(float(np.mean(c.score))) for c in candidates) > PREDICTED:
         said += (
-            " None of them foretells what was held out, which may be unlike the rest (speeds, load): the choice is "
+            " None of them predicts what was held out, which may be unlike the rest (speeds, load): the choice is "
             "unsure; name a law (--law), or give a record to judge them by (--validation)."
         )
     return said

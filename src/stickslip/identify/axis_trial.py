@@ -80,7 +80,7 @@ class Trial:
             bad = np.flatnonzero(~np.isfinite(values))
             if bad.size:
                 raise InputError(
-                    f"{self.name}: {name} is not a number in row {bad[0]}; cut or mend the record"
+                    f"{self.name}: {name} is not a number in row {bad[0]}; cut or correct the record"
                 )
         back = np.flatnonzero(np.diff(self.time) <= 0.0)
         if back.size:

@@ -119,7 +119,7 @@ class Machine:
             for v in (top * i / 200.0, -top * i / 200.0):
                 if law.steady(v, self.clutch.parameters) * v < 0.0:
                     raise ParameterError(
-                        f"machine: friction helps the motion at {v:g} rad/s; lower encoder.max_speed or mend friction"
+                        f"machine: friction helps the motion at {v:g} rad/s; lower encoder.max_speed or fix friction"
                     )
 
     @property

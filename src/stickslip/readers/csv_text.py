@@ -284,7 +284,7 @@ def _values_one_by_one(body: Sequence[str], dialect: Dialect) -> tuple[Array, li
     findings: list[Finding] = []
 
     def warn(code: str, message: str, row: int) -> None:
-        findings.append(Finding("warning", code, message, f"row {row + 1}", "mend or delete these rows"))
+        findings.append(Finding("warning", code, message, f"row {row + 1}", "correct or delete these rows"))
 
     if short:
         said = f"{len(short)} rows have fewer than {dialect.width} cells; the rest was taken as missing"

@@ -92,7 +92,7 @@ def with_resampled_time(record: Record, period: float | None = None) -> Record:
     record : Record
         Times ascend.
     period : float
-        s; the median distance of the samples where it is not given.
+        s; the median sample interval where it is not given.
 
     Raises
     ------

@@ -48,7 +48,7 @@ def _parse(path: Path, text: str) -> Any:
                 return [json.loads(line) for line in lines]
         except (ValueError, RecursionError):
             pass
-        raise InputError(f"{path} is not JSON: {error}; mend the file there") from None
+        raise InputError(f"{path} is not JSON: {error}; correct the file there") from None
 
 
 def _split(parts: Mapping[str, Any]) -> Any:

@@ -42,7 +42,7 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
         said = f"{inertia:.4g} {unit('kg·m²')} times the acceleration" if inertia else "not fed forward"
         out.append(f"inertia:           {said}")
         out.append(f"error reduction:   {reduction(result)}")
-        out.append(f"margin of gain:    {margin(c, result)}")
+        out.append(f"gain margin:       {margin(c, result)}")
     for note in result.notes:
         out.append(note)
     return out
@@ -80,7 +80,7 @@ def reduction(result: Recommendation) -> str:
         return f"{best} on the best estimate; no interval"
     return (
         f"{best} on the best estimate; {100.0 * result.confidence:.0f} % interval {percent(*result.reduction)}, "
-        f"safe on all {result.confirmed_on} axes drawn for it"
+        f"safe on all {result.confirmed_on} sampled axes (Monte Carlo)"
     )
 
 

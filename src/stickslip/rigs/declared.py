@@ -49,7 +49,7 @@ def _told(kind: str, rig: Rig, what: str) -> Any:
     except InputError:
         raise
     except Exception as error:
-        raise InputError(f"rig {kind}: {what} raised {type(error).__name__}: {error}; mend it") from error
+        raise InputError(f"rig {kind}: {what} raised {type(error).__name__}: {error}; correct it") from error
 
 
 @contextmanager

@@ -267,7 +267,7 @@ class Ds402:
         code = self._read(cia.ERROR_CODE)
         if not self.settings.reset_fault:
             raise DriveFault(
-                f"{self.name}: the drive shows fault 0x{code:04X}; mend its cause, or set reset_fault"
+                f"{self.name}: the drive shows fault 0x{code:04X}; remove its cause, or set reset_fault"
             )
         self._write(cia.CONTROLWORD, 0, 0, 2)
         self._write(cia.CONTROLWORD, 0, cia.RESET, 2)
@@ -437,7 +437,7 @@ def build(table: Table) -> Ds402:
             sample_time=table.positive("sample_time", "s", 1e-3),
             watchdog=table.choice("watchdog", WATCHDOGS, "rpdo"),
             watchdog_time=table.positive("watchdog_time", "s", 0.01),
-            reset_fault=table.choice("reset_fault", ("no", "yes"), "no") == "yes",
+            reset_fault=table.flag("reset_fault", False),
             timeout=table.positive("timeout", "s", 0.005),
         )
     )

@@ -56,7 +56,7 @@ def _built(name: str, build: Callable[[Table], Rig], table: Table) -> Rig:
     except StickslipError:
         raise
     except Exception as error:
-        raise InputError(f"rig {name}: build raised {type(error).__name__}: {error}; mend it") from error
+        raise InputError(f"rig {name}: build raised {type(error).__name__}: {error}; correct it") from error
 
 
 def limits_in(table: Table, default: Limits | None = None) -> Limits:

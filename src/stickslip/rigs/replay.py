@@ -171,7 +171,7 @@ def usable(sample_time: float) -> float:
     """
     if not FASTEST <= sample_time < math.inf:
         raise InputError(
-            f"replay: sample_time = {sample_time:g} s must be at least {FASTEST:g}; give one, or mend the log's times"
+            f"replay: sample_time = {sample_time:g} s must be at least {FASTEST:g}; give one, or fix the log's times"
         )
     return sample_time
 

@@ -115,7 +115,7 @@ def insist_on_setpoints(wanted: Array) -> None:
     if wrong.size:
         row, column = wrong[0].tolist()
         raise InputError(
-            f"setpoint {row} has {names[column]} = {wanted[row, column]:g}, which must be a finite number; mend what "
+            f"setpoint {row} has {names[column]} = {wanted[row, column]:g}, which must be a finite number; fix what "
             "made it"
         )
 

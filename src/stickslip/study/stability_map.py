@@ -163,7 +163,7 @@ def confirmed(
     filters, values : sequence of float
         Hz (0 for none), and gains.
     drawn : bool
-        Whether the maps for a picture are reckoned too.
+        Whether the maps for a picture are computed too.
     """
     alone = moved(machine, Controller(gains, None, VirtualRig(machine).limits.torque, machine.sample_time))
     count = 2.0 * math.pi / machine.encoder.counts if machine.encoder.counts > 0.0 else 0.0

@@ -150,7 +150,7 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
     tolerance = table.positive("tolerance", "rad", 1e-7)
     runs = [replace(r, numerics=replace(r.numerics, tolerance=tolerance, output=r.duration)) for r in runs]
     metrics = table.texts("metrics", METRICS) if table.has("metrics") else list(USUAL)
-    check = table.choice("check", ("yes", "no"), "yes") == "yes"
+    check = table.flag("check", True)
     drawn, left_out = _drawn(table, {r.axis.friction.law.name for r in runs})
     tuned = _spreads(table, "tune", drawn.method) if table.has("tune") else []
     step, device = _lanes(table, metrics)
@@ -224,7 +224,7 @@ def _drawn(table: Table, laws: set[str]) -> tuple[Drawn, tuple[str, ...]]:
     seed = _whole(table, "seed", 1, least=0)
     if seed >= MOST_SEED:
         raise ConfigError(f"{table.label('seed')} = {seed} has more than 63 bits; give a number below 2**63")
-    nested = table.choice("nested", ("yes", "no"), "no") == "yes"
+    nested = table.flag("nested", False)
     if nested and (method == "grid" or not spreads):
         raise table.error("nested", "needs ranges and the method sobol or latin")
     return Drawn(method, tuple(spreads), cases, seed, estimates, correlation, nested), left_out

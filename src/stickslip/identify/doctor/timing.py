@@ -118,7 +118,7 @@ def sampling(view: View) -> Iterator[Finding]:
 
 
 def scale(view: View) -> Iterator[Finding]:
-    """Milliseconds for seconds, and the reverse, by the distance of the samples."""
+    """Milliseconds for seconds, and the reverse, by the sample interval."""
     if view.time.size < 2:
         return
     period = view.period
