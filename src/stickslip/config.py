@@ -200,7 +200,7 @@ class Table:
         if not self.has(key):
             return default
         value = self.values[key]
-        if value in ("yes", "no") and not isinstance(value, bool):
+        if value in ("yes", "no"):
             meant = "true" if value == "yes" else "false"
             said = f"{self.label(key)} = {_show(value)} is read as {meant}; write {key} = {meant}"
             warnings.warn(said, ModelRemark, stacklevel=2)

@@ -75,6 +75,8 @@ class Machine:
         Compensators' models that someone identified on it (the thesis's tables), by name.
     notes : tuple of str
         What the file says about its own numbers.
+    switched_off : tuple of str
+        Imperfections that `without` left out.
     """
 
     name: str
@@ -155,7 +157,12 @@ class Machine:
         return seen + beside
 
     def without(self, *names: str) -> Machine:
-        """This machine with imperfections switched off (`IMPERFECTIONS`).
+        """This machine with imperfections switched off.
+
+        Parameters
+        ----------
+        *names : str
+            Of `IMPERFECTIONS`.
 
         Raises
         ------
