@@ -67,6 +67,17 @@ def test_what_a_rig_answers(place, value):
     assert not rig.open_now
 
 
+@pytest.mark.parametrize(
+    "value", [None, 0.5, np.zeros(6), (1.0, 2.0)], ids=["none", "number", "array", "pair"]
+)
+def test_an_answer_that_is_no_measurement_is_named(value):
+    rig = AxisRig(blocks=False)
+    usual = rig.exchange
+    rig.exchange = lambda torque: value if len(rig.torques) == 20 else usual(torque)  # type: ignore[method-assign]
+    with pytest.raises(RigError, match="exchange gave .*; it must give a Measurement"), Loop(rig) as loop:
+        loop.run(setpoints(100, torque=0.1))
+
+
 def test_a_rig_that_cannot_be_closed(tmp_path):
     rig = broken("close", OSError("cable"))
     with pytest.raises(RigError, match="close raised OSError: cable"):

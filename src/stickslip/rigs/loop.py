@@ -374,7 +374,7 @@ class Loop:
         measured = self._control.measured
         try:
             found = self.rig.exchange(torque)
-            if len(found) != FIELDS:  # a single number would be taken for all of them
+            if not isinstance(found, tuple) or len(found) != FIELDS:  # one number would be taken for all
                 raise RigError(f"{self.rig.name}: exchange gave {found!r}; it must give a Measurement")
             measured[:] = found
         except BaseException as error:  # whatever it is: the torque goes to zero first
