@@ -74,7 +74,7 @@ def test_an_answer_that_is_no_measurement_is_named(value):
     rig = AxisRig(blocks=False)
     usual = rig.exchange
     rig.exchange = lambda torque: value if len(rig.torques) == 20 else usual(torque)  # type: ignore[method-assign]
-    with pytest.raises(RigError, match="exchange gave .*; it must give a Measurement"), Loop(rig) as loop:
+    with pytest.raises(RigError, match=r"exchange gave .*; it must give a Measurement"), Loop(rig) as loop:
         loop.run(setpoints(100, torque=0.1))
 
 

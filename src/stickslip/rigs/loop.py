@@ -373,7 +373,7 @@ class Loop:
             times[0] = self._pace.wait(self._step.rehearse)
         measured = self._control.measured
         try:
-            found = self.rig.exchange(torque)
+            found = cast(Any, self.rig.exchange(torque))
             if not isinstance(found, tuple) or len(found) != FIELDS:  # one number would be taken for all
                 raise RigError(f"{self.rig.name}: exchange gave {found!r}; it must give a Measurement")
             measured[:] = found
