@@ -101,6 +101,15 @@ def test_the_tutorial_does_what_it_says(tmp_path: Path) -> None:
     assert {p.name for p in tmp_path.iterdir()} >= {"alone.svg", "helped.svg", "lugre.png", "helped.npz"}
 
 
+@pytest.mark.slow
+def test_the_page_on_the_library_does_what_it_says(tmp_path: Path) -> None:
+    page = DOCS / "howto" / "library.md"
+    command = [sys.executable, str(DOCS / "_ext" / "sessions.py"), str(page), str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "c" / "model.c").exists()
+
+
 def test_a_page_that_shows_what_is_not_printed_is_refused(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("```python\nprint(1 + 1)\n```\n\n```text\n3\n```\n")
