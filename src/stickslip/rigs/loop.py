@@ -373,8 +373,9 @@ class Loop:
             times[0] = self._pace.wait(self._step.rehearse)
         measured = self._control.measured
         try:
-            found = cast(Any, self.rig.exchange(torque))
-            if not isinstance(found, tuple) or len(found) != FIELDS:  # one number would be taken for all
+            found: object = cast(object, self.rig.exchange(torque))
+            # One number would be taken for all.
+            if not isinstance(found, tuple) or len(found) != FIELDS:  # type: ignore[reportUnknownArgumentType]
                 raise RigError(f"{self.rig.name}: exchange gave {found!r}; it must give a Measurement")
             measured[:] = found
         except BaseException as error:  # whatever it is: the torque goes to zero first
