@@ -69,6 +69,8 @@ class Machine:
         s
     seed : int
         Of every noise.
+    start_angle : float
+        Angle of the shaft where positions count from, rad: where a run meets ripple and cogging.
     limits : mapping of str to float
         ``torque``, ``temperature``, ``following_error``, ``stop_time``: what a rig of this machine declares.
     models : mapping of str to Model
@@ -97,6 +99,7 @@ class Machine:
     models: Mapping[str, Model] = field(default_factory=dict[str, Model])
     notes: tuple[str, ...] = ()
     switched_off: tuple[str, ...] = ()
+    start_angle: float = 0.0
 
     def __post_init__(self) -> None:
         if not (self.inertia > 0.0 and math.isfinite(self.inertia)):
@@ -110,6 +113,8 @@ class Machine:
             raise ParameterError(f"machine: delay = {self.delay:g} samples must be from 0 to 1")
         if not (self.sample_time > 0.0 and math.isfinite(self.sample_time)):
             raise ParameterError(f"machine: sample_time = {self.sample_time:g} s must be greater than 0")
+        if not math.isfinite(self.start_angle):
+            raise ParameterError(f"machine: start_angle = {self.start_angle:g} rad must be a finite number")
         self._positive_up_to_its_speed()
 
     def _positive_up_to_its_speed(self) -> None:
@@ -123,6 +128,11 @@ class Machine:
                     raise ParameterError(
                         f"machine: friction helps the motion at {v:g} rad/s; lower encoder.max_speed or fix friction"
                     )
+
+    @property
+    def friction(self) -> Model:
+        """The whole friction of the axis as its motor sees it."""
+        return self.contact.friction
 
     @property
     def clutch(self) -> Model:
@@ -274,6 +284,7 @@ def _read(path: Path) -> Machine:
             _encoder(top), _sensor(top), top.number("delay", "samples", 0.0),
             top.number("velocity_filter", "Hz", 0.0, 0.0), top.positive("sample_time", "s", 1e-3),
             int(top.number("seed", "", 0.0, 0.0)), _limits(top), _models(top), notes,
+            start_angle=top.number("start_angle", "rad", 0.0),
         )  # fmt: skip
 
 

@@ -24,8 +24,8 @@ from stickslip.jit import call_holding, call_step, kernel, pointer
     SAMPLE, SUBSTEPS, SIZE, STATES, KT, LIMIT, COMMAND_STEP, MONITOR_STEP, CURRENT_NOISE, MONITOR_NOISE, DELAY,
     LAGS, SEED, COUNT, JITTER, MODE, MODE_SHARE, SENSOR_STEP, SENSOR_NOISE, MAX_SPEED, DRIFT, DRIFT_TIME, KAPPA,
     T_REFERENCE, T_AMBIENT, HEATING, HEAT_KEPT, BEARING, BEARING_K, ROTOR, SHAFT, DISK, HARMONICS, COGS,
-    DAMPED, HEAT_TIME, NUMBERS,
-) = range(37)  # fmt: skip
+    DAMPED, HEAT_TIME, VISCOUS, NUMBERS,
+) = range(38)  # fmt: skip
 # NUMBERS is where the harmonics begin: order, amplitude, phase of each of the contact's, then of the cogging.
 
 # ---- columns of the sub-step's matrix: SIZE of the transition, then what each input adds ----------------------
@@ -364,7 +364,7 @@ def measure(plant: Plant, drive: float, factor: float, measured: Any) -> None:
     """Write time, position, motor torque, sensor torque, temperature and status as the sensors see them now."""
     n, memory = plant.numbers, plant.memory
     x, tick = HEAD, memory[TICK]
-    shaft, disk, mode = int(n[SHAFT]), int(n[DISK]), int(n[MODE])
+    shaft, mode = int(n[SHAFT]), int(n[MODE])
     angle = memory[x + shaft]
     if mode > 0:
         angle += n[MODE_SHARE] * (memory[x + mode] - angle)
@@ -373,10 +373,7 @@ def measure(plant: Plant, drive: float, factor: float, measured: Any) -> None:
     current = (memory[x + int(n[LAGS])] if n[LAGS] > 0.0 else drive) / n[KT]
     if n[MONITOR_NOISE] > 0.0:
         current += n[MONITOR_NOISE] * gaussian(n[SEED], tick, 2)
-    ripple = 1.0
-    if n[HARMONICS] > 0.0:
-        ripple += harmonics(n, NUMBERS, int(n[HARMONICS]), memory[x + disk])
-    sensor = factor * ripple * memory[FRICTION]
+    sensor = contact_torque(plant, factor)
     if n[SENSOR_NOISE] > 0.0:
         sensor += n[SENSOR_NOISE] * gaussian(n[SEED], tick, 3)
     measured[0] = tick * n[SAMPLE] + memory[PAUSED]
@@ -385,3 +382,23 @@ def measure(plant: Plant, drive: float, factor: float, measured: Any) -> None:
     measured[3] = converted(sensor, n[SENSOR_STEP])
     measured[4] = memory[WARMTH]
     measured[5] = OVERSPEED if memory[TRIPPED] != 0.0 else 0.0
+
+
+@kernel(inline=True)
+def contact_torque(plant: Plant, factor: float) -> float:
+    """Friction of the contact now, with its ripple and what drift and temperature make of it, N·m."""
+    n, memory = plant.numbers, plant.memory
+    ripple = 1.0
+    if n[HARMONICS] > 0.0:
+        ripple += harmonics(n, NUMBERS, int(n[HARMONICS]), memory[HEAD + int(n[DISK])])
+    return factor * ripple * memory[FRICTION]
+
+
+@kernel()
+def axis_itself(plant: Plant, out: Any) -> None:
+    """Position and velocity at the encoder's inertia, and all friction that acts, as no sensor shows them."""
+    n, memory = plant.numbers, plant.memory
+    factor = state_factor(n, memory[TICK] * n[SAMPLE] + memory[PAUSED], memory[WARMTH])
+    shaft = HEAD + int(n[SHAFT])
+    out[0], out[1] = memory[shaft], memory[shaft + 1]
+    out[2] = contact_torque(plant, factor) + memory[BEARING_NOW] + n[VISCOUS] * memory[shaft + 1]

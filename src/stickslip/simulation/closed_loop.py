@@ -22,6 +22,7 @@ from stickslip.errors import (
     StepFailure,
     UnknownName,
 )
+from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.record import Record
@@ -29,7 +30,7 @@ from stickslip.simulation import _case
 from stickslip.simulation._case import COLUMNS, UNITS, Case, Outcome, lay_out, slip_rules
 from stickslip.simulation._meter import metrics
 
-__all__ = ["INTEGRATORS", "Choice", "integrator_for", "prepare", "run_case", "simulate"]
+__all__ = ["INTEGRATORS", "Choice", "check_machine_run", "integrator_for", "prepare", "run_case", "simulate"]
 
 INTEGRATORS = ("exact", "adaptive", "sampled", "fixed")
 """In the order in which `integrator="auto"` tries them."""
@@ -63,7 +64,7 @@ REASONS: dict[int, tuple[type[SimulationError], str]] = {
 
 
 def simulate(
-    axis: RigidAxis,
+    axis: RigidAxis | Machine,
     controller: Controller | SampledController,
     reference: Reference,
     duration: float,
@@ -81,7 +82,10 @@ def simulate(
 
     Parameters
     ----------
-    axis : RigidAxis
+    axis : RigidAxis or Machine
+        A machine (`stickslip.load_machine`) runs with all its imperfections under the controller sampled at the
+        machine's rate; ``integrator``, ``tolerance`` and ``time_step`` are then of no account
+        (`stickslip.simulation.machine_loop`).
     controller : Controller or SampledController
     reference : Reference
     duration : float
@@ -124,6 +128,13 @@ def simulate(
         If the run diverges, leaves the finite numbers or switches without end; it says when and why, and its
         ``record`` holds what was computed.
     """
+    if isinstance(axis, Machine):
+        check_machine_run(axis, controller, duration, output, integrator, initial=initial, slip_rule=slip_rule)
+        machine_loop = importlib.import_module("stickslip.simulation.machine_loop")
+        return machine_loop.simulate_machine(
+            axis, controller, reference, duration,
+            output=output, slip_rule=slip_rule, initial=initial, metered=metered, check=check,
+        )  # fmt: skip
     case = prepare(
         axis, controller, reference, duration,
         tolerance=tolerance, slip_rule=slip_rule, output=output, initial=initial, metered=metered,
@@ -195,9 +206,45 @@ def prepare(
     metered: bool = True,
 ) -> Case:
     """Check the arguments of `simulate` and lay the loop out for an integrator's ``run``."""
-    for name, value, unit in (("duration", duration, "s"), ("tolerance", tolerance, "rad")):
-        if not (math.isfinite(value) and value > 0.0):
-            raise ParameterError(f"simulate: {name} = {value:g} {unit} must be greater than 0")
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise ParameterError(f"simulate: tolerance = {tolerance:g} rad must be greater than 0")
+    check_run(duration, initial, controller.sample_time)
+    return lay_out(
+        axis, controller, reference, float(duration),
+        tolerance=tolerance, grid=_grid(output, duration), slip_rule=slip_rule, initial=initial, metered=metered,
+    )  # fmt: skip
+
+
+def check_machine_run(
+    machine: Machine, controller: Controller | SampledController, duration: float, output: Any,
+    integrator: str = "auto", *, initial: tuple[float, float] = (0.0, 0.0), slip_rule: str | None = None,
+) -> None:  # fmt: skip
+    """Find what is wrong with a run of a machine without running it; compiles its laws.
+
+    Raises
+    ------
+    InputError
+    """
+    if integrator != "auto":
+        raise InputError(
+            f"the {integrator} integrator cannot run a machine, whose samples have an engine of their own; leave "
+            "integrator out"
+        )
+    check_run(duration, initial, machine.sample_time)
+    machine_loop = importlib.import_module("stickslip.simulation.machine_loop")
+    machine_loop.rows_at(output, machine.sample_time, duration)
+    machine_loop.sampled_on(controller, machine, slip_rule)
+
+
+def check_run(duration: float, initial: tuple[float, float], sample_time: float) -> None:
+    """Refuse a duration, a start or a sample time (s; 0 in continuous time) with which nothing can be run.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not (math.isfinite(duration) and duration > 0.0):
+        raise ParameterError(f"simulate: duration = {duration:g} s must be greater than 0")
     if duration < SHORTEST:
         raise ParameterError(
             f"simulate: duration = {duration:g} s is shorter than {SHORTEST:g} s, in which nothing moves; give a "
@@ -205,17 +252,13 @@ def prepare(
         )
     if not all(math.isfinite(x) for x in initial):
         raise ParameterError(f"simulate: initial = {initial} must be two finite numbers")
-    if controller.sample_time > 0.0:
-        _insist_on_steps("sample_time", controller.sample_time, duration)
-        samples = duration / controller.sample_time
+    if sample_time > 0.0:
+        _insist_on_steps("sample_time", sample_time, duration)
+        samples = duration / sample_time
         insist_on_memory(
-            SAMPLE * samples, f"simulate: {samples:.3g} steps of sample_time = {controller.sample_time:g} s",
+            SAMPLE * samples, f"simulate: {samples:.3g} steps of sample_time = {sample_time:g} s",
             "use a longer one or a shorter duration",
         )  # fmt: skip
-    return lay_out(
-        axis, controller, reference, float(duration),
-        tolerance=tolerance, grid=_grid(output, duration), slip_rule=slip_rule, initial=initial, metered=metered,
-    )  # fmt: skip
 
 
 def _insist_on_steps(name: str, step: float, duration: float) -> None:

@@ -187,13 +187,14 @@ def numbers_of(machine: Machine, parts: int, states: int, places: dict[str, int]
         step.HEAT_KEPT: math.exp(-machine.sample_time / heat.time), step.HEAT_TIME: heat.time,
         step.BEARING: bearings.coulomb, step.BEARING_K: bearings.stiffness, step.ROTOR: places["rotor"],
         step.SHAFT: places["shaft"], step.DISK: places["disk"], step.HARMONICS: len(ripple.order),
-        step.COGS: len(cogging.order), step.DAMPED: 1.0 if damped else 0.0,
+        step.COGS: len(cogging.order), step.DAMPED: 1.0 if damped else 0.0, step.VISCOUS: bearings.viscous,
     }  # fmt: skip
     for place, value in values.items():
         n[place] = value
     rows = [
-        *zip(ripple.order, ripple.amplitude, ripple.phase, strict=True),
-        *zip(cogging.order, cogging.amplitude, cogging.phase, strict=True),
+        (order, amplitude, phase + order * machine.start_angle)
+        for part in (ripple, cogging)
+        for order, amplitude, phase in zip(part.order, part.amplitude, part.phase, strict=True)
     ]
     n[step.NUMBERS :] = np.array(rows, dtype=np.float64).ravel()
     return n

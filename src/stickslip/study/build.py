@@ -6,7 +6,7 @@ import csv
 import importlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from stickslip import plugins
 from stickslip.config import Table, refuse_endless
@@ -18,6 +18,7 @@ from stickslip.control.linear import LINEAR, Cascade, Gains, place
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import ConfigError, InputError
+from stickslip.machines.machine import IMPERFECTIONS, Machine, machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.model_tables import friction_laws, law_files, model, models, refuse_unknown
@@ -77,6 +78,34 @@ def axis(table: Table, friction: Model) -> RigidAxis:
             table.number("load", "", 1.0, lower=0.0),
             table.number("temperature", "°C", 20.0),
         )
+
+
+def machine_of(table: Table) -> dict[str, Machine]:
+    """The machines of a table by what to append to its name: ``machine`` (a name of the library or a file) with all its
+    imperfections; less those of ``without``, with those of ``only`` alone, or one for each of ``each_alone``, alone."""
+    with table, table.blamed():
+        name = table.text("machine")
+        found = machine(str(table.document.locate(name)) if name.endswith(".toml") else name)
+        ways = [key for key in ("without", "only", "each_alone") if table.has(key)]
+        if len(ways) > 1:
+            raise table.error(ways[1], f"and {ways[0]} exclude each other; give one of them")
+        if table.has("start_angle"):
+            found = replace(found, start_angle=table.number("start_angle", "rad"))
+        if not ways:
+            return {"": found}
+        named = table.texts(ways[0], IMPERFECTIONS)
+        if ways[0] == "without":
+            return {"": found.without(*named)}
+        if ways[0] == "only":
+            return {"": found.without(*(n for n in IMPERFECTIONS if n not in named))}
+        return {f"-{n}": found.without(*(other for other in IMPERFECTIONS if other != n)) for n in named}
+
+
+def machines(tables: Mapping[str, Table]) -> dict[str, Machine]:
+    """Every machine of a study by name."""
+    return {
+        f"{name}{more}": found for name, table in tables.items() for more, found in machine_of(table).items()
+    }
 
 
 # ---- references ------------------------------------------------------------------------------------------------

@@ -15,9 +15,11 @@ from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import ConfigError, InputError, UnknownName
+from stickslip.machines.machine import Machine
+from stickslip.machines.numbers import machine_numbers
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulation.closed_loop import integrator_for, prepare
+from stickslip.simulation.closed_loop import check_machine_run, integrator_for, prepare
 from stickslip.study import build
 from stickslip.study.build import Numerics, Placement
 from stickslip.study.provenance import engine_hash, source_hash
@@ -50,7 +52,7 @@ class PlannedRun:
     reference: str
     friction: str
     controller: str
-    axis: RigidAxis
+    axis: RigidAxis | Machine
     control: Controller | SampledController
     motion: Reference
     duration: float
@@ -78,6 +80,7 @@ class PlannedRun:
             "slip_rule": self.slip_rule,
             "inertia": self.axis.inertia,
             "friction": self.axis.friction.as_dict(),
+            **({"machine": described(self.axis)} if isinstance(self.axis, Machine) else {}),
             **(
                 {"controller": self.control.as_dict()}
                 if isinstance(self.control, SampledController)
@@ -99,6 +102,11 @@ class PlannedRun:
         """
         n = self.numerics
         try:
+            if isinstance(self.axis, Machine):
+                check_machine_run(
+                    self.axis, self.control, self.duration, n.output, n.integrator, slip_rule=self.rule
+                )
+                return
             case = prepare(
                 self.axis, self.control, self.motion, self.duration,
                 tolerance=n.tolerance, slip_rule=self.rule, output=n.output,
@@ -106,6 +114,14 @@ class PlannedRun:
             integrator_for(case, n.integrator)
         except InputError as error:
             raise ConfigError(f"run {self.key}: {error}") from None
+
+
+def described(machine: Machine) -> dict[str, Any]:
+    """Everything of a machine that a run's numbers depend on."""
+    laws = {name: model.as_dict() for name, model in machine.models.items()}
+    return {**machine_numbers(machine), **machine.as_dict(), "sample_time": machine.sample_time,
+            "converters": repr((machine.amplifier, machine.sensor, machine.cogging, machine.contact.ripple)),
+            "models": laws}  # fmt: skip
 
 
 def frictions_of(control: Controller | SampledController) -> list[Model]:
@@ -267,8 +283,7 @@ def load_run(path: Path) -> PlannedRun:
         rule = table.choice("slip_rule", SLIP_RULES) if table.has("slip_rule") else None
         files = build.law_files(table)
         laws = build.models(table.tables("laws"), files)
-        with table.table("friction") as t:
-            axis = build.axis(table.table("axis"), build.model(t, build.friction_laws(files)))
+        axis = _axis(table, files)
         with table.table("reference") as t:
             motion = _Motion.read(t)
         with table.table("controller") as t:
@@ -280,7 +295,21 @@ def load_run(path: Path) -> PlannedRun:
     )  # fmt: skip
 
 
-def named_rule(rule: str | None, axis: RigidAxis, control: Controller | SampledController) -> str:
+def _axis(table: Table, files: Mapping[str, Any]) -> RigidAxis | Machine:
+    """The axis of a single run: [axis] and [friction], or [machine]."""
+    if not table.has("machine"):
+        with table.table("friction") as t:
+            return build.axis(table.table("axis"), build.model(t, build.friction_laws(files)))
+    for other in ("axis", "friction"):
+        if table.has(other):
+            raise table.error(other, "and [machine] exclude each other; give one of them")
+    found = build.machine_of(table.table("machine"))
+    if list(found) != [""]:
+        raise table.error("machine", "names several machines (each_alone); a single run has one")
+    return found[""]
+
+
+def named_rule(rule: str | None, axis: RigidAxis | Machine, control: Controller | SampledController) -> str:
     """The rule by which a run's name calls it: what its file gives; where it gives none, "own" if one of its laws
     brings another one than the default."""
     kept = {m.law.option_of("slip_rule") for m in (axis.friction, *frictions_of(control))} - {""}
@@ -304,11 +333,11 @@ class _Motion:
 class _Parts:
     """What a study names: machine, frictions, references, laws and controllers."""
 
-    axis: Table
+    axis: Table | None
     laws_from_files: Mapping[str, Any]
     numerics: Numerics
     motions: Mapping[str, _Motion]
-    frictions: Mapping[str, RigidAxis]
+    frictions: Mapping[str, RigidAxis | Machine]
     laws: Mapping[str, Model]
     controllers: Mapping[str, Table]
 
@@ -316,20 +345,31 @@ class _Parts:
     def read(table: Table) -> _Parts:
         numerics = build.numerics(table, Numerics())
         files = build.law_files(table)
+        machines = build.machines(table.tables("machines"))
         for family in ("friction", "references", "controllers"):
-            if not table.tables(family):
+            if not table.tables(family) and not (family == "friction" and machines):
                 raise ConfigError(f"{table.label(family)} is missing; give at least one [{family}.NAME]")
-        axis = table.table("axis")
         frictions = build.models(table.tables("friction"), files)
+        axis = table.table("axis") if frictions or table.has("axis") else None
+        if both := set(frictions) & set(machines):
+            raise table.error("machines", f"and friction share the name {min(both)!r}; give one another name")
         return _Parts(
             axis,
             files,
             numerics,
             {name: _Motion.read(t) for name, t in table.tables("references").items()},
-            {name: build.axis(axis, friction) for name, friction in frictions.items()},
+            {
+                **{name: build.axis(axis, friction) for name, friction in frictions.items() if axis},
+                **machines,
+            },
             build.models(table.tables("laws"), files),
             table.tables("controllers"),
         )
+
+    @property
+    def inertia(self) -> float:
+        """What gains are placed with, kg·m²: that of the axis, else of the first machine."""
+        return next(iter(self.frictions.values())).inertia
 
     def runs(
         self,
@@ -340,7 +380,7 @@ class _Parts:
     ) -> list[PlannedRun]:
         """Every one of each with every one of the others."""
         made: dict[tuple[str, str], tuple[Controller | SampledController, Numerics]] = {}
-        inertia = next(iter(self.frictions.values())).inertia
+        inertia = self.inertia
         for c in controllers:
             for m in motions:
                 with self.controllers[c] as table:
@@ -363,7 +403,9 @@ def _comparison(table: Table, parts: _Parts, rule: str | None) -> list[PlannedRu
         table.text("title", "")
         table.has("figures")
         own = build.models(table.tables("friction"), parts.laws_from_files)
-        axes = {name: build.axis(parts.axis, friction) for name, friction in own.items()}
+        if own and parts.axis is None:
+            raise table.error("friction", "needs a table [axis]")
+        axes = {name: build.axis(parts.axis, friction) for name, friction in own.items() if parts.axis}
         wider = replace(
             parts,
             frictions={**parts.frictions, **axes},

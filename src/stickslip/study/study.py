@@ -15,8 +15,9 @@ from typing import Any
 
 from stickslip.capacity import insist_on_jobs
 from stickslip.errors import SimulationError
+from stickslip.machines.machine import Machine
 from stickslip.record import Record
-from stickslip.simulation.closed_loop import prepare, run_case
+from stickslip.simulation.closed_loop import prepare, run_case, simulate
 from stickslip.study import files
 from stickslip.study.plan import PlannedRun, Study, load, load_run, select
 from stickslip.study.result import Run, StudyResult
@@ -50,6 +51,12 @@ def execute(planned: PlannedRun, check: bool = False) -> Executed:
     n = planned.numerics
     start, failure = time.thread_time(), ""
     try:
+        if isinstance(planned.axis, Machine):
+            record = simulate(
+                planned.axis, planned.control, planned.motion, planned.duration,
+                slip_rule=planned.rule, output=n.output, check=check,
+            )  # fmt: skip
+            return Executed(record, "", time.thread_time() - start)
         case = prepare(
             planned.axis, planned.control, planned.motion, planned.duration,
             tolerance=n.tolerance, slip_rule=planned.rule, output=n.output,

@@ -206,6 +206,8 @@ def _read(results: batch.Results, metrics: Sequence[str], integrator: str) -> Me
 def integrator_of(sweep: Sweep, run: int) -> tuple[str, str]:
     """What will run the cases of a run, as far as its first one tells, and why not what comes first; "" if it does."""
     planned = sweep.runs[run]
+    if isinstance(planned.axis, Machine):
+        return "machine", "a machine's samples have an engine of their own"
     reasons: list[str] = []
     if sweep.step > 0.0:
         try:
@@ -221,6 +223,8 @@ def integrator_of(sweep: Sweep, run: int) -> tuple[str, str]:
 
 def as_lanes(planned: PlannedRun, values: Mapping[str, Array], step: float) -> lanes.Lanes | None:
     """The block in lanes, or None where they cannot run it."""
+    if isinstance(planned.axis, Machine):
+        return None
     try:
         return lanes.prepare(_laid_out(planned), as_columns(planned, values), step)
     except InputError:
@@ -241,6 +245,8 @@ def _laid_out(planned: PlannedRun) -> _case.Case:
 
 def _as_batch(planned: PlannedRun, values: Mapping[str, Array]) -> batch.Batch | None:
     """The block as one batch, or None where its cases are run one by one."""
+    if isinstance(planned.axis, Machine):
+        return None
     if planned.numerics.integrator not in ("auto", "exact") or not values:
         return None
     try:
@@ -258,6 +264,8 @@ def _alone(
     none = [np.nan] * len(metrics)
     try:
         run = varied(planned, values)
+        if isinstance(run.axis, Machine):
+            return _on_machine(run, run.axis, metrics, FINER if kick else 0)
         case = _laid_out(run)
         name, integrate, _ = integrator_for(case, run.numerics.integrator)
     except ParameterError as error:
@@ -274,3 +282,19 @@ def _alone(
         return none, _reason(outcome.code, outcome.time), name
     found = read_meter(outcome.meter, outcome.turns)
     return [found[name] for name in metrics], "", name
+
+
+def _on_machine(
+    run: PlannedRun, machine: Machine, metrics: Sequence[str], finer: int
+) -> tuple[list[float], str, str]:
+    """The same of a machine; `finer` times its sub-steps, 0 for its own choice."""
+    parts = finer * int(lay_out_machine(machine).numbers[SUBSTEPS])
+    try:
+        record = simulate_machine(
+            machine, run.control, run.motion, run.duration,
+            output=[0.0], slip_rule=run.rule, substeps=parts,
+        )  # fmt: skip
+    except SimulationError as error:
+        return [np.nan] * len(metrics), f"ended at {error.time:.6g} s: {error}", "machine"
+    found = record.meta["metrics"]
+    return [found[name] for name in metrics], "", "machine"

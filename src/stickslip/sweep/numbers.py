@@ -21,13 +21,15 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import UnknownName
+from stickslip.machines.machine import Machine
+from stickslip.machines.numbers import machine_numbers, with_friction, with_numbers
 from stickslip.model import Model, Reference
 from stickslip.study.plan import PlannedRun
 
 __all__ = ["as_columns", "belongs", "poles", "value_of", "varied"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-FAMILIES = ("axis", "friction", "law", "controller", "reference")
+FAMILIES = ("axis", "machine", "friction", "law", "controller", "reference")
 POLES = ("bandwidth_hz", "damping")
 SETTINGS = ("gain", "filter_hz", *POLES, *Gains._fields, "torque_limit", "sample_time")
 ELEMENT = re.compile(r"(.+)\[(\d+)\]")
@@ -36,6 +38,8 @@ ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 def parts(name: str) -> tuple[str, str, int | None]:
     """Family, name, and element if one is meant."""
     family, _, rest = name.partition(".")
+    if family == "machine":
+        return family, rest, None  # its elements are numbers of their own: ripple.amplitude[0]
     match = ELEMENT.fullmatch(rest)
     return (family, match[1], int(match[2])) if match else (family, rest, None)
 
@@ -52,7 +56,11 @@ def poles(gains: Gains, inertia: float) -> tuple[str, float, float]:
 def known(run: PlannedRun) -> dict[str, Any]:
     """Every number of a run, by name; those of lists as tuples."""
     control = run.control
-    found: dict[str, Any] = {"axis.inertia": run.axis.inertia}
+    found: dict[str, Any] = {}
+    if isinstance(run.axis, Machine):
+        found |= {f"machine.{k}": v for k, v in machine_numbers(run.axis).items()}
+    else:
+        found["axis.inertia"] = run.axis.inertia
     found |= {f"friction.{k}": v for k, v in run.axis.friction.parameters._asdict().items()}
     if isinstance(control, SampledController):
         found |= {f"controller.{k}": v for k, v in control.values().items()}
@@ -134,11 +142,12 @@ def varied(run: PlannedRun, values: Mapping[str, Any]) -> PlannedRun:
     motion = run.motion
     if sorted_["reference"]:
         motion = Reference(motion.kind, **{**motion.parameters._asdict(), **sorted_["reference"]})
-    axis = replace(
-        run.axis,
-        inertia=float(sorted_["axis"].get("inertia", run.axis.inertia)),
-        friction=with_values(run.axis.friction, sorted_["friction"]),
-    )
+    friction = with_values(run.axis.friction, sorted_["friction"])
+    if isinstance(run.axis, Machine):
+        axis = with_friction(with_numbers(run.axis, sorted_["machine"]), friction)
+    else:
+        inertia = float(sorted_["axis"].get("inertia", run.axis.inertia))
+        axis = replace(run.axis, inertia=inertia, friction=friction)
     return replace(
         run, axis=axis, motion=motion, control=_control(run, sorted_["controller"], sorted_["law"])
     )
