@@ -129,7 +129,9 @@ def simulate(
         ``record`` holds what was computed.
     """
     if isinstance(axis, Machine):
-        check_machine_run(axis, controller, duration, output, integrator, initial=initial, slip_rule=slip_rule)
+        check_machine_run(
+            axis, controller, duration, output, integrator, initial=initial, slip_rule=slip_rule
+        )
         machine_loop = importlib.import_module("stickslip.simulation.machine_loop")
         return machine_loop.simulate_machine(
             axis, controller, reference, duration,

@@ -93,7 +93,8 @@ def machine_of(table: Table) -> dict[str, Machine]:
             found = replace(found, start_angle=table.number("start_angle", "rad"))
         if not ways:
             return {"": found}
-        named = table.texts(ways[0], IMPERFECTIONS)
+        whole = ways[0] == "only" and table.values["only"] == []  # without any
+        named: list[str] = [] if whole else list(table.texts(ways[0], IMPERFECTIONS))
         if ways[0] == "without":
             return {"": found.without(*named)}
         if ways[0] == "only":

@@ -40,7 +40,7 @@ __all__ = [
 SLIP_RULES = ("signed", "literal")
 OWN = "own"
 """What stands for the slip rule in the name of a run whose laws keep rules of their own."""
-BUILT_IN = ("thesis",)
+BUILT_IN = ("thesis", "imperfections")
 FAMILIES = ("slip_rule", "reference", "friction", "controller")
 
 
@@ -213,7 +213,7 @@ class Study:
 
 
 def load(study: str | Path, moved: Mapping[str, Path] | None = None) -> Study:
-    """Read a study: the path of a TOML file, or the name of one that ships with the package ("thesis").
+    """Read a study: the path of a TOML file, or the name of one that ships with the package.
 
     Parameters
     ----------
@@ -362,7 +362,7 @@ class _Parts:
                 **{name: build.axis(axis, friction) for name, friction in frictions.items() if axis},
                 **machines,
             },
-            build.models(table.tables("laws"), files),
+            {**_models_of(machines), **build.models(table.tables("laws"), files)},
             table.tables("controllers"),
         )
 
@@ -396,6 +396,18 @@ class _Parts:
                        self.motions[m].reference, self.motions[m].duration, made[c, m][1])
             for rule in rules for m in motions for f in frictions for c in controllers
         ]  # fmt: skip
+
+
+def _models_of(machines: Mapping[str, Machine]) -> dict[str, Model]:
+    """The laws that somebody identified on the machines, by name: what controllers may hold beside [laws.*]."""
+    found: dict[str, Model] = {}
+    for one in machines.values():
+        for name, model in one.models.items():
+            if found.setdefault(name, model).as_dict() != model.as_dict():
+                raise ConfigError(
+                    f"two machines have different models {name!r}; give what is meant as [laws.{name}]"
+                )
+    return found
 
 
 def _comparison(table: Table, parts: _Parts, rule: str | None) -> list[PlannedRun]:
@@ -433,9 +445,12 @@ def _drive(name: str, table: Table, parts: _Parts) -> Drive:
     with table:
         frictions = table.texts("frictions", parts.frictions) if table.has("frictions") else []
         laws = table.texts("laws", parts.laws, "laws") if table.has("laws") else []
-        axes = {f: parts.frictions[f] for f in frictions}
-        inertia = next(iter(parts.frictions.values())).inertia
-        axes |= {n: RigidAxis(inertia, parts.laws[n]) for n in laws}
+        axes = {f: axis for f in frictions if isinstance(axis := parts.frictions[f], RigidAxis)}
+        if left := [f for f in frictions if f not in axes]:
+            raise table.error(
+                "frictions", f"has {left[0]!r}, a machine: in open loop only ideal axes are driven"
+            )
+        axes |= {n: RigidAxis(parts.inertia, parts.laws[n]) for n in laws}
         return Drive(
             name, table.text("title", name), table.text("figure", ""), table.positive("amplitude", "N·m"),
             table.positive("frequency", "Hz"), table.positive("duration", "s"), axes,

@@ -11,11 +11,16 @@ import numpy as np
 
 from stickslip.control.compensators.feedback import Feedback
 from stickslip.control.controller import Controller
-from stickslip.errors import InputError, ParameterError
+from stickslip.errors import InputError, ParameterError, SimulationError
+from stickslip.machines.machine import Machine
+from stickslip.machines.rigid import RigidAxis
 from stickslip.simulation import _case, batch, lanes
+from stickslip.simulation._machine_step import SUBSTEPS
 from stickslip.simulation._meter import metrics as read_meter
 from stickslip.simulation.accuracy import KICKS, LOOSER
 from stickslip.simulation.closed_loop import REASONS, integrator_for, prepare
+from stickslip.simulation.machine import lay_out_machine
+from stickslip.simulation.machine_loop import simulate_machine
 from stickslip.study.plan import PlannedRun
 from stickslip.sweep.numbers import as_columns, varied
 from stickslip.sweep.plan import BLOCK, Sweep
@@ -31,6 +36,8 @@ The first is a tenth of the 1 % that is wanted: motions without a truth scatter 
 LONGER, SURE_OF_STEPS = 2.0, 0.003
 """Times the step of lanes, at which they run again, and the part of a metric by which the two may differ: a third of
 `SURE`, since where an axis switches often two steps can agree by chance."""
+FINER = 2
+"""Times the sub-steps of a machine, with which it runs again where wrong steps are asked for."""
 FLOORS = {"rad": 1e-8, "s": 1e-6, "Nm": 1e-6, "J": 1e-9}
 """Differences this small count for nothing, by the unit that a metric's name ends with (rad/s: 1e-6)."""
 
@@ -54,7 +61,7 @@ class Block:
     failures : list of str
         Why a case ended early or could not be run, else "".
     integrators : list of str
-        What ran a case: "exact", "adaptive", "sampled", "fixed" or "lanes"; "" where it could not be run.
+        What ran a case: "exact", "adaptive", "sampled", "fixed", "lanes" or "machine"; "" where it could not be run.
     """
 
     run: int
@@ -237,6 +244,7 @@ def _reason(code: int, time: float) -> str:
 
 def _laid_out(planned: PlannedRun) -> _case.Case:
     n = planned.numerics
+    assert isinstance(planned.axis, RigidAxis)
     return prepare(
         planned.axis, planned.control, planned.motion, planned.duration,
         tolerance=n.tolerance, slip_rule=planned.rule, output=planned.duration,
@@ -292,7 +300,7 @@ def _on_machine(
     try:
         record = simulate_machine(
             machine, run.control, run.motion, run.duration,
-            output=[0.0], slip_rule=run.rule, substeps=parts,
+            output=np.zeros(1), slip_rule=run.rule, substeps=parts,
         )  # fmt: skip
     except SimulationError as error:
         return [np.nan] * len(metrics), f"ended at {error.time:.6g} s: {error}", "machine"
