@@ -97,6 +97,9 @@ def print_accuracy(meta: Mapping[str, Any]) -> None:
         )
     if "error_rad" not in found:
         return
+    if "machine" in meta:
+        print(f"accuracy: half as long sub-steps move its position by up to {found['error_rad']:.1g} rad")
+        return
     tolerance, error = meta["tolerance"], found["error_rad"]
     if error <= 10.0 * tolerance:
         print(
@@ -110,7 +113,13 @@ def print_accuracy(meta: Mapping[str, Any]) -> None:
 
 
 def print_integrator(meta: Mapping[str, Any]) -> None:
-    """What ran a case where the integrators that come first could not; else nothing."""
+    """What ran a case where the integrators that come first could not, or which machine; else nothing."""
+    if machine := meta.get("machine"):
+        left = f" without {', '.join(machine['without'])}" if machine["without"] else ""
+        every = meta["counts"]["substeps"]
+        print(
+            f"machine: {machine['name']}{left}, sampled every {meta['sample_time']:g} s in {every} sub-steps"
+        )
     if refused := meta.get("refused"):
         print(f"integrator: {meta['integrator']}; {'; '.join(refused.values())}")
 

@@ -1,0 +1,167 @@
+"""Machines with their imperfections in studies, single runs and sweeps, by the same commands as ideal axes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.cli import main
+from stickslip.errors import ConfigError
+from stickslip.machines.machine import IMPERFECTIONS, machine
+from stickslip.study import study as studies
+from stickslip.study.plan import load, load_run
+from stickslip.sweep.block import measured
+from stickslip.sweep.numbers import known, varied
+
+STUDY = """
+[machines.all]
+machine = "thesis-dry"
+
+[machines.bare]
+machine = "thesis-dry"
+only = []
+
+[machines.only]
+machine = "thesis-dry"
+each_alone = ["cogging", "flexibility"]
+
+[references.low]
+kind = "sine"
+amplitude = 0.05
+frequency = 1.0
+duration = 1.0
+placement = {bandwidth_hz = 10.0, damping = 0.85}
+
+[controllers.PD]
+linear = "PD"
+
+[controllers.FF]
+linear = "PD"
+compensator = "feedforward"
+law = "lugre"
+"""
+RUN = """
+[machine]
+machine = "thesis-dry"
+without = ["cogging"]
+start_angle = 0.3
+
+[reference]
+kind = "sine"
+amplitude = 0.05
+frequency = 1.0
+duration = 0.5
+
+[controller]
+linear = "PD"
+placement = {bandwidth_hz = 10.0, damping = 0.85}
+"""
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    (tmp_path / "study.toml").write_text(STUDY)
+    return tmp_path / "study.toml"
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    (tmp_path / "run.toml").write_text(RUN)
+    return tmp_path / "run.toml"
+
+
+def test_a_study_runs_machines_by_name_and_finds_them_again(study: Path) -> None:
+    planned = load(study)
+    names = ["all", "bare", "only-cogging", "only-flexibility"]
+    assert list(dict.fromkeys(r.friction for r in planned.runs)) == names
+    assert len({r.fingerprint for r in planned.runs}) == 8
+    result = studies.run(planned, study.parent / "out")
+    assert not any(r.failure for r in result.runs)
+    again = studies.run(planned, study.parent / "out")
+    assert [r.metrics["position_rms_rad"] for r in again.runs] == [
+        r.metrics["position_rms_rad"] for r in result.runs
+    ]
+    here = next(r for r in planned.runs if (r.friction, r.controller) == ("only-cogging", "FF"))
+    bare = machine("thesis-dry").without(*(n for n in IMPERFECTIONS if n != "cogging"))
+    alone = ss.simulate(bare, here.control, here.motion, here.duration)
+    there = next(r for r in result.runs if (r.friction, r.controller) == ("only-cogging", "FF"))
+    assert there.metrics["position_rms_rad"] == alone.meta["metrics"]["position_rms_rad"]
+
+
+def test_laws_of_the_machines_file_serve_controllers(study: Path) -> None:
+    planned = load(study)
+    (helped,) = {r.control.compensator for r in planned.runs if r.controller == "FF"}
+    assert helped.model.as_dict() == machine("thesis-dry").models["lugre"].as_dict()
+
+
+def test_a_single_run_takes_a_machine(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    planned = load_run(run)
+    assert planned.axis.start_angle == 0.3
+    assert main(["simulate", str(run), "--out", str(run.parent / "run.npz")]) == 0
+    record = ss.Record.load(run.parent / "run.npz")
+    assert record.meta["machine"]["without"] == ["cogging"]
+    assert np.ptp(record["position_measured"] - record["position"]) > 0.0
+    assert "position_rms" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (('without = ["cogging"]', 'without = ["cogging"]\nonly = ["delay"]'), "exclude each other"),
+        (('without = ["cogging"]', 'without = ["warp"]'), "warp"),
+        (('without = ["cogging"]', 'each_alone = ["cogging"]'), "a single run has one"),
+        (("[machine]", "[axis]\ninertia = 1.0\n\n[machine]"), "exclude each other"),
+        (('machine = "thesis-dry"', 'machine = "nowhere"'), "nowhere"),
+        (("[controller]", "[controller]\nsample_time = 0.0005"), "sample_time = 0.0005"),
+    ],
+)
+def test_what_cannot_be_is_said_before_anything_runs(run: Path, change: tuple[str, str], said: str) -> None:
+    run.write_text(RUN.replace(*change))
+    with pytest.raises((ConfigError, ss.InputError), match=said):
+        load_run(run).check()
+
+
+def test_an_angle_of_start_moves_what_depends_on_it(run: Path) -> None:
+    planned = load_run(run)
+    there = varied(planned, {"machine.start_angle": 0.3 + 2.0 * np.pi})
+    here, again, other = (
+        ss.simulate(r.axis, r.control, r.motion, r.duration)["position"]
+        for r in (planned, there, varied(planned, {"machine.start_angle": 1.0}))
+    )
+    assert np.max(np.abs(again - here)) < 1e-9
+    assert np.max(np.abs(other - here)) > 1e-6
+
+
+def test_a_sweep_varies_any_number_of_a_machine(run: Path) -> None:
+    planned = load_run(run)
+    names = known(planned)
+    assert "axis.inertia" not in names
+    stiff, counts = names["machine.flexible.elasticity"], names["machine.encoder.counts"]
+    values = {
+        "machine.flexible.elasticity": np.array([stiff, 2.0 * stiff, stiff]),
+        "machine.encoder.counts": np.array([counts, counts, counts / 8.0]),
+    }
+    found = measured(planned, values, ["position_rms_rad"], 3)
+    assert found.integrators == ["machine"] * 3
+    assert len(set(found.metrics[:, 0].tolist())) == 3
+    alone = ss.simulate(planned.axis, planned.control, planned.motion, planned.duration)
+    assert found.metrics[0, 0] == alone.meta["metrics"]["position_rms_rad"]
+
+
+def test_a_sweep_of_a_machine_from_its_file(study: Path) -> None:
+    sweep = study.parent / "sweep.toml"
+    sweep.write_text(
+        'study = "study.toml"\nonly = ["only-cogging", "PD"]\ncases = 3\nmetrics = ["position_rms_rad"]\n\n'
+        '[vary."machine.start_angle"]\nrange = [0.0, 1.0]\n'
+    )
+    code = main(["sweep", str(sweep), "--out", str(study.parent / "swept"), "--jobs", "1"])
+    assert code == 0
+
+
+def test_the_study_of_imperfections_ships() -> None:
+    planned = load("imperfections")
+    assert len({r.controller for r in planned.runs}) == 10
+    assert len({r.friction for r in planned.runs}) == 14
