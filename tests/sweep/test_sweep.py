@@ -487,10 +487,12 @@ def test_an_interrupted_sweep_gives_none_of_joblibs_advice(small, recwarn):
 
 
 def test_the_command_prints_and_draws(tmp_path, capsys):
-    (tmp_path / "figures").mkdir()
+    command = ["sweep", str(SMALL), "--out", str(tmp_path), "--cases", "60", "--jobs", "2"]
+    assert main(command) == 0
     for name in ("tornado-of-a-run-that-was.png", "my-own.png"):
         (tmp_path / "figures" / name).write_bytes(b"")
-    assert main(["sweep", str(SMALL), "--out", str(tmp_path), "--cases", "60", "--jobs", "2"]) == 0
+    capsys.readouterr()
+    assert main(command) == 0
     out = capsys.readouterr().out
     assert "signed/sine/nominal/FF-lugre" in out
     assert (tmp_path / "figures" / "percentiles-signed-sine-nominal.png").exists()

@@ -22,6 +22,7 @@ from stickslip.errors import InputError
 from stickslip.export import CONTROLLER_TARGETS, controller_target, target_named
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target, settings_of
+from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 from stickslip.study.files import prepared_folder, unwritable
@@ -320,7 +321,8 @@ def job_of(
         )
     if isinstance(source, (str, os.PathLike)):
         axis = load_run(Path(source)).axis
-        around = Surroundings(load=axis.load, temperature=axis.temperature)
+        if isinstance(axis, RigidAxis):
+            around = Surroundings(load=axis.load, temperature=axis.temperature)
     return Job(made.compensator.model, name, made, surroundings=around, settings=settings)
 
 
