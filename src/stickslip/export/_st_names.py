@@ -57,4 +57,6 @@ def named_in_st(names: Iterable[str], taken: Iterable[str] = RESERVED) -> Mappin
 def plain(name: str) -> str:
     """The name without what the norm forbids."""
     letters = re.sub(r"_+", "_", name).strip("_")
+    # The norm permits these inside a name; matiec looks for them letter by letter, and ends the body there.
+    letters = re.sub(r"(?i)(end)_(function|program)", r"\1\2", letters)
     return letters if letters[:1].isalpha() else f"x{letters}"
