@@ -65,7 +65,9 @@ def test_a_real_compiler_takes_it_and_gives_the_torque_of_the_law(law, tmp_path)
     assert np.abs(found - expected).max() <= BOUND * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("name", ["end_if", "my_end_function_x", "end_program", "torque", "my__axis_", "LIMIT", "u"])
+@pytest.mark.parametrize(
+    "name", ["end_if", "my_end_function_x", "end_program", "torque", "my__axis_", "LIMIT", "u"]
+)
 def test_a_block_has_a_name_that_the_norm_permits(name):
     text = st.write(Job(Model("coulomb", fc=0.3), name)).files[f"{name}.st"]
     program = Program(text)

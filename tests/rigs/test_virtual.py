@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -80,26 +79,6 @@ def test_blocks_and_single_samples_agree_bit_for_bit(name):
             kept.append(loop.run(wanted, law))
     assert np.array_equal(kept[0], kept[1])
     assert len(kept[0]) == len(wanted)
-
-
-@pytest.mark.parametrize("name", ["thesis-dry", "thesis-grease"])
-def test_speed_with_every_imperfection_on(name):
-    """The package asks 100 000 samples/s of CPU time; a busy machine may take half of that."""
-    wanted, law = tracking(20.0), controller(name)
-    best = 0.0
-    for _ in range(3):
-        with Loop(virtual_rig(name)) as loop:
-            loop.prepare(law)
-            begin = time.process_time()
-            loop.run(wanted, law)
-            best = max(best, len(wanted) / (time.process_time() - begin))
-    assert best > 5e4
-    rig = virtual_rig(name)
-    rig.open()
-    begin = time.process_time()
-    for _ in range(2000):
-        rig.exchange(0.1)
-    assert 2000 * T / (time.process_time() - begin) > 10.0
 
 
 def test_pause_comes_to_rest_and_lets_time_pass():

@@ -137,11 +137,19 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.verbs.identify import identify
 
     model_file, report_file = places(args.out)
-    _files.refuse_foreign([model_file, *([] if args.no_report else [report_file])], args.force)
+    written = [model_file, *([] if args.no_report else [report_file])]
     if not args.no_report:
         # What writes it loads while compiled code runs.
         threading.Thread(target=lambda: importlib.import_module("jinja2")).start()
-    result = identify(*args.files, **options_of(args), **_reading.reading_of(args))
+
+    def begins(what: str) -> None:
+        """Logs and options are fine: before anything is computed, whether there is a place for what comes of it."""
+        _files.refuse_foreign(written, args.force)
+        _output.say(what)
+
+    options = options_of(args)
+    options["progress"] = begins
+    result = identify(*args.files, **options, **_reading.reading_of(args))
     made: dict[str, Path] = {}
     if result.identification.model is not None:
         made["model_file"] = result.save(model_file)

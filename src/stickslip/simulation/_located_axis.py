@@ -152,5 +152,6 @@ def glide_of(a: Any) -> Array:
     rate[0, 1] = 1.0
     rate[1, 1:4] = -a["viscous"], -1.0, 1.0
     rate[1] /= a["inertia"]
-    rate[2, 2], rate[2, 4] = -attraction / a["level"], attraction
+    if a["level"] > 0.0:  # else nothing slips against anything
+        rate[2, 2], rate[2, 4] = -attraction / a["level"], attraction
     return np.asarray(expm(rate * a["sample_time"]), dtype=np.float64)[:3, 1:]

@@ -282,8 +282,9 @@ def load_run(path: Path) -> PlannedRun:
         numerics = build.numerics(table, Numerics())
         rule = table.choice("slip_rule", SLIP_RULES) if table.has("slip_rule") else None
         files = build.law_files(table)
-        laws = build.models(table.tables("laws"), files)
         axis = _axis(table, files)
+        known = _models_of({"": axis}) if isinstance(axis, Machine) else {}
+        laws = {**known, **build.models(table.tables("laws"), files)}
         with table.table("reference") as t:
             motion = _Motion.read(t)
         with table.table("controller") as t:

@@ -283,7 +283,7 @@ def _alone(
     if name == "exact":
         case.numbers[_case.KICK] = kick
     elif kick != 0.0:
-        case.numbers[_case.TOLERANCE] *= LOOSER
+        case.numbers[_case.TOLERANCE] *= LOOSER.get(name, 1.0)
         step *= LONGER
     outcome = integrate(case, step) if name == "fixed" else integrate(case)
     if outcome.code != _case.DONE:
