@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.control.compensators._base import Compensator
 from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import UnknownName
@@ -28,6 +29,7 @@ __all__ = [
     "Outcome",
     "Side",
     "StepBudget",
+    "compensator_told",
     "lay_out",
     "ruled",
     "slip_rules",
@@ -60,6 +62,15 @@ NO_COMPENSATOR, FROM_REFERENCE, FROM_MEASUREMENT = 0.0, 1.0, 2.0
 
 STORM_EVENTS, STORM_TIME = 4000, 5e-3
 """More switches than this within this time (s) end a run."""
+
+
+def compensator_told(helper: Compensator | None, model: Model | None) -> dict[str, Any]:
+    """What a record says of a compensator that ran with this model; nothing where there is none."""
+    if helper is None or model is None:
+        return {}
+    numbers = ("gain", "filter_hz", "lead", "deadband", "offset", "inertia_feedforward", "substeps")
+    own = {name: getattr(helper, name) for name in numbers}
+    return {"compensator": {"kind": helper.name, **own, **model.as_dict()}}
 
 
 @dataclass(frozen=True)

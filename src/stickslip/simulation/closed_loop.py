@@ -24,10 +24,18 @@ from stickslip.errors import (
 )
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.model import Reference
 from stickslip.record import Record
 from stickslip.simulation import _case
-from stickslip.simulation._case import COLUMNS, UNITS, Case, Outcome, lay_out, slip_rules
+from stickslip.simulation._case import (
+    COLUMNS,
+    UNITS,
+    Case,
+    Outcome,
+    compensator_told,
+    lay_out,
+    slip_rules,
+)
 from stickslip.simulation._meter import metrics
 
 __all__ = ["INTEGRATORS", "Choice", "check_machine_run", "integrator_for", "prepare", "run_case", "simulate"]
@@ -345,22 +353,12 @@ def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
         meta["controller"] = controller.as_dict()
     else:
         meta["gains"] = controller.gains._asdict()
-        meta |= _compensator(controller, assist)
+        meta |= compensator_told(controller.compensator, assist)
     if case.numbers[_case.METERED] and outcome.code == _case.DONE:
         meta["metrics"] = {k: float(v) for k, v in metrics(outcome.meter, outcome.turns).items()}
         meta["energy"] = _energy(case, columns, meta["metrics"])
     channels = {name: columns[i] for i, name in enumerate(COLUMNS) if name != "time"}
     return Record(columns[0], channels, UNITS, meta)
-
-
-def _compensator(controller: Controller, assist: Model | None) -> dict[str, Any]:
-    """What a record says of a compensator, if there is one."""
-    helper = controller.compensator
-    if helper is None or assist is None:
-        return {}
-    numbers = ("gain", "filter_hz", "lead", "deadband", "offset", "inertia_feedforward", "substeps")
-    own = {name: getattr(helper, name) for name in numbers}
-    return {"compensator": {"kind": helper.name, **own, **assist.as_dict()}}
 
 
 def _energy(case: Case, columns: Any, found: dict[str, float]) -> dict[str, float]:

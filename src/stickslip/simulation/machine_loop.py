@@ -24,7 +24,7 @@ from stickslip.record import Record
 from stickslip.simulation import _machine_step as step
 from stickslip.simulation._case import COLUMNS as OF_AXES
 from stickslip.simulation._case import UNITS as OF_AXES_UNITS
-from stickslip.simulation._case import ruled, slip_rules
+from stickslip.simulation._case import compensator_told, ruled, slip_rules
 from stickslip.simulation._fixed_loop import NUDGE
 from stickslip.simulation._machine_step import Plant, axis_itself, plant_of, sample
 from stickslip.simulation._meter import (
@@ -143,26 +143,21 @@ def sampled_on(
             f"its own ({machine.encoder.counts:g}); leave it out"
         )
     own = replace(controller, sample_time=machine.sample_time)
-    helper, said = own.compensator, dict[str, Any]()
-    model = None
+    helper, model = own.compensator, None
     if helper is not None:
         model = ruled(helper.model, slip_rule)
         # The machine's own low-pass, where the compensator brings none: as a rig of this machine has it.
         helper = replace(helper, model=model, filter_hz=helper.filter_hz or machine.filter or None)
         own = replace(own, compensator=helper)
-        numbers = ("gain", "filter_hz", "lead", "deadband", "offset", "inertia_feedforward", "substeps")
-        said = {
-            "compensator": {
-                "kind": helper.name,
-                **{n: getattr(helper, n) for n in numbers},
-                **model.as_dict(),
-            }
-        }
     law, p = (model.law, model.parameters) if model else (None, None)
     laid = sampled_with(
         own, law.pack_state(law.state(p)) if law else np.zeros(1), flat(law.pack(p)) if law else np.zeros(1)
     )
-    return laid, {"gains": own.gains._asdict(), **said, "laws": {"compensator": model}}
+    return laid, {
+        "gains": own.gains._asdict(),
+        **compensator_told(helper, model),
+        "laws": {"compensator": model},
+    }
 
 
 def rows_at(
