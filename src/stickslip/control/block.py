@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from stickslip import plugins
+from stickslip.control.registry import control_law
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import ParameterError
 from stickslip.model import Model
-from stickslip.spec import Field
+from stickslip.spec import Field, Law
 
 __all__ = ["ControlBlock", "within"]
 
@@ -49,32 +50,33 @@ class ControlBlock:
         choices: Mapping[str, str] | None = None,
         **parameters: Any,
     ) -> None:
-        found = plugins.control_law(law) if isinstance(law, str) else law
+        found = control_law(law) if isinstance(law, str) else law
         self.law: ControlLaw = found.having(**choices) if choices else found
         if self.law.holds_friction and friction is None:
-            raise ParameterError(f"{self.law.name}: it needs a friction law; give friction=Model(...)")
+            raise ParameterError(f"{self.law.name}: needs a friction law; give friction=Model(...)")
         if friction is not None and not self.law.holds_friction:
-            raise ParameterError(f"{self.law.name}: it takes no friction law; leave friction out")
+            raise ParameterError(f"{self.law.name}: takes no friction law; leave friction out")
+        if friction is not None and self.law.reads_steady and friction.law.steady is None:
+            raise ParameterError(
+                f"{self.law.name}: friction law {friction.law.name!r} has no torque at constant velocity; "
+                "give one with `steady`"
+            )
         self.friction = friction
         own = self.law.parameters(parameters)
-        make: Any = namedtuple  # whose fields are not known to a type checker
-        held = {HELD: friction.parameters} if friction else {}
-        self.parameters: Any = make("Parameters", [*own._fields, *held])(*own, *held.values())
+        held = (friction.parameters,) if friction else ()
+        self.parameters: Any = parameters_of((*own._fields, *(HELD for _ in held)))(*own, *held)
 
     # ---- what a composition reads ----------------------------------------------------------------------
 
     @property
     def fields(self) -> tuple[Field, ...]:
         """Parameters, those of the friction law under their whole names."""
-        return (*self.law.fields, *within(HELD, self.friction.law.fields if self.friction else ()))
+        return fields_in(self.law, self.friction.law if self.friction else None)
 
     @property
     def state_fields(self) -> tuple[Field, ...]:
         """As `fields`, of the state."""
-        return (
-            *self.law.state_fields,
-            *within(HELD, self.friction.law.state_fields if self.friction else ()),
-        )
+        return state_fields_in(self.law, self.friction.law if self.friction else None)
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -91,28 +93,49 @@ class ControlBlock:
     def function(self, name: str) -> Any:
         """The law's function of that name with the friction law in its place; None where it has none."""
         own = getattr(self.law, name)
-        return self.law.holding(name, self.friction.law.step) if own and self.friction else own
+        return self.law.holding(name, self.friction.law) if own and self.friction else own
+
+    @property
+    def own(self) -> dict[str, Any]:
+        """The law's own parameters by name."""
+        return {f.name: getattr(self.parameters, f.name) for f in self.law.fields}
 
     def with_values(self, values: Mapping[str, Any], friction: Mapping[str, Any]) -> ControlBlock:
         """The block with other `values` of its own parameters, and of those of the `friction` law that it holds."""
-        own = {f.name: getattr(self.parameters, f.name) for f in self.law.fields}
         held = self.friction
         if held is not None and friction:
             held = Model(held.law, **{**held.parameters._asdict(), **friction})
-        return ControlBlock(self.law, held, **{**own, **values})
+        return ControlBlock(self.law, held, **{**self.own, **values})
 
     # ---- for people --------------------------------------------------------------------------------------
 
     def as_dict(self) -> dict[str, Any]:
         """Law, choices and parameters as plain data."""
-        values = {f.name: getattr(self.parameters, f.name) for f in self.law.fields}
         held = {HELD: self.friction.as_dict()} if self.friction else {}
-        return {"law": self.law.name, **dict(self.law.chosen), **values, **held}
+        return {"law": self.law.name, **dict(self.law.chosen), **self.own, **held}
 
     def __repr__(self) -> str:
         inside = "".join(f", {k}={v!r}" for k, v in self.as_dict().items() if k not in ("law", HELD))
         held = f", friction={self.friction!r}" if self.friction else ""
         return f"ControlBlock({self.law.name!r}{held}{inside})"
+
+
+@functools.cache
+def parameters_of(names: tuple[str, ...]) -> Any:
+    """The type of a block's parameters: made once, as it takes longer than all the rest of a block."""
+    return namedtuple("Parameters", names)  # type: ignore[reportUntypedNamedTuple]
+
+
+@functools.lru_cache(maxsize=1024)
+def fields_in(law: ControlLaw, held: Law | None) -> tuple[Field, ...]:
+    """Parameters of a control law and of the friction law that it holds, these under their whole names."""
+    return (*law.fields, *within(HELD, held.fields if held else ()))
+
+
+@functools.lru_cache(maxsize=1024)
+def state_fields_in(law: ControlLaw, held: Law | None) -> tuple[Field, ...]:
+    """As `fields_in`, of the state."""
+    return (*law.state_fields, *within(HELD, held.state_fields if held else ()))
 
 
 def within(part: str, fields: tuple[Field, ...]) -> tuple[Field, ...]:

@@ -53,7 +53,6 @@ class Settings(NamedTuple):
 class Memory(NamedTuple):
     """What the composition remembers besides what the laws see."""
 
-    turns: Annotated[float, Par("-", "", "measured position: whole turns; 0 where they are not counted")]
     seconds: Annotated[float, Par("s", "", "time since the first sample, in whole seconds")]
     part: Annotated[float, Par("s", "", "the rest of that time")]
     waited: Annotated[float, Par("s", "", "time without a usable input since the last one")]

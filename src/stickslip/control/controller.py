@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from stickslip.control.compensators._base import Compensator
+from stickslip.control.compensator import Compensator
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import ParameterError
 
@@ -66,7 +66,7 @@ class Controller:
             raise ParameterError(f"controller: encoder_counts = {self.encoder_counts:g} must be at least 0")
         if self.encoder_counts > 0.0 and self.sample_time == 0.0:
             raise ParameterError(
-                "controller: an encoder is read by samples; give a sample_time greater than 0"
+                "controller: encoder_counts needs a sampled controller; give a sample_time greater than 0"
             )
         if not math.isfinite(self.velocity_filter) or self.velocity_filter < 0.0:
             raise ParameterError(
@@ -77,14 +77,18 @@ class Controller:
             ("a velocity_filter", self.velocity_filter > 0.0),
         ):
             if given and self.sample_time == 0.0:
-                raise ParameterError(f"controller: {name} acts on samples; give a sample_time greater than 0")
-        helper = self.compensator
-        corner = helper.filter_hz if helper else None
-        if helper and corner and corner > highest_corner(self.sample_time):
+                raise ParameterError(
+                    f"controller: {name} needs a sampled controller; give a sample_time greater than 0"
+                )
+        compensator = self.compensator
+        corner = compensator.filter_hz if compensator else None
+        if compensator and corner and corner > highest_corner(self.sample_time):
             raise ParameterError(
-                f"{helper.name}: filter_hz = {corner:g} Hz is more than samples of {self.sample_time:g} s can be "
-                f"filtered with; give at most {highest_corner(self.sample_time):g} Hz, or none"
+                f"{compensator.name}: filter_hz = {corner:g} Hz is too high for a sample time of {self.sample_time:g} "
+                f"s; give at most {highest_corner(self.sample_time):g} Hz, or none"
             )
-        if helper and self.sample_time == 0.0 and helper.sampled:
-            name = helper.sampled[0]
-            raise ParameterError(f"controller: {name} acts on samples; give a sample_time greater than 0")
+        if compensator and self.sample_time == 0.0 and compensator.sampled:
+            name = compensator.sampled[0]
+            raise ParameterError(
+                f"controller: {name} needs a sampled controller; give a sample_time greater than 0"
+            )

@@ -23,14 +23,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from stickslip import plugins
 from stickslip.config import Table, read_toml
 from stickslip.control.block import ControlBlock
+from stickslip.control.registry import control_law, control_law_names, law_files
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.errors import ConfigError, suggestion
 from stickslip.model import Model
-from stickslip.model_tables import law_files, models
+from stickslip.model_tables import models
 
 __all__ = ["Placement", "composed", "is_composed", "placement", "read_controller"]
 
@@ -131,7 +131,7 @@ def composed(
         raise table.error("estimator", "must be one table; a controller has one velocity")
     with table.blamed():
         return SampledController(
-            sample_time=table.positive("sample_time", "s"),
+            sample_time=table.number("sample_time", "s", 0.0, lower=0.0),
             torque_limit=table.positive("torque_limit", "N·m") if table.has("torque_limit") else math.inf,
             encoder_counts=table.number("encoder_counts", "counts per revolution", 0.0, lower=0.0),
             estimator=estimator[0] if estimator else None,
@@ -184,7 +184,7 @@ def law_of(table: Table, laws: Mapping[str, ControlLaw]) -> ControlLaw:
     """The control law that a table names."""
     name = table.text("law")
     if name.endswith(".py"):
-        return plugins.control_law(str(table.document.locate(name)), table.label("law"))
+        return control_law(str(table.document.locate(name)), table.label("law"))
     if name in laws:
         return laws[name]
-    return plugins.control_law(table.choice("law", (*plugins.control_law_names(), *laws)))
+    return control_law(table.choice("law", (*control_law_names(), *laws)))

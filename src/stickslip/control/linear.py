@@ -15,7 +15,7 @@ from typing import Annotated, NamedTuple
 from stickslip.errors import ParameterError
 from stickslip.spec import Par
 
-__all__ = ["LINEAR", "Cascade", "Gains", "pd", "pid", "place", "pr"]
+__all__ = ["LINEAR", "Cascade", "Compensation", "Gains", "pd", "pid", "place", "pr"]
 
 
 class Gains(NamedTuple):
@@ -56,6 +56,17 @@ class Cascade(NamedTuple):
         """
         kp = self.kvp * self.kv + self.kvi * self.feed
         return Gains(kp, self.kvi * self.kv, self.kvp, self.kvp * self.feed)
+
+
+class Compensation(NamedTuple):
+    """A held friction law's torque in continuous time: ``gain`` times the law at a velocity."""
+
+    velocity: str
+    """``"reference"`` or ``"measured"``"""
+    gain: float
+    """Factor on the law's torque"""
+    corner: float = 0.0
+    """Of a second-order Butterworth low-pass on the velocity, rad/s; 0 for none"""
 
 
 def pr(kp: float, kd: float) -> Gains:

@@ -12,17 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.config import Table, read_toml
-from stickslip.control.compensators._base import Compensator
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import COMPENSATORS, Compensator
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import InputError
 from stickslip.model import Model
 from stickslip.spec import fields_of
 
-__all__ = ["KINDS", "Recommended", "read_recommended", "recommended_in"]
-
-KINDS: dict[str, type[Compensator]] = {"feedforward": Feedforward, "feedback": Feedback}
+__all__ = ["Recommended", "read_recommended", "recommended_in"]
 
 
 @dataclass(frozen=True)
@@ -89,7 +85,7 @@ class Recommended:
 
     def on(self, model: Model) -> Compensator:
         """The compensator with its law."""
-        return KINDS[self.compensator](
+        return COMPENSATORS[self.compensator](
             model,
             self.gain,
             self.filter or None,
@@ -115,13 +111,13 @@ def recommended_in(whole: Table) -> Recommended:
     """As `read_recommended`, of the content of a file."""
     if not whole.has("recommended"):
         raise InputError(
-            f"{whole.document.name} recommends nothing (it has no table [recommended]); give what "
-            "`stickslip recommend --out` or `stickslip rig commission` wrote"
+            f"{whole.document.name} has no table [recommended]; give a file written by "
+            "`stickslip recommend --out` or `stickslip rig commission`"
         )
     with whole.table("recommended") as given:
         own = _loop(given) if given.has("loop") else None
         return Recommended(
-            given.choice("compensator", KINDS), given.positive("gain", ""),
+            given.choice("compensator", COMPENSATORS), given.positive("gain", ""),
             0.0 if own else given.positive("bandwidth", "Hz"), 0.0 if own else given.positive("damping", ""),
             given.positive("inertia", "kg·m²"), given.number("lead", "s", 0.0, 0.0),
             given.number("deadband", "rad/s", 0.0, 0.0), given.number("filter", "Hz", 0.0, 0.0),

@@ -1,4 +1,4 @@
-"""A sampled controller made of control laws, with its limit and its sample time."""
+"""A controller made of control laws, with its limit and its sample time."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
-from stickslip.control.block import ControlBlock, within
+from stickslip.control.block import ControlBlock, fields_in, state_fields_in, within
 from stickslip.control.composition import MEMORY, Settings, functions_with
+from stickslip.control.continuous import Continuous, continuous_form, refuse_windup
 from stickslip.control_spec import PLACES
-from stickslip.errors import ParameterError
-from stickslip.spec import Field, Surroundings, fields_of, packed
+from stickslip.errors import ParameterError, suggestion
+from stickslip.model import Model
+from stickslip.spec import Field, Learned, Surroundings, fields_of, packed
 from stickslip.subset import Layout
 
 __all__ = ["FADE", "SampledController"]
@@ -29,14 +31,14 @@ Blocks = ControlBlock | Sequence[ControlBlock] | None
 
 @dataclass(frozen=True)
 class SampledController:
-    """A controller that acts every sample time and holds its torque in between.
+    """A controller that acts every sample time and holds its torque in between, or in continuous time.
 
     Attributes
     ----------
     loop : ControlBlock or sequence of ControlBlock
         The control loop: PD, PID, ...
     sample_time : float
-        s
+        s; 0 acts in continuous time, where all its laws have a continuous form.
     feedforward, observer : ControlBlock or sequence of ControlBlock, optional
         What acts on the reference alone, and on the measurement.
     estimator : ControlBlock, optional
@@ -45,6 +47,8 @@ class SampledController:
         The size of the torque never exceeds it, N·m; infinite for none.
     encoder_counts : float
         Counts per revolution of the encoder; 0 measures exactly.
+    alone : bool
+        Whether a law that adapts may stand without an integral or an observer, as in a comparison; no file says so.
 
     Raises
     ------
@@ -59,24 +63,39 @@ class SampledController:
     estimator: ControlBlock | None = None
     torque_limit: float = math.inf
     encoder_counts: float = 0.0
+    alone: bool = False
 
     def __post_init__(self) -> None:
-        for name, value, unit in (
-            ("sample_time", self.sample_time, "s"),
-            ("torque_limit", self.torque_limit, "N·m"),
-        ):
-            if not value > 0.0 or (name == "sample_time" and not math.isfinite(value)):
-                raise ParameterError(f"controller: {name} = {value:g} {unit} must be greater than 0")
+        if not (math.isfinite(self.sample_time) and self.sample_time >= 0.0):
+            raise ParameterError(f"controller: sample_time = {self.sample_time:g} s must be at least 0")
+        if not self.torque_limit > 0.0:
+            raise ParameterError(
+                f"controller: torque_limit = {self.torque_limit:g} N·m must be greater than 0"
+            )
         if not (math.isfinite(self.encoder_counts) and self.encoder_counts >= 0.0):
             raise ParameterError(f"controller: encoder_counts = {self.encoder_counts:g} must be at least 0")
         for place in PLACES:
             for block in _listed(getattr(self, place)):
                 if block.law.place != place:
                     raise ParameterError(
-                        f"controller: {place} = {block.law.name!r} is no {place}; give it as {block.law.place}"
+                        f"controller: {place} = {block.law.name!r} cannot be used as {place}; "
+                        f"give it as {block.law.place}"
                     )
         if not self.blocks.keys() - {"estimator"}:
-            raise ParameterError("controller: it has no law; give a loop, a feedforward or an observer")
+            raise ParameterError("controller: no control law; give a loop, a feedforward or an observer")
+        laws = [block.law for block in self.blocks.values()]
+        adapting = next((law.name for law in laws if law.adapts), "")
+        if adapting and not self.alone and not any(law.integrates for law in laws):
+            raise ParameterError(
+                f"controller: {adapting} cannot adapt while the axis sticks, and no other law moves the axis then; "
+                "add a loop with an integral (pid) or an observer (disturbance_observer)"
+            )
+        if self.sample_time == 0.0:
+            if self.encoder_counts > 0.0:
+                raise ParameterError(
+                    "controller: encoder_counts needs a sampled controller; give a sample_time greater than 0"
+                )
+            _ = self.continuous  # refuses laws that act on samples
 
     # ---- its laws ----------------------------------------------------------------------------------------
 
@@ -100,12 +119,12 @@ class SampledController:
     @functools.cached_property
     def fields(self) -> tuple[Field, ...]:
         """The parameters of all its laws, under their whole names."""
-        return _distinct(f for part, block in self.blocks.items() for f in within(part, block.fields))
+        return _fields_of(self.laws)
 
     @functools.cached_property
     def state_fields(self) -> tuple[Field, ...]:
         """As `fields`, of the states."""
-        return _distinct(f for part, block in self.blocks.items() for f in within(part, block.state_fields))
+        return _state_fields_of(self.laws)
 
     @functools.cached_property
     def layouts(self) -> dict[str, Layout]:
@@ -125,6 +144,32 @@ class SampledController:
         """The functions of `stickslip.control.composition` with its laws in their places."""
         return functions_with(_written(self.blocks))
 
+    @functools.cached_property
+    def continuous(self) -> Continuous:
+        """Its laws in continuous time.
+
+        Raises
+        ------
+        ParameterError
+            If one of its laws acts on samples only.
+        """
+        found = continuous_form(self.blocks)
+        refuse_windup(found, self.torque_limit)
+        return found
+
+    @functools.cached_property
+    def answers_to_acceleration(self) -> bool:
+        """Whether the torque depends on the reference's acceleration alone."""
+        torques: list[float] = []
+        for acceleration in (0.0, 1.0):
+            n, u = self.settings._replace(torque_limit=math.inf), SimpleNamespace(**Surroundings()._asdict())
+            torques.append(
+                self.functions["sample"](
+                    0.0, 0.0, 0.0, acceleration, n, self.memory(), self.state(), self.parameters, u
+                )
+            )
+        return torques[0] != torques[1]
+
     # ---- its numbers -------------------------------------------------------------------------------------
 
     @property
@@ -139,14 +184,58 @@ class SampledController:
         """Parameters of the laws, each law's a part: ``p.loop.kp``."""
         return SimpleNamespace(**{part: block.parameters for part, block in self.blocks.items()})
 
-    def state(self) -> SimpleNamespace:
-        """The state of the laws at the start."""
-        return SimpleNamespace(**{part: block.state() for part, block in self.blocks.items()})
+    def state(self, learned: Mapping[str, Any] | None = None) -> SimpleNamespace:
+        """The state of the laws at the start, with what they have `learned` before (as the method `learned` gives it).
+
+        Raises
+        ------
+        ParameterError
+            If a learned value is no finite number, or belongs to no law of this controller.
+        """
+        z = SimpleNamespace(**{part: block.state() for part, block in self.blocks.items()})
+        places = self._learned()
+        for name, value in (learned or {}).items():
+            if name not in places:
+                raise ParameterError(
+                    f"controller: nothing learned is called {name!r}; {suggestion(name, places)}"
+                )
+            *whole, last = places[name]
+            owner = _at(z, whole)
+            numbers = cast("list[Any]", value) if isinstance(value, list) else [value]
+            before = getattr(owner, last)
+            if not all(isinstance(x, (int, float)) and math.isfinite(x) for x in numbers) or (
+                isinstance(before, list) != isinstance(value, list)
+                or (isinstance(before, list) and len(numbers) != len(cast("list[Any]", before)))
+            ):
+                raise ParameterError(
+                    f"controller: learned {name} = {value!r} does not fit its law; save it again from one like this"
+                )
+            setattr(owner, last, [float(x) for x in numbers] if isinstance(value, list) else float(value))
+        return z
+
+    def learned(self, z: SimpleNamespace) -> dict[str, Any]:
+        """What its laws have learned in the state `z`, by whole names: to be kept with the power off; plain data."""
+        found = {name: _at(z, path) for name, path in self._learned().items()}
+        return {k: list(cast("list[Any]", v)) if isinstance(v, list) else v for k, v in found.items()}
+
+    def _learned(self) -> dict[str, tuple[str, ...]]:
+        """Where what is learned lies in the state, by whole names."""
+        fields = zip(self.state_fields, self._paths("state_fields"))
+        return {f.name: path for f, path in fields if isinstance(f.par, Learned)}
 
     @staticmethod
     def memory() -> SimpleNamespace:
         """The memory of the composition at the start."""
         return SimpleNamespace(**{f.name: 0.0 for f in MEMORY})
+
+    def holding(self, change: Callable[[Model], Model]) -> SampledController:
+        """The controller whose friction laws are what `change` makes of them."""
+        places: dict[str, list[ControlBlock]] = {place: [] for place in PLACES}
+        for block in self.blocks.values():
+            places[block.law.place].append(
+                ControlBlock(block.law, change(block.friction), **block.own) if block.friction else block
+            )
+        return replace(self, estimator=places.pop("estimator")[0], **places)
 
     def values(self) -> dict[str, Any]:
         """The parameters of all its laws by their whole names."""
@@ -214,15 +303,25 @@ def _listed(blocks: Blocks) -> list[ControlBlock]:
     return [blocks] if isinstance(blocks, ControlBlock) else list(blocks)
 
 
+@functools.lru_cache(maxsize=256)
+def _fields_of(laws: tuple[Any, ...]) -> tuple[Field, ...]:
+    """The parameters of these laws, under their whole names."""
+    return _distinct(f for part, law, held in laws for f in within(part, fields_in(law, held)))
+
+
+@functools.lru_cache(maxsize=256)
+def _state_fields_of(laws: tuple[Any, ...]) -> tuple[Field, ...]:
+    """As `_fields_of`, of the states."""
+    return _distinct(f for part, law, held in laws for f in within(part, state_fields_in(law, held)))
+
+
 def _distinct(fields: Iterable[Field]) -> tuple[Field, ...]:
     """The fields; two of one name would be one number."""
     out = tuple(fields)
     names = [f.name for f in out]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise ParameterError(
-            f"controller: two of its laws' fields are called {twice[0]!r}; rename one of them"
-        )
+        raise ParameterError(f"controller: two control laws have a field {twice[0]!r}; rename one of them")
     return out
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from stickslip import plugins
 from stickslip.control.block import ControlBlock
+from stickslip.control.registry import control_law_names
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.model import Model
@@ -37,7 +38,7 @@ def tables_of(controller: SampledController) -> dict[str, Any]:
 
 def _block(part: str, block: ControlBlock, held: dict[str, Any]) -> dict[str, Any]:
     """The table of a block; its friction law goes into ``held`` under the part's name."""
-    known = plugins.control_law_names()
+    known = control_law_names()
     table: dict[str, Any] = {"law": _named(block.law, known), **block.law.chosen}
     for f in block.law.fields:
         value = getattr(block.parameters, f.name)

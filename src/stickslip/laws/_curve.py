@@ -191,7 +191,7 @@ def check_points(p: Any) -> str:
     """The velocities ascend from 0."""
     v = p.curve_velocity
     if v[0] != 0.0:
-        return f"curve_velocity begins with {v[0]:g} rad/s; give the torque at 0 first"
+        return f"curve_velocity starts with {v[0]:g} rad/s; give the torque at 0 first"
     for i in range(1, len(v)):
         if v[i] <= v[i - 1]:
             return f"curve_velocity[{i}] = {v[i]:g} rad/s does not lie above the one before; sort the points"

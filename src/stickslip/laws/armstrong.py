@@ -8,7 +8,7 @@ sliding torque, so that the torque is continuous where the motion stops. So clos
 acts on the size of the sliding torque, never on its direction.
 
 The delay is eight samples of the past velocity, no nearer than tau_L / 6, and a straight line between two of them. It
-has no rate: the law runs by its steps, in the fixed integrator.
+has no rate: the law runs by its steps, in the fixed and the sampled integrator.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from stickslip.control_spec import ControlLaw
@@ -23,6 +24,11 @@ def delay(p: Any, sample_time: float) -> float:
     return 0.5 * sample_time
 
 
+def continuous(p: Any) -> float:
+    """In continuous time it is the velocity itself: no corner, rad/s."""
+    return math.inf
+
+
 CONTROL_LAW = ControlLaw(
     "backward_difference", Params, sample, "estimator",
     title="Backward difference",
@@ -30,5 +36,6 @@ CONTROL_LAW = ControlLaw(
     source=("franklin1998",),
     example={},
     delay=delay,
+    continuous=continuous,
     linear=True,
 )  # fmt: skip

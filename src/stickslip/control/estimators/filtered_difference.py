@@ -36,6 +36,11 @@ def delay(p: Any, sample_time: float) -> float:
     return sample_time * (0.5 + kept / (1.0 - kept))
 
 
+def continuous(p: Any) -> float:
+    """In continuous time it is this low-pass: its corner, rad/s."""
+    return float(p.corner)
+
+
 CONTROL_LAW = ControlLaw(
     "filtered_difference", Params, sample, "estimator",
     title="Filtered difference",
@@ -44,5 +49,6 @@ CONTROL_LAW = ControlLaw(
     example={"corner": 1000.0},
     State=State,
     delay=delay,
+    continuous=continuous,
     linear=True,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What moves the axis: one file a control law. `CONTROL_LAWS` names them, `stickslip.plugins.control_law` finds them.
+"""What moves the axis: one file a control law; `CONTROL_LAWS` names them, `stickslip.control.registry` finds them.
 
 To add a control law, write its file and add its name to this tuple.
 """
@@ -7,15 +7,23 @@ CONTROL_LAWS = (
     "pr",
     "pd",
     "pid",
+    "gains",
     "cascade",
     "boundary_layer",
     "super_twisting",
+    "robust_adaptive",
     "friction_feedforward",
+    "scaled_feedforward",
+    "least_squares_feedforward",
+    "gradient_feedforward",
     "inertia_feedforward",
+    "position_feedforward",
     "dither",
     "friction_feedback",
     "friction_observer",
+    "lugre_observer",
     "coulomb_observer",
+    "adaptive_friction",
     "disturbance_observer",
     "extended_state_observer",
     "stiction_push",

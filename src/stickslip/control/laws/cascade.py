@@ -21,7 +21,7 @@ class Params(NamedTuple):
     kvp: Annotated[float, Par("N·m·s/rad", "K_p", "gain of the velocity loop", lower=0.0)]
     kvi: Annotated[
         float,
-        Par("N·m/rad", "K_i", "integral gain of the velocity loop, kvp over its reset time", positive=True),
+        Par("N·m/rad", "K_i", "integral gain of the velocity loop, kvp over its reset time", lower=0.0),
     ]
     feed: Annotated[
         float, Par("-", "f", "part of the reference velocity that is fed forward", lower=0.0, default=1.0)
@@ -51,6 +51,8 @@ class Tracking(NamedTuple):
 
 def back_calculation(growth: float, whole: float, y: Any, p: Any) -> float:
     """The growth minus what the limit took off the last torque, over the tracking time, rad."""
+    if p.kvi <= 0.0:
+        return growth
     return growth + y.elapsed * (y.applied - y.commanded) / (p.kvi * p.tracking_time)
 
 
@@ -77,9 +79,11 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
 
 
 def take_over(missing: float, y: Any, z: Any, p: Any, u: Any) -> float:
-    """The integral takes it all."""
-    z.integral += missing / p.kvi
-    return 0.0
+    """The integral takes it all, where there is one."""
+    if p.kvi > 0.0:
+        z.integral += missing / p.kvi
+        return 0.0
+    return missing
 
 
 CONTROL_LAW = ControlLaw(
@@ -91,5 +95,6 @@ CONTROL_LAW = ControlLaw(
     State=State,
     take_over=take_over,
     linear=True,
+    integrates=True,
     choices=(ANTI_WINDUP,),
 )  # fmt: skip

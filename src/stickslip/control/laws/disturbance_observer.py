@@ -88,6 +88,26 @@ ALIGNED = Choice(
 acting = sample_torque
 
 
+def exact(y: Any, p: Any) -> float:
+    """1: the inertia weighs as the torque does."""
+    return 1.0
+
+
+def textbook(y: Any, p: Any) -> float:
+    """Below 1: the form w - g J v of the textbooks takes the inertia for smaller the larger g T is."""
+    return p.corner * y.elapsed / math.expm1(p.corner * y.elapsed)
+
+
+FORM = Choice(
+    "form",
+    "weighed",
+    {"exact": Option(exact), "textbook": Option(textbook)},
+    "exact",
+    "how the inertia weighs in a sample: exactly, or as in the auxiliary variable w of the textbooks",
+)
+weighed = exact
+
+
 # ---- the low-pass Q ----------------------------------------------------------------------------------------------
 
 
@@ -155,7 +175,7 @@ def raw_torque(y: Any, z: Any, p: Any) -> float:
     z.torque_3 = z.torque_2
     z.torque_2 = z.torque_1
     z.torque_1 = given
-    raw = acting(now, before) - p.inertia * (y.velocity - z.velocity) / y.elapsed
+    raw = acting(now, before) - weighed(y, p) * p.inertia * (y.velocity - z.velocity) / y.elapsed
     z.velocity = y.velocity
     return raw
 
@@ -188,5 +208,6 @@ CONTROL_LAW = ControlLaw(
     State=State,
     check=check,
     linear=True,
-    choices=(FED_WITH, ALIGNED, ORDER, AT_REST),
+    integrates=True,
+    choices=(FED_WITH, ALIGNED, FORM, ORDER, AT_REST),
 )  # fmt: skip

@@ -51,4 +51,5 @@ CONTROL_LAW = ControlLaw(
     example={"inertia": 3.8623e-4, "corner": 400.0},
     State=State,
     linear=True,
+    integrates=True,
 )  # fmt: skip

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw, friction
-from stickslip.spec import Par
+from stickslip.control.laws._seen import LOW_PASS, OVER_SAMPLE, Seen, compensation, linear, open_pass
+from stickslip.control.linear import Compensation
+from stickslip.control_spec import ControlLaw
+from stickslip.spec import Choice, Option, Par
 
 __all__ = ["CONTROL_LAW"]
 
@@ -22,26 +24,43 @@ class Params(NamedTuple):
     ]
 
 
-class State(NamedTuple):
-    """Internal state."""
+def estimated(y: Any) -> float:
+    """The velocity of the controller's estimator, rad/s."""
+    return y.velocity
 
-    seen: Annotated[float, Par("rad/s", "", "velocity that the law saw one sample ago")]
-    running: Annotated[float, Par("-", "", "1 after its first sample")]
+
+def difference(y: Any) -> float:
+    """The difference of the last two measured positions over the time between them, rad/s."""
+    return y.moved / y.elapsed
+
+
+SOURCE = Choice(
+    "source",
+    "seen_velocity",
+    {"estimator": Option(estimated), "difference": Option(difference)},
+    "estimator",
+    "which velocity the friction law sees",
+)
+seen_velocity = estimated
+low_passed = open_pass
+over_sample = linear
 
 
 def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     """Torque, N·m; before its first sample the law has seen nothing."""
-    now = y.velocity
+    now = low_passed(seen_velocity(y), y, z, p)
     if abs(now) < p.deadband:
         now = 0.0
     last = z.seen
-    elapsed = y.elapsed
-    if z.running == 0.0 or y.started == 0.0:
-        last = now
-        elapsed = 0.0
     z.seen = now
+    torque = p.gain * over_sample(last, now, y, z, p, u)
     z.running = 1.0
-    return p.gain * friction(last, now, elapsed, z.friction, p.friction, u)
+    return torque
+
+
+def continuous(p: Any) -> Compensation | str:
+    """The same in continuous time."""
+    return compensation("measured", p)
 
 
 CONTROL_LAW = ControlLaw(
@@ -50,6 +69,8 @@ CONTROL_LAW = ControlLaw(
     equation=r"T = g F(v)",
     source=("thesis figure 3.4",),
     example={"gain": 0.9},
-    State=State,
+    State=Seen,
+    continuous=continuous,
     holds_friction=True,
+    choices=(OVER_SAMPLE, LOW_PASS, SOURCE),
 )  # fmt: skip

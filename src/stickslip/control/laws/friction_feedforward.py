@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw, friction
-from stickslip.spec import Choice, Option, Par
+from stickslip.control.laws._seen import LOW_PASS, OVER_SAMPLE, compensation, linear, open_pass
+from stickslip.control.linear import Compensation
+from stickslip.control_spec import ControlLaw
+from stickslip.spec import Par
 
 __all__ = ["CONTROL_LAW"]
 
@@ -35,27 +37,13 @@ class State(NamedTuple):
     reference_velocity: Annotated[float, Par("rad/s", "", "reference velocity one sample ago")]
     seen: Annotated[float, Par("rad/s", "", "velocity that the law saw one sample ago")]
     running: Annotated[float, Par("-", "", "1 after its first sample")]
+    in_1: Annotated[float, Par("rad/s", "", "low-pass: input one sample ago")]
+    in_2: Annotated[float, Par("rad/s", "", "low-pass: input two samples ago")]
+    out_1: Annotated[float, Par("rad/s", "", "low-pass: output one sample ago")]
+    out_2: Annotated[float, Par("rad/s", "", "low-pass: output two samples ago")]
 
 
-def linear(last: float, now: float, y: Any, z: Any, p: Any, u: Any) -> float:
-    """The velocity runs linearly over the sample; before its first one the law has seen nothing. N·m."""
-    if z.running == 0.0 or y.started == 0.0:
-        return friction(now, now, 0.0, z.friction, p.friction, u)
-    return friction(last, now, y.elapsed, z.friction, p.friction, u)
-
-
-def held(last: float, now: float, y: Any, z: Any, p: Any, u: Any) -> float:
-    """The velocity of this sample holds over the whole sample, N·m."""
-    return friction(now, now, y.elapsed, z.friction, p.friction, u)
-
-
-VELOCITY = Choice(
-    "velocity",
-    "over_sample",
-    {"linear": Option(linear), "held": Option(held)},
-    "linear",
-    "how the reference velocity runs over a sample",
-)
+low_passed = open_pass
 over_sample = linear
 
 
@@ -65,6 +53,7 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     if z.running != 0.0 and y.started != 0.0 and now != 0.0:
         now = now + p.lead * (now - z.reference_velocity) / y.elapsed
     z.reference_velocity = y.reference_velocity
+    now = low_passed(now, y, z, p)
     if abs(now) < p.deadband:
         now = 0.0
     last = z.seen
@@ -74,6 +63,11 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     return torque
 
 
+def continuous(p: Any) -> Compensation | str:
+    """The same in continuous time."""
+    return compensation("reference", p)
+
+
 CONTROL_LAW = ControlLaw(
     "friction_feedforward", Params, sample, "feedforward",
     title="Friction feedforward",
@@ -81,6 +75,7 @@ CONTROL_LAW = ControlLaw(
     source=("thesis figure 3.3",),
     example={"gain": 0.9},
     State=State,
+    continuous=continuous,
     holds_friction=True,
-    choices=(VELOCITY,),
+    choices=(OVER_SAMPLE, LOW_PASS),
 )  # fmt: skip

@@ -23,12 +23,23 @@ class Params(NamedTuple):
     correction: Annotated[
         float, Par("1/s", "k", "velocity that the law sees besides, over the position error", lower=0.0)
     ]
+    sigma2: Annotated[
+        float,
+        Par(
+            "N·m·s/rad",
+            "sigma_2",
+            "the law's viscous friction, which is not corrected",
+            lower=0.0,
+            default=0.0,
+        ),
+    ]
 
 
 def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     """Torque, N·m; the velocity holds over the sample."""
-    seen = y.slow_velocity + p.correction * y.error
-    return p.gain * friction(seen, seen, y.elapsed, z.friction, p.friction, u)
+    besides = p.correction * y.error
+    seen = y.slow_velocity + besides
+    return p.gain * (friction(seen, seen, y.elapsed, z.friction, p.friction, u) - p.sigma2 * besides)
 
 
 CONTROL_LAW = ControlLaw(

@@ -165,5 +165,6 @@ CONTROL_LAW = ControlLaw(
     continuous=continuous,
     placed=placed,
     linear=True,
+    integrates=True,
     choices=(ANTI_WINDUP, AT_REST),
 )  # fmt: skip

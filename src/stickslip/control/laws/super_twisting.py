@@ -44,23 +44,23 @@ def kept(w: float, y: Any, p: Any) -> float:
     return min(max(w, -y.torque_limit / p.inertia), y.torque_limit / p.inertia)
 
 
-def explicit(s: float, y: Any, z: Any, p: Any) -> float:
+def explicit(off: float, y: Any, z: Any, p: Any) -> float:
     """Acceleration by the error of this sample, rad/s²; advances the integral."""
     switch = 0.0
-    if s > 0.0:
+    if off > 0.0:
         switch = 1.0
-    if s < 0.0:
+    if off < 0.0:
         switch = -1.0
     z.integral = kept(z.integral + y.elapsed * INTEGRAL * p.rate * switch, y, p)
-    return ROOT * math.sqrt(p.rate) * signed_root(s) + z.integral
+    return ROOT * math.sqrt(p.rate) * signed_root(off) + z.integral
 
 
-def implicit(s: float, y: Any, z: Any, p: Any) -> float:
+def implicit(off: float, y: Any, z: Any, p: Any) -> float:
     """Acceleration by the error that the sample will end with, rad/s²; advances the integral."""
     time = y.elapsed
     k1 = ROOT * math.sqrt(p.rate)
     k2 = INTEGRAL * p.rate
-    ahead = s - time * z.integral
+    ahead = off - time * z.integral
     layer = time * time * k2
     switch = ahead / layer
     end = 0.0
@@ -85,8 +85,8 @@ pulled = explicit
 def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     """Torque, N·m."""
     rate = y.reference_velocity - y.velocity
-    s = rate + p.slope * y.error
-    return p.inertia * (pulled(s, y, z, p) + p.slope * rate)
+    off = rate + p.slope * y.error
+    return p.inertia * (pulled(off, y, z, p) + p.slope * rate)
 
 
 def take_over(missing: float, y: Any, z: Any, p: Any, u: Any) -> float:

@@ -1,4 +1,7 @@
-"""What compensators share: a law with parameters, a gain and a filter on the velocity it sees."""
+"""The short form of a compensator: a friction law with parameters, a gain and a filter on the velocity it sees.
+
+`stickslip.control.composed` gives the control laws that it stands for.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from typing import ClassVar
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
-__all__ = ["MOST_SUBSTEPS", "Compensator"]
+__all__ = ["COMPENSATORS", "MOST_SUBSTEPS", "Compensator", "Feedback", "Feedforward"]
 
 MOST_SUBSTEPS = 1000
 
@@ -53,7 +56,6 @@ class Compensator:
     substeps: int = 1
 
     name: ClassVar[str] = ""
-    prefix: ClassVar[str] = ""
     velocity: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
@@ -78,7 +80,7 @@ class Compensator:
             )
         if self.lead > 0.0 and self.velocity != "reference":
             raise ParameterError(
-                f"{self.name}: lead = {self.lead:g} s, but only a reference can be led; leave it out"
+                f"{self.name}: lead = {self.lead:g} s needs the reference velocity; leave it out, or use a feedforward"
             )
 
     @property
@@ -87,3 +89,75 @@ class Compensator:
         names = ("lead", "deadband", "offset", "inertia_feedforward")
         set_here = [name for name in names if getattr(self, name) != 0.0]
         return (*set_here, *(["substeps"] if self.substeps != 1 else []))
+
+
+@dataclass(frozen=True)
+class Feedforward(Compensator):
+    """T_hat = gain * law(reference velocity). Its state depends on time alone.
+
+    Attributes
+    ----------
+    model : Model
+        The law and its parameters.
+    gain : float
+        Factor on the compensating torque; 1 cancels the whole model.
+    filter_hz : float or None
+        Corner of a second-order Butterworth low-pass on the velocity, Hz.
+    lead : float
+        Time by which the law looks ahead of the reference, s: its velocity is extended along the last two samples, and
+        a reference at rest stays at rest. Only of a feedforward with a sample time.
+    deadband : float
+        The law sees velocities below it, rad/s, as rest, so that a count of the encoder does not compensate a friction
+        that is not there. Only with a sample time.
+    offset : float
+        Constant torque that acts against positive motion beside friction, N·m: it is given whole, whatever the gain.
+        Only with a sample time.
+    inertia_feedforward : float
+        Inertia whose torque along the reference is given, kg·m² times the reference's acceleration. Only with a sample
+        time.
+    substeps : int
+        Steps of the law into which a sample is divided, the velocity linear in between, 1 to 1000: the error of a step
+        falls with them. Only with a sample time.
+    """
+
+    name: ClassVar[str] = "feedforward"
+    velocity: ClassVar[str] = "reference"
+
+
+@dataclass(frozen=True)
+class Feedback(Compensator):
+    """T_hat = gain * law(measured velocity).
+
+    In continuous time the sign of the velocity is the exact limit: it changes where v passes through zero, and
+    a feedback that cancels friction repels from there. With a sample time it is what the samples say.
+
+    Attributes
+    ----------
+    model : Model
+        The law and its parameters.
+    gain : float
+        Factor on the compensating torque; 1 cancels the whole model.
+    filter_hz : float or None
+        Corner of a second-order Butterworth low-pass on the velocity, Hz.
+    lead : float
+        0: only a reference can be led.
+    deadband : float
+        The law sees velocities below it, rad/s, as rest, so that a count of the encoder does not compensate a friction
+        that is not there. Only with a sample time.
+    offset : float
+        Constant torque that acts against positive motion beside friction, N·m: it is given whole, whatever the gain.
+        Only with a sample time.
+    inertia_feedforward : float
+        Inertia whose torque along the reference is given, kg·m² times the reference's acceleration. Only with a sample
+        time.
+    substeps : int
+        Steps of the law into which a sample is divided, the velocity linear in between, 1 to 1000: the error of a step
+        falls with them. Only with a sample time.
+    """
+
+    name: ClassVar[str] = "feedback"
+    velocity: ClassVar[str] = "measured"
+
+
+COMPENSATORS: dict[str, type[Compensator]] = {kind.name: kind for kind in (Feedforward, Feedback)}
+"""By the names that files and the command line use."""
