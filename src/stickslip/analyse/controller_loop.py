@@ -137,8 +137,12 @@ def linearised(
     Raises
     ------
     InputError
-        If a law is not smooth about rest.
+        If a law is not smooth about rest, or the controller acts in continuous time.
     """
+    if controller.sample_time == 0.0:
+        raise InputError(
+            "stability: the controller acts in continuous time; give it a sample_time greater than 0"
+        )
     sticking = with_springs(replace(controller, torque_limit=math.inf), amplitude, frequency)
     run = _Sample(sticking)
     found = [run.answers(SMALL * row) / SMALL for row in np.eye(run.size + 1)]

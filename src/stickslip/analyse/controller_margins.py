@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyse.controller_loop import LinearController, linearised
-from stickslip.analyse.presliding_loop import Axis, Contact, Loop, Poles, Train
+from stickslip.analyse.presliding_loop import Axis, Contact, Drivetrain, Loop, Poles
 from stickslip.analyse.stability import AMPLITUDES, SLOW, edge, stable
 from stickslip.analyse.stability_result import Cycle
 from stickslip.control.sampled_controller import SampledController
@@ -156,39 +156,39 @@ def controller_stability(
     """
     if not 0.0 <= delay <= 100.0:
         raise ParameterError(f"stability: delay = {delay:g} samples must be from 0 to 100")
-    train, drive = about(axis, controller, delay, axis.amplitude)
+    drivetrain, drive = about(axis, controller, delay, axis.amplitude)
     free = linearised(controller, math.inf, axis.ringing, delay)
-    sticking = margins("sticking", train, drive)
+    sticking = margins("sticking", drivetrain, drive)
     softer = math.nan
     if sticking.poles.stable:
-        softer = edge(lambda s: stable(train.softer(1.0 - s), drive), np.linspace(0.0, 1.0, 51))
+        softer = edge(lambda s: stable(drivetrain.softer(1.0 - s), drive), np.linspace(0.0, 1.0, 51))
     frequency = np.geomspace(0.1, 0.5 / drive.sample_time, DRAWN)
     estimator = controller.blocks["estimator"]
     late = estimator.law.delay(estimator.parameters, drive.sample_time) if estimator.law.delay else math.nan
     return ControllerStability(
         tuple(f"{part}: {block.law.name}" for part, block in controller.blocks.items()),
-        (sticking, margins("sliding", slid(axis), free)), axis.amplitude, train.visible, drive.sample_time, late,
+        (sticking, margins("sliding", slid(axis), free)), axis.amplitude, drivetrain.visible, drive.sample_time, late,
         softer, cycle_of(axis, controller, delay, sticking.poles), frequency, -drive.response(frequency),
     )  # fmt: skip
 
 
-def slid(axis: Axis) -> Train:
-    """The train while its contact slides fast: friction is a constant torque, and a damper by its viscous part."""
+def slid(axis: Axis) -> Drivetrain:
+    """The drivetrain while its contact slides fast: friction is a constant torque, and a damper by its viscous part."""
     law, p = axis.friction.law, axis.friction.parameters
     slope = 0.0
     if law.steady:
         fast = FAST * (float(law.velocity_scale(p)) if law.velocity_scale else 0.1)
         slope = float(law.steady(1.1 * fast, p) - law.steady(fast, p)) / (0.1 * fast)
-    bearings = replace(axis.train.bearings, stiffness=0.0)
-    return replace(axis.train, contact=Contact(0.0, slope), bearings=bearings)
+    bearings = replace(axis.drivetrain.bearings, stiffness=0.0)
+    return replace(axis.drivetrain, contact=Contact(0.0, slope), bearings=bearings)
 
 
 def about(
     axis: Axis, controller: SampledController, delay: float, amplitude: float
-) -> tuple[Train, LinearController]:
-    """Train and controller at an amplitude of the encoder, with the laws as they are at the loop's own frequency."""
+) -> tuple[Drivetrain, LinearController]:
+    """Drivetrain and controller at an amplitude of the encoder, the laws as they are at the loop's own frequency."""
 
-    def at(frequency: float) -> tuple[Train, LinearController]:
+    def at(frequency: float) -> tuple[Drivetrain, LinearController]:
         return axis.at(amplitude, frequency), linearised(controller, amplitude, frequency, delay)
 
     found = at(axis.ringing)
@@ -200,18 +200,20 @@ def about(
     return found
 
 
-def margins(name: str, train: Train, drive: LinearController) -> LoopMargins:
+def margins(name: str, drivetrain: Drivetrain, drive: LinearController) -> LoopMargins:
     """Poles, and how much more torque and delay the loop bears."""
-    poles = Loop(train, drive).poles()
+    poles = Loop(drivetrain, drive).poles()
     if not poles.stable:
         return LoopMargins(name, poles, (math.nan, math.nan), math.nan)
 
     def with_torque(factor: float) -> bool:
-        return stable(train, replace(drive, factor=factor))
+        return stable(drivetrain, replace(drive, factor=factor))
 
     high = edge(with_torque, np.geomspace(1.0, MOST, 81))
     low = edge(with_torque, np.geomspace(1.0, LEAST, 81))
-    late = edge(lambda d: stable(train, replace(drive, delay=drive.delay + d)), np.linspace(0.0, LATEST, 201))
+    late = edge(
+        lambda d: stable(drivetrain, replace(drive, delay=drive.delay + d)), np.linspace(0.0, LATEST, 201)
+    )
     return LoopMargins(name, poles, (low, high), late)
 
 

@@ -1,6 +1,6 @@
-"""What the elasticity of a drive train does: static twist, modes, and what modes are possible at all; thesis 4.5.
+"""What the elasticity of a drive drivetrain does: static twist, modes, and what modes are possible at all; thesis 4.5.
 
-A train is a chain of inertias joined by springs: motor rotor, coupling, shaft, friction disk (thesis figure 4.57).
+A drivetrain is a chain of inertias joined by springs: motor rotor, coupling, shaft, friction disk (thesis figure 4.57).
 
 Lowest possible first mode
 --------------------------
@@ -133,14 +133,14 @@ def far_inertia(stiffness: float, frequency: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Flexibility:
-    """What is known of a train: `flexibility` fills it.
+    """What is known of a drivetrain: `flexibility` fills it.
 
     Attributes
     ----------
     stiffness : tuple of float
         N·m/rad
     inertia : float
-        Of the whole train, kg·m².
+        Of the whole drivetrain, kg·m².
     twists : mapping of str to tuple of float
         Static twist of every spring, rad, by the name of the torque.
     torques : mapping of str to float
@@ -154,7 +154,8 @@ class Flexibility:
     far : tuple of float
         For every claimed one: the last inertia if it is that inertia's frequency with the rest held, kg·m².
     true_first : tuple of float
-        The first mode of the free train with that last inertia, the rest undivided, Hz; NaN where it exceeds the total.
+        The first mode of the free drivetrain with that last inertia, the rest undivided, Hz; NaN where it exceeds the
+        total.
     """
 
     stiffness: tuple[float, ...]
@@ -195,12 +196,14 @@ class Flexibility:
     def _verdict(self, claim: float, far: float, true: float) -> str:
         if claim >= self.floor:
             return f"a first mode at {claim:g} Hz is possible"
-        held = f"{far:.4g} kg·m² behind the last spring rings at {claim:g} Hz with the rest held"
+        held = f"{far:.4g} kg·m² behind the last spring oscillates at {claim:g} Hz with the rest held"
         if math.isnan(true):
             return (
                 f"a first mode at {claim:g} Hz is impossible; {held}, but that is more than the whole inertia"
             )
-        return f"a first mode at {claim:g} Hz is impossible; {held}, and at {true:.4g} Hz in the free train"
+        return (
+            f"a first mode at {claim:g} Hz is impossible; {held}, and at {true:.4g} Hz in the free drivetrain"
+        )
 
 
 def flexibility(
@@ -211,14 +214,14 @@ def flexibility(
     inertias: Sequence[float] = (),
     claimed: Sequence[float] = (),
 ) -> Flexibility:
-    """Twists, modes and the bound on the first mode of a train; thesis 4.5.
+    """Twists, modes and the bound on the first mode of a drivetrain; thesis 4.5.
 
     Parameters
     ----------
     stiffness : sequence of float
         N·m/rad, motor side first.
     inertia : float
-        Of the whole train, kg·m²; given `inertias` add up to it within 1 %.
+        Of the whole drivetrain, kg·m²; given `inertias` add up to it within 1 %.
     torques : dict of str to float, optional
         Torques by name, N·m; the static twist of every spring is reported for each.
     inertias : sequence of float, optional
@@ -248,7 +251,7 @@ def flexibility(
 
 
 def _free_first(stiffness: float, total: float, last: float) -> float:
-    """First mode of the train when only its last spring gives, Hz."""
+    """First mode of the drivetrain when only its last spring gives, Hz."""
     if last >= total:
         return math.nan
     return float(modes(Chain((total - last, last), (stiffness,))).frequencies[1])

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from stickslip.analyse.presliding_loop import Axis, Contact, Train
+from stickslip.analyse.presliding_loop import Axis, Contact, Drivetrain
 from stickslip.machines.machine import Machine
 
 __all__ = ["axis_of"]
 
 
 def axis_of(machine: Machine, amplitude: float = 0.0) -> Axis:
-    """Train and contact of a machine with the imperfections that it has; noise, ripple and drift do not enter.
+    """Drivetrain and contact of a machine with the imperfections that it has; noise, ripple and drift do not enter.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def axis_of(machine: Machine, amplitude: float = 0.0) -> Axis:
     inertias = (flexible.rotor, flexible.shaft, flexible.disk) if flexible else (machine.inertia,)
     # Bearings stick like their spring as long as the motion is small; viscous they are always.
     beside = Contact(bearings.stiffness if bearings.coulomb > 0.0 else 0.0, bearings.viscous)
-    train = Train(
+    drivetrain = Drivetrain(
         inertias,
         (flexible.coupling, flexible.elasticity) if flexible else (),
         dampers=flexible.dampers if flexible else (),
@@ -35,4 +35,4 @@ def axis_of(machine: Machine, amplitude: float = 0.0) -> Axis:
         bearings=beside,
     )
     count = 2.0 * math.pi / encoder.counts if encoder.counts > 0.0 else 1e-6
-    return Axis(train, machine.clutch, amplitude or count)
+    return Axis(drivetrain, machine.clutch, amplitude or count)

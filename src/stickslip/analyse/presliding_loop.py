@@ -3,7 +3,7 @@
 While every contact sticks, friction is a spring (and a damper) at the place where it acts, and so is the law in a
 feedback compensator, with the opposite sign. The plant is a chain of inertias (thesis figure 4.57) with the motor on
 the first, the contact on the last. Its torque is held for a sample time, and may come late; the drive is that of
-`stickslip.control.sampled`, linearised about rest.
+`stickslip.control.composition`, linearised about rest.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from stickslip.errors import ParameterError
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
-__all__ = ["Axis", "Contact", "Drive", "Loop", "Poles", "Sampled", "Train", "describing"]
+__all__ = ["Axis", "Contact", "Drive", "Drivetrain", "Loop", "Poles", "Sampled", "describing"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -74,7 +74,7 @@ def describing(model: Model, amplitude: float, frequency: float) -> Contact:
 
 
 @dataclass(frozen=True)
-class Train:
+class Drivetrain:
     """What the drive moves, while the contact sticks.
 
     Attributes
@@ -117,7 +117,7 @@ class Train:
         if self.dampers and len(self.dampers) != len(self.springs):
             raise ParameterError(f"stability: {len(self.dampers)} dampers for {len(self.springs)} springs")
 
-    def softer(self, share: float) -> Train:
+    def softer(self, share: float) -> Drivetrain:
         """The same, but that the encoder sees only so much of the contact: some of its elements slip."""
         seen = share * (self.visible - self.bearings.stiffness)
         if seen <= 0.0:
@@ -280,7 +280,7 @@ class Drive:
         return a, b, c, d + now * forward
 
     def _filter(self) -> tuple[float, float, float]:
-        """Weights of the low-pass, as `stickslip.control.sampled` has them."""
+        """Weights of the low-pass, as `stickslip.control.laws._seen` has them."""
         g = math.tan(min(math.pi * self.filter_hz * self.sample_time, 0.495 * math.pi))
         scale = 1.0 / (1.0 + math.sqrt(2.0) * g + g * g)
         return g * g * scale, 2.0 * (g * g - 1.0) * scale, (1.0 - math.sqrt(2.0) * g + g * g) * scale
@@ -311,10 +311,10 @@ class Poles:
 
 
 @lru_cache(maxsize=512)
-def held(train: Train, sample_time: float, late: float) -> tuple[Array, Array, Array, Array]:
+def held(drivetrain: Drivetrain, sample_time: float, late: float) -> tuple[Array, Array, Array, Array]:
     """From sample to sample: A, B of the new torque, which acts from `late` samples on, B of the one before, C."""
     linalg: Any = importlib.import_module("scipy.linalg")
-    a, b, c = train.state_space()
+    a, b, c = drivetrain.state_space()
     n = a.shape[0]
     both = np.zeros((n + 1, n + 1))
     both[:n, :n], both[:n, n:] = a, b
@@ -325,17 +325,17 @@ def held(train: Train, sample_time: float, late: float) -> tuple[Array, Array, A
 
 @dataclass(frozen=True)
 class Loop:
-    """A train under a drive.
+    """A drivetrain under a drive.
 
     Attributes
     ----------
-    train : Train
+    drivetrain : Drivetrain
     drive : Drive, or another `Sampled`
     measured : float
         Factor on the measured angle: 1, or what a quantiser's describing function makes of it.
     """
 
-    train: Train
+    drivetrain: Drivetrain
     drive: Sampled
     measured: float = 1.0
 
@@ -343,7 +343,7 @@ class Loop:
         """The closed loop from sample to sample."""
         whole = math.floor(self.drive.delay)
         part = self.drive.delay - whole
-        ad, new, old, c = held(self.train, self.drive.sample_time, part)
+        ad, new, old, c = held(self.drivetrain, self.drive.sample_time, part)
         ac, bc, cc, dc = self.drive.state_space()
         c = self.measured * c
         n, m = ad.shape[0], ac.shape[0]
@@ -372,9 +372,9 @@ class Loop:
 
 @dataclass(frozen=True)
 class Axis:
-    """A train, the law of its contact, and the amplitude of motion at the encoder (rad) that counts as small."""
+    """A drivetrain, the law of its contact, and the amplitude of motion at the encoder (rad) that counts as small."""
 
-    train: Train
+    drivetrain: Drivetrain
     friction: Model
     amplitude: float = math.pi * 2e-6
 
@@ -382,13 +382,13 @@ class Axis:
     def ringing(self) -> float:
         """Frequency of the whole inertia on the contact that the encoder sees, Hz."""
         stiff = self.at(self.amplitude, 100.0).visible
-        return math.sqrt(max(stiff, 1e-9) / math.fsum(self.train.inertias)) / (2.0 * math.pi)
+        return math.sqrt(max(stiff, 1e-9) / math.fsum(self.drivetrain.inertias)) / (2.0 * math.pi)
 
-    def at(self, amplitude: float, frequency: float) -> Train:
-        """The train with its contact as it is at that amplitude of the encoder (rad) and frequency (Hz)."""
-        out = self.train
+    def at(self, amplitude: float, frequency: float) -> Drivetrain:
+        """The drivetrain with its contact as it is at that amplitude of the encoder (rad) and frequency (Hz)."""
+        out = self.drivetrain
         # How far the contact moves depends on its stiffness, and that on how far it moves.
         for _ in range(3):
             moved = amplitude * (out.reach if out.contact.stiffness > 0.0 else 1.0)
-            out = replace(self.train, contact=describing(self.friction, moved, frequency))
+            out = replace(self.drivetrain, contact=describing(self.friction, moved, frequency))
         return out

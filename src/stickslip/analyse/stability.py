@@ -24,7 +24,16 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyse.presliding_loop import Axis, Contact, Drive, Loop, Poles, Sampled, Train, describing
+from stickslip.analyse.presliding_loop import (
+    Axis,
+    Contact,
+    Drive,
+    Drivetrain,
+    Loop,
+    Poles,
+    Sampled,
+    describing,
+)
 from stickslip.analyse.stability_result import (
     FILTERS,
     GAINS,
@@ -62,9 +71,9 @@ SLOW = 5.0
 # ---- one loop ------------------------------------------------------------------------------------------------------
 
 
-def stable(train: Train, drive: Sampled, measured: float = 1.0) -> bool:
+def stable(drivetrain: Drivetrain, drive: Sampled, measured: float = 1.0) -> bool:
     """Whether the loop is stable."""
-    return Loop(train, drive, measured).poles().stable
+    return Loop(drivetrain, drive, measured).poles().stable
 
 
 def edge(good: Callable[[float], bool], points: Array) -> float:
@@ -81,33 +90,33 @@ def edge(good: Callable[[float], bool], points: Array) -> float:
     return float(points[-1])
 
 
-def gain_margin(train: Train, drive: Drive, law: Contact) -> float:
+def gain_margin(drivetrain: Drivetrain, drive: Drive, law: Contact) -> float:
     """The loop is stable for all gains from 0 to this, at most `MOST_GAIN`; NaN where it is unstable without any."""
     # Steep laws go unstable at tiny gains: the first points are close together.
     points = np.concatenate([[0.0], np.geomspace(1e-4, 0.1, 10), np.linspace(0.2, MOST_GAIN, 29)])
-    return edge(lambda g: stable(train, replace(drive, law=law, gain=g)), points)
+    return edge(lambda g: stable(drivetrain, replace(drive, law=law, gain=g)), points)
 
 
-def _linear_limit(train: Train, drive: Drive) -> float:
+def _linear_limit(drivetrain: Drivetrain, drive: Drive) -> float:
     def good(s: float) -> bool:
         g = drive.gains
         scaled = Gains(g.kp * s * s, g.ki * s**3, g.kd * s, g.kr * s)
-        return stable(train, replace(drive, gains=scaled, law=Contact(0.0)))
+        return stable(drivetrain, replace(drive, gains=scaled, law=Contact(0.0)))
 
     return edge(good, np.geomspace(0.02, 20.0, 61))
 
 
 def with_law(
     axis: Axis, drive: Drive, model: Model | None, amplitude: float, frequency: float
-) -> tuple[Train, Drive]:
-    """Train and drive at an amplitude of the encoder; the compensator sees what its filter leaves of it."""
-    train = axis.at(amplitude, frequency)
+) -> tuple[Drivetrain, Drive]:
+    """Drivetrain and drive at an amplitude of the encoder; the compensator sees what its filter leaves of it."""
+    drivetrain = axis.at(amplitude, frequency)
     if model is None:
-        return train, replace(drive, law=Contact(0.0), filter_hz=0.0)
+        return drivetrain, replace(drive, law=Contact(0.0), filter_hz=0.0)
     left = 1.0
     if drive.filter_hz > 0.0:
         left = 1.0 / math.sqrt(1.0 + (frequency / drive.filter_hz) ** 4)
-    return train, replace(drive, law=describing(model, amplitude * left, frequency), gain=1.0)
+    return drivetrain, replace(drive, law=describing(model, amplitude * left, frequency), gain=1.0)
 
 
 def _poles(axis: Axis, drive: Drive, model: Model | None, amplitude: float) -> Poles:
@@ -139,18 +148,18 @@ def _cycle(axis: Axis, drive: Drive, model: Model | None, first: Poles) -> Cycle
 def _margins(name: str, axis: Axis, drive: Drive, model: Model | None) -> Margins:
     at_one = _poles(axis, drive, model, axis.amplitude)
     frequency = at_one.frequency if at_one.frequency >= SLOW else axis.ringing
-    train, there = with_law(axis, drive, model, axis.amplitude, frequency)
+    drivetrain, there = with_law(axis, drive, model, axis.amplitude, frequency)
     softer = counts = math.nan
     if at_one.stable:
-        lost = edge(lambda s: stable(train.softer(1.0 - s), there), np.linspace(0.0, 1.0, 51))
+        lost = edge(lambda s: stable(drivetrain.softer(1.0 - s), there), np.linspace(0.0, 1.0, 51))
         softer = lost
-        counts = edge(lambda n: stable(train, there, n), np.linspace(1.0, MOST_GAIN, 41))
-        if not all(stable(train, there, n) for n in np.linspace(0.05, 1.0, 20)):
+        counts = edge(lambda n: stable(drivetrain, there, n), np.linspace(1.0, MOST_GAIN, 41))
+        if not all(stable(drivetrain, there, n) for n in np.linspace(0.05, 1.0, 20)):
             counts = 0.0
     law = there.law
-    static = (train.visible + drive.gains.kp) / law.stiffness if law.stiffness > 1e-9 else math.inf
+    static = (drivetrain.visible + drive.gains.kp) / law.stiffness if law.stiffness > 1e-9 else math.inf
     return Margins(
-        name, law, there.filter_hz, at_one, gain_margin(train, there, law) if model else math.nan,
+        name, law, there.filter_hz, at_one, gain_margin(drivetrain, there, law) if model else math.nan,
         static if model else math.nan, softer, counts, _cycle(axis, drive, model, at_one),
     )  # fmt: skip
 
@@ -163,22 +172,24 @@ def _recommended(name: str, axis: Axis, drive: Drive, model: Model) -> Recommend
     """
     for gain in TRIED_GAINS:
         for corner in (f for f in TRIED_FILTERS if f <= highest_corner(drive.sample_time)):
-            train, setting = with_law(
+            drivetrain, setting = with_law(
                 axis, replace(drive, filter_hz=corner), model, axis.amplitude, axis.ringing
             )
             setting = replace(setting, gain=gain)
-            if _safe(train, setting):
-                return Recommended(name, gain, corner, Loop(train, setting).poles())
+            if _safe(drivetrain, setting):
+                return Recommended(name, gain, corner, Loop(drivetrain, setting).poles())
     return None
 
 
-def _safe(train: Train, setting: Drive) -> bool:
-    if not all(stable(train.softer(share), setting) for share in SOFTER):
+def _safe(drivetrain: Drivetrain, setting: Drive) -> bool:
+    if not all(stable(drivetrain.softer(share), setting) for share in SOFTER):
         return False
     # Without stiffness left the loop creeps away whatever the filter: the reserve of the gain goes no further.
-    static = (train.visible + setting.gains.kp) / max(setting.law.stiffness, 1e-9)
+    static = (drivetrain.visible + setting.gains.kp) / max(setting.law.stiffness, 1e-9)
     more = replace(setting, gain=min(RESERVE * setting.gain, 0.999 * static))
-    return stable(train, more) and all(stable(train, setting, n) for n in (0.25, 0.5, 0.75, 1.1, COUNTED))
+    return stable(drivetrain, more) and all(
+        stable(drivetrain, setting, n) for n in (0.25, 0.5, 0.75, 1.1, COUNTED)
+    )
 
 
 # ---- all of them ---------------------------------------------------------------------------------------------------
@@ -208,19 +219,19 @@ def stability(
     rows += [
         _margins(name, axis, replace(alone, filter_hz=f), model) for name, model in models.items() for f in filters
     ]  # fmt: skip
-    train = axis.at(axis.amplitude, axis.ringing)
+    drivetrain = axis.at(axis.amplitude, axis.ringing)
     over_time: dict[str, Array] = {}
     over_filter: dict[str, Array] = {}
     for name, model in models.items():
         law = describing(model, axis.amplitude, axis.ringing)
         over_time[name] = np.array(
-            [gain_margin(train, replace(alone, sample_time=float(t)), law) for t in TIMES]
+            [gain_margin(drivetrain, replace(alone, sample_time=float(t)), law) for t in TIMES]
         )
         over_filter[name] = np.array([_filtered(axis, alone, model, float(f)) for f in FILTERS])
     stiffest = max(models, key=lambda name: describing(models[name], axis.amplitude, axis.ringing).stiffness)
     advice = {name: _recommended(name, axis, alone, model) for name, model in models.items()}
     return Stability(
-        axis, alone, train, _linear_limit(train, alone), tuple(rows), over_time, over_filter, advice,
+        axis, alone, drivetrain, _linear_limit(drivetrain, alone), tuple(rows), over_time, over_filter, advice,
         _map(axis, stiffest, models[stiffest], [replace(alone, sample_time=float(t)) for t in TIMES]),
         _map(axis, stiffest, models[stiffest], [replace(alone, filter_hz=float(f)) for f in FILTERS]),
     )  # fmt: skip
@@ -229,13 +240,13 @@ def stability(
 def _map(axis: Axis, name: str, model: Model, drives: Sequence[Drive]) -> Map:
     growth, frequency = np.empty((GAINS.size, len(drives))), np.empty((GAINS.size, len(drives)))
     for j, drive in enumerate(drives):
-        train, there = with_law(axis, drive, model, axis.amplitude, axis.ringing)
+        drivetrain, there = with_law(axis, drive, model, axis.amplitude, axis.ringing)
         for i, gain in enumerate(GAINS):
-            found = Loop(train, replace(there, gain=float(gain))).poles()
+            found = Loop(drivetrain, replace(there, gain=float(gain))).poles()
             growth[i, j], frequency[i, j] = found.growth, found.frequency
     return Map(name, growth, frequency)
 
 
 def _filtered(axis: Axis, drive: Drive, model: Model, corner: float) -> float:
-    train, there = with_law(axis, replace(drive, filter_hz=corner), model, axis.amplitude, axis.ringing)
-    return gain_margin(train, there, there.law)
+    drivetrain, there = with_law(axis, replace(drive, filter_hz=corner), model, axis.amplitude, axis.ringing)
+    return gain_margin(drivetrain, there, there.law)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyse.presliding_loop import Axis, Contact, Drive, Poles, Train
+from stickslip.analyse.presliding_loop import Axis, Contact, Drive, Drivetrain, Poles
 
 __all__ = ["FILTERS", "GAINS", "MOST_GAIN", "TIMES", "Cycle", "Map", "Margins", "Recommended", "Stability"]
 
@@ -137,7 +137,7 @@ class Stability:
     axis : Axis
     drive : Drive
         Its law and gain are not used.
-    train : Train
+    drivetrain : Drivetrain
         With the contact as it is at the small amplitude.
     linear_limit : float
         The linear controller alone is stable up to this factor on its bandwidth; NaN where at none.
@@ -153,7 +153,7 @@ class Stability:
 
     axis: Axis
     drive: Drive
-    train: Train
+    drivetrain: Drivetrain
     linear_limit: float
     margins: tuple[Margins, ...]
     over_time: Mapping[str, Array]
@@ -170,7 +170,8 @@ class Stability:
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            "train": asdict(self.train), "drive": asdict(self.drive), "visible_stiffness": self.train.visible,
+            "drivetrain": asdict(self.drivetrain), "drive": asdict(self.drive),
+            "visible_stiffness": self.drivetrain.visible,
             "amplitude": self.axis.amplitude, "linear_limit": self.linear_limit,
             "margins": [asdict(m) for m in self.margins],
             "sample_times": TIMES.tolist(), "filters": FILTERS.tolist(),
@@ -188,7 +189,7 @@ class Stability:
             else f"up to {self.linear_limit:.2f} times its bandwidth"
         )
         return [
-            f"motion of {_angle(self.axis.amplitude)}; contact as the encoder sees it {self.train.visible:.1f} "
+            f"motion of {_angle(self.axis.amplitude)}; contact as the encoder sees it {self.drivetrain.visible:.1f} "
             f"N·m/rad, k_p {d.gains.kp:.4g}; {1e3 * d.sample_time:g} ms, {d.delay:g} samples late",
             f"the linear controller alone is stable {limit}",
             "",

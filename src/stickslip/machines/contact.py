@@ -45,16 +45,20 @@ class Bearings:
 
 @dataclass(frozen=True)
 class Drift:
-    """Slow change of friction after the machine was switched on: a factor 1 + change (1 - exp(-t / time))."""
+    """Change of friction after the machine was switched on: from ``begin`` (s) on a factor
+    1 + change (1 - exp(-(t - begin) / time))."""
 
     change: float = 0.0
     time: float = 1800.0
+    begin: float = 0.0
 
     def __post_init__(self) -> None:
         if not -1.0 < self.change <= 10.0:
             raise ParameterError(f"drift: change = {self.change:g} must be above -1 and at most 10")
         if not self.time > 0.0:
             raise ParameterError(f"drift: time = {self.time:g} s must be greater than 0")
+        if not (self.begin >= 0.0 and math.isfinite(self.begin)):
+            raise ParameterError(f"drift: begin = {self.begin:g} s must be a finite number of at least 0")
 
 
 @dataclass(frozen=True)

@@ -335,7 +335,10 @@ def _contact_of(top: Table, friction: Model) -> Contact:
             )  # fmt: skip
     if (table := _part(top, "drift")) is not None:
         with table, table.blamed():
-            drift = Drift(table.number("change", ""), table.positive("time", "s", 1800.0))
+            drift = Drift(
+                table.number("change", ""), table.positive("time", "s", 1800.0),
+                table.number("begin", "s", 0.0, 0.0),
+            )  # fmt: skip
     if (table := _part(top, "heat")) is not None:
         with table, table.blamed():
             heat = Heat(

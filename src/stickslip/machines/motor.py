@@ -9,6 +9,9 @@ from stickslip.errors import ParameterError
 
 __all__ = ["Amplifier", "Converter", "Harmonics"]
 
+HIGHEST = 4096
+"""Order, at most: 24 slots behind a gear of 1:50 have 1200 at the output."""
+
 
 @dataclass(frozen=True)
 class Converter:
@@ -84,8 +87,8 @@ class Harmonics:
                 "give as many of each"
             )
         for order in self.order:
-            if order != round(order) or not 1 <= order <= 64:
-                raise ParameterError(f"harmonics: order {order:g} must be a whole number from 1 to 64")
+            if order != round(order) or not 1 <= order <= HIGHEST:
+                raise ParameterError(f"harmonics: order {order:g} must be a whole number from 1 to {HIGHEST}")
 
     def at(self, angle: float) -> float:
         """The sum at an angle, rad."""

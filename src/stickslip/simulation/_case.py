@@ -6,12 +6,13 @@ Kernels share the columns of the rows they write, the codes they end with, and t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.control.compensators._base import Compensator
+from stickslip.control.compensator import Compensator
+from stickslip.control.composed import continuous_of
 from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import UnknownName
@@ -29,9 +30,12 @@ __all__ = [
     "Outcome",
     "Side",
     "StepBudget",
-    "compensator_told",
+    "controller_told",
+    "feeds_back",
+    "held_in",
     "lay_out",
     "ruled",
+    "ruled_in",
     "slip_rules",
     "surroundings",
 ]
@@ -55,22 +59,29 @@ DONE, DIVERGED, NOT_FINITE, STORM, NO_STEP, ROWS_FULL, TOO_STIFF, TOO_FAST = ran
 (
     INERTIA, KP, KI, KD, KR, TORQUE_LIMIT, DURATION, TOLERANCE, SOURCE, GAIN, FILTER, POSITION_0, VELOCITY_0,
     PLANT_SCALE, COMPENSATOR_SCALE, STIFFNESS, MAX_STEP, POSITION_LIMIT, VELOCITY_LIMIT, METERED, SAMPLE_TIME,
-    ENCODER, PLANT_BAND, LOAD, TEMPERATURE, KICK, NUMBERS,
+    ENCODER, PLANT_BAND, LOAD, TEMPERATURE, PERTURBATION, NUMBERS,
 ) = range(27)  # fmt: skip
-"""KICK: see `stickslip.simulation.accuracy`."""
+"""PERTURBATION: see `stickslip.simulation.accuracy`."""
 NO_COMPENSATOR, FROM_REFERENCE, FROM_MEASUREMENT = 0.0, 1.0, 2.0
 
 STORM_EVENTS, STORM_TIME = 4000, 5e-3
 """More switches than this within this time (s) end a run."""
 
 
-def compensator_told(helper: Compensator | None, model: Model | None) -> dict[str, Any]:
-    """What a record says of a compensator that ran with this model; nothing where there is none."""
-    if helper is None or model is None:
+def controller_told(controller: Controller | SampledController) -> dict[str, Any]:
+    """What a record says of a controller."""
+    if isinstance(controller, SampledController):
+        return {"controller": controller.as_dict()}
+    return {"gains": controller.gains._asdict(), **_compensator_told(controller.compensator)}
+
+
+def _compensator_told(helper: Compensator | None) -> dict[str, Any]:
+    """The same of a compensator; nothing where there is none."""
+    if helper is None:
         return {}
     numbers = ("gain", "filter_hz", "lead", "deadband", "offset", "inertia_feedforward", "substeps")
     own = {name: getattr(helper, name) for name in numbers}
-    return {"compensator": {"kind": helper.name, **own, **model.as_dict()}}
+    return {"compensator": {"kind": helper.name, **own, **helper.model.as_dict()}}
 
 
 @dataclass(frozen=True)
@@ -202,6 +213,34 @@ def slip_rules(**models: Model | None) -> dict[str, str]:
     return {name: rule for name, rule in rules.items() if rule}
 
 
+def ruled_in(
+    controller: Controller | SampledController, slip_rule: str | None
+) -> Controller | SampledController:
+    """The controller whose friction laws are under a run's slip rule, as `ruled` has it."""
+    if slip_rule is None:
+        return controller
+    if isinstance(controller, SampledController):
+        return controller.holding(lambda model: ruled(model, slip_rule))
+    helper = controller.compensator
+    if helper is None:
+        return controller
+    return replace(controller, compensator=replace(helper, model=ruled(helper.model, slip_rule)))
+
+
+def held_in(controller: Controller | SampledController) -> dict[str, Model | None]:
+    """The friction laws in a controller, by what a record calls them."""
+    if isinstance(controller, SampledController):
+        return {part: block.friction for part, block in controller.blocks.items() if block.friction}
+    return {"compensator": controller.compensator and controller.compensator.model}
+
+
+def feeds_back(controller: Controller | SampledController) -> bool:
+    """Whether a friction law in the controller acts on what is measured."""
+    if isinstance(controller, SampledController):
+        return any(b.law.place == "observer" and b.friction for b in controller.blocks.values())
+    return controller.compensator is not None and controller.compensator.velocity == "measured"
+
+
 class StepBudget(NamedTuple):
     """How many steps an integrator may take: at the start, for each second, and for each break of the reference.
 
@@ -239,21 +278,20 @@ def lay_out(
     limits: tuple[float, float] = (1e6, 1e6),
 ) -> Case:
     """Lay a closed loop out in flat arrays (compiles its laws and reference if they are not cached)."""
-    composed = isinstance(controller, SampledController)
-    helper = None if composed else controller.compensator
+    controller = ruled_in(controller, slip_rule)
+    moving = None if controller.sample_time > 0.0 else continuous_of(controller)
     plant = Side.of(ruled(axis.friction, slip_rule))
-    assist = Side.of(ruled(helper.model, slip_rule) if helper else None)
+    assist = Side.of(moving.friction if moving else None)
     numbers = np.zeros(NUMBERS)
     numbers[INERTIA] = axis.inertia
-    if not composed:
-        gains = controller.linear
+    if moving:
+        gains = moving.gains
         numbers[[KP, KI, KD, KR]] = gains.kp, gains.ki, gains.kd, gains.kr
     numbers[TORQUE_LIMIT] = controller.torque_limit
     numbers[DURATION], numbers[TOLERANCE], numbers[MAX_STEP] = duration, tolerance, max_step
-    if helper:
-        numbers[SOURCE] = FROM_REFERENCE if helper.velocity == "reference" else FROM_MEASUREMENT
-        numbers[GAIN] = helper.gain
-        numbers[FILTER] = 2.0 * math.pi * helper.filter_hz if helper.filter_hz else 0.0
+    if moving and (form := moving.compensation):
+        numbers[SOURCE] = FROM_REFERENCE if form.velocity == "reference" else FROM_MEASUREMENT
+        numbers[GAIN], numbers[FILTER] = form.gain, form.corner
     numbers[POSITION_0], numbers[VELOCITY_0] = initial
     numbers[PLANT_SCALE], numbers[COMPENSATOR_SCALE] = plant.velocity_scale, assist.velocity_scale
     numbers[PLANT_BAND] = plant.rest_band

@@ -1,30 +1,22 @@
-"""Sampled controllers compiled, with their laws inside: `stickslip.control.sampled` and those made of control laws."""
+"""Sampled controllers compiled, with their laws inside."""
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.control.composed import composed_of
 from stickslip.control.composition import MEMORY as MEMORY_FIELDS
 from stickslip.control.controller import Controller
-from stickslip.control.sampled import Memory, Settings, sampled_by, settings
 from stickslip.control.sampled_controller import SampledController
 from stickslip.jit import call_sample, compiled_sample, flat, kernel, pointer
-from stickslip.simulation._case import Side
-from stickslip.spec import Law, Surroundings, fields_of
-from stickslip.subset import Layout, law_layouts
 
-__all__ = ["Sampled", "compiled", "measured_position", "replay", "sampled_of", "sampled_with"]
+__all__ = ["Sampled", "compiled", "measured_position", "replay"]
 
-COMPENSATION, FAULT, MEMORY = *map(Memory._fields.index, ("compensation", "fault")), len(Memory._fields)
-"""Places of the compensating torque and of the fault in the memory, and its size; the law's state follows it."""
-COMPOSED_COMPENSATION, COMPOSED_FAULT = (
-    [f.name for f in MEMORY_FIELDS].index(name) for name in ("others", "fault")
-)
-"""The same places in the memory of a controller made of control laws."""
+COMPENSATION, FAULT = ([f.name for f in MEMORY_FIELDS].index(name) for name in ("others", "fault"))
+"""Places of the compensating torque and of the fault in the memory."""
 
 
 @kernel()
@@ -34,18 +26,6 @@ def measured_position(position: float, counts: float) -> float:
         return position
     count = 2.0 * math.pi / counts
     return count * math.floor(position / count + 0.5)
-
-
-@functools.cache
-def sampler(law: Law | None) -> int:
-    """Address of one sample of the controller with this compensator."""
-    empty = {"z": Layout(()), "p": Layout(()), "u": Layout(Surroundings._fields)}
-    layouts = {
-        **(law_layouts(law) if law else empty),
-        "n": Layout.of(fields_of(Settings), counted=False),
-        "m": Layout.of(fields_of(Memory), counted=False),
-    }
-    return compiled_sample(f"sampled_{law.name}" if law else "sampled", sampled_by(law), layouts)
 
 
 class Sampled(NamedTuple):
@@ -63,44 +43,24 @@ class Sampled(NamedTuple):
     """place of the fault in it"""
 
 
-def sampled_with(controller: Controller, state: Any, parameters: Any) -> Sampled:
-    """Compile a controller with gains and a compensator, whose law's state and parameters are given."""
-    helper = controller.compensator
+def compiled(controller: Controller | SampledController) -> Sampled:
+    """Compile a controller as the control laws that it is made of."""
+    own = composed_of(controller)
+    laws = own.laws
+    if laws not in _compiled:
+        _compiled[laws] = compiled_sample("controller", own.functions["sample"], own.layouts)
     return Sampled(
-        sampler(helper.model.law if helper else None),
-        np.array(settings(controller)),
-        np.zeros(MEMORY),
-        flat(state).copy(),
-        parameters,
+        _compiled[laws],
+        np.array(own.settings),
+        np.zeros(len(MEMORY_FIELDS)),
+        flat(own.packed_state()),
+        flat(own.packed()),
         COMPENSATION,
         FAULT,
     )
 
 
-def compiled(controller: SampledController) -> Sampled:
-    """Compile a controller made of control laws."""
-    laws = controller.laws
-    if laws not in _compiled:
-        _compiled[laws] = compiled_sample("controller", controller.functions["sample"], controller.layouts)
-    return Sampled(
-        _compiled[laws],
-        np.array(controller.settings),
-        np.zeros(len(MEMORY_FIELDS)),
-        flat(controller.packed_state()),
-        flat(controller.packed()),
-        COMPOSED_COMPENSATION,
-        COMPOSED_FAULT,
-    )
-
-
 _compiled: dict[Any, int] = {}
-
-
-def sampled_of(controller: Controller | SampledController, compensator: Side) -> Sampled:
-    """Compile a controller (one in continuous time is laid out, and never called)."""
-    if isinstance(controller, SampledController):
-        return compiled(controller)
-    return sampled_with(controller, compensator.state, compensator.parameters)
 
 
 @kernel()

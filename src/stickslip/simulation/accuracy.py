@@ -16,12 +16,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.simulation import adaptive, exact, sampled
-from stickslip.simulation._case import DONE, KICK, POSITION_0, TOLERANCE, Case, Outcome
+from stickslip.simulation._case import DONE, PERTURBATION, POSITION_0, TOLERANCE, Case, Outcome
+from stickslip.simulation.adaptive import engine as adaptive
+from stickslip.simulation.exact import engine as exact
+from stickslip.simulation.sampled import engine as sampled
 
 __all__ = ["BESIDE", "Accuracy", "branches", "estimate", "start_apart"]
 
-KICKS = (2.0, -2.0)
+PERTURBATIONS = (2.0, -2.0)
 """Over what a step may be wrong by."""
 WELL = 10.0
 """Largest error of a well-conditioned run, over the tolerance."""
@@ -76,7 +78,7 @@ def estimate(case: Case, integrator: str = "exact") -> Accuracy:
         If the integrator cannot run the case, or is another one.
     """
     if integrator == "exact":
-        error = _kicked(case)
+        error = _perturbed(case)
     elif integrator in RUNS:
         error = max(_looser(case, integrator), LEAST * float(case.numbers[TOLERANCE]))
     else:
@@ -119,12 +121,12 @@ def _beside(case: Case, side: float) -> Case:
     return replace(case, numbers=numbers)
 
 
-def _kicked(case: Case) -> float:
+def _perturbed(case: Case) -> float:
     prepared, worst = exact.prepare(case), 0.0
     motion, code, _ = prepared.run()
-    for kick in KICKS:
+    for perturbation in PERTURBATIONS:
         parameters = prepared.parameters.copy()
-        parameters[KICK] = kick
+        parameters[PERTURBATION] = perturbation
         other, ended, _ = replace(prepared, parameters=parameters).run()
         worst = max(worst, _apart(motion[:, 0], other[:, 0], code == ended == DONE))
     return worst

@@ -32,7 +32,8 @@ from stickslip.simulation._case import (
     UNITS,
     Case,
     Outcome,
-    compensator_told,
+    controller_told,
+    held_in,
     lay_out,
     slip_rules,
 )
@@ -93,7 +94,7 @@ def simulate(
     axis : RigidAxis or Machine
         A machine (`stickslip.load_machine`) runs with all its imperfections under the controller sampled at the
         machine's rate; ``integrator``, ``tolerance`` and ``time_step`` are then of no account
-        (`stickslip.simulation.machine_loop`).
+        (`stickslip.simulation.machine.loop`).
     controller : Controller or SampledController
     reference : Reference
     duration : float
@@ -103,7 +104,7 @@ def simulate(
     tolerance : float
         Position error that a well-conditioned run may gather, rad (exact, adaptive and sampled).
     time_step : float
-        Longest step of the fixed integrator, s.
+        Longest step of the fixed integrator, s; it runs controllers in continuous time.
     slip_rule : {"signed", "literal"}, optional
         The rule from stick to slip of every law in the loop that has one (`stickslip.laws._stick`), in place of its own
         choice; left out, each law keeps the rule that it was made with.
@@ -140,7 +141,7 @@ def simulate(
         check_machine_run(
             axis, controller, duration, output, integrator, initial=initial, slip_rule=slip_rule
         )
-        machine_loop = importlib.import_module("stickslip.simulation.machine_loop")
+        machine_loop = importlib.import_module("stickslip.simulation.machine.loop")
         return machine_loop.simulate_machine(
             axis, controller, reference, duration,
             output=output, slip_rule=slip_rule, initial=initial, metered=metered, check=check,
@@ -173,6 +174,10 @@ def run_case(
     how: dict[str, Any] = {"integrator": name, "slip_rule": slip_rule}
     if refused:
         how["refused"] = dict(refused)
+    if name == "sampled" and (
+        why := importlib.import_module("stickslip.simulation.sampled.engine").cannot_locate(case)
+    ):
+        how["general_step"] = why
     if check and name != "fixed" and outcome.code == _case.DONE:
         found = importlib.import_module("stickslip.simulation.accuracy").estimate(case, name)
         how["accuracy"] = {
@@ -197,9 +202,10 @@ def _in_numbers(case: Case, outcome: Outcome) -> str:
     steps = outcome.counts["steps"]
     duration = float(case.numbers[_case.DURATION])
     whole = f"some {steps * duration / outcome.time:.2g}" if outcome.time > 0.0 else "no number of them"
+    other = ", or use the fixed integrator" if case.numbers[_case.SAMPLE_TIME] == 0.0 else ""
     return (
         f", {steps:,} so far; at this pace {duration:g} s take {whole}: friction is too stiff for the inertia, or the "
-        "reference too fast; check them, give a shorter duration, or use the fixed integrator"
+        f"reference too fast; check them, give a shorter duration{other}"
     )
 
 
@@ -241,7 +247,7 @@ def check_machine_run(
             "integrator out"
         )
     check_run(duration, initial, machine.sample_time)
-    machine_loop = importlib.import_module("stickslip.simulation.machine_loop")
+    machine_loop = importlib.import_module("stickslip.simulation.machine.loop")
     machine_loop.rows_at(output, machine.sample_time, duration)
     machine_loop.sampled_on(controller, machine, slip_rule)
 
@@ -315,13 +321,13 @@ def integrator_for(case: Case, name: str = "auto") -> Choice:
     if name != "auto":
         if name not in INTEGRATORS:
             raise UnknownName("integrator", name, (*INTEGRATORS, "auto"))
-        module = importlib.import_module(f"stickslip.simulation.{name}")
+        module = importlib.import_module(f"stickslip.simulation.{name}.engine")
         if why := module.can_run(case):
             raise InputError(f"the {name} integrator cannot run this: {why}")
         return Choice(name, module.run, {})
     refused: dict[str, str] = {}
     for candidate in INTEGRATORS:
-        module = importlib.import_module(f"stickslip.simulation.{candidate}")
+        module = importlib.import_module(f"stickslip.simulation.{candidate}.engine")
         why = module.can_run(case)
         if not why:
             return Choice(candidate, module.run, refused)
@@ -334,13 +340,13 @@ def integrator_for(case: Case, name: str = "auto") -> Choice:
 def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
     rows = outcome.rows
     columns = np.ascontiguousarray(rows.T)
-    controller, plant, assist = case.controller, case.plant.model, case.compensator.model
+    controller, plant = case.controller, case.plant.model
     assert plant is not None
     meta: dict[str, Any] = {
         "what": "simulation",
         "version": stickslip.__version__,
         **how,
-        "slip_rules": slip_rules(friction=plant, compensator=assist),
+        "slip_rules": slip_rules(friction=plant, **held_in(controller)),
         "tolerance": float(case.numbers[_case.TOLERANCE]),
         "duration": float(case.numbers[_case.DURATION]),
         "ended": outcome.time,
@@ -348,12 +354,8 @@ def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
         "friction": plant.as_dict(),
         "reference": case.reference.as_dict(),
         "counts": outcome.counts,
+        **controller_told(controller),
     }
-    if isinstance(controller, SampledController):
-        meta["controller"] = controller.as_dict()
-    else:
-        meta["gains"] = controller.gains._asdict()
-        meta |= compensator_told(controller.compensator, assist)
     if case.numbers[_case.METERED] and outcome.code == _case.DONE:
         meta["metrics"] = {k: float(v) for k, v in metrics(outcome.meter, outcome.turns).items()}
         meta["energy"] = _energy(case, columns, meta["metrics"])

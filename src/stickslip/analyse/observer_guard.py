@@ -1,0 +1,202 @@
+"""Whether a LuGre observer (Canudas de Wit et al. 1995) may be switched on: what certifies it, what its guard finds.
+
+The observer gives the stiffness sigma0 back to an axis that sticks. This positive feedback is stable only below a limit
+near the contact's own stiffness, found exactly from the sampled loop on the stuck axis. Besides, one count of the
+encoder must bend its bristle by less than what slides.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy import linalg
+
+from stickslip.analyse.controller_loop import linearised
+from stickslip.control.block import ControlBlock
+from stickslip.control.sampled_controller import SampledController
+from stickslip.errors import ParameterError
+
+__all__ = ["Ratios", "largest_stiffness", "objection", "positive_real_ratios", "stuck_radius"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+CLOSE = 1e-3
+"""Part to which the largest stiffness is found."""
+
+
+@dataclass(frozen=True)
+class Ratios:
+    """What the condition of strict positive realness comes to: each at least 1, and the observer's error decays.
+
+    Attributes
+    ----------
+    velocity : float
+        sigma1 K_v / (sigma0 J): damping of the loop against what the bristle gives back. Infinite for a velocity loop.
+    integral : float
+        sigma0 K_p / (sigma1 K_i): infinite without an integral.
+    """
+
+    velocity: float
+    integral: float
+
+    @property
+    def certified(self) -> bool:
+        """Whether both are met; where not, nothing is said of the loop, and a simulation decides."""
+        return self.velocity >= 1.0 and self.integral >= 1.0
+
+    def __str__(self) -> str:
+        word = "certified" if self.certified else "not certified: a simulation decides"
+        return (
+            f"sigma1 Kv / (sigma0 J) = {self.velocity:.3g}, sigma0 Kp / (sigma1 Ki) = {self.integral:.3g} "
+            f"(each must be at least 1): {word}"
+        )
+
+
+def positive_real_ratios(
+    sigma0: float,
+    sigma1: float,
+    inertia: float,
+    kp: float,
+    kv: float,
+    ki: float = 0.0,
+    *,
+    position: bool = True,
+) -> Ratios:
+    """The condition in closed form, Canudas de Wit et al. 1995.
+
+    Parameters
+    ----------
+    sigma0, sigma1 : float
+        Of the observer, N·m/rad and N·m·s/rad.
+    inertia : float
+        kg·m²
+    kp, kv, ki : float
+        Of the loop: on the position error, the velocity error and the integral, N·m/rad, N·m·s/rad, N·m/(rad·s); of a
+        velocity loop ``kp`` and ``ki`` are those of its PI.
+    position : bool
+        Whether it is a position loop; a velocity loop has to meet the second ratio alone.
+    """
+    velocity = sigma1 * kv / (sigma0 * inertia) if position else math.inf
+    integral = sigma0 * kp / (sigma1 * ki) if sigma1 * ki > 0.0 else math.inf
+    return Ratios(velocity, integral)
+
+
+def stuck_radius(
+    controller: SampledController, inertia: float, stiffness: float, damping: float = 0.0, delay: int = 0
+) -> float:
+    """The largest size of an eigenvalue of the loop on an axis whose contact sticks: stable below 1.
+
+    Parameters
+    ----------
+    controller : SampledController
+    inertia, stiffness, damping : float
+        Of the axis, kg·m²; of its contact while it sticks, N·m/rad and N·m·s/rad.
+    delay : int
+        Samples by which the torque acts late.
+    """
+    a, b, c, d = about_rest(controller)
+    n, size = a.shape[0], a.shape[0] + 2 + delay
+    axis = np.zeros((3, 3))
+    axis[0, 1], axis[1] = 1.0, np.array([-stiffness, -damping, 1.0]) / inertia
+    algebra: Any = linalg
+    moved: Array = algebra.expm(axis * controller.sample_time)
+    whole, torque = np.zeros((size, size)), np.zeros(size)
+    torque[:n], torque[n] = c, d
+    held = torque if delay == 0 else np.eye(size)[n + 2]
+    whole[:n, :n], whole[:n, n] = a, b
+    whole[n : n + 2, n : n + 2] = moved[:2, :2]
+    whole[n : n + 2] += np.outer(moved[:2, 2], held)
+    for k in range(delay):  # the oldest torque first
+        whole[n + 2 + k] = torque if k == delay - 1 else np.eye(size)[n + 3 + k]
+    return float(np.abs(np.linalg.eigvals(whole)).max())
+
+
+def about_rest(controller: SampledController) -> tuple[Array, Array, Array, float]:
+    """The controller about rest, where its bristle is a spring that the velocity winds: A, B, C, D from the angle.
+
+    States: those of everything else, the bristle's deflection, and the angle one sample ago.
+    """
+    part = part_of(controller)
+    if controller.blocks["estimator"].law.name != "backward_difference":
+        raise ParameterError(
+            "observer: its guard knows the velocity as a backward difference only; leave estimator out"
+        )
+    p, time = controller.blocks[part].parameters, controller.sample_time
+    others = [b for name, b in controller.blocks.items() if b.law.place == "observer" and name != part]
+    rest = linearised(replace(controller, observer=others or None), math.inf, 1.0).state_space()
+    n = rest[0].shape[0]
+    a, b, c = np.zeros((n + 2, n + 2)), np.zeros(n + 2), np.zeros(n + 2)
+    a[:n, :n], b[:n], c[:n] = rest[0], rest[1][:, 0], rest[2][0]
+    a[n, n], a[n, n + 1], b[n], b[n + 1] = 1.0, -1.0, 1.0 - p.correction * time, 1.0
+    viscous = p.gain * p.sigma2 / time
+    c += p.gain * p.sigma0 * a[n]
+    c[n + 1] -= viscous
+    return a, b, c, rest[3] + p.gain * p.sigma0 * b[n] + viscous
+
+
+def largest_stiffness(
+    controller: SampledController, inertia: float, stiffness: float, damping: float = 0.0, delay: int = 0
+) -> float:
+    """The sigma0 of its LuGre observer up to which the loop on the stuck axis is stable, N·m/rad.
+
+    Parameters as of `stuck_radius`.
+
+    Raises
+    ------
+    ParameterError
+        If the controller has no LuGre observer.
+    """
+    part = part_of(controller)
+    bare = controller.with_values({f"{part}_sigma0": 1e-3 * stiffness})
+    least = max(stuck_radius(bare, inertia, stiffness, damping, delay), 1.0)
+
+    def holds(sigma0: float) -> bool:
+        own = controller.with_values({f"{part}_sigma0": sigma0})
+        return stuck_radius(own, inertia, stiffness, damping, delay) <= least + 1e-9
+
+    good, bad = 0.0, 4.0 * stiffness
+    while bad - good > CLOSE * stiffness:
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if holds(middle) else (good, middle)
+    return good
+
+
+def part_of(controller: SampledController) -> str:
+    """The name of its LuGre observer's part."""
+    for part, block in controller.blocks.items():
+        if block.law.name == "lugre_observer":
+            return part
+    raise ParameterError("largest_stiffness: the controller has no lugre_observer; give it one")
+
+
+def objection(
+    controller: SampledController, inertia: float, stiffness: float, counts: float = 0.0, damping: float = 0.0,
+    delay: int = 0,
+) -> str:  # fmt: skip
+    """Why its LuGre observer is not to be switched on, in a sentence, or "".
+
+    Parameters
+    ----------
+    controller : SampledController
+    inertia, stiffness, damping, delay
+        As of `stuck_radius`.
+    counts : float
+        Of the encoder, per revolution; 0: exact.
+    """
+    p: ControlBlock = controller.blocks[part_of(controller)]
+    sigma0, gain, fc = p.parameters.sigma0, p.parameters.gain, p.parameters.fc
+    limit = largest_stiffness(controller, inertia, stiffness, damping, delay)
+    if sigma0 >= limit:
+        return (
+            f"its stiffness {gain:g} x {sigma0:g} N·m/rad is given back to a contact of {stiffness:g} N·m/rad, and is "
+            f"stable at rest only below {limit:.0f} N·m/rad"
+        )
+    count = 2.0 * math.pi / counts if counts else 0.0
+    if sigma0 * count >= fc:
+        return (
+            f"one count of the encoder, {count:.3g} rad, bends its bristle by {sigma0 * count:.3g} N·m, as much as "
+            f"slides ({fc:g} N·m)"
+        )
+    return ""

@@ -1,0 +1,1 @@
+"""The adaptive integrator: Dormand-Prince 5(4) with located events."""

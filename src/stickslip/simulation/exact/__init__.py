@@ -1,0 +1,1 @@
+"""The exact integrator: event-driven flow of a loop that is linear between events."""

@@ -1,0 +1,274 @@
+"""Output of the exact integrator: rows, positions on the grid, and windows for the meter."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from stickslip.jit import kernel, pointer
+from stickslip.simulation._case import COLUMNS
+from stickslip.simulation._meter import MAX_WINDOW, WINDOW, meter
+from stickslip.simulation.exact.flow import UNMOVED, Linear, flow, free_motion, kept_flow, moved
+from stickslip.simulation.exact.segment import (
+    FREE_POSITION,
+    FREE_VELOCITY,
+    cubic_of,
+    integral_at,
+    shows,
+    slip_torque_at,
+    state_at,
+)
+from stickslip.simulation.exact.state import (
+    DS,
+    EDGE,
+    GOAL,
+    GOAL_RATE,
+    GRID_ROWS,
+    GRID_WRITTEN,
+    INTEGRAL,
+    JUMPED,
+    LAG,
+    POSITION,
+    ROWS,
+    ROWS_WRITTEN,
+    SIDE_SIZE,
+    SIDES,
+    SPACING,
+    TIME,
+    VELOCITY,
+    R,
+    S,
+    command,
+    torques,
+)
+
+ROW_SIZE = len(COLUMNS)
+SHORTEST_WINDOW = 1e-10
+"""Shorter segments are left out of the metrics (s)."""
+
+
+FINEST_NODES = 0.03
+"""Half a window in radians (or e-folds) of the free motion, that need not be undercut."""
+MOST_WINDOWS = 250_000
+"""Of a step, each of four nodes: half a second of work, in which nothing hears a wish to end."""
+UNSEEN = 1e-8
+"""Free motion slower than this (rad/s) adds nothing to a metric; the nodes need not follow it."""
+UNSEEN_COARSE = 1e-4
+"""The same where only coarse metrics are wanted: 1e-8 rad of the ringing in pre-sliding."""
+
+
+@kernel(exact=False, inline=True)
+def rows_until(plan: Any, grid: Any, row: int, end: float) -> int:
+    """The first row after `row` whose time is after `end`; loops over a known number of rows are vectorised."""
+    rows = int(plan[GRID_ROWS])
+    last = row
+    if plan[SPACING] > 0.0:
+        # A guess that rounding may put one row off.
+        last = min(max(int((end - grid[0]) / plan[SPACING]), row), rows)
+        if last > row and grid[last - 1] > end:
+            last -= 1
+    while last < rows and grid[last] <= end:
+        last += 1
+    return last
+
+
+@kernel(exact=False)
+def write_grid(
+    lin: Linear, plan: Any, loop: Any, segment: Any, grid: Any, count: Any, out: Any, h: float, visible: float,
+    spaced: Any, generation: int,
+) -> None:  # fmt: skip
+    """Write position and velocity at the grid's times inside the first h of the segment; the next one is inside.
+
+    On an even grid the free motion is carried from one time to the next by one matrix. A free motion that has
+    died out (less than `visible` rad) is left out.
+    """
+    row = int(count[GRID_WRITTEN])
+    last = rows_until(plan, grid, row, loop[TIME] + h + EDGE)
+    count[GRID_WRITTEN] = last
+    time = loop[TIME]
+    c0, c1, c2, c3 = cubic_of(segment)
+    if lin.discriminant > 0.0 and not shows(lin, segment, visible):
+        for i in range(row, last):
+            x = grid[i] - time
+            out[2 * i] = c0 + x * (c1 + x * (c2 + x * c3))
+            out[2 * i + 1] = c1 + x * (2.0 * c2 + x * 3.0 * c3)
+        return
+    x = grid[row] - time
+    p, q = free_motion(flow(lin, x), segment[FREE_POSITION], segment[FREE_VELOCITY])
+    even = plan[SPACING] > 0.0
+    between = kept_flow(lin, spaced, generation, plan[SPACING]) if even and row + 1 < last else UNMOVED
+    for i in range(row, last):
+        x = grid[i] - time
+        if not even:
+            p, q = free_motion(flow(lin, x), segment[FREE_POSITION], segment[FREE_VELOCITY])
+        out[2 * i] = c0 + x * (c1 + x * (c2 + x * c3)) + p
+        out[2 * i + 1] = c1 + x * (2.0 * c2 + x * 3.0 * c3) + q
+        p, q = free_motion(between, p, q)
+
+
+@kernel(exact=False)
+def put_row(
+    rows: Any, count: Any, t: float, goal: float, rate: float, theta: float, v: float, tm: float, tf: float, th: float,
+    event: float,
+) -> None:  # fmt: skip
+    """Write the next row, in the order of `_case.COLUMNS`."""
+    row_at = pointer(rows, int(count[ROWS_WRITTEN]) * ROW_SIZE)
+    count[ROWS_WRITTEN] += 1.0
+    row_at[0] = t
+    row_at[1] = goal
+    row_at[2] = rate
+    row_at[3] = theta
+    row_at[4] = v
+    row_at[5] = tm
+    row_at[6] = tf
+    row_at[7] = th
+    row_at[8] = event
+
+
+@kernel(exact=False, inline=True)
+def signals(
+    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, x: float, theta: float, v: float
+) -> tuple[float, float, float, float, float]:  # fmt: skip
+    """Reference position and velocity; motor, friction and compensating torque at x inside the segment."""
+    r, _, goal, rate = command(parameters, plan, cells, loop, loop[TIME] + x)
+    s0 = slip_torque_at(sides, segment, 0, x)
+    s1 = slip_torque_at(sides, segment, 1, x) if plan[SIDES] > 1 else 0.0
+    integral = integral_at(parameters, loop, segment, x)
+    tm, tf, th = torques(parameters, plan, sides, loop, r, goal, rate, integral, theta, v, s0, s1)
+    return goal, rate, tm, tf, th
+
+
+@kernel(exact=False)
+def write_rows(
+    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, grid: Any, count: Any,
+    rows: Any, h: float,
+) -> None:  # fmt: skip
+    """Write rows at the grid's times inside the first h of the segment."""
+    while count[GRID_WRITTEN] < plan[GRID_ROWS]:
+        t = grid[int(count[GRID_WRITTEN])]
+        x = t - loop[TIME]
+        if x > h + 1e-12:
+            return
+        theta, v = state_at(lin, segment, x)
+        goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, loop, segment, x, theta, v)
+        put_row(rows, count, t, goal, rate, theta, v, tm, tf, th, 0.0)
+        count[GRID_WRITTEN] += 1.0
+
+
+@kernel(exact=False)
+def room_for_event(plan: Any, count: Any) -> bool:
+    """Whether an event's rows still leave room for the rest of the grid."""
+    return count[ROWS_WRITTEN] + 2.0 + plan[GRID_ROWS] - count[GRID_WRITTEN] <= plan[ROWS]
+
+
+@kernel(exact=False)
+def row_before(
+    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, count: Any, rows: Any, x: float,
+    theta: float, v: float,
+) -> None:  # fmt: skip
+    """Write the row of an event at x, as the segment ends there."""
+    if room_for_event(plan, count):
+        goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, loop, segment, x, theta, v)
+        put_row(rows, count, loop[TIME] + x, goal, rate, theta, v, tm, tf, th, 1.0)
+
+
+@kernel(exact=False)
+def row_after(parameters: Any, plan: Any, sides: Any, loop: Any, count: Any, rows: Any) -> None:
+    """Write the row after an event if a torque has jumped."""
+    last = int(count[ROWS_WRITTEN]) - 1
+    if last < 0 or not room_for_event(plan, count):
+        return
+    s0 = sides[S] + sides[LAG] * sides[DS]
+    s1 = sides[SIDE_SIZE + S] + sides[SIDE_SIZE + LAG] * sides[SIDE_SIZE + DS] if plan[SIDES] > 1 else 0.0
+    goal = loop[GOAL]
+    rate = loop[GOAL_RATE]
+    theta = loop[POSITION]
+    v = loop[VELOCITY]
+    tm, tf, th = torques(
+        parameters, plan, sides, loop, loop[R], goal, rate, loop[INTEGRAL], theta, v, s0, s1
+    )  # fmt: skip
+    before = pointer(rows, last * ROW_SIZE)
+    if abs(tm - before[5]) + abs(tf - before[6]) + abs(th - before[7]) > 1e-6:
+        put_row(rows, count, loop[TIME], goal, rate, theta, v, tm, tf, th, 1.0)
+
+
+@kernel(exact=False, inline=True)
+def windows_for(rate: float, speed: float, h: float, unseen: float) -> float:
+    """Windows whose five nodes follow a free motion of that rate (1/s) and velocity (rad/s) over h, at least 1.
+
+    Boole's rule is wrong by about 2e-3 y^6 of the changing part for nodes y/2 of a radian apart.
+    """
+    y = 0.5 * h * abs(rate)
+    # Most segments are short; a root costs as much as the rest.
+    if speed < unseen or y <= FINEST_NODES or (y <= 1.0 and y * y * y * speed <= 1e-5):
+        return 1.0
+    return y / max(FINEST_NODES, min(1.0, 0.1 * (1e-2 / speed) ** (1.0 / 3.0)))
+
+
+@kernel(exact=False, inline=True)
+def windows_of(lin: Linear, segment: Any, h: float, longest: float) -> int:
+    """Windows, none longer than `longest`, in which the meter sees the first h of a segment."""
+    p = segment[FREE_POSITION]
+    q = segment[FREE_VELOCITY]
+    unseen = UNSEEN_COARSE if longest > MAX_WINDOW else UNSEEN
+    if lin.discriminant > 0.0:
+        rate = max(lin.frequency, lin.decay)
+        most = windows_for(rate, abs(q) + rate * abs(p), h, unseen)
+    else:
+        fast = -lin.decay - lin.frequency
+        slow = -lin.decay + lin.frequency
+        share = 0.5 / (lin.frequency + 1e-9)
+        most = max(
+            windows_for(fast, abs(fast * (q - slow * p)) * share, h, unseen),
+            windows_for(slow, abs(slow * (q - fast * p)) * share, h, unseen),
+        )
+    return math.ceil(min(max(most, h / longest), MOST_WINDOWS + 1.0) * (1.0 - 1e-9))
+
+
+@kernel(exact=False)
+def measure(
+    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, h: float, acc: Any,
+    turns: Any, nodes: Any,
+) -> bool:  # fmt: skip
+    """Hand the first h of the segment to the meter, in windows of five nodes; False where they are too many."""
+    if h < SHORTEST_WINDOW:
+        return True
+    windows = windows_of(lin, segment, h, acc[WINDOW])
+    if windows > MOST_WINDOWS:
+        return False
+    width = h / windows
+    c = cubic_of(segment)
+    m = flow(lin, 0.25 * width)
+    p = segment[FREE_POSITION]
+    q = segment[FREE_VELOCITY]
+    if loop[JUMPED] > 0.0:
+        fill(parameters, plan, cells, sides, loop, segment, 0.0, loop[POSITION], loop[VELOCITY], nodes, 4)
+        loop[JUMPED] = 0.0
+    for w in range(windows):
+        for j in range(8):
+            nodes[j, 0] = nodes[j, 4]
+        for k in range(1, 5):
+            x = (w + 0.25 * k) * width
+            p, q = free_motion(m, p, q)
+            theta, v = moved(c, UNMOVED, x, p, q)
+            fill(parameters, plan, cells, sides, loop, segment, x, theta, v, nodes, k)
+        meter(
+            acc, turns, loop[TIME] + w * width, width, nodes)  # fmt: skip
+    return True
+
+
+@kernel(exact=False)
+def fill(
+    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, x: float, theta: float, v: float,
+    nodes: Any, k: int,
+) -> None:  # fmt: skip
+    """Write one node of every signal that the meter reads."""
+    goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, loop, segment, x, theta, v)
+    nodes[0, k] = goal - theta
+    nodes[1, k] = rate - v
+    nodes[2, k] = theta
+    nodes[3, k] = v
+    nodes[4, k] = rate
+    nodes[5, k] = tm
+    nodes[6, k] = tf
+    nodes[7, k] = th

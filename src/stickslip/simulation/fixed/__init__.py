@@ -1,0 +1,1 @@
+"""The fixed-step integrator: an implicit step for any law."""

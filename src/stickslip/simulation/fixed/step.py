@@ -1,0 +1,413 @@
+"""One implicit step of an axis with friction, for any law through its ``step`` alone.
+
+The end velocity solves J (v1 - v0) / h = mean over the step of (T_m - T_f). Two means are used:
+
+* the trapezoid (A-stable, second order) where the step resolves the contact, with the step cut where the
+  velocity passes through zero (Hairer, Norsett and Wanner 1993, II.6: integration with stopping at a
+  discontinuity);
+* Alexander's two-stage SDIRK (L-stable, second order; Alexander 1977, SIAM J. Numer. Anal. 14) where it
+  does not: there the trapezoid would ring without damping. Each stage is a step of backward Euler, over which
+  the law sees a constant velocity.
+
+A law whose torque jumps at zero velocity is continued across zero by its one-sided value while a step is
+solved, so that the crossing can be located. At v = 0 the axis rests while neither one-sided net torque drives
+it away; a feedback compensator that jumps there takes its part of that interval (Filippov's sliding mode).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from stickslip.jit import kernel
+from stickslip.simulation._case import (
+    FILTER,
+    FROM_MEASUREMENT,
+    FROM_REFERENCE,
+    INERTIA,
+    PLANT_BAND,
+    SOURCE,
+)
+from stickslip.simulation.fixed.loop import (
+    FILTER_RATE,
+    FILTERED,
+    FRICTION,
+    GATHERED,
+    HEAD,
+    HELP,
+    HOLDING,
+    INTEGRAL,
+    LEAVING,
+    LINEAR,
+    MOTOR,
+    POSITION,
+    POSITION_D,
+    SIDE,
+    VELOCITY,
+    VELOCITY_D,
+    Loop,
+    copy,
+    helper_jumps,
+    helper_slides,
+    limited,
+    look_ahead,
+    low_pass,
+    plant_holds,
+    plant_slides,
+    set_motor,
+    sign,
+    step_helper,
+    step_plant,
+)
+
+GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
+VELOCITY_ROUNDING = 1e-14  # rad/s, relative above 1 rad/s
+FINE = 0.1  # of the sliding curve's velocity scale, by which the velocity near rest may change in a step
+APPROACH = 0.9  # of the time to the zero of a steep compensator's velocity, in which it is approached
+UNSEEN = 0.003  # of the travel up to break-away, which a damped step near rest may hide
+LANDING, GROWTH = 1e-3, 4.0  # of a step: the first one after that zero, and the growth of those that follow
+
+
+# ---- one implicit stage -----------------------------------------------------------------------------------
+
+
+@kernel()
+def close(loop: Loop, a: Any, b: Any, h: float, v1: float, side: float, w: float) -> float:
+    """Complete the state b at the end of a step from a for the end velocity v1; returns the net torque there.
+
+    w = 1/2: trapezoid, the laws see the velocity run from a's to v1; w = 1: backward Euler, they see v1.
+    A law that jumps at zero keeps its value on `side` beyond it (side 0: its own declared value).
+    """
+    n, ahead = loop.numbers, loop.ahead
+    copy(a, b)
+    v0 = a[VELOCITY] if w < 1.0 else v1
+    b[VELOCITY], b[LEAVING] = v1, 0.0
+    b[POSITION] = a[POSITION] + h * ((1.0 - w) * a[VELOCITY] + w * v1)
+    b[POSITION_D], b[VELOCITY_D] = ahead[POSITION_D], ahead[VELOCITY_D]
+    error0, error1 = a[POSITION_D] - a[POSITION], b[POSITION_D] - b[POSITION]
+    b[INTEGRAL] = a[INTEGRAL] + h * ((1.0 - w) * error0 + w * error1)
+    over = v1 * side <= n[PLANT_BAND] and side != 0.0
+    b[FRICTION] = step_plant(loop, b, v0, v1, h)
+    if over and loop.plant[HOLDING] != 0:
+        b[FRICTION] = plant_slides(loop, b, side)
+    if n[SOURCE] == FROM_REFERENCE:
+        for i in range(HEAD + loop.plant_states, b.size):
+            b[i] = ahead[i]
+        b[HELP], b[FILTERED], b[FILTER_RATE] = ahead[HELP], ahead[FILTERED], ahead[FILTER_RATE]
+    elif n[SOURCE] == FROM_MEASUREMENT:
+        y0, y1 = v0, v1
+        if n[FILTER] > 0.0:
+            low_pass(n, a, b, v0, v1, h, w)
+            y1 = b[FILTERED]
+            y0 = a[FILTERED] if w < 1.0 else y1
+        b[HELP] = step_helper(loop, b, y0, y1, h)
+        if over and helper_jumps(loop):
+            b[HELP] = helper_slides(loop, b, side)
+    set_motor(loop, b)
+    return b[MOTOR] - b[FRICTION]
+
+
+@kernel()
+def guess(a: float, fa: float, b: float, fb: float, count: int) -> float:
+    """A point between a and b, where f changes sign: the secant's, every fourth time the middle."""
+    x = a - fa * (b - a) / (fb - fa)
+    if count % 4 == 3 or not min(a, b) < x < max(a, b):
+        x = 0.5 * (a + b)
+    return x
+
+
+@kernel()
+def solve(loop: Loop, a: Any, b: Any, h: float, side: float, w: float) -> bool:
+    """Find the end velocity of a stage from a, and complete b; False if there is none.
+
+    Of several solutions the first one is taken in the direction in which the net torque at the present
+    velocity drives: the others lie beyond a repelling one, where the torque falls steeply with the velocity.
+    """
+    inertia, v = loop.numbers[INERTIA], a[VELOCITY]
+    known = inertia * v + h * (1.0 - w) * (a[MOTOR] - a[FRICTION])
+    enough = inertia * VELOCITY_ROUNDING
+    low = v
+    f_low = inertia * low - known - h * w * close(loop, a, b, h, low, side, w)
+    if abs(f_low) <= enough * max(1.0, abs(low)):
+        return True
+    stride = -f_low / inertia
+    high, f_high = low, f_low
+    for _ in range(60):
+        high = low + stride
+        f_high = inertia * high - known - h * w * close(loop, a, b, h, high, side, w)
+        if not math.isfinite(f_high):
+            return False
+        if f_high * f_low <= 0.0:
+            break
+        low, f_low = high, f_high
+        stride *= 2.0
+    if f_high * f_low > 0.0:
+        return False
+    for i in range(200):
+        if abs(f_high) <= enough * max(1.0, abs(high)):
+            return True
+        x = guess(low, f_low, high, f_high, i)
+        f = inertia * x - known - h * w * close(loop, a, b, h, x, side, w)
+        # Illinois: the end that stays halves its weight, so that both ends approach the root.
+        if f * f_high < 0.0:
+            low, f_low = high, f_high
+        else:
+            f_low *= 0.5
+        high, f_high = x, f
+        if abs(high - low) <= VELOCITY_ROUNDING * max(1e-3, abs(high)):
+            return True
+    return False
+
+
+# ---- one step ---------------------------------------------------------------------------------------------
+
+
+@kernel()
+def damped_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> bool:
+    """Alexander's SDIRK of order 2: two stages of backward Euler, L-stable."""
+    middle, base = loop.middle, loop.base
+    part, rest = GAMMA * h, (1.0 - GAMMA) * h
+    look_ahead(loop, a, t, part)
+    if not solve(loop, a, middle, part, 0.0, 1.0):
+        return False
+    # The second stage starts from a, moved on for `rest` with the slopes of the first.
+    copy(a, base)
+    ratio = rest / part
+    for i in (POSITION, VELOCITY, INTEGRAL, FILTERED, FILTER_RATE):
+        base[i] = a[i] + ratio * (middle[i] - a[i])
+    step_plant(loop, base, middle[VELOCITY], middle[VELOCITY], rest)
+    if loop.numbers[SOURCE] == FROM_MEASUREMENT:
+        v = middle[FILTERED] if loop.numbers[FILTER] > 0.0 else middle[VELOCITY]
+        step_helper(loop, base, v, v, rest)
+    look_ahead(loop, a, t, h)
+    done = solve(loop, base, b, part, 0.0, 1.0)
+    b[SIDE] = sign(b[VELOCITY])
+    return done
+
+
+@kernel()
+def drive(loop: Loop, z: Any, side: float) -> float:
+    """Net torque at rest, seen from one side of zero velocity, N·m."""
+    friction, motor = z[FRICTION], z[MOTOR]
+    if loop.plant[HOLDING] != 0:
+        friction = plant_holds(loop, z, side)
+    if helper_jumps(loop):
+        motor = limited(loop.numbers, z[LINEAR] + helper_slides(loop, z, side))
+    return motor - friction
+
+
+@kernel()
+def departure(loop: Loop, z: Any) -> float:
+    """The direction in which an axis at rest leaves; 0 if it stays.
+
+    Where both sides repel, it goes on in the direction of its arrival, or from rest with the net torque.
+    """
+    up, down = drive(loop, z, 1.0), -drive(loop, z, -1.0)
+    if up > 0.0 and down > 0.0:
+        free = z[MOTOR] if loop.plant[HOLDING] != 0 else z[MOTOR] - z[FRICTION]
+        return -z[SIDE] if z[SIDE] != 0.0 else sign(free)
+    if up > 0.0:
+        return 1.0
+    return -1.0 if down > 0.0 else 0.0
+
+
+@kernel()
+def leave(loop: Loop, z: Any, side: float) -> None:
+    """Let the axis leave rest towards `side`: the torques are those on that side of zero velocity."""
+    z[LEAVING] = side
+    if loop.plant[HOLDING] != 0:
+        z[FRICTION] = plant_slides(loop, z, side)
+    if helper_jumps(loop):
+        z[HELP] = helper_slides(loop, z, side)
+        set_motor(loop, z)
+
+
+@kernel()
+def rest_for(loop: Loop, a: Any, b: Any, t: float, h: float) -> None:
+    """Stay at rest from a to b: a plant that holds gives the torque that balances the motor's."""
+    look_ahead(loop, a, t, h)
+    close(loop, a, b, h, 0.0, 0.0, 0.5)
+    b[SIDE] = 0.0
+    if loop.plant[HOLDING] != 0:
+        b[FRICTION] = b[MOTOR]
+
+
+@kernel()
+def rest_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> float:
+    """Rest over h, or until the torque breaks the contact away; returns the time taken (b holds the end)."""
+    if loop.plant[HOLDING] != 0:
+        a[FRICTION] = a[MOTOR]
+    rest_for(loop, a, b, t, h)
+    side = departure(loop, b)
+    if side == 0.0:
+        return h
+    low, high = 0.0, h
+    f_low, f_high = side * drive(loop, a, side), side * drive(loop, b, side)
+    if f_low >= 0.0:  # both sides repel from the begin: only the direction was open
+        copy(a, b)
+        leave(loop, b, side)
+        return 0.0
+    x = high
+    for i in range(60):
+        x = guess(low, f_low, high, f_high, i)
+        rest_for(loop, a, b, t, x)
+        f = side * drive(loop, b, side)
+        if f < 0.0:
+            low, f_low, f_high = x, f, 0.5 * f_high
+        else:
+            high, f_high, f_low = x, f, 0.5 * f_low
+        if abs(f) <= 1e-14 or high - low <= 1e-13 * h:
+            break
+    leave(loop, b, side)
+    return x
+
+
+@kernel()
+def unbalanced(loop: Loop, z: Any) -> float:
+    """What the motor's torque exceeds the holding torque by, N·m; sets the friction torque of a contact at rest."""
+    direction = sign(z[MOTOR])
+    z[FRICTION] = direction * min(abs(z[MOTOR]), direction * plant_holds(loop, z, direction))
+    return z[MOTOR] - z[FRICTION]
+
+
+@kernel()
+def gather(loop: Loop, a: Any, b: Any, t: float, h: float, before: float) -> float:
+    """Rest in the band from a to b while the momentum gathers; how far its velocity lies above the band, rad/s."""
+    rest_for(loop, a, b, t, h)
+    push = 0.5 * h * (before + unbalanced(loop, b))
+    b[GATHERED] = a[GATHERED] + push / loop.numbers[INERTIA]
+    return abs(b[GATHERED]) - loop.numbers[PLANT_BAND]
+
+
+@kernel()
+def band_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, bool]:
+    """Rest in the band over h, or until the gathered momentum leaves it; the time taken, and whether it left."""
+    before = unbalanced(loop, a)
+    f_high = gather(loop, a, b, t, h, before)
+    if f_high <= 0.0:
+        return h, False
+    low, high = 0.0, h
+    f_low = min(abs(a[GATHERED]) - loop.numbers[PLANT_BAND], 0.0)
+    x = high
+    for i in range(60):
+        x = guess(low, f_low, high, f_high, i)
+        f = gather(loop, a, b, t, x, before)
+        if f < 0.0:
+            low, f_low, f_high = x, f, 0.5 * f_high
+        else:
+            high, f_high, f_low = x, f, 0.5 * f_low
+        if abs(f) <= VELOCITY_ROUNDING or high - low <= 1e-13 * h:
+            break
+    side = sign(b[GATHERED])
+    b[VELOCITY], b[GATHERED] = side * loop.numbers[PLANT_BAND], 0.0
+    set_motor(loop, b)
+    leave(loop, b, side)
+    return x, True
+
+
+@kernel()
+def enter_band(loop: Loop, b: Any, side: float) -> None:
+    """Come to rest in the band, at its edge; the velocity goes on as gathered momentum."""
+    b[VELOCITY], b[GATHERED], b[LEAVING] = 0.0, side * loop.numbers[PLANT_BAND], 0.0
+    set_motor(loop, b)
+    unbalanced(loop, b)
+
+
+@kernel()
+def near_rest(loop: Loop, v0: float, v1: float) -> float:
+    """Factor by which a step shrinks so that the velocity near rest changes by little of the curve's scale.
+
+    A sticking element breaks away where s(v) falls to its load, and s falls within that scale.
+    """
+    scale, change = loop.fine, abs(v1 - v0)
+    if change <= FINE * scale or min(abs(v0), abs(v1)) > 3.0 * scale:
+        return 1.0
+    return 0.9 * FINE * scale / change
+
+
+@kernel()
+def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, bool]:
+    """A step of the trapezoid, cut at a reversal; returns the time taken (< 0: no solution) and whether."""
+    side = sign(a[VELOCITY]) if a[VELOCITY] != 0.0 else a[LEAVING]
+    jumping = side if loop.plant[HOLDING] != 0 or helper_jumps(loop) else 0.0
+    look_ahead(loop, a, t, h)
+    if not solve(loop, a, b, h, jumping, 0.5):
+        return -1.0, False
+    for _ in range(10):
+        shorter = h * near_rest(loop, a[VELOCITY], b[VELOCITY])
+        if shorter == h:
+            break
+        h = shorter
+        look_ahead(loop, a, t, h)
+        if not solve(loop, a, b, h, jumping, 0.5):
+            return -1.0, False
+    band = loop.numbers[PLANT_BAND]
+    if side == 0.0 or b[VELOCITY] * side > band:
+        b[SIDE] = sign(b[VELOCITY])
+        return h, False
+    if a[VELOCITY] * side <= band:  # it grazed: the drive to `side` fell again within the step
+        rest_for(loop, a, b, t, h if band == 0.0 else 0.0)
+        if band > 0.0:
+            enter_band(loop, b, side)
+        return (h, False) if band == 0.0 else (0.0, True)
+    low, high, f_low, f_high = 0.0, h, side * a[VELOCITY] - band, side * b[VELOCITY] - band
+    x = h
+    for i in range(60):
+        x = guess(low, f_low, high, f_high, i)
+        look_ahead(loop, a, t, x)
+        if not solve(loop, a, b, x, jumping, 0.5):
+            return -1.0, False
+        f = side * b[VELOCITY] - band
+        if f > 0.0:
+            low, f_low, f_high = x, f, 0.5 * f_high
+        else:
+            high, f_high, f_low = x, f, 0.5 * f_low
+        if abs(f) <= VELOCITY_ROUNDING or high - low <= 1e-13 * h:
+            break
+    if loop.steep and x > LANDING * h:
+        x *= APPROACH
+        look_ahead(loop, a, t, x)
+        solved = solve(loop, a, b, x, jumping, 0.5)
+        b[SIDE] = side
+        return (x, False) if solved and side * b[VELOCITY] > 0.0 else (-1.0, False)
+    look_ahead(loop, a, t, x)
+    close(loop, a, b, x, side * band, jumping, 0.5)
+    b[SIDE] = side
+    if band > 0.0:
+        enter_band(loop, b, side)
+    return x, True
+
+
+@kernel()
+def loses_motion(loop: Loop, a: Any, b: Any, h: float) -> bool:
+    """Whether a damped step from a to b near rest hides a motion that a bristle would remember.
+
+    The stages' velocities differ by what the step does not resolve; a contact that slides farther than its
+    travel up to break-away remembers nothing of it.
+    """
+    v0, v1 = a[VELOCITY], b[VELOCITY]
+    slides = v0 * v1 > 0.0 and min(abs(v0), abs(v1)) * h > loop.travel
+    return not slides and GAMMA * h * abs(v1 - loop.middle[VELOCITY]) > UNSEEN * loop.travel
+
+
+@kernel()
+def advance(loop: Loop, a: Any, b: Any, t: float, h: float, cap: float) -> tuple[float, bool]:
+    """One step from a to b, at most h long, in motion at most `cap`.
+
+    Returns the time taken (< 0: no solution) and whether an event ended the step.
+    """
+    if loop.damped:
+        done = damped_step(loop, a, b, t, h)
+        if done and h > loop.resolved and loses_motion(loop, a, b, h):
+            h = loop.resolved
+            done = damped_step(loop, a, b, t, h)
+        return (h, False) if done else (-1.0, False)
+    if loop.numbers[PLANT_BAND] > 0.0 and a[VELOCITY] == 0.0:
+        return band_step(loop, a, b, t, h)
+    if a[VELOCITY] == 0.0 and a[LEAVING] == 0.0 and (loop.plant[HOLDING] != 0 or helper_jumps(loop)):
+        side = departure(loop, a)
+        if side == 0.0:
+            taken = rest_step(loop, a, b, t, h)
+            return taken, b[LEAVING] != 0.0
+        leave(loop, a, side)
+    return moving_step(loop, a, b, t, min(h, cap))

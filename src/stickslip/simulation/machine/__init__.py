@@ -1,0 +1,1 @@
+"""A virtual machine with its imperfections, sample by sample."""

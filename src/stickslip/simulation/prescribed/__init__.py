@@ -1,0 +1,1 @@
+"""Friction under prescribed motion."""

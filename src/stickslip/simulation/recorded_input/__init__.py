@@ -1,0 +1,1 @@
+"""An axis driven by a recorded signal, as identification simulates it."""

@@ -1,0 +1,235 @@
+"""A record followed in segments side by side: the observer's corrections of `recorded_input.Course`, ten times as fast.
+
+Where an axis slides at speed, an observer and a contact forget within a fraction of a second how they began. There a
+record is cut, each segment begins a while before its cut, and `LANES` of them run in vectors of the machine
+(`recorded_input.simd_batch`). The law's own ``step`` takes part without branches (`branchless`); laws that cannot be
+written so, and axes with backlash, a pendulum or harmonics, are left to `recorded_input.Course`.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.jit import compiled_lanes, flat
+from stickslip.simulation.many.simd_source import body
+from stickslip.simulation.recorded_input import simd_batch
+from stickslip.simulation.recorded_input.branchless import Assumption, Name, NotStraight, Trace, traced
+from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, reads_load
+from stickslip.spec import Law, Surroundings
+from stickslip.subset import law_layouts, lower
+
+__all__ = ["LANES", "Segments", "cut"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Mask = np.ndarray[Any, np.dtype[np.bool_]]
+
+LANES = 8
+LONGEST = 0.5
+"""Part of a record beyond which its longest segment, `Segments.longest`, is too long for lanes to be worth it."""
+INLINED = frozenset(
+    {
+        "start", "improve", "first_stage", "second_stage", "take_other_rise", "accept", "beyond", "pull", "look_back",
+    }
+)  # fmt: skip
+"""Functions that run for all lanes at once."""
+
+
+# ---- the program -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Program:
+    """A law's compiled text, or None where it has none, and the parameters that it holds for."""
+
+    assumptions: frozenset[Assumption]
+    follow: Any
+
+    def fits(self, parameters: Sequence[float]) -> bool:
+        """Whether it holds for these."""
+        return all(a.fits(parameters) for a in self.assumptions)
+
+
+_programs: dict[int, tuple[Law, list[Program]]] = {}
+_lock = threading.Lock()
+
+
+def program_for(law: Law, parameters: Sequence[float]) -> Program:
+    """The program of a law with such parameters, compiled on first use."""
+    with _lock:
+        _, programs = _programs.setdefault(id(law), (law, []))
+        for program in programs:
+            if program.fits(parameters):
+                return program
+        trace = Trace(parameters)
+        try:
+            follow = compiled_lanes(source(law, trace)).follow_lanes
+        except NotStraight:
+            follow = None
+        programs.append(Program(frozenset(trace.assumptions), follow))
+        return programs[-1]
+
+
+def source(law: Law, trace: Trace) -> str:
+    """The specialised text.
+
+    Raises
+    ------
+    NotStraight
+        If the law's functions cannot be written as straight lines.
+    """
+    count = len(law.pack_state(law.state(law.parameters(dict(law.example)))))
+    text = [
+        "import math",
+        "import numpy as np",
+        "from stickslip.jit import compile_inlined, compile_lanes, exponential, exponential_less_one, pointer, select",
+        f"LANES, STATES, HOLDS = {LANES}, {count}, {law.holding is not None}",
+    ]
+    constants, functions = body(("recorded_input/simd_batch",), INLINED)
+    text += constants
+    text += written(law, "step", {"v0": Name("v"), "v1": Name("v"), "dt": Name("h")}, "law", "v, h", trace)
+    if law.holding is not None:
+        text += written(law, "holding", {"direction": Name("direction")}, "withstood", "direction", trace)
+    return "\n".join([*text, *functions]) + "\n"
+
+
+def written(
+    law: Law, entry: str, arguments: dict[str, Name], name: str, signature: str, trace: Trace
+) -> list[str]:
+    """The lines of one of the law's functions; it reads the states in BASE and leaves them in TRIAL."""
+    functions = lower({f"_{entry}_": getattr(law, entry)}, law_layouts(law))
+    count = len(law.pack_state(law.state(law.parameters(dict(law.example)))))
+    arrays: dict[Any, Any] = {("p", i): Name(f"p[{i}]") for i in range(len(trace.parameters))}
+    arrays |= {("z", i): Name(f"z{i}") for i in range(count)}
+    arrays |= {("u", i): x for i, x in enumerate(Surroundings())}
+    arrays["u", Surroundings._fields.index("load")] = Name("load")
+    del arrays["u", Surroundings._fields.index("position")]
+    own = Trace(trace.parameters, assumptions=trace.assumptions)
+    given = {**arguments, "z": "z", "p": "p", "u": "u"}
+    result = traced(functions, f"_{entry}_", given, arrays, own)
+    lines = [f"z{i} = w[(BASE + {i}) * LANES + lane]" for i in range(count)]
+    lines += ["load = w[LOAD * LANES + lane]", *own.lines]
+    if entry == "step":
+        lines += [f"w[(TRIAL + {i}) * LANES + lane] = {arrays['z', i]}" for i in range(count)]
+    lines.append(f"return {result}")
+    return ["@compile_inlined", f"def {name}(w, lane, {signature}, p):", *(f"    {line}" for line in lines)]
+
+
+# ---- a record ----------------------------------------------------------------------------------------------------
+
+
+def cut(forgotten: Mask, warm: int) -> list[int]:
+    """Rows at which a record is cut into at most `LANES` segments, the longest as short as can be; the first is 0.
+
+    Parameters
+    ----------
+    forgotten : array of bool, shape (n,)
+        Where nothing is left of what was `warm` rows before.
+    warm : int
+        Rows that a segment begins before its cut.
+    """
+    allowed, n = np.flatnonzero(forgotten), forgotten.size
+    short, long = n // LANES, n
+    while long - short > max(1, n // 1000):
+        middle = (short + long) // 2
+        short, long = (short, middle) if cuts_within(middle, allowed, warm, n) else (middle, long)
+    return cuts_within(long, allowed, warm, n) or [0]
+
+
+def cuts_within(rows: int, allowed: Any, warm: int, n: int) -> list[int]:
+    """Cuts so that no segment has more rows, what is before its cut included; none where there are no such."""
+    cuts = [0]
+    while (end := max(0, cuts[-1] - warm) + rows) < n:
+        place = int(np.searchsorted(allowed, end, side="right")) - 1
+        if place < 0 or allowed[place] <= cuts[-1] or len(cuts) == LANES:
+            return []
+        cuts.append(int(allowed[place]))
+    return cuts
+
+
+class Segments:
+    """A held drive with an observer, laid out in segments."""
+
+    def __init__(self, law: Law, drive: Drive, cuts: Sequence[int], warm: int, rounding: float) -> None:
+        self.law, self.drive, self.cuts, self.warm, self.rounding = law, drive, list(cuts), warm, rounding
+        n = drive.time.size
+        ends = [*self.cuts[1:], n]
+        self.begins = [max(0, c - warm) for c in self.cuts]
+        rows = max(end - begin for begin, end in zip(self.begins, ends, strict=True))
+        first = np.array(self.begins + [0] * (LANES - len(self.begins)))
+        self.rows: Any = np.minimum(np.arange(rows)[:, None] + first, n - 1)
+        self.ends, self.longest = ends, rows / n
+        self.speeds = np.zeros(LANES)
+        assert drive.goal is not None
+        self.speeds[1 : len(first)] = drive.goal[first[1:]]
+        self.signals = self.laid_out()
+        self.substeps = max(1, math.ceil(float(np.max(np.diff(drive.time))) / drive.max_step - 1e-9))
+        self.scaled = not reads_load(law)
+
+    def laid_out(self) -> Array:
+        """The signals of all lanes, shape (rows, SIGNALS, LANES)."""
+        drive, at = self.drive, self.rows
+        last = at == drive.time.size - 1
+        out = np.zeros((len(at), simd_batch.SIGNALS, LANES))
+        columns = {
+            simd_batch.SIGNAL: drive.gain * drive.signal, simd_batch.SEEN: drive.position,
+            simd_batch.DAMPING: drive.damping,
+            simd_batch.GOAL: drive.goal, simd_batch.FIRM: drive.firm, simd_batch.DISTURBANCE: drive.disturbance,
+        }  # fmt: skip
+        for place, values in columns.items():
+            if values is not None:
+                out[:, place] = values[at]
+        assert drive.position is not None
+        out[:, simd_batch.NEXT] = np.append(drive.position[1:], drive.position[-1])[at]
+        out[:, simd_batch.GOES_ON] = ~last
+        out[:, simd_batch.PERIOD] = np.diff(drive.time, append=2.0 * drive.time[-1] - drive.time[-2])[at]
+        return out
+
+    def perturbed(self, torque: Array) -> Segments:
+        """The same with another torque from outside, N·m, shape (n,)."""
+        other = object.__new__(Segments)
+        other.__dict__ |= self.__dict__
+        other.signals = self.signals.copy()
+        other.signals[:, simd_batch.DISTURBANCE] = torque[self.rows]
+        return other
+
+    def numbers(self, mechanics: Mechanics) -> tuple[float, ...]:
+        """What the kernel reads of axis and observer."""
+        drive = self.drive
+        n = np.zeros(simd_batch.NUMBERS)
+        n[simd_batch.INERTIA], n[simd_batch.OFFSET] = mechanics.inertia, mechanics.offset
+        n[simd_batch.DRIVE_GAIN], n[simd_batch.BACK_EMF] = mechanics.drive_gain, mechanics.back_emf
+        n[simd_batch.LOAD_MOTOR], n[simd_batch.LOAD_EXTERNAL] = mechanics.load_motor, mechanics.load_external
+        n[simd_batch.SCALED], n[simd_batch.SPRING], n[simd_batch.FORGETS] = (
+            self.scaled,
+            drive.spring,
+            drive.forgets,
+        )
+        n[simd_batch.RETURNS], n[simd_batch.SLACK], n[simd_batch.ROUNDING] = (
+            drive.returns,
+            drive.slack,
+            self.rounding,
+        )
+        return tuple(n.tolist())
+
+    def corrections(self, mechanics: Mechanics, parameters: Any) -> Array | None:
+        """The observer's corrections, shape (n,), as `recorded_input.Course.run` says; None where it cannot be."""
+        harmonics = mechanics.harmonics
+        more = harmonics.torque or harmonics.friction or mechanics.gravity or mechanics.backlash
+        packed = tuple(float(x) for x in self.law.pack(parameters))
+        if self.longest > LONGEST or more or (program := program_for(self.law, packed)).follow is None:
+            return None
+        states = flat(self.law.pack_state(self.law.state(parameters)))
+        found = np.empty((len(self.rows), LANES))
+        program.follow(
+            self.numbers(mechanics), packed, states, self.speeds, self.signals, self.substeps, LANES, found
+        )
+        out = np.empty(self.drive.time.size)
+        for lane, (begin, first, end) in enumerate(zip(self.begins, self.cuts, self.ends, strict=True)):
+            out[first:end] = found[first - begin : end - begin, lane]
+        return out

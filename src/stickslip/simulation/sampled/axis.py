@@ -1,0 +1,174 @@
+"""A case laid out for the sampled engine: the records that its kernels read."""
+
+# scipy's matrix exponential carries no types.
+# pyright: reportUnknownVariableType=false
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+
+from stickslip.simulation._case import (
+    INERTIA,
+    MAX_STEP,
+    METERED,
+    PLANT_BAND,
+    POSITION_0,
+    POSITION_LIMIT,
+    SAMPLE_TIME,
+    TOLERANCE,
+    VELOCITY_0,
+    VELOCITY_LIMIT,
+    Array,
+    Case,
+    Side,
+)
+from stickslip.simulation.exact.engine import curve_of, elements_of, is_literal, layer_of, lowest
+from stickslip.simulation.exact.flow import flow, linear
+from stickslip.simulation.sampled.modes import gather
+from stickslip.simulation.sampled.rates import (
+    AXIS,
+    BENDS,
+    CREEPS,
+    FOLLOWS,
+    HOLDS,
+    LEVELS,
+    RELAXES,
+    RESTS,
+    SLIPS,
+    SPRING,
+    STATE,
+    STEPS,
+    STUCK,
+)
+from stickslip.spec import Bristle, Elements
+
+__all__ = ["axis_of", "general_axis"]
+
+LOCAL = 1e-3
+"""Of the tolerance, which one step may be wrong by."""
+GENERAL = 1e-2
+"""The same for a general step, whose errors the loop pulls back."""
+NEAR = 1e-3
+"""Of the torque that moves the stuck axis by that: a load at its limit."""
+SETTLED = 0.1
+"""Of the torque that bends a bristle by the tolerance of a step: it then is bent as in steady sliding."""
+LEVEL = 1e-15
+"""Of the curve, by which it may still vary where it counts as level."""
+
+
+def general_axis(case: Case) -> tuple[Any, Any, Any]:
+    """The constants of an axis that takes the general step, its state at the start, and no elements."""
+    n = case.numbers
+    axis, state = np.zeros(1, AXIS), np.zeros(1, STATE)
+    a, z = axis[0], state[0]
+    a["inertia"], a["sample_time"], a["local"] = n[INERTIA], n[SAMPLE_TIME], GENERAL * n[TOLERANCE]
+    a["position_limit"], a["velocity_limit"] = n[POSITION_LIMIT], n[VELOCITY_LIMIT]
+    a["metered"], a["longest"] = int(n[METERED]), n[MAX_STEP]
+    z["position"], z["velocity"], z["next"] = n[POSITION_0], n[VELOCITY_0], n[SAMPLE_TIME]
+    z["direction"] = np.sign(z["velocity"])
+    z["mode"] = STEPS
+    if case.plant.pointers.holding and abs(z["velocity"]) <= n[PLANT_BAND]:
+        z["mode"], z["velocity"], z["goal"] = HOLDS, 0.0, z["velocity"]
+    return axis, state, np.zeros(0, SPRING)
+
+
+def axis_of(case: Case) -> tuple[Any, Any, Any]:
+    """The constants of the axis, its state at the start, and its elements."""
+    e, n, side = elements_of(case.plant), case.numbers, case.plant
+    assert e is not None
+    axis, state, _ = general_axis(case)
+    a, z = axis[0], state[0]
+    a["local"], a["literal"] = LOCAL * n[TOLERANCE], int(is_literal(side))
+    a["viscous"], a["breakaway"] = e.viscous, e.breakaway
+    a["curve"], a["scale"] = (0, 1.0) if e.constant_curve else (side.pointers.sliding, e.velocity_scale)
+    a["lowest"], a["floor"] = lowest(side, e), floors(side, e)
+    springs = fill_bristle(a, e) if isinstance(e, Bristle) else fill_elements(a, side, e)
+    z["velocity"], z["goal"] = n[VELOCITY_0], 0.0
+    z["mode"] = starting_mode(a, z, springs)
+    gather(a, z, springs)
+    a["near"] = NEAR * a["local"] * z["spring"]
+    a["far"], a["level"] = level_from(side, e)
+    a["glide"] = glide_of(a)
+    if z["spring"] > 0.0:
+        a["flow"] = flow(linear(a["inertia"], a["viscous"], z["spring"]), a["sample_time"])
+    return axis, state, springs
+
+
+def fill_bristle(a: Any, e: Bristle) -> Any:
+    """Write a bristle's constants; it has no elements."""
+    a["kind"], a["bristle"], a["lag"] = BENDS, e.stiffness, e.damping / e.stiffness
+    a["settled"] = SETTLED * a["local"] * e.stiffness
+    if a["metered"]:
+        # The meter reads the motion between the ends of a step from a quintic, which must hold its ringing.
+        a["longest"] = min(a["longest"], math.sqrt(a["inertia"] / e.stiffness))
+    return np.zeros(0, SPRING)
+
+
+def fill_elements(a: Any, side: Side, e: Elements) -> Any:
+    """Write the constants of elements; returns those that are springs."""
+    a["kind"] = FOLLOWS if math.isinf(e.attraction) else RELAXES
+    a["attraction"] = 0.0 if math.isinf(e.attraction) else e.attraction
+    sprung = [(k, s, 0.0, 0.0) for k, s in zip(e.stiffness, e.share, strict=True) if math.isfinite(k)]
+    rigid = math.fsum(s for k, s in zip(e.stiffness, e.share, strict=True) if math.isinf(k))
+    if math.isinf(e.slope):
+        a["rigid"] = rigid
+    else:
+        a["steep"], a["slope"], a["layer"] = rigid, e.slope, layer_of(side, e)
+    return np.array(sprung, dtype=SPRING)
+
+
+def starting_mode(a: Any, z: Any, springs: Any) -> int:
+    """What the axis does at the start."""
+    if a["kind"] == BENDS:
+        return SLIPS
+    if springs.size:
+        return STUCK
+    if a["steep"] > 0.0:
+        return SLIPS if abs(z["velocity"]) > a["layer"] else CREEPS
+    return SLIPS if z["velocity"] != 0.0 else RESTS
+
+
+def floors(side: Side, e: Elements | Bristle) -> Array:
+    """Bounds below the sliding curve on velocities up to scale 2^(4 - LEVELS), twice that, and so on; N·m."""
+    if e.constant_curve:
+        return np.full(LEVELS, e.breakaway)
+    assert side.model is not None
+    curve, p = curve_of(side).function, side.model.parameters
+    assert curve is not None
+    tops: list[float] = [e.velocity_scale * 2.0 ** (i + 4 - LEVELS) for i in range(LEVELS)]
+    least: list[float] = []
+    for low, top in zip([0.0, *tops], tops, strict=False):
+        speeds = [low + (top - low) * i / 32.0 for i in range(33)]
+        least.append(min(curve(v, p) for v in speeds))
+    return (1.0 - 1e-4) * np.minimum.accumulate(least)
+
+
+def level_from(side: Side, e: Elements | Bristle) -> tuple[float, float]:
+    """The velocity above which the sliding curve no longer varies, rad/s (infinite if it does), and its value there."""
+    if e.constant_curve:
+        return 0.0, e.breakaway
+    assert side.model is not None
+    curve, p = curve_of(side).function, side.model.parameters
+    assert curve is not None
+    end = curve(1e6 * e.velocity_scale, p)
+    speeds = e.velocity_scale * np.geomspace(1.0, 1e6, 400)
+    varies = [abs(curve(float(v), p) - end) > LEVEL * end for v in speeds]
+    if varies[-2]:
+        return math.inf, end
+    return float(speeds[1 + max((i for i, yes in enumerate(varies) if yes), default=-1)]), end
+
+
+def glide_of(a: Any) -> Array:
+    """What velocity, slipping force, held torque and pull make of displacement, velocity and slipping force."""
+    attraction = 0.0 if a["kind"] == BENDS else a["attraction"]
+    rate = np.zeros((5, 5))
+    rate[0, 1] = 1.0
+    rate[1, 1:4] = -a["viscous"], -1.0, 1.0
+    rate[1] /= a["inertia"]
+    if a["level"] > 0.0:  # else nothing slips against anything
+        rate[2, 2], rate[2, 4] = -attraction / a["level"], attraction
+    return np.asarray(expm(rate * a["sample_time"]), dtype=np.float64)[:3, 1:]

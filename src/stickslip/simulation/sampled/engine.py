@@ -1,0 +1,291 @@
+"""The sampled engine: an axis between two samples of its controller, under a torque that is held.
+
+Between two samples the torque does not change, so that the motion is that of the contact alone: exact while every
+element sticks (`sampled.stick`), of order 8 under error control while something slips (`sampled.slip`), and cut where
+an element breaks away or the axis turns (`sampled.modes`). That is for laws that give `modes`
+(`stickslip.spec.Elements`, `Bristle`); every other law takes implicit steps under error control
+(`sampled.general`). The tolerance is, as that of the other integrators, the error in position that a well-conditioned
+run may gather; general steps, of second order, gather more where a contact's spring rings at rest.
+
+The controller is one compiled function a sample (`_sampled`), whatever it is made of.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip.jit import call_profile, call_sample, kernel, pointer
+from stickslip.simulation._case import (
+    COLUMNS,
+    DIVERGED,
+    DONE,
+    DURATION,
+    ENCODER,
+    NO_STEP,
+    NOT_FINITE,
+    SAMPLE_TIME,
+    STORM,
+    STORM_EVENTS,
+    STORM_TIME,
+    TOO_STIFF,
+    Array,
+    Case,
+    Outcome,
+    surroundings,
+)
+from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter, settle_band_of
+from stickslip.simulation._sampled import Sampled, compiled, measured_position
+from stickslip.simulation.exact.engine import crosses_once, elements_of, modulations
+from stickslip.simulation.recorded_input.step import Plant
+from stickslip.simulation.sampled.axis import axis_of, general_axis
+from stickslip.simulation.sampled.general import Contact, act_on, contact_of, hold, plant_of, step_on
+from stickslip.simulation.sampled.modes import creep, friction, rest, sign
+from stickslip.simulation.sampled.output import measure, write
+from stickslip.simulation.sampled.rates import BENDS, HOLDS, RESTS, SLIPS, STEPS, STUCK
+from stickslip.simulation.sampled.slip import slip
+from stickslip.simulation.sampled.stick import stick
+from stickslip.spec import Elements
+from stickslip.waiting import Reached, watched
+
+__all__ = ["can_run", "run"]
+
+NUDGE = 1e-11
+"""s after a sample, at which the reference is read, so that a kink there is seen from behind."""
+MOST_STEPS = 5e7
+NOW, ASKED = range(2)
+"""Of the clock: the time reached, s, and whether the run is to end."""
+ROWS, OUTPUTS = range(2)
+"""Of the counts."""
+
+
+class Control(NamedTuple):
+    """The controller and its reference."""
+
+    sampled: Sampled
+    profile: int
+    reference_parameters: Any
+    encoder: float
+    surroundings: Any
+    motion: Any
+
+
+def can_run(case: Case) -> str:
+    """Say why this integrator cannot run `case`, in one sentence; "" if it can."""
+    if case.numbers[SAMPLE_TIME] == 0.0:
+        return "the controller acts in continuous time, not with a sample time"
+    return ""
+
+
+def cannot_locate(case: Case) -> str:
+    """Say why the motion of `case` is no located flow but takes general steps, in one sentence; "" if it is one."""
+    side = case.plant
+    assert side.model is not None
+    law = side.model.law
+    if law.reads_surroundings:
+        return f"law {law.name!r} depends on its surroundings ({modulations(law)})"
+    e = elements_of(side)
+    if e is None:
+        return f"law {law.name!r} gives no `modes`"
+    if not e.constant_curve and (not side.pointers.sliding or e.velocity_scale <= 0.0):
+        return f"law {law.name!r} has no sliding curve with a velocity scale"
+    if isinstance(e, Elements):
+        rigid = [math.isinf(k) for k in e.stiffness]
+        if any(rigid) and not (all(rigid) and math.isinf(e.attraction)):
+            return f"law {law.name!r} has rigid elements in addition to springs, or with a finite attraction"
+        if math.isfinite(e.slope) and not (all(rigid) and crosses_once(side, e)):
+            return f"law {law.name!r} has a steep slope that meets the sliding curve more than once, or never"
+    return ""
+
+
+def run(case: Case) -> Outcome:
+    """Integrate the case.
+
+    Returns
+    -------
+    Outcome
+        One row per entry of ``case.grid`` (from the right where the controller's torque jumps), and rows per reversal,
+        standstill and break-away. A run that ends early says so in ``code`` and keeps its rows.
+    """
+    n = case.numbers
+    axis, state, springs = general_axis(case) if cannot_locate(case) else axis_of(case)
+    contact = contact_of(case)
+    accumulator = new_meter(float(n[DURATION]), settle_band_of(case.reference, float(n[DURATION])))
+    turns, nodes = np.zeros((4096, 2)), np.zeros((8, 5))
+    counts, clock = np.zeros(2, dtype=np.int64), np.zeros(2)
+    grid = np.ascontiguousarray(case.grid, dtype=np.float64)
+    control = Control(
+        compiled(case.controller), case.profile, case.reference_parameters, float(n[ENCODER]),
+        surroundings(n), np.zeros(3),
+    )  # fmt: skip
+    stops = stops_of(case)
+
+    def stop() -> None:
+        clock[ASKED] = 1.0
+
+    rows, code = watched(
+        lambda: integrate(
+            control, axis, state, springs, contact, case.plant.parameters, stops, grid, nodes, accumulator, turns,
+            counts, clock,
+        ),
+        lambda: Reached(float(clock[NOW]), float(n[DURATION]), float(state[0]["steps"])), stop,
+    )  # fmt: skip
+    found = {name: int(state[0][name]) for name in ("steps", "rejected", "events")}
+    return Outcome(
+        rows, int(code), float(clock[NOW]), accumulator, turns[: int(accumulator[TURN_COUNT])], found
+    )
+
+
+# ---- laying a case out -------------------------------------------------------------------------------------------
+
+
+def stops_of(case: Case) -> Array:
+    """When a stretch ends, how long it is, and whether the controller samples there (1); shape (n, 3)."""
+    period, duration = float(case.numbers[SAMPLE_TIME]), float(case.numbers[DURATION])
+    samples = period * np.arange(1, math.ceil(duration / period - 1e-9))
+    others = np.concatenate([case.breaks, case.grid[case.grid > 0.0]])
+    times = np.concatenate([samples, others])
+    marks = np.concatenate([np.ones(samples.size), np.zeros(others.size)])
+    order = np.lexsort((-marks, times))
+    times, marks = times[order], marks[order]
+    first = np.concatenate([[True], np.diff(times) > 1e-12 * max(1.0, duration)])
+    out = np.zeros((int(first.sum()), 3))
+    out[:, 0] = times[first]
+    out[:, 1] = np.diff(out[:, 0], prepend=0.0)
+    np.maximum.at(out[:, 2], np.cumsum(first) - 1, marks)
+    whole = np.abs(out[:, 1] - period) < 1e-9 * period
+    # Exactly the sample time, so that the flow kept for it serves.
+    out[whole, 1] = period
+    return out
+
+
+# ---- the loop over time ------------------------------------------------------------------------------------------
+
+
+@kernel(exact=False)
+def integrate(
+    control: Control, axes: Any, states: Any, springs: Any, contact: Contact, parameters: Any, stops: Any, grid: Any,
+    nodes: Any, acc: Any, turns: Any, counts: Any, clock: Any,
+) -> tuple[Any, int]:  # fmt: skip
+    """Run from 0 to the last stop; returns rows and code."""
+    axis, z = axes[0], states[0]
+    starts = states.copy()
+    rows = np.zeros((grid.size + 256, len(COLUMNS)))
+    storm = np.full(STORM_EVENTS, -1.0)
+    code = DONE
+    plant = plant_of(contact)
+    act(control, axis, z, parameters, contact, plant, 0.0)
+    rows = put_out(control, axis, z, parameters, 0.0, grid, rows, counts)
+    for i in range(stops.shape[0]):
+        left = stops[i, 1]
+        while left > 0.0 and code == DONE:
+            happened = z.events
+            if axis.metered:
+                starts[0] = z
+            time = stops[i, 0] - left
+            taken = advance(axis, z, springs, parameters, contact, plant, time, left)
+            left = left - taken if left - taken > 1e-12 * axis.sample_time else 0.0
+            z.steps += 1
+            if axis.metered and taken > 0.0:
+                measure(control, axis, starts[0], z, time, taken, nodes, acc, turns)
+            if z.events != happened:
+                rows = write(control, axis, z, parameters, time + taken, 1.0, rows, counts[ROWS])
+                counts[ROWS] += 1
+                code = stormy(z, time + taken, storm)
+                if z.mode < STEPS:
+                    refresh(axis, z, parameters)
+            if z.failed:
+                code = NO_STEP
+        clock[NOW] = stops[i, 0] - left
+        code = verdict(axis, z) if code == DONE else code
+        if clock[ASKED] != 0.0 or z.steps + z.rejected > MOST_STEPS:
+            code = TOO_STIFF
+        if code != DONE:
+            break
+        if stops[i, 2] > 0.0:
+            act(control, axis, z, parameters, contact, plant, stops[i, 0])
+        rows = put_out(control, axis, z, parameters, stops[i, 0], grid, rows, counts)
+    if axis.metered:
+        close_standstill(acc, clock[NOW])
+    return rows[: counts[ROWS]].copy(), code
+
+
+@kernel(exact=False)
+def advance(
+    axis: Any, z: Any, springs: Any, parameters: Any, contact: Contact, plant: Plant, t: float, left: float
+) -> float:
+    """Move on by at most `left` s under the held torque, until something changes; returns the time taken."""
+    if z.mode == STEPS:
+        return step_on(axis, z, contact, plant, t, left)
+    if z.mode == HOLDS:
+        return hold(axis, z, contact, plant, t, left)
+    if z.mode == STUCK:
+        return stick(axis, z, springs, parameters, left)
+    if z.mode == SLIPS:
+        return slip(axis, z, springs, parameters, left)
+    if z.mode == RESTS:
+        return rest(axis, z, springs, parameters, left)
+    return creep(axis, z, springs, left)
+
+
+@kernel(exact=False)
+def act(
+    control: Control, axis: Any, z: Any, parameters: Any, contact: Contact, plant: Plant, t: float
+) -> None:
+    """Let the controller sample, and hold what it answers."""
+    motion, sampled = control.motion, control.sampled
+    call_profile(control.profile, t + NUDGE, pointer(control.reference_parameters, 0), pointer(motion, 0))
+    control.surroundings[0], control.surroundings[3] = z.position + z.moved, t
+    z.torque = call_sample(
+        sampled.address, measured_position(z.position + z.moved, control.encoder), motion[0] - NUDGE * motion[1],
+        motion[1], motion[2], pointer(sampled.settings, 0), pointer(sampled.memory, 0),
+        pointer(sampled.state, 0), pointer(sampled.parameters, 0), pointer(control.surroundings, 0),
+    )  # fmt: skip
+    if sampled.memory[sampled.fault] != 0.0:
+        z.torque = math.nan
+    if z.mode < STEPS:
+        refresh(axis, z, parameters)
+    else:
+        act_on(axis, z, contact, plant, t)
+
+
+@kernel(exact=False)
+def refresh(axis: Any, z: Any, parameters: Any) -> None:
+    """The acceleration after a jump of the torque or a change of what slips; a bristle at rest takes its direction."""
+    z.acceleration = (z.torque - friction(axis, z, parameters)) / axis.inertia
+    if axis.kind == BENDS and z.velocity == 0.0:
+        z.direction = sign(z.acceleration)
+
+
+@kernel(exact=False)
+def put_out(
+    control: Control, axis: Any, z: Any, parameters: Any, t: float, grid: Any, rows: Any, counts: Any
+) -> Any:
+    """Write the rows of the output times up to t; returns the rows."""
+    while counts[OUTPUTS] < grid.size and grid[counts[OUTPUTS]] <= t + 1e-12 * max(1.0, t):
+        rows = write(control, axis, z, parameters, grid[counts[OUTPUTS]], 0.0, rows, counts[ROWS])
+        counts[ROWS] += 1
+        counts[OUTPUTS] += 1
+    return rows
+
+
+@kernel(exact=False)
+def stormy(z: Any, t: float, storm: Any) -> int:
+    """STORM where too many events lie too near; `storm` holds the times of the last ones."""
+    last = z.events % storm.size
+    if storm[last] >= 0.0 and t - storm[last] < STORM_TIME:
+        return STORM
+    storm[last] = t
+    return DONE
+
+
+@kernel(exact=False)
+def verdict(axis: Any, z: Any) -> int:
+    """DONE if the motion may go on, else why the run ends."""
+    if not (math.isfinite(z.position + z.moved) and math.isfinite(z.velocity) and math.isfinite(z.torque)):
+        return NOT_FINITE
+    if abs(z.position + z.moved) > axis.position_limit or abs(z.velocity) > axis.velocity_limit:
+        return DIVERGED
+    return DONE

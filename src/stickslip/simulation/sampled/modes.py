@@ -1,0 +1,207 @@
+"""What sticks and what slips: break-away and reversal of a contact in the sampled engine, written down in its state."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from stickslip.jit import kernel
+from stickslip.simulation.sampled.rates import (
+    BENDS,
+    CREEPS,
+    FOLLOWS,
+    LEVELS,
+    RESTS,
+    SLIPS,
+    STEPS,
+    STUCK,
+    curve_at,
+)
+
+__all__ = [
+    "break_away",
+    "creep",
+    "floor_below",
+    "fold",
+    "friction",
+    "gather",
+    "heaviest",
+    "rest",
+    "sign",
+    "turn",
+]
+
+AT_ONCE = 1e-12
+"""Of the curve: elements whose load lies this near to it break away with the first one."""
+OUT = 1.0 + 1e-12
+"""Of the velocity that ends a steep slope, beyond which the slope is left: not to and fro by rounding."""
+
+
+@kernel(exact=False, inline=True)
+def sign(x: float) -> float:
+    """+1, -1, or 0."""
+    if x > 0.0:
+        return 1.0
+    return -1.0 if x < 0.0 else 0.0
+
+
+@kernel(exact=False, inline=True)
+def floor_below(axis: Any, v: float) -> float:
+    """A bound below s on all velocities up to v, N·m."""
+    if axis.curve == 0:
+        return axis.breakaway
+    top = axis.scale * 2.0 ** (4 - LEVELS)
+    for i in range(LEVELS):
+        if v <= top:
+            return axis.floor[i]
+        top *= 2.0
+    return axis.lowest
+
+
+@kernel(exact=False, inline=True)
+def heaviest(axis: Any, springs: Any, moved: float, direction: float) -> float:
+    """The largest load of a sticking element over its share, N·m (`stickslip.laws._stick`)."""
+    most = -math.inf
+    for i in range(springs.shape[0]):
+        if springs[i].slips == 0.0:
+            force = springs[i].force + springs[i].stiffness * moved
+            load = abs(force) if axis.literal else direction * force
+            most = max(most, load / springs[i].share)
+    return most
+
+
+@kernel(exact=False)
+def fold(axis: Any, z: Any, springs: Any, parameters: Any) -> None:
+    """Write every element's force down as it is now."""
+    relaxed = math.exp(-z.relaxed)
+    level = 0.0
+    if axis.kind == FOLLOWS:
+        level = z.direction * curve_at(axis.curve, axis.breakaway, parameters, z.velocity)
+    elif z.share > 0.0:
+        level = (z.slipping - relaxed * z.slipped_from) / z.share
+    for i in range(springs.shape[0]):
+        if springs[i].slips == 0.0:
+            springs[i].force += springs[i].stiffness * z.moved
+        elif axis.kind == FOLLOWS:
+            springs[i].force = springs[i].share * level
+        else:
+            springs[i].force = relaxed * springs[i].force + springs[i].share * level
+    z.position += z.moved
+    z.moved = 0.0
+
+
+@kernel(exact=False)
+def gather(axis: Any, z: Any, springs: Any) -> None:
+    """Sum up what sticks and what slips."""
+    if axis.kind == BENDS:
+        return
+    z.held = z.spring = z.slipping = z.relaxed = 0.0
+    z.share = axis.rigid + axis.steep if z.mode == SLIPS else 0.0
+    for i in range(springs.shape[0]):
+        if springs[i].slips == 0.0:
+            z.held += springs[i].force
+            z.spring += springs[i].stiffness
+        else:
+            z.slipping += springs[i].force
+            z.share += springs[i].share
+    z.slipped_from = z.slipping
+
+
+@kernel(exact=False)
+def break_away(axis: Any, z: Any, springs: Any, parameters: Any, direction: float) -> None:
+    """Let the elements slip whose load has reached their share of the curve; the heaviest in any case."""
+    fold(axis, z, springs, parameters)
+    level = curve_at(axis.curve, axis.breakaway, parameters, z.velocity)
+    enough = min(level * (1.0 - AT_ONCE), heaviest(axis, springs, 0.0, direction))
+    for i in range(springs.shape[0]):
+        if springs[i].slips == 0.0:
+            load = abs(springs[i].force) if axis.literal else direction * springs[i].force
+            if load >= enough * springs[i].share:
+                springs[i].slips = 1.0
+    z.direction, z.mode = direction, SLIPS
+    z.events += 1
+    gather(axis, z, springs)
+
+
+@kernel(exact=False)
+def turn(axis: Any, z: Any, springs: Any, parameters: Any) -> None:
+    """The velocity has fallen to zero (or to where the steep slope begins): what slipped sticks."""
+    z.velocity = z.direction * axis.layer
+    z.events += 1
+    if axis.kind == BENDS:
+        z.direction = sign(z.torque - z.slipping)
+        return
+    fold(axis, z, springs, parameters)
+    for i in range(springs.shape[0]):
+        springs[i].slips = 0.0
+    z.mode = STUCK
+    if axis.rigid > 0.0:
+        z.mode = RESTS
+    elif axis.steep > 0.0:
+        z.mode = CREEPS
+    gather(axis, z, springs)
+
+
+@kernel(exact=False)
+def set_off(axis: Any, z: Any, springs: Any, direction: float) -> None:
+    """A rigid contact begins to slide."""
+    z.direction, z.mode = direction, SLIPS
+    z.position += z.moved
+    z.moved = 0.0
+    z.events += 1
+    gather(axis, z, springs)
+
+
+@kernel(exact=False)
+def rest(axis: Any, z: Any, springs: Any, parameters: Any, left: float) -> float:
+    """A rigid contact holds the axis, or lets it go; returns the time taken."""
+    z.velocity = z.acceleration = 0.0
+    if abs(z.torque) <= axis.rigid * curve_at(axis.curve, axis.breakaway, parameters, 0.0):
+        return left
+    set_off(axis, z, springs, sign(z.torque))
+    return 0.0
+
+
+@kernel(exact=False)
+def creep(axis: Any, z: Any, springs: Any, left: float) -> float:
+    """Follow a steep slope, J dv/dt = u - slope v, at most to where it meets the curve; returns the time taken."""
+    slope = axis.slope
+    rate = slope / axis.inertia
+    goal, v = z.torque / slope, z.velocity
+    leaves = abs(goal) > axis.layer * OUT
+    edge = math.copysign(axis.layer, goal)
+    taken = left
+    if leaves:
+        gone = (goal - edge) / (goal - v) if (edge - v) * edge > 0.0 else 1.0
+        taken = -math.log(gone) / rate
+        leaves = taken < left
+        taken = min(taken, left)
+    faded = -math.expm1(-rate * taken)
+    z.goal = goal
+    z.moved += goal * taken + (v - goal) * faded / rate
+    z.velocity = edge if leaves else v + (goal - v) * faded
+    z.acceleration = (z.torque - slope * z.velocity) / axis.inertia
+    if leaves:
+        set_off(axis, z, springs, sign(goal))
+    return taken
+
+
+@kernel(exact=False)
+def friction(axis: Any, z: Any, parameters: Any) -> float:
+    """Torque of the contact now, N·m."""
+    v = z.velocity
+    if z.mode == RESTS:
+        return z.torque
+    if z.mode >= STEPS:
+        return z.held
+    if z.mode == CREEPS:
+        return axis.slope * v
+    force = z.held + z.spring * z.moved + axis.viscous * v
+    if z.mode == STUCK:
+        return force
+    level = curve_at(axis.curve, axis.breakaway, parameters, v)
+    if axis.kind == FOLLOWS:
+        return force + z.share * z.direction * level
+    if axis.kind == BENDS:
+        return force + z.slipping + axis.lag * axis.bristle * v * (1.0 - z.direction * z.slipping / level)
+    return force + z.slipping

@@ -1,0 +1,88 @@
+"""Rows and metrics of the sampled engine."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from stickslip.jit import call_profile, kernel, pointer
+from stickslip.simulation._meter import MAX_WINDOW, meter
+from stickslip.simulation.exact.flow import flow, free_motion, linear
+from stickslip.simulation.sampled.modes import friction
+from stickslip.simulation.sampled.rates import CREEPS, STUCK
+from stickslip.simulation.sampled.slip import hermite, quintic
+
+__all__ = ["measure", "write"]
+
+BESIDE = 1e-11
+"""s, by which one-sided values of the reference lie inside a stretch."""
+
+
+@kernel(exact=False)
+def write(
+    control: Any, axis: Any, z: Any, parameters: Any, t: float, event: float, rows: Any, count: int
+) -> Any:
+    """Write the row at t; returns the rows, grown where they were full."""
+    if count == rows.shape[0]:
+        grown = np.zeros((2 * count, rows.shape[1]))
+        grown[:count] = rows
+        rows = grown
+    call_profile(control.profile, t, pointer(control.reference_parameters, 0), pointer(control.motion, 0))
+    row = rows[count]
+    row[0], row[1], row[2] = t, control.motion[0], control.motion[1]
+    row[3], row[4] = z.position + z.moved, z.velocity
+    row[5], row[6] = z.torque, friction(axis, z, parameters)
+    row[7] = control.sampled.memory[control.sampled.compensation]
+    row[8] = event
+    return rows
+
+
+@kernel(exact=False)
+def moved_after(axis: Any, was: Any, z: Any, h: float, t: float) -> tuple[float, float, float]:
+    """Position, velocity and acceleration t into a stretch of h that has led from `was` to `z`."""
+    start = was.position + was.moved
+    v0, a0 = was.velocity, was.acceleration
+    if was.mode == STUCK:
+        lin = linear(axis.inertia, axis.viscous, was.spring)
+        off = was.moved - z.goal
+        e, v = free_motion(flow(lin, t), off, v0)
+        return start + (e - off), v, -lin.square * e - 2.0 * lin.decay * v
+    if was.mode == CREEPS:
+        rate = axis.slope / axis.inertia
+        faded = -math.expm1(-rate * t)
+        v = v0 + (z.goal - v0) * faded
+        return start + z.goal * t + (v0 - z.goal) * faded / rate, v, (z.goal - v) * rate
+    d, v1, a1 = z.position + z.moved - start, z.velocity, z.acceleration
+    v = hermite(v0, a0, v1, a1, h, t)
+    x = t / h
+    # The slope of the cubic of velocities.
+    a = 6.0 * x * (1.0 - x) * (v1 - v0) / h + (1.0 - x) * (1.0 - 3.0 * x) * a0 + x * (3.0 * x - 2.0) * a1
+    return start + quintic(d, v0, a0, v1, a1, h, t), v, a
+
+
+@kernel(exact=False)
+def measure(
+    control: Any, axis: Any, was: Any, z: Any, t: float, h: float, nodes: Any, acc: Any, turns: Any
+) -> None:
+    """Hand the stretch that has led from `was` to `z` to the meter."""
+    windows = math.ceil(h / MAX_WINDOW * (1.0 - 1e-9))
+    beside = min(BESIDE, 0.5 * h)
+    for window in range(windows):
+        for i in range(5):
+            x = h * (window + 0.25 * i) / windows
+            inside = min(max(t + x, t + beside), t + h - beside)
+            call_profile(
+                control.profile, inside, pointer(control.reference_parameters, 0), pointer(control.motion, 0)
+            )
+            position, v, a = moved_after(axis, was, z, h, x)
+            nodes[0, i] = control.motion[0] - position
+            nodes[1, i] = control.motion[1] - v
+            nodes[2, i] = position
+            nodes[3, i] = v
+            nodes[4, i] = control.motion[1]
+            nodes[5, i] = was.torque
+            nodes[6, i] = was.torque - axis.inertia * a
+            nodes[7, i] = control.sampled.memory[control.sampled.compensation]
+        meter(acc, turns, t + h * window / windows, h / windows, nodes)

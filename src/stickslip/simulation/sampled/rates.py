@@ -1,0 +1,127 @@
+"""What the sampled engine remembers of an axis, and the rates of one that slips under a held torque.
+
+J dv/dt = u - F (thesis eq. 3.1 with T_m = u): while something slips, F is the springs of the sticking elements, one
+slipping force s for all that slip (they share a curve: thesis eq. 2.17 summed up) and the viscous part.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip.jit import call_value, kernel, pointer
+
+__all__ = ["AXIS", "LEVELS", "SPRING", "STATE", "Slip", "combined", "curve_at", "rates", "slip_of"]
+
+RELAXES, FOLLOWS, BENDS = range(3)
+"""What a slipping force does: relax towards the curve (GMS), lie on it (Coulomb, Maxwell-slip), bend as a bristle."""
+STUCK, SLIPS, RESTS, CREEPS, STEPS, HOLDS = range(6)
+"""What the axis does: every spring sticks; something slips; a rigid contact holds; it is on its steep slope. And of the
+general step: it moves; a contact that jumps at rest holds."""
+LEVELS = 24
+"""Velocities up to which the lowest value of the sliding curve is kept, each twice the one before."""
+
+AXIS = np.dtype(
+    [
+        *((name, np.float64) for name in (
+            "inertia", "viscous", "attraction", "bristle", "lag", "breakaway", "scale", "lowest", "rigid", "steep",
+            "slope", "layer", "far", "level", "settled", "sample_time", "local", "near", "longest", "position_limit",
+            "velocity_limit",
+        )),
+        ("flow", np.float64, (4,)),
+        ("glide", np.float64, (3, 4)),
+        ("floor", np.float64, (LEVELS,)),
+        *((name, np.int64) for name in ("kind", "curve", "literal", "metered")),
+    ]
+)  # fmt: skip
+"""Constants of an axis: SI units; `stickslip.simulation.sampled.axis` fills them in. ``flow`` leads a stuck axis over
+a sample, ``glide`` one on which everything slips faster than ``far``, where the curve is level."""
+STATE = np.dtype(
+    [
+        *((name, np.float64) for name in (
+            "position", "moved", "velocity", "acceleration", "torque", "direction", "slipping", "slipped_from",
+            "relaxed", "held", "spring", "share", "next", "goal",
+        )),
+        *((name, np.int64) for name in ("mode", "events", "steps", "rejected", "failed")),
+    ]
+)  # fmt: skip
+"""The motion at one time. ``moved`` is the displacement since the springs' forces were written down, rad; ``held`` and
+``spring`` are force and stiffness of the sticking ones, ``slipping`` and ``share`` force and share of the others;
+``goal`` is where a stuck axis would come to rest, or the velocity at which one on its steep slope would go on."""
+SPRING = np.dtype([(name, np.float64) for name in ("stiffness", "share", "force", "slips")])
+"""One element: ``force`` in N·m where ``moved`` is 0; ``slips`` is 1 or 0."""
+
+
+class Slip(NamedTuple):
+    """The constants of one step in which something slips."""
+
+    kind: int
+    mobility: float
+    free: float
+    spring: float
+    viscous: float
+    pull: float
+    attraction: float
+    direction: float
+    bristle: float
+    lag: float
+    breakaway: float
+    curve: int
+    parameters: Any
+    of_velocity: float
+    of_force: float
+
+
+@kernel(exact=False, inline=True)
+def slip_of(axis: Any, z: Any, parameters: Any) -> Slip:
+    """The constants of the present step."""
+    time = axis.sample_time
+    of_force = time * time / axis.inertia
+    of_velocity = time
+    if axis.kind == BENDS:
+        # A bristle's force is balanced by its spring, or drives the axis for a period of that.
+        period = math.sqrt(axis.inertia / axis.bristle)
+        of_velocity = max(time, period)
+        of_force = max(1.0, time / period) / axis.bristle
+    return Slip(
+        axis.kind, 1.0 / axis.inertia, z.torque - z.held - z.spring * z.moved, z.spring, axis.viscous,
+        z.share * z.direction, axis.attraction, z.direction, axis.bristle, axis.lag, axis.breakaway, axis.curve,
+        parameters, of_velocity, of_force,
+    )  # fmt: skip
+
+
+@kernel(exact=False, inline=True)
+def curve_at(curve: int, breakaway: float, parameters: Any, v: float) -> float:
+    """s(v), N·m."""
+    if curve == 0:
+        return breakaway
+    return call_value(curve, v, pointer(parameters, 0))
+
+
+@kernel(exact=False, inline=True)
+def rates(m: Slip, d: float, v: float, s: float) -> tuple[float, float, float]:
+    """Acceleration, rate of the slipping force and rate of its relaxation, d after the step's start."""
+    level = curve_at(m.curve, m.breakaway, m.parameters, v)
+    ds = 0.0
+    decay = 0.0
+    force = s
+    if m.kind == RELAXES:
+        decay = m.attraction / level
+        ds = m.attraction * m.pull - decay * s
+    elif m.kind == FOLLOWS:
+        force = m.pull * level
+    else:
+        ds = m.bristle * v * (1.0 - m.direction * s / level)
+        force = s + m.lag * ds
+    return m.mobility * (m.free - m.spring * d - force - m.viscous * v), ds, decay
+
+
+@kernel(exact=False, inline=True)
+def combined(fifth: float, third: float) -> float:
+    """Hairer's estimate of a step's error from those of orders 5 and 3."""
+    five, three = fifth * fifth, third * third
+    if five == 0.0:
+        return 0.0
+    return five / math.sqrt(five + 0.01 * three)
