@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.estimate import Estimate
-from stickslip.identify.vector import Vector
-from stickslip.simulation.steady import Steady
+from stickslip.identify.fit.parameter_vector import Vector
+from stickslip.simulation.prescribed.steady import Steady
 
 __all__ = [
     "EXTRAPOLATED",

@@ -120,7 +120,7 @@ def identified_in(table: Table) -> Identified:
 
 def covariance(estimates: tuple[Estimate, ...], correlation: Array, logarithmic: list[bool]) -> Array:
     """Covariance of the estimates, of the logarithms of those that are said to be."""
-    from stickslip.identify.draws import log_spread
+    from stickslip.identify.monte_carlo import log_spread
 
     std = np.array([
         log_spread(e) if log else (e.std if math.isfinite(e.std) else (e.upper - e.lower) / 3.92)

@@ -21,8 +21,9 @@ from stickslip.config import Document, Table
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.machines.angle import AngleMap
+from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
-from stickslip.model import MODEL_FORMAT
+from stickslip.model import MODEL_FORMAT, Model
 
 __all__ = ["in_memory", "model_content", "model_data", "versions", "write_model"]
 
@@ -52,7 +53,7 @@ def write_model(
     Raises
     ------
     InputError
-        If there is no law, or the file cannot be written.
+        If there is neither a law nor a map over the angle, or the file cannot be written.
     """
     import tomli_w
 
@@ -92,23 +93,21 @@ def _relative(law: str, target: Path) -> str:
 
 def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: str = "") -> dict[str, Any]:
     """The content of the file as plain data."""
-    if found.model is None:
+    the_map: Any = found.details.get("map")
+    if found.model is None and not isinstance(the_map, PositionMap):
         raise InputError(f"{found.method} yields no whole law, so there is no model to write")
     axis: Any = found.details.get("axis")
-    plain = found.model.as_dict()
-    names = {f.name for f in found.model.law.fields}
-    choices = {k: v for k, v in plain.items() if k not in names and k != "law"}
     out: dict[str, Any] = {
         "format": MODEL_FORMAT,
-        "law": law or found.model.law.name,
         "method": found.method,
         "motion": axis.motion if isinstance(axis, ServoAxis) else "rotary",
         "notes": list(found.notes),
         "measure_next": list(found.measure_next),
-        "parameters": {k: v for k, v in plain.items() if k in names},
     }
-    if choices:
-        out["choices"] = choices
+    if found.model is not None:
+        out |= _law(found.model, law)
+    if isinstance(the_map, PositionMap):
+        out["position_map"] = the_map.as_dict()
     mechanics: Any = found.details.get("mechanics")
     if mechanics is not None:
         out["axis"] = {
@@ -131,6 +130,15 @@ def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: st
     out["data"] = [dict(d) for d in data]
     out["versions"] = versions()
     return out
+
+
+def _law(model: Model, law: str) -> dict[str, Any]:
+    """Its name, parameters and choices."""
+    plain = model.as_dict()
+    names = {f.name for f in model.law.fields}
+    choices = {k: v for k, v in plain.items() if k not in names and k != "law"}
+    out = {"law": law or model.law.name, "parameters": {k: v for k, v in plain.items() if k in names}}
+    return out | ({"choices": choices} if choices else {})
 
 
 def _estimate(e: Estimate) -> dict[str, Any]:

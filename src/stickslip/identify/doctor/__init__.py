@@ -15,10 +15,10 @@ import numpy as np
 
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding, sorted_findings
-from stickslip.identify.doctor import change, excitation, physics, signals, spikes, timing, units
+from stickslip.identify.doctor import change, excitation, physics, play, signals, spikes, timing, units
 from stickslip.identify.doctor._view import View
-from stickslip.identify.regression import regress_axis
-from stickslip.identify.regressions import Regress
+from stickslip.identify.regression.regression import regress_axis
+from stickslip.identify.regression.regressions import Regress
 from stickslip.readers.cut import range_words, taken
 from stickslip.record import Record
 
@@ -40,7 +40,7 @@ CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
     *FIRST, timing.scale, units.assumed, units.counted,
     units.degrees, units.reference_scale, units.velocity_scale, units.too_fast, units.torque_scale, spikes.spikes,
     signals.wrapped, signals.saturated, signals.supply, signals.quantised, physics.sign, physics.skew, physics.gravity,
-    change.changes, change.temperature, excitation.moved,
+    play.backlash, change.changes, change.temperature, excitation.moved,
 )  # fmt: skip
 
 
@@ -111,7 +111,8 @@ def examine(
     accept : sequence of str
         Codes of errors that count as warnings, since the caller knows better; those of `FINAL` stay errors.
     regress : callable
-        The regression on certain sliding; a `stickslip.identify.regressions.Regressions` keeps it for who asks again.
+        The regression on certain sliding; a `stickslip.identify.regression.regressions.Regressions` keeps it for who
+        asks again.
 
     Raises
     ------

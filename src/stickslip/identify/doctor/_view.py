@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.filters import ZeroPhase, butterworth_poles
-from stickslip.identify.regression import regress_axis
-from stickslip.identify.regressions import Regress
+from stickslip.identify.fit.filters import ZeroPhase, butterworth_poles
+from stickslip.identify.regression.regression import regress_axis
+from stickslip.identify.regression.regressions import Regress
 from stickslip.readers.cut import file_rows
 from stickslip.record import Record, encoder_step
 

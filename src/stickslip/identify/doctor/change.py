@@ -18,7 +18,7 @@ import numpy as np
 
 from stickslip.finding import Finding
 from stickslip.identify.doctor._view import Array, Smooth, View, row
-from stickslip.identify.profile import long_run
+from stickslip.identify.fit.profile import long_run
 
 __all__ = ["changes", "temperature"]
 
@@ -190,7 +190,7 @@ class System:
 def _system(smooth: Smooth, rows: Any) -> System:
     v = smooth.velocity[rows]
     curve = _curve(np.abs(v))
-    # What friction has in common in both directions cannot be told from a torque over the position.
+    # What friction has in common in both directions cannot be distinguished from a torque over the position.
     odd = curve * np.sign(v)[:, None]
     matrix = np.column_stack([smooth.acceleration[rows], odd, curve, _place(smooth.position[rows])])
     size: Array = np.sqrt(np.mean(matrix**2, axis=0))

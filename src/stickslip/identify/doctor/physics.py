@@ -16,11 +16,11 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.identify.axis_trial import Trial
 from stickslip.identify.doctor._view import Array, Smooth, View
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["gravity", "sign", "skew"]
+__all__ = ["gravity", "line_of", "sign", "skew", "usable"]
 
 ROWS = 20_000
 """Rows of a regression: more tell no more."""
@@ -49,7 +49,7 @@ class Fit:
 
 def sign(view: View) -> Iterator[Finding]:
     """The work of friction over the record: it cannot be negative."""
-    smooth = _usable(view)
+    smooth = usable(view)
     if smooth is None:
         return
     measured = view.torque_channel == "friction_torque"
@@ -112,7 +112,7 @@ def _braking(smooth: Smooth, *, measured: bool) -> tuple[float, float]:
 
 def skew(view: View) -> Iterator[Finding]:
     """When the torque acted: a note from a tenth of a row on, a warning from where no drive does so."""
-    smooth = _usable(view)
+    smooth = usable(view)
     record = view.record
     if smooth is None or view.torque_channel != "motor_torque" or "position" not in record.channels:
         return
@@ -172,7 +172,7 @@ def _skew_at_reversals(view: View, smooth: Smooth) -> float | None:
 
 def gravity(view: View) -> Iterator[Finding]:
     """A mean torque that comes back with every turn: gravity; or a constant one."""
-    smooth = _usable(view)
+    smooth = usable(view)
     if smooth is None or view.torque_channel != "motor_torque":
         return
     plain = _fit(smooth, 0)
@@ -210,13 +210,18 @@ def gravity(view: View) -> Iterator[Finding]:
         )
 
 
-def _usable(view: View) -> Smooth | None:
+def usable(view: View) -> Smooth | None:
     """The filtered record, where it has torque and moves."""
     smooth = view.smooth
     if smooth is None or not smooth.torque.size or smooth.fast <= 0.0:
         return None
     enough = np.count_nonzero(smooth.moving) >= 50 and float(np.std(smooth.torque)) > 0.0
     return smooth if enough else None
+
+
+def line_of(smooth: Smooth) -> Fit:
+    """Inertia, Coulomb, viscous and constant part of the torque while it moves."""
+    return _fit(smooth, 0)
 
 
 def _hangs_in_degrees(smooth: Smooth, rest: float) -> bool:

@@ -137,7 +137,7 @@ def quantised(view: View) -> Iterator[Finding]:
     fast = view.smooth.fast
     unit = view.record.units["position"]
     message = (
-        f"position moves in steps of {step:.4g} {unit}; below {lowest:.3g} {unit}/s a speed told from"
+        f"position moves in steps of {step:.4g} {unit}; below {lowest:.3g} {unit}/s a speed computed from"
         f" {WINDOW:g} s of it is more than {100 * SLOW_ERROR:g} % uncertain"
     )
     if lowest > 0.3 * fast and fast > 0.0:

@@ -25,6 +25,7 @@ METHODS = (
     "attraction",
     "lugre",
     "hysteresis",
+    "cogging",
 )
 
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 from stickslip.config import named_numbers
 from stickslip.errors import InputError, UnknownName
-from stickslip.identify.axis_trial import DRIVES, Trial, trial_of
 from stickslip.identify.methods.method import Options
+from stickslip.identify.trial import DRIVES, Trial, trial_of
 from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.record import Record
-from stickslip.simulation.driven import Loop
+from stickslip.simulation.recorded_input.simulation import Loop
 
 __all__ = ["driven", "loop_of", "trials_of"]
 

@@ -1,15 +1,15 @@
-"""GMS's attraction parameter from a motion in one direction (`stickslip.identify.attraction`)."""
+"""GMS's attraction parameter from a motion in one direction (`stickslip.identify.presliding.attraction`)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from stickslip.errors import InputError
-from stickslip.identify.attraction import identify_attraction
 from stickslip.identify.estimate import Identification
-from stickslip.identify.hysteresis import Loop
 from stickslip.identify.methods._records import has_torque, single, torque_channel
 from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.presliding.attraction import identify_attraction
+from stickslip.identify.presliding.hysteresis import Loop
 from stickslip.record import Record
 
 __all__ = ["METHOD"]

@@ -1,18 +1,22 @@
-"""Inertia, offset or gravity and friction jointly, from any motion (`stickslip.identify.axis`)."""
+"""Inertia, offset or gravity and friction jointly, from any motion (`stickslip.identify.axis.identify`)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from stickslip.identify.axis import AUTOMATIC, identify_axis
-from stickslip.identify.axis_agreed import regressed
-from stickslip.identify.axis_inverse import inverse_dynamics
-from stickslip.identify.axis_output import Extras
-from stickslip.identify.axis_plain import inverse_identification
-from stickslip.identify.axis_trial import Trial
+from stickslip.errors import InputError
+from stickslip.identify.axis.agreed import regressed
+from stickslip.identify.axis.identify import AUTOMATIC, identify_axis
+from stickslip.identify.axis.output import Extras
+from stickslip.identify.axis.over_angle import over_angle
+from stickslip.identify.axis.plain import inverse_identification
 from stickslip.identify.estimate import Identification
 from stickslip.identify.methods._trials import driven, trials_of
 from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identify.trial import Trial
+from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 
 __all__ = ["METHOD"]
@@ -22,8 +26,23 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     """The whole axis; the last records judge where some are held out."""
     axis, trials = trials_of(records, options)
     count = len(trials) - options.held_out
+    skew = skew_of(trials[:count], options)
+    if not options.position_map:
+        return identified(axis, trials, count, skew, options)
+    try:
+        over = over_angle(trials[:count], axis, skew, options.regress)
+    except InputError as error:
+        found = identified(axis, trials, count, skew, options)
+        return replace(found, notes=(*found.notes, f"No torque over the angle is identified: {error}."))
+    without = [over.taken_out_of(t, axis) for t in trials]
+    return over.joined_to(identified(axis, without, count, skew, options))
+
+
+def identified(
+    axis: ServoAxis, trials: Sequence[Trial], count: int, skew: float | None, options: Options
+) -> Identification:
+    """The axis from the first so many trials, judged by the rest."""
     fitted, held = trials[:count], trials[count:]
-    skew = skew_of(fitted, options)
     if options.inverse:
         plain = inverse_dynamics(
             fitted, axis, per_direction=options.per_direction, harmonics=options.harmonics

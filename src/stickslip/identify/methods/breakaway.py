@@ -1,13 +1,13 @@
-"""Torque at the break, per direction, from torque ramps (`stickslip.identify.breakaway`)."""
+"""Torque at the break, per direction, from torque ramps (`stickslip.identify.presliding.breakaway`)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stickslip.identify.breakaway import identify_breakaway
 from stickslip.identify.estimate import Identification
 from stickslip.identify.methods._records import has_torque, torque_channel
 from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.presliding.breakaway import identify_breakaway
 from stickslip.record import Record
 
 __all__ = ["METHOD"]

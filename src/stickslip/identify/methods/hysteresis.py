@@ -9,9 +9,9 @@ import numpy as np
 
 from stickslip.errors import UnknownName
 from stickslip.identify.estimate import Identification
-from stickslip.identify.hysteresis import Loop, choose_hysteresis, templates_for
 from stickslip.identify.methods._records import has_torque, single, torque_channel
 from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.presliding.hysteresis import Loop, choose_hysteresis, templates_for
 from stickslip.record import Record
 
 __all__ = ["METHOD"]

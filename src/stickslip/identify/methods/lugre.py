@@ -1,4 +1,4 @@
-"""LuGre's sigma0 and sigma1 from a stick-slip response (`stickslip.identify.lugre_dynamics`)."""
+"""LuGre's sigma0 and sigma1 from a stick-slip response (`stickslip.identify.presliding.lugre_dynamics`)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
-from stickslip.identify.lugre_dynamics import Response, identify_lugre_dynamics
 from stickslip.identify.methods._records import curve_values, has_torque, single, torque_channel
 from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.presliding.lugre_dynamics import Response, identify_lugre_dynamics
 from stickslip.record import Record
 
 __all__ = ["METHOD"]

@@ -10,8 +10,8 @@ from typing import Literal
 from stickslip import plugins
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification, silent
-from stickslip.identify.regression import regress_axis
-from stickslip.identify.regressions import Regress
+from stickslip.identify.regression.regression import regress_axis
+from stickslip.identify.regression.regressions import Regress
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.spec import Law
@@ -70,14 +70,17 @@ class Options:
         s from then until it acts.
     harmonics : int
         Of a torque over the position (axis).
+    position_map : bool
+        Whether a map over the angle, orders chosen by the records, is found and taken out first (axis).
     load : bool
         Friction that grows with the load of the gearing (axis).
     intervals : {"prediction", "covariance"}
-        As in `stickslip.identify.axis.identify_axis`.
+        As in `stickslip.identify.axis.identify.identify_axis`.
     robust : bool
         Outliers count linearly in the output error (axis).
     regress : callable
-        The regression on certain sliding; a `stickslip.identify.regressions.Regressions` does not repeat the doctor's.
+        The regression on certain sliding; a `stickslip.identify.regression.regressions.Regressions` does not repeat
+        the doctor's.
     progress : callable
         Is told what begins, in a few words.
     """
@@ -108,11 +111,16 @@ class Options:
     robust: bool = False
     regress: Regress = regress_axis
     progress: Callable[[str], None] = silent
+    position_map: bool = False
 
     def __post_init__(self) -> None:
         for option, count in (("harmonics", self.harmonics), ("elements", self.elements)):
             if count < 0:
                 raise InputError(f"--{option} {count} must be 0 or more")
+        if self.position_map and self.harmonics:
+            raise InputError(
+                f"--position chooses its orders by itself, --harmonics {self.harmonics} gives them; leave one out"
+            )
         for option, value in (("noise", self.noise), ("threshold", self.threshold)):
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"--{option} {value:g} must be greater than 0")
@@ -135,6 +143,8 @@ class Method:
         ``check(records, options)`` refuses, before anything is computed, records that lack what it needs.
     holds_out : bool
         Whether records may judge the result instead of being fitted.
+    takes_current : bool
+        Whether a current without a torque constant will do.
     """
 
     name: str
@@ -142,6 +152,7 @@ class Method:
     identify: Callable[[Sequence[Record], Options], Identification]
     check: Callable[[Sequence[Record], Options], None]
     holds_out: bool = False
+    takes_current: bool = False
 
 
 def law_of(given: str | Law) -> Law:

@@ -1,14 +1,14 @@
-"""GMS elements from loops of torque over displacement (`stickslip.identify.presliding`)."""
+"""GMS elements from loops of torque over displacement (`stickslip.identify.presliding.presliding`)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from stickslip.identify.estimate import Identification
-from stickslip.identify.hysteresis import Loop
 from stickslip.identify.methods._records import curve_values, has_torque, single, torque_channel
 from stickslip.identify.methods.method import Method, Options
-from stickslip.identify.presliding import identify_presliding
+from stickslip.identify.presliding.hysteresis import Loop
+from stickslip.identify.presliding.presliding import identify_presliding
 from stickslip.record import Record
 
 __all__ = ["METHOD"]

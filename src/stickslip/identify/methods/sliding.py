@@ -1,4 +1,5 @@
-"""A curve through the torques at constant velocities (`stickslip.identify.sliding`); of several laws one is chosen."""
+"""A curve through the torques at constant velocities (`stickslip.identify.sliding.curve`); of several laws one is
+chosen."""
 
 from __future__ import annotations
 
@@ -7,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.identify.axis_start import starts
 from stickslip.identify.estimate import Identification
+from stickslip.identify.fit.axis_start import starts
 from stickslip.identify.methods._records import has_torque, torque_channel
 from stickslip.identify.methods.method import Method, Options, law_of
-from stickslip.identify.segments import sliding_points
-from stickslip.identify.sliding import Array, identify_sliding
-from stickslip.identify.sliding_choice import candidates, choose_sliding
+from stickslip.identify.sliding.choice import candidates, choose_sliding
+from stickslip.identify.sliding.curve import Array, identify_sliding
+from stickslip.identify.sliding.segments import sliding_points
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.spec import Law

@@ -1,0 +1,279 @@
+"""What several estimators say of one axis, and which of them a number is taken from.
+
+Inertia, offset, gravity and the level and slope of friction are those of the regression on certain sliding
+(`stickslip.identify.regression.regression`), which assumes nothing about the hold of the torque or about reversals; the
+prediction error (`stickslip.identify.axis.prediction`) tells what only slow motion and reversals show. Where both
+contradict each other, what it alone says is not called identified, and the reason is given.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.axis.gravity import hanging
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.fit.noise import Noise
+from stickslip.identify.fit.parameter_vector import Parameter, Vector
+from stickslip.identify.fit.uncertainty import verdict_on
+from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identify.regression.regression import QUANTILE, Regression, regress_axis
+from stickslip.identify.regression.regressions import Regress
+from stickslip.identify.regression.strokes import stacked
+from stickslip.identify.trial import Trial
+from stickslip.machines.servo import ServoAxis
+
+__all__ = [
+    "SAME",
+    "TOLD_BY_SLIDING",
+    "agreed",
+    "aligned",
+    "as_good",
+    "held_against",
+    "on_timing",
+    "regressed",
+    "sliding_values",
+]
+
+ALIGNED = 0.1
+"""Rows by which a torque that acts from row to row must be off its row to be moved."""
+KNOWN = 0.5
+"""Rows: the skew's half-width up to which it says anything about the hold of the torque."""
+SAME = 0.05
+"""Relative difference of two numbers that is none."""
+AS_GOOD = 1.5
+"""Times as much as the regression leaves of the torque in certain sliding, that other values may leave and still
+stand."""
+FALLS = 0.95
+"""Probability of a fall of friction in certain sliding from which on its numbers are held against the others'."""
+TOLD_BY_SLIDING = ("inertia", "offset", "gravity", "gravity_angle", "fc", "sigma2")
+DOUBT = "the prediction error, the only evidence for it, contradicts certain sliding on {name}: {other} against {own}"
+
+UNDECIDED = (
+    "the prediction error says {name} {own}, the plain inverse dynamics {other}, and the record slides too little in "
+    "one direction to decide"
+)
+
+
+def regressed(
+    trials: Sequence[Trial], axis: ServoAxis, skew: float | None, harmonic_period: float | None = None,
+    regress: Regress = regress_axis,
+) -> tuple[Regression | None, list[str]]:  # fmt: skip
+    """The regression on certain sliding, where the records allow it; else why they do not."""
+    if any(t.drive is None for t in trials):
+        return None, []
+    try:
+        return regress(trials, axis, skew=skew, harmonic_period=harmonic_period), []
+    except InputError as error:
+        return None, [f"No regression on certain sliding: {error}."]
+
+
+def aligned(trials: Sequence[Trial], found: Regression | None) -> list[Trial]:
+    """The trials, their drive's signal moved so that it acts from its row to the next, as simulations take it."""
+    if found is None:
+        return list(trials)
+    skew = found.numbers["skew"]
+    out: list[Trial] = []
+    for t in trials:
+        late = skew.value + 0.5 * t.period
+        if t.drive is None or abs(late) <= ALIGNED * t.period or QUANTILE * skew.std > KNOWN * t.period:
+            out.append(t)
+            continue
+        out.append(replace(t, drive=np.interp(t.time + late, t.time, t.drive)))
+    return out
+
+
+def on_timing(found: Regression | None) -> list[str]:
+    """When the torque acted, in a sentence; nothing where the record does not tell."""
+    if found is None:
+        return []
+    low, high = found.interval("skew")
+    half, row = 0.5 * (high - low), found.period
+    if half > KNOWN * row:
+        return []
+    value = found.numbers["skew"].value
+    where = "after" if value < 0.0 else "before"
+    share = -value / row
+    kind = (
+        "as a command held from row to row" if abs(share - 0.5) <= max(ALIGNED, half / row)
+        else "as a value sampled at the row" if abs(share) <= max(ALIGNED, half / row)
+        else "as a mean over the row before" if abs(share + 0.5) <= max(ALIGNED, half / row)
+        else "a hold and a delay together"
+    )  # fmt: skip
+    return [
+        f"The torque acted {1e3 * abs(value):.3g} ms (±{1e3 * half:.2g}) {where} its row on average, {abs(share):.2g} "
+        f"of a row: {kind}; this is allowed for."
+    ]
+
+
+# ---- numbers --------------------------------------------------------------------------------------------------
+
+
+def sliding_values(found: Regression) -> dict[str, tuple[float, float, float]]:
+    """Value and ends of the 95 % interval of every number that certain sliding tells, by the names of estimates."""
+    out: dict[str, tuple[float, float, float]] = {}
+    for name in ("inertia", "offset", "fc", "sigma2"):
+        out[name] = (found.numbers[name].value, *found.interval(name))
+    if "gravity_sin" in found.numbers:
+        sine, cosine = found.numbers["gravity_sin"], found.numbers["gravity_cos"]
+        size, angle = hanging(sine.value, cosine.value, stacked(found.rows, "position"))
+        along = math.hypot(sine.value * sine.std, cosine.value * cosine.std) / size
+        across = math.hypot(cosine.value * sine.std, sine.value * cosine.std) / size**2
+        out["gravity"] = (size, size - QUANTILE * along, size + QUANTILE * along)
+        out["gravity_angle"] = (angle, angle - QUANTILE * across, angle + QUANTILE * across)
+    return out
+
+
+def agreed(
+    estimates: Iterable[Estimate], found: Regression, vector: Vector, inverse: InverseDynamics | None,
+    scale: Mapping[str, float], fine: bool = True,
+) -> tuple[tuple[Estimate, ...], list[str]]:  # fmt: skip
+    """Every number from the estimator that shows it, and what is to be said.
+
+    Parameters
+    ----------
+    estimates : iterable of Estimate
+        Those of the prediction error (or the starting values, where `fine` is False).
+    found : Regression
+    vector : Vector
+        Whose parameters they are.
+    inverse : InverseDynamics or None
+        The plain inverse dynamics: an interval is widened to hold what it says.
+    scale : mapping
+        What the half-width of a signed parameter is compared with, by name.
+    fine : bool
+        Whether the prediction error was asked.
+    """
+    sliding, parameters = sliding_values(found), {p.name: p for p in vector.free}
+    taken: dict[str, Estimate] = {}
+    notes: list[str] = []
+    doubts = ""
+    held = found.held_for(ALIGNED) and not found.orders
+    estimates, stands = list(estimates), inverse is not None and as_good(inverse, found)
+    for e in estimates:
+        if e.name not in sliding or e.name not in parameters:
+            continue
+        size = scale.get(e.name, math.nan)
+        own = told(e, parameters[e.name], *sliding[e.name], size)
+        apart = abs(e.value - own.value) > math.hypot(e.upper - e.lower, own.upper - own.lower) / 2.0
+        if fine and not apart:
+            # Its intervals are narrow, and hold where the torque acted as simulations take it.
+            taken[e.name] = e if held and e.identified and not own.identified else own
+            continue
+        if fine and abs(e.value - own.value) > SAME * abs(own.value) and e.name in ("inertia", "fc"):
+            doubts = DOUBT.format(name=e.name, other=f"{e.value:.4g}", own=f"{own.value:.4g} {e.unit}")
+        if stands:
+            own, said = held_together(own, plain_value(e.name, inverse), parameters[e.name], size)
+            notes += said
+        taken[e.name] = own
+    if doubts:
+        # Where both disagree on what both can tell, neither value nor interval of the fine one is to be trusted.
+        taken |= {
+            e.name: told(e, parameters[e.name], *sliding[e.name], scale.get(e.name, math.nan))
+            for e in estimates if taken.get(e.name) is e
+        }  # fmt: skip
+        notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
+    if fine and found.falls >= FALLS:
+        for e in estimates:
+            if e.name in ("fs", "vs") and e.name in parameters:
+                taken[e.name], said = fall_together(e, found, parameters[e.name])
+                notes += said
+    out = tuple(taken.get(e.name, e) for e in estimates)
+    if doubts:
+        out = tuple(
+            replace(e, identified=False, verdict=doubts) if e.identified and e.name not in sliding else e
+            for e in out
+        )
+    if found.doubt:
+        out = tuple(replace(e, identified=False, verdict=found.doubt) if e.identified else e for e in out)
+        notes.append(f"Nothing is identified: {found.doubt}. Record gentler motion.")
+    return out, notes
+
+
+def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale: float) -> Estimate:
+    """An estimate with another value and interval, judged by the same rules, within the parameter's bounds."""
+    std = (high - low) / (2.0 * QUANTILE)
+    least = p.par.lower if not p.par.positive else max(p.par.lower, 1e-12 * abs(high))
+    value, low, high = (min(max(x, least), p.par.upper) for x in (value, low, high))
+    why = verdict_on(p, value, low, high, Noise(1.0, "residual", math.inf), scale)
+    return replace(e, value=value, std=std, lower=low, upper=high, identified=not why, verdict=why)
+
+
+PLAIN = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}
+"""Names of the plain inverse dynamics."""
+
+
+def plain_value(name: str, inverse: InverseDynamics | None) -> tuple[float, float] | None:
+    """Value and half-width of the plain inverse dynamics, where it has that number."""
+    own = PLAIN.get(name, "")
+    if inverse is None or not inverse.has(own):
+        return None
+    return inverse[own], QUANTILE * float(inverse.robust_std[inverse.names.index(own)])
+
+
+def fall_together(e: Estimate, found: Regression, p: Parameter) -> tuple[Estimate, list[str]]:
+    """Fs or vs of the prediction error, its interval widened to hold what certain sliding says of the fall of
+    friction where both contradict each other."""
+    own = found.vs if e.name == "vs" else found.numbers["fs"]
+    half = QUANTILE * own.std
+    apart = abs(own.value - e.value) > math.hypot(0.5 * (e.upper - e.lower), half)
+    if not (apart and e.identified) or abs(own.value - e.value) <= SAME * abs(e.value):
+        return e, []
+    wide = told(e, p, e.value, min(e.lower, own.value), max(e.upper, own.value), math.nan)
+    return wide, [
+        f"{e.name}: certain sliding says {own.value:.4g}, the prediction error {e.value:.4g} {e.unit}; the interval "
+        "holds both."
+    ]
+
+
+def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tuple[Estimate, ...]:
+    """The estimates of a record without certain sliding: nothing is identified where inertia, level or slope
+    contradicts the plain inverse dynamics, since nothing decides between the two."""
+    out = tuple(estimates)
+    for e in out:
+        other = plain_value(e.name, inverse)
+        if e.name not in ("inertia", "fc", "sigma2") or other is None:
+            continue
+        apart = abs(other[0] - e.value) > math.hypot(0.5 * (e.upper - e.lower), other[1])
+        if apart and abs(other[0] - e.value) > SAME * abs(e.value):
+            why = UNDECIDED.format(name=e.name, own=f"{e.value:.4g}", other=f"{other[0]:.4g} {e.unit}")
+            return tuple(replace(x, identified=False, verdict=why) if x.identified else x for x in out)
+    return out
+
+
+def as_good(inverse: InverseDynamics, found: Regression, times: float = AS_GOOD) -> bool:
+    """Whether the plain inverse dynamics explains certain sliding as well as the regression: else that refutes it.
+
+    It may leave so many `times` as much of the torque there.
+    """
+    values = {
+        "inertia": inverse["inertia"],
+        "sigma2": inverse.viscous,
+        "fc": inverse.coulomb,
+        "offset": inverse.offset,
+    }
+    gravity = {n: inverse[n] for n in ("gravity_sin", "gravity_cos") if inverse.has(n)}
+    own = {n: v.value for n, v in found.numbers.items()}
+    return found.left_by(values | gravity) <= times * found.left_by(own)
+
+
+def held_together(
+    e: Estimate, other: tuple[float, float] | None, p: Parameter, scale: float
+) -> tuple[Estimate, list[str]]:
+    """The estimate, its interval widened to hold what the plain inverse dynamics says where both contradict each
+    other."""
+    if other is None:
+        return e, []
+    value, half = other
+    apart = abs(value - e.value) > math.hypot(0.5 * (e.upper - e.lower), half)
+    if not apart or abs(value - e.value) <= SAME * max(abs(e.value), scale if math.isfinite(scale) else 0.0):
+        return e, []
+    wide = told(e, p, e.value, min(e.lower, value), max(e.upper, value), scale)
+    return wide, [
+        f"{e.name}: the plain inverse dynamics, reversals included, says {value:.4g}, certain sliding {e.value:.4g} "
+        f"{e.unit}; the interval holds both."
+    ]

@@ -1,0 +1,269 @@
+"""A whole axis from any record: inertia, gravity or offset, and friction jointly.
+
+First what certain sliding tells in several bands (`stickslip.identify.regression.regression`), and when the torque
+acted; its hold and delay are taken out of the record before anything is simulated. What only slow motion and reversals
+tell comes from the prediction error (`stickslip.identify.axis.prediction`); `stickslip.identify.axis.agreed` says which
+number is whose. Of several laws the error on held-out data chooses (`stickslip.identify.axis.choice`). Records
+without the drive's signal are fitted by the output error (`stickslip.identify.axis.output`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip import plugins
+from stickslip.errors import InputError, UnknownName
+from stickslip.identify.axis.agreed import (
+    TOLD_BY_SLIDING,
+    aligned,
+    on_timing,
+    regressed,
+)
+from stickslip.identify.axis.choice import (
+    Candidate,
+    chosen_of,
+    compared,
+    foreseen,
+    options_of,
+    sentence_on,
+)  # fmt: skip
+from stickslip.identify.axis.law_fit import Evidence, estimated
+from stickslip.identify.axis.output import output_error
+from stickslip.identify.axis.result import assembled, narrow_note, noted
+from stickslip.identify.axis.search import Extras, require_start
+from stickslip.identify.estimate import Identification, silent
+from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
+from stickslip.identify.regression.regression import Regression, regress_axis
+from stickslip.identify.regression.regressions import Regress
+from stickslip.identify.trial import Trial
+from stickslip.machines.servo import ServoAxis
+from stickslip.spec import Law
+
+__all__ = ["AUTOMATIC", "Candidate", "identify_axis"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+AUTOMATIC = ("coulomb", "stribeck", "lugre")
+"""Laws among which the held-out error chooses where none is named."""
+NO_PREDICTION = "The prediction error cannot be had from these records:"
+INTERVALS = ("prediction", "covariance")
+FALLS, SHOWN = 0.95, 4.0
+"""Probability, and standard deviations of Fs - Fc, from which on friction is taken to fall with velocity."""
+SIMPLEST = (
+    "Law '{simplest}' is given instead of '{law}': the record does not determine the additional parameters of "
+    "'{law}', and no "
+    "fall of friction with velocity shows."
+)
+HELD_OUT = 0.3
+"""Last part of every record that is held out where several laws are compared and no validation record is given."""
+
+
+def identify_axis(
+    trials: Sequence[Trial],
+    axis: ServoAxis,
+    laws: Sequence[str | Law] = AUTOMATIC,
+    *,
+    validation: Sequence[Trial] = (),
+    free: Sequence[str] = (),
+    frozen: Sequence[str] = (),
+    values: Mapping[str, Any] | None = None,
+    extras: Extras = Extras(),  # noqa: B008 (frozen)
+    per_direction: bool = False,
+    robust: bool = False,
+    profiles: bool = False,
+    intervals: str = "prediction",
+    skew: float | None = None,
+    regress: Regress = regress_axis,
+    progress: Callable[[str], None] = silent,
+) -> Identification:
+    """Identify an axis: which law it has, its values, and how sure they are.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        Fitted together.
+    axis : ServoAxis
+    laws : sequence of str or Law
+        Names, paths of law files, or laws. Of several, the one with the fewest parameters is taken whose held-out
+        error lies within one standard error of the best (Hastie, Tibshirani and Friedman 2009, 7.10).
+    validation : sequence of Trial
+        Held out. Without any, and with several laws, the last 30 % of every record are held out for the choice
+        (the first, where the end is half as fast again as all before), and the chosen law is then fitted to all.
+    free, frozen, values, extras
+        As in `stickslip.identify.axis.output.output_error`.
+    robust, profiles
+        As there, for the output error alone; the prediction error weighs outliers anyway.
+    per_direction : bool
+        Whether friction has parameters of its own for each direction, in every law that allows it and in the inverse
+        dynamics reported with it. A constant torque cannot be distinguished from it: `offset` is kept at 0 unless it is
+        free or given.
+    intervals : {"prediction", "covariance"}
+        Values and intervals from the prediction error (`stickslip.identify.axis.prediction`), where the records allow
+        it; or from the covariance of the output error, which is too narrow where noise is coloured.
+    skew : float, optional
+        s by which the column of the torque lies behind the torque that acted, where it is known; found otherwise.
+    regress : callable
+        The regression on certain sliding; a `stickslip.identify.regression.regressions.Regressions` does not repeat
+        the doctor's.
+    progress : callable
+        Is told what begins, in a few words.
+
+    Returns
+    -------
+    Identification
+        ``details`` holds ``mechanics``, ``inverse`` (`InverseDynamics` or None), ``regression`` (`Regression` or None),
+        ``output`` (`FittedAxis`) and ``candidates``.
+
+    Raises
+    ------
+    InputError
+        If the records do not allow it, or no law could be fitted.
+    """
+    if not laws:
+        raise InputError("no law to identify; name at least one")
+    if intervals not in INTERVALS:
+        raise UnknownName("source of intervals", intervals, INTERVALS)
+    tried = [plugins.law(x) if isinstance(x, str) else x for x in laws]
+    if per_direction:
+        tried = [each_way(law) for law in tried]
+        if "offset" not in (*free, *(values or {})):
+            frozen, values = (*frozen, "offset"), {"offset": 0.0, **(values or {})}
+    options: dict[str, Any] = {
+        "free": free, "frozen": frozen, "values": values, "extras": extras, "robust": robust
+    }  # fmt: skip
+    refuse_harmonics(trials, extras.harmonics + extras.friction_harmonics, simulated=True)
+    evidence, notes = looked_at(trials, validation, axis, extras, skew, per_direction, regress)
+    if evidence.inverse is None:
+        require_start(evidence.trials, axis, tried, dict(values or {}), extras)
+    if per_direction or not plain_axis(extras, free, values):
+        evidence = replace(evidence, sliding=None)
+    automatic = tuple(laws) == AUTOMATIC
+    if automatic:
+        tried = shortlist(tried, evidence.sliding)
+    chosen, own = tried[0], options_of(tried[0], options, tried)
+    if len(tried) > 1:
+        candidates, by = judged_laws(evidence, tried, options, intervals, progress)
+        place = chosen_of(candidates)
+        chosen, evidence = tried[place], replace(evidence, candidates=candidates)
+        own = dict(options_of(chosen, options, tried), values=candidates[place].start)
+        notes = [*notes, sentence_on(candidates, chosen.name), *by]
+    progress(f"{chosen.name}: all of the data")
+    lacking = ""
+    if intervals == "prediction":
+        try:
+            found = estimated(chosen, own, evidence, notes)
+            if automatic and not per_direction and nothing_more(found, {*free, *frozen, *(values or {})}):
+                simplest = plugins.law(AUTOMATIC[0])
+                said = [*notes, SIMPLEST.format(law=chosen.name, simplest=simplest.name)]
+                found = estimated(simplest, options_of(simplest, options, [simplest]), evidence, said)
+            return found
+        except InputError as error:
+            lacking = f"{NO_PREDICTION} {error}."
+    result = output_error(evidence.trials, axis, chosen, evidence.inverse, profiles=profiles, **own)
+    found = assembled(
+        result, result.estimates, result.fit.correlation, evidence.inverse, evidence.validation,
+        evidence.candidates, notes,
+    )  # fmt: skip
+    return noted(found, narrow_note(result, ask=not lacking), *filter(None, [lacking]))
+
+
+def looked_at(
+    trials: Sequence[Trial], validation: Sequence[Trial], axis: ServoAxis, extras: Extras, skew: float | None,
+    per_direction: bool, regress: Regress,
+) -> tuple[Evidence, list[str]]:  # fmt: skip
+    """What the regressions tell, the torque of every record moved to where it acted; and what is to be said."""
+    sliding, notes = regressed(trials, axis, skew, extras.harmonic_period, regress)
+    trials, validation = aligned(trials, sliding), aligned(validation, sliding)
+    inverse, more = first_look(trials, axis, extras, per_direction)
+    unchecked = sliding is None and all(t.drive is not None for t in trials)
+    said = [*(on_timing(sliding) if skew is None else []), *notes, *more]
+    return Evidence(trials, validation, axis, inverse, sliding, unchecked), said
+
+
+def shortlist(laws: Sequence[Law], sliding: Regression | None) -> list[Law]:
+    """The laws worth a comparison where none was named: only those with a fall of friction where one shows clearly.
+
+    Where none shows it may lie below the speeds of certain sliding.
+    """
+    if sliding is None or sliding.falls < FALLS or sliding.fall_shown < SHOWN:
+        return list(laws)
+    return [law for law in laws if "fs" in {f.name for f in law.fields}] or list(laws)
+
+
+def nothing_more(found: Identification, given: Set[str]) -> bool:
+    """Whether the record tells nothing of what a law has beside Coulomb's, and shows no fall of friction either.
+
+    What the user named (`given`) is never dropped.
+    """
+    estimates = {e.name: e for e in found.estimates}
+    own = {f.name for f in found.model.law.fields} - {*TOLD_BY_SLIDING} if found.model else set[str]()
+    more = {n: e for n, e in estimates.items() if n.partition("[")[0] in own}
+    falls = "fs" in estimates and estimates["fs"].value > estimates["fc"].value
+    return bool(more) and not (own & given or any(e.identified for e in more.values()) or falls)
+
+
+def judged_laws(
+    evidence: Evidence,
+    laws: Sequence[Law],
+    options: Mapping[str, Any],
+    intervals: str,
+    progress: Callable[[str], None],
+) -> tuple[list[Candidate], list[str]]:
+    """The laws judged as the chosen one will be fitted; and what is to be said where that could not be."""
+    axis, inverse = evidence.axis, evidence.inverse
+    fitted, held = held_out(evidence.trials, evidence.validation)
+    said: list[str] = []
+    if intervals == "prediction" and inverse is not None:
+        try:
+            return foreseen(fitted, held, axis, laws, inverse, options, progress), said
+        except InputError as error:
+            said.append(
+                f"Laws were compared by the output error of the simulation, not the prediction error: {error}."
+            )
+    return compared(fitted, held, axis, laws, inverse, options, progress), said
+
+
+def plain_axis(extras: Extras, free: Sequence[str], values: Mapping[str, Any] | None) -> bool:
+    """Whether the axis is no more than inertia, friction, offset or gravity, and a torque over the position."""
+    more = {"drive_gain", "back_emf", "backlash", "controller_gain", "load_motor", "load_external"}
+    return not (extras.load or extras.friction_harmonics or more & {*free, *(values or {})})
+
+
+def held_out(trials: Sequence[Trial], validation: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
+    """What laws are fitted to, and what they are compared on."""
+    if validation:
+        return list(trials), list(validation)
+    pairs = [t.split(HELD_OUT) for t in trials]
+    return [a for a, _ in pairs], [b for _, b in pairs]
+
+
+def first_look(
+    trials: Sequence[Trial], axis: ServoAxis, extras: Extras, per_direction: bool
+) -> tuple[InverseDynamics | None, list[str]]:
+    """The inverse dynamics, where the records allow one."""
+    try:
+        found = inverse_dynamics(
+            trials, axis, harmonics=extras.harmonics, harmonic_period=extras.harmonic_period
+        )
+    except InputError as error:
+        return None, [f"No inverse dynamics: {error}"]
+    notes: list[str] = []
+    if per_direction:
+        each = inverse_dynamics(trials, axis, per_direction=True, harmonics=extras.harmonics)
+        notes.append(
+            f"Per direction: Fc {each['fc_plus']:.4g} and {each['fc_minus']:.4g}, Fv {each['fv_plus']:.4g} and "
+            f"{each['fv_minus']:.4g}; relative error {100 * each.relative_error:.2f} % instead of "
+            f"{100 * found.relative_error:.2f} %."
+        )
+        notes.append("A torque offset cannot be distinguished from friction that differs by direction.")
+    return found, notes
+
+
+def each_way(law: Law) -> Law:
+    """The law with parameters of its own for v < 0, where it may have them."""
+    known = {choice.name for choice in law.choices}
+    return law.having(symmetry="asymmetric") if "symmetry" in known else law

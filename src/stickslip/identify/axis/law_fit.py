@@ -1,0 +1,194 @@
+"""One law fitted to an axis, each number from the estimator that shows it on the records at hand.
+
+Certain sliding alone (`stickslip.identify.regression.regression`) where it tells the whole law; else the prediction
+error (`stickslip.identify.axis.prediction`), held against certain sliding (`stickslip.identify.axis.agreed`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.axis.agreed import (
+    TOLD_BY_SLIDING,
+    agreed,
+    as_good,
+    held_against,
+)
+from stickslip.identify.axis.choice import (
+    Candidate,
+)  # fmt: skip
+from stickslip.identify.axis.output import laid_out, starting_models
+from stickslip.identify.axis.prediction import axis_prediction
+from stickslip.identify.axis.problem import Problem
+from stickslip.identify.axis.result import assembled, evident, noted, untold_by_reversals
+from stickslip.identify.axis.search import Extras, FittedAxis
+from stickslip.identify.axis.settled import ALIKE, settled
+from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.fit.parameter_vector import Vector
+from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identify.regression.regression import Regression
+from stickslip.identify.trial import Trial
+from stickslip.machines.servo import ServoAxis
+from stickslip.spec import Law
+
+__all__ = ["Evidence", "estimated", "predicted"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+HELD = 0.1
+"""Rows by which a torque may act beside its row for reversals to tell stiffness."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What is known of the records before a law is fitted to them.
+
+    Attributes
+    ----------
+    trials, validation : sequence of Trial
+        Fitted, and held out; the torque where it acted.
+    axis : ServoAxis
+    inverse : InverseDynamics or None
+        Plain regression, where the records allow it.
+    sliding : Regression or None
+        The regression on certain sliding, where it is part of the answer.
+    unchecked : bool
+        Whether the drive's signal is known, but no regression on certain sliding: the inverse dynamics stand in.
+    candidates : sequence of Candidate
+        The laws that were compared.
+    """
+
+    trials: Sequence[Trial]
+    validation: Sequence[Trial]
+    axis: ServoAxis
+    inverse: InverseDynamics | None
+    sliding: Regression | None
+    unchecked: bool
+    candidates: Sequence[Candidate] = ()
+
+
+def estimated(
+    law: Law, options: Mapping[str, Any], evidence: Evidence, notes: Sequence[str]
+) -> Identification:
+    """The law's values and intervals by certain sliding alone where that suffices, else by the prediction error.
+
+    Raises
+    ------
+    InputError
+        If the records do not allow the prediction error.
+    """
+    inverse, sliding = evidence.inverse, evidence.sliding
+    if sliding is not None and inverse is not None and told_whole(law):
+        found = by_sliding(law, options, evidence, inverse, sliding, notes)
+        if all(e.identified for e in found.estimates) or not sliding.held_for(HELD):
+            return found
+    return predicted(law, options, evidence, notes)
+
+
+def told_whole(law: Law) -> bool:
+    """Whether certain sliding tells every parameter of a law."""
+    return {f.name for f in law.fields} <= set(TOLD_BY_SLIDING)
+
+
+def by_sliding(
+    law: Law,
+    options: Mapping[str, Any],
+    evidence: Evidence,
+    inverse: InverseDynamics,
+    sliding: Regression,
+    notes: Sequence[str],
+) -> Identification:
+    """An axis whose law certain sliding tells whole: nothing is left for a search."""
+    trials, axis = evidence.trials, evidence.axis
+    given = dict(options["values"] or {})
+    model = starting_models(trials, law, inverse, given)[0]
+    extras: Extras = options["extras"]
+    vector, _ = laid_out(trials, axis, law, inverse, model, given, options["free"], options["frozen"], extras)
+    level = abs(sliding.numbers["fc"].value)
+    scale = {p.name: 1.0 if p.par.unit == "rad" else level for p in vector.free}
+    start = vector.values(vector.start)
+    first = [
+        Estimate(
+            p.name, p.par.unit, p.par.symbol, float(x), math.inf, -math.inf, math.inf, False, "not fitted"
+        )
+        for p, x in zip(vector.free, start, strict=True)
+    ]
+    estimates, said = agreed(first, sliding, vector, inverse, scale, fine=False)
+    u = vector.coordinates(vector.named(vector.start) | {e.name: e.value for e in estimates})
+    estimates = evident(estimates, vector, u, trials, axis)
+    estimates, more = settled(estimates, model, inverse, believed=as_good(inverse, sliding, ALIKE))
+    u = vector.coordinates(vector.named(u) | {e.name: e.value for e in estimates})
+    found = with_values(trials, axis, law, vector, u, extras)
+    shown = [replace(e, unit=axis.unit(e.unit)) for e in estimates]
+    names, told = [e.name for e in shown], list(sliding.numbers)[:4]
+    correlation = np.eye(len(names))
+    for i, a in enumerate(names):
+        for j, b in enumerate(names):
+            if a in told and b in told:
+                correlation[i, j] = sliding.bands[0].correlation[told.index(a), told.index(b)]
+    result = assembled(
+        found,
+        shown,
+        correlation,
+        inverse,
+        evidence.validation,
+        evidence.candidates,
+        [*notes, *said, *more],
+        sliding,
+    )
+    return noted(result)
+
+
+def with_values(
+    trials: Sequence[Trial], axis: ServoAxis, law: Law, vector: Vector, u: Array, extras: Extras
+) -> FittedAxis:
+    """The axis with these values, ready to be simulated."""
+    problem = Problem.of(
+        trials, axis, law, vector, inertia=vector.named(u)["inertia"], harmonic_period=extras.harmonic_period
+    )
+    return FittedAxis(problem.weighted(u).resolved(u), u)
+
+
+def predicted(
+    law: Law, options: Mapping[str, Any], evidence: Evidence, notes: Sequence[str]
+) -> Identification:
+    """Each number from the estimator that shows it, misfits of the simulation with these values."""
+    trials, axis, inverse, sliding = evidence.trials, evidence.axis, evidence.inverse, evidence.sliding
+    given = {k: v for k, v in options.items() if k != "robust"}
+    result = axis_prediction(trials, axis, law, first=inverse, **given)
+    estimates, u, said = result.estimates, result.u, list[str]()
+    if sliding is not None:
+        level = abs(sliding.numbers["fc"].value)
+        scale = {p.name: 1.0 if p.par.unit == "rad" else level for p in result.vector.free}
+        estimates, said = agreed(estimates, sliding, result.vector, inverse, scale)
+        if not sliding.held_for(HELD):
+            estimates = untold_by_reversals(estimates, result.model, sliding)
+        u = result.vector.coordinates(
+            result.vector.named(u) | {e.name: e.value for e in estimates if e.name in TOLD_BY_SLIDING}
+        )
+    estimates = evident(estimates, result.vector, u, trials, axis)
+    if evidence.unchecked and inverse is not None:
+        estimates = held_against(estimates, inverse)
+    if sliding is not None and inverse is not None:
+        believed = as_good(inverse, sliding, ALIKE)
+        estimates, more = settled(estimates, result.model, inverse, believed=believed)
+        said = [*said, *more]
+    u = result.vector.coordinates(result.vector.named(u) | {e.name: e.value for e in estimates})
+    fitted = with_values(trials, axis, law, result.vector, u, options["extras"])
+    estimates = tuple(replace(e, unit=axis.unit(e.unit)) for e in estimates)
+    found = assembled(
+        fitted,
+        estimates,
+        result.correlation(),
+        inverse,
+        evidence.validation,
+        evidence.candidates,
+        [*notes, *said],
+        sliding,
+    )
+    return noted(replace(found, details={**found.details, "prediction": result}))

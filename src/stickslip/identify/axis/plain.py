@@ -1,0 +1,137 @@
+"""The plain inverse dynamics as an identification of its own: ``--inverse``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.axis.agreed import SAME
+from stickslip.identify.axis.gravity import hanging
+from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.regression.force_error import plain_error_on
+from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identify.regression.regression import QUANTILE, Regression
+from stickslip.identify.trial import Trial
+from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
+from stickslip.simulation.recorded_input.simulation import Mechanics
+
+__all__ = ["inverse_identification"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+POSITIVE = ("inertia", "fc", "sigma2", "gravity")
+"""Beginnings of the names of numbers that are greater than 0; the angle of a pendulum is none."""
+
+
+def inverse_identification(
+    found: InverseDynamics,
+    axis: ServoAxis,
+    sliding: Regression | None = None,
+    validation: Sequence[Trial] = (),
+) -> Identification:
+    """The inverse dynamics as an `Identification`, its friction as the law ``coulomb``.
+
+    Per direction the law is asymmetric, unless a constant torque above the friction acts along: then it has the mean of
+    both directions, and the constant torque half of their difference. Intervals are widened to hold what certain
+    sliding says (`stickslip.identify.regression.regression`) where both contradict each other; `validation` records
+    give the held-out error.
+    """
+    model, mechanics = parts_of(found)
+    names, units, values, covariance = of_the_model(found, model)
+    std = np.sqrt(np.diag(covariance))
+    estimates: list[Estimate] = []
+    notes: list[str] = []
+    # Where each direction has its own, none is the mean of both that certain sliding tells.
+    both = ("inertia",) if "fc_negative" in names else ("inertia", "fc", "sigma2", "offset")
+    for name, unit, value, spread in zip(names, units, values.tolist(), std.tolist(), strict=True):
+        low, high = value - 1.96 * spread, value + 1.96 * spread
+        if sliding is not None and name in both:
+            other, half = sliding.numbers[name].value, QUANTILE * sliding.numbers[name].std
+            apart = abs(other - value) > math.hypot(half, 0.5 * (high - low))
+            if apart and abs(other - value) > SAME * max(
+                abs(value), abs(found.coulomb) if name == "offset" else 0.0
+            ):
+                low, high = min(low, other), max(high, other)
+                notes.append(
+                    f"{name}: {value:.4g} here, {other:.4g} {unit} where the axis slides for certain "
+                    "(reversals, stops and the hold of the torque left out); the interval holds both."
+                )
+        if name.startswith(POSITIVE) and name != "gravity_angle":
+            good = low > 0.0 and high <= 2.0 * low
+        else:
+            good = 0.5 * (high - low) <= 0.05 * (1.0 if unit == "rad" else abs(found.coulomb))
+        why = "" if good else "its interval is too wide"
+        estimates.append(Estimate(name, unit, name, value, spread, low, high, good, why))
+    misfit = {"inverse_dynamics_relative": found.relative_error}
+    if validation:
+        misfit["held_out_inverse_dynamics_relative"] = plain_error_on(validation, axis, found)
+    return Identification(
+        "inverse dynamics", model, tuple(estimates), covariance / np.outer(std, std),
+        misfit,
+        (f"Position filtered at {found.cutoff:.4g} Hz, decimated to {found.band:.4g} Hz; intervals allow for the "
+         "correlation of the residuals.", *notes),
+        details={"inverse": found, "axis": axis, "mechanics": mechanics,
+                 "classic_std": dict(zip(found.names, found.std.tolist()))},
+    )  # fmt: skip
+
+
+def of_the_model(
+    found: InverseDynamics, model: Model
+) -> tuple[list[str], list[str], Array, Array]:  # fmt: skip
+    """Names, units, values and covariance of the numbers as the model has them: ``sigma2`` for ``fv``, those of a
+    direction or of both, and a pendulum's gravity as its amplitude and the angle at which it hangs."""
+    row = dict(zip(found.names, np.eye(len(found.names)), strict=True))
+    own: dict[str, Array] = {"inertia": row["inertia"]}
+    if not found.has("fc_plus"):
+        own |= {"sigma2": row["fv"], "fc": row["fc"], "offset": row["offset"]}
+    elif "fc_negative" in {f.name for f in model.law.fields}:
+        own |= {"sigma2": row["fv_plus"], "fc": row["fc_plus"]}
+        own |= {"sigma2_negative": row["fv_minus"], "fc_negative": row["fc_minus"]}
+    else:
+        own |= {
+            "sigma2": 0.5 * (row["fv_plus"] + row["fv_minus"]),
+            "fc": 0.5 * (row["fc_plus"] + row["fc_minus"]),
+        }
+        own |= {"offset": 0.5 * (row["fc_plus"] - row["fc_minus"])}
+    if found.has("gravity_sin"):
+        # Their values are not linear in these, but what they change by is.
+        s, c = found["gravity_sin"], found["gravity_cos"]
+        size = max(math.hypot(s, c), 1e-300)
+        own["gravity"] = (s * row["gravity_sin"] + c * row["gravity_cos"]) / size
+        own["gravity_angle"] = (c * row["gravity_sin"] - s * row["gravity_cos"]) / size**2
+    own |= {n: row[n] for n in found.names if n.startswith(("cos[", "sin["))}
+    names, weights = list(own), np.array(list(own.values()))
+    values = np.asarray(weights @ found.values, dtype=np.float64)
+    if "gravity_angle" in names:
+        values[names.index("gravity_angle")] = pendulum_of(found)[1]
+    of = dict(zip(found.names, found.units, strict=True))
+    torque, damping = (of.get(n, of.get(f"{n}_plus", "")) for n in ("fc", "fv"))
+    units = {"inertia": of["inertia"], "sigma2": damping, "sigma2_negative": damping, "gravity_angle": "rad"}
+    return names, [units.get(n, torque) for n in names], values, weights @ found.covariance @ weights.T
+
+
+def pendulum_of(found: InverseDynamics) -> tuple[float, float]:
+    """Amplitude of gravity, N·m, and the angle at which the pendulum hangs, rad."""
+    return hanging(found["gravity_sin"], found["gravity_cos"], found.position)
+
+
+def parts_of(found: InverseDynamics) -> tuple[Model, Mechanics]:
+    """Friction and what is beside it: inertia, constant torque, gravity."""
+    each = [found[n] for n in ("fc_plus", "fc_minus")] if found.has("fc_plus") else []
+    offset = found.offset
+    if each and min(each) >= 0.0:
+        offset = 0.0
+        slopes = {"sigma2": max(found["fv_plus"], 0.0), "sigma2_negative": max(found["fv_minus"], 0.0)}
+        model = Model("coulomb", {"symmetry": "asymmetric"}, fc=each[0], fc_negative=each[1], **slopes)
+    else:
+        model = Model("coulomb", fc=max(found.coulomb, 0.0), sigma2=max(found.viscous, 0.0))
+    mechanics = Mechanics(max(found["inertia"], 0.0), offset=offset)
+    if found.has("gravity_sin"):
+        size, angle = pendulum_of(found)
+        mechanics = replace(mechanics, gravity=size, gravity_angle=angle)
+    return model, mechanics

@@ -1,0 +1,255 @@
+"""Prediction error of a whole axis: from records with torque and position to any law, with honest intervals."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.axis.output import Extras, laid_out, starting_models
+from stickslip.identify.axis.problem import mechanics_of
+from stickslip.identify.fit.axis_start import steady_fits
+from stickslip.identify.fit.broyden import Secants
+from stickslip.identify.fit.levenberg_marquardt import cost_of
+from stickslip.identify.fit.parallel import mapped
+from stickslip.identify.fit.parameter_vector import Vector
+from stickslip.identify.observer.innovations import BAND, Criterion
+from stickslip.identify.observer.observer import ROUGH, Motion, Prepared, prepare
+from stickslip.identify.observer.prediction_error import PredictionError, prediction_error
+from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, uniform
+from stickslip.identify.trial import Trial
+from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
+from stickslip.record import encoder_step
+from stickslip.spec import Law
+
+__all__ = ["axis_prediction", "motion_of", "searched", "watched"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+SLOWER = (0.02, 0.1, 0.5)
+"""Parts of the usual speed at which a Stribeck effect is looked for."""
+WORSE = 1.1
+BEST, SPREAD = 4, 4
+"""Starts that are followed: those of the lowest sums of squares, and some of all others, since a stiffness that is far
+off hides how right the rest of a start is."""
+ROUNDS = ((BEST + SPREAD, 20), (3, 50))
+"""Descents, the best so far, that go on until they have taken so many simulations."""
+HOPS, EVALUATIONS = 3, 60
+"""Hops from the best of them; simulations that each may take."""
+SETTLED = 1e-3
+"""Relative decrease of the sum of squares below which a descent ends."""
+ALIKE = 0.03
+"""Coordinates by which two descents differ at least."""
+HOP = 0.4
+"""Standard deviation of a hop in the law's coordinates; a tenth of it in the others."""
+RESTING, SLOWEST = 0.02, 1e-3
+"""s of rest after which a torque counts as withstood; and the part of the usual speed that counts as creeping."""
+LEVELS = 24
+"""Groups of speeds, from slow to fast, in which friction is averaged to start from."""
+
+
+def axis_prediction(
+    trials: Sequence[Trial],
+    axis: ServoAxis,
+    law: Law,
+    *,
+    first: InverseDynamics | None = None,
+    values: Mapping[str, Any] | None = None,
+    free: Sequence[str] = (),
+    frozen: Sequence[str] = (),
+    extras: Extras = Extras(),  # noqa: B008 (frozen)
+    seed: int = 0,
+) -> PredictionError:
+    """Identify an axis by what an observer has to correct (`stickslip.identify.observer.prediction_error`).
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        With the drive's signal.
+    axis : ServoAxis
+    law : Law
+    first : InverseDynamics, optional
+        Where the search starts; found here where it is not given.
+    values, free, frozen, extras
+        As in `stickslip.identify.axis.output.output_error`.
+    seed : int
+        Of the search's hops and of the noise that intervals come from.
+
+    Returns
+    -------
+    PredictionError
+
+    Raises
+    ------
+    InputError
+        If a record has no drive signal, moves too little, the axis has backlash, or no simulation from the starting
+        values succeeds.
+    """
+    motions, band = watched(trials, axis, values, free)
+    start = first or inverse_dynamics(trials, axis)
+    criterion, u = searched(
+        trials, axis, law, motions, start, dict(values or {}), free, frozen, extras, band, seed
+    )
+    return prediction_error(
+        motions, law, criterion.vector, criterion.mechanics, inertia=criterion.vector.named(u)["inertia"],
+        friction=abs(start.coulomb), start=u, signed_scale=abs(start.coulomb), band=band, seed=seed,
+    )  # fmt: skip
+
+
+def watched(
+    trials: Sequence[Trial], axis: ServoAxis, values: Mapping[str, Any] | None, free: Sequence[str]
+) -> tuple[list[Motion], float]:
+    """What the observer follows, and the Hz up to which its corrections count; refuses what it cannot follow."""
+    for t in trials:
+        if t.drive is None:
+            raise InputError(f"{t.name}: the drive's signal is missing; this method needs it")
+    if (values or {}).get("backlash", axis.backlash) > 0.0 or "backlash" in free:
+        raise InputError(
+            "its observer takes the measured velocity for the axis's own, which backlash forbids"
+        )
+    return [motion_of(t) for t in trials], min(BAND, *(0.1 / t.period for t in trials))
+
+
+def searched(
+    trials: Sequence[Trial], axis: ServoAxis, law: Law, motions: Sequence[Motion], start: InverseDynamics,
+    given: Mapping[str, Any], free: Sequence[str], frozen: Sequence[str], extras: Extras, band: float, seed: int,
+    hops: int = HOPS,
+) -> tuple[Criterion, Array]:  # fmt: skip
+    """The criterion of the best minimum met under the firm observer, and its coordinates."""
+    records: list[Prepared] = []
+    criteria: list[Criterion] = []
+    mechanics = functools.partial(mechanics_of, harmonic_period=extras.harmonic_period)
+    for model in starting_points(trials, axis, law, start, given):
+        vector, inertia = laid_out(trials, axis, law, start, model, given, free, frozen, extras)
+        # All start from one inertia.
+        records = records or [
+            prepare(m, law, inertia, abs(start.coulomb), band, rounding=ROUGH) for m in motions
+        ]
+        criteria.append(Criterion.first(records, law, vector, mechanics))
+    costs = mapped(lambda c: cost_of(c.residuals(c.vector.start)), criteria)
+    # Several ways lead to one start: it counts once.
+    tried = {float(f"{cost:.6g}"): criterion for cost, criterion in zip(costs, criteria, strict=True)}
+    tried.pop(math.inf, None)
+    if not tried:
+        raise InputError(
+            f"{law.name}: no simulation from the starting values succeeds; give others with --set NAME=VALUE (values)"
+        )
+    ranked = [tried[cost] for cost in sorted(tried)]
+    others = ranked[BEST:]
+    ranked = ranked[:BEST] + [others[i] for i in spread(len(others), SPREAD)]
+    running = mapped(lambda c: (c, c.search(c.vector.start)), ranked)
+    for count, evaluations in ROUNDS:
+        going = [search for _, search in running[:count]]
+        mapped(lambda search: search.run(evaluations, SETTLED), going)  # noqa: B023 (done at once)
+        running = apart(sorted(running[:count], key=lambda entry: entry[1].cost))
+    criterion, search = running[0]
+    # Outliers would choose among hops by plain squares: from here on the likelihood that weighs them decides.
+    adapted = criterion.adapted(search.u)
+    best = descended(adapted, search.u)
+    rng, own = np.random.default_rng(seed), {f.name for f in law.fields}
+    others = [hop(adapted.vector, best[1], own, rng) for _ in range(hops)]
+    reached = mapped(functools.partial(descended, adapted), others)
+    return adapted, min([best, *reached], key=lambda entry: entry[0])[1]
+
+
+def spread(count: int, most: int) -> list[int]:
+    """At most so many places, evenly among that many, the last among them."""
+    taken = min(most, count)
+    return [(i + 1) * count // taken - 1 for i in range(taken)]
+
+
+def apart(running: Sequence[tuple[Criterion, Secants]]) -> list[tuple[Criterion, Secants]]:
+    """Those that reached another place than every better one: several starts may lead to one minimum."""
+    kept: list[tuple[Criterion, Secants]] = []
+    for criterion, search in running:
+        if all(float(np.max(np.abs(search.u - k.u))) > ALIKE for _, k in kept):
+            kept.append((criterion, search))
+    return kept
+
+
+def descended(criterion: Criterion, start: Array) -> tuple[float, Array]:
+    """Sum of squares and coordinates that a few steps from a start reach; infinite where it cannot be simulated."""
+    try:
+        search = criterion.search(start)
+    except InputError:
+        return math.inf, start
+    search.run(EVALUATIONS, SETTLED)
+    return search.cost, search.u
+
+
+def hop(vector: Vector, u: Array, law: set[str], rng: np.random.Generator) -> Array:
+    """Somewhere near, mostly in the law's parameters: a static torque and velocity may hide behind a ridge."""
+    own = np.array(
+        [p.name.partition("[")[0] in law for p in vector.free if vector.coordinate_of(p.name) is not None]
+    )
+    own = np.concatenate([own, np.ones(u.size - own.size, dtype=np.bool_)])
+    there = u + HOP * np.where(own, 1.0, 0.1) * rng.standard_normal(u.size)
+    return np.clip(there, vector.lower, vector.upper)
+
+
+def motion_of(trial: Trial) -> Motion:
+    """The trial on a regular grid, its drive's signal as it acts."""
+    t, q, u, _ = uniform(trial)
+    supply = 1.0 if trial.supply is None else np.interp(t, trial.time, trial.supply)
+    return Motion(t, q, supply * u, encoder_step(q))
+
+
+def starting_points(
+    trials: Sequence[Trial], axis: ServoAxis, law: Law, first: InverseDynamics, given: Mapping[str, Any]
+) -> list[Model]:
+    """Examples on this axis's scales, as they are and with their steady torque fitted to the measured levels.
+
+    The levels of a motion that sticks and slips mislead: there the torque that was withstood at rest takes the place
+    of the slowest. The simulation decides.
+    """
+    held = [f.name for f in law.fields if f.name in given]
+    slower = [replace(first, velocity=part * first.velocity) for part in SLOWER]
+    examples = [m for f in slower for m in starting_models(trials, law, f, given)]
+    speed, torque = levels_of(first)
+    fitted = steady_fits(examples, speed, torque, held)
+    misfits = [misfit_of(m, speed, torque) for m in fitted]
+    near = [m for m, misfit in zip(fitted, misfits, strict=True) if misfit <= WORSE * min(misfits)]
+    held_at = held_torque(trials, axis, first)
+    if held_at <= first.coulomb:
+        return examples + near
+    slow = max(1, LEVELS // 8)
+    speed[:slow], torque[:slow] = SLOWEST * first.usual_speed, held_at
+    return examples + near + steady_fits(examples, speed, torque, held)
+
+
+def held_torque(trials: Sequence[Trial], axis: ServoAxis, first: InverseDynamics) -> float:
+    """Torque that the contact withstood at rest, N·m: where the position stays within two counts for a while."""
+    level = 0.0
+    for trial in trials:
+        motion = motion_of(trial)
+        reach = max(1, round(RESTING / float(motion.time[1] - motion.time[0])))
+        moved = np.abs(motion.position[reach:] - motion.position[:-reach])
+        still = moved <= max(2.0 * motion.count, RESTING * SLOWEST * first.usual_speed)
+        gain, _ = axis.drive_gains(trial.quantity)
+        if np.any(still):
+            torque = np.abs(gain * motion.torque[reach:][still] - first.offset)
+            level = max(level, float(np.quantile(torque, 0.98)))
+    return level
+
+
+def levels_of(first: InverseDynamics) -> tuple[Array, Array]:
+    """Speeds, from slow to fast, and the friction that the inverse dynamics leaves there, N·m."""
+    v = first.velocity
+    friction = first.residual + np.sign(v) * first.coulomb + first.viscous * v
+    groups = [g for g in np.array_split(np.argsort(np.abs(v)), LEVELS) if g.size]
+    speed = np.array([float(np.median(np.abs(v[g]))) for g in groups])
+    return speed, np.array([float(np.median(np.sign(v[g]) * friction[g])) for g in groups])
+
+
+def misfit_of(model: Model, speed: Array, torque: Array) -> float:
+    """Sum of absolute differences of the steady torque from that at the levels, N·m; 1 for a law without one."""
+    steady = model.law.steady
+    if steady is None:
+        return 1.0
+    return sum(abs(steady(float(x), model.parameters) - y) for x, y in zip(speed, torque, strict=True))

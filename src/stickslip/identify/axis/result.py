@@ -1,0 +1,196 @@
+"""What an identification of an axis hands back: numbers that the record can hold, errors, and what is to be said."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.axis.agreed import TOLD_BY_SLIDING
+from stickslip.identify.axis.choice import (
+    Candidate,
+)  # fmt: skip
+from stickslip.identify.axis.gravity import within_a_turn
+from stickslip.identify.axis.load_check import ADVICE, judged_load
+from stickslip.identify.axis.loop_check import doubted_loops
+from stickslip.identify.axis.output import OutputError
+from stickslip.identify.axis.search import FittedAxis, errors_of
+from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.evidence import within_speeds
+from stickslip.identify.fit.axis_start import told_by
+from stickslip.identify.fit.parameter_vector import Vector
+from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
+from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identify.regression.regression import Regression
+from stickslip.identify.trial import Trial
+from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
+from stickslip.spec import Law
+
+__all__ = ["assembled", "evident", "narrow_note", "noted", "rising", "untold_by_reversals"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+WINDOW, CREEP = 0.02, 1e-3
+"""s over which a speed is averaged; part of the highest below which an axis counts as at rest."""
+ONLY_REVERSALS = (
+    "only reversals tell it, and the torque is not known to act from row to row as recorded; log the command at "
+    "the drive's own rate"
+)
+STRIBECK = ("fs", "vs", "delta_s")
+LOOP_OFF = 0.3
+"""Relative error of the simulated loop's drive signal from which on its gains are doubted."""
+
+
+def assembled(
+    result: FittedAxis, estimates: Sequence[Estimate], correlation: Array, inverse: InverseDynamics | None,
+    validation: Sequence[Trial], candidates: Sequence[Candidate], notes: Sequence[str],
+    sliding: Regression | None = None,
+) -> Identification:  # fmt: skip
+    """Everything in one `Identification`, but for what is to be said of its intervals."""
+    trials = result.problem.trials
+    estimates = within_a_turn(estimates, np.concatenate([t.position for t in trials]))
+    judged = judged_load(estimates, inverse, result.mechanics)
+    misfit = errors_of(trials, result.problem.signals, result.misfits(trials))
+    axis, named = result.problem.axis, result.problem.vector.named(result.u)
+    if inverse is not None and inverse.has("fc"):
+        misfit["force_relative"] = force_error(inverse, result.model, named)
+        misfit["inverse_dynamics_relative"] = inverse.relative_error
+    if validation:
+        misfit |= {f"held_out_{k}": v for k, v in result.held_out(validation).items()}
+        if inverse is not None and inverse.has("fc"):
+            misfit["held_out_force_relative"] = force_error_on(
+                validation, axis, result.model, named, inverse.cutoff
+            )
+            misfit["held_out_inverse_dynamics_relative"] = plain_error_on(validation, axis, inverse)
+    return Identification(
+        "axis",
+        result.model,
+        judged,
+        correlation,
+        misfit,
+        tuple(notes),
+        measure_next=advice(judged, result.problem.law),
+        details={
+            "mechanics": result.mechanics, "inverse": inverse, "regression": sliding,
+            "output": result, "candidates": tuple(candidates),
+            "axis": result.problem.axis, "units": result.problem.units,
+        },
+    )  # fmt: skip
+
+
+def evident(
+    estimates: Sequence[Estimate], vector: Vector, u: Array, trials: Sequence[Trial], axis: ServoAxis
+) -> tuple[Estimate, ...]:
+    """The estimates, those refused that the record cannot hold: too high levels, effects at other speeds."""
+    largest = max(float(np.max(np.abs(t.torque(axis, speed_of(t))))) for t in trials)
+    speeds = np.concatenate([np.abs(speed_of(t)) for t in trials])
+    moving = speeds[speeds > CREEP * float(np.max(speeds))]
+    seen = np.quantile(moving, np.linspace(0.02, 1.0, 50)) if moving.size else np.zeros(0)
+    out: list[Estimate] = []
+    for e in within_speeds(estimates, vector, u, seen, axis.unit("rad/s")):
+        above = e.unit == "N·m" and e.name not in ("offset", "gravity") and e.value > largest
+        why = f"a level of friction above the largest torque recorded, {largest:.4g}, cannot be"
+        out.append(replace(e, identified=False, verdict=why) if above else e)
+    by_name = {e.name: e for e in out}
+    if {"fs", "fc"} <= by_name.keys() and by_name["fs"].value <= by_name["fc"].value:
+        why = "no fall of friction with velocity shows: fs is not above fc"
+        out = [replace(e, identified=False, verdict=why) if e.name in STRIBECK else e for e in out]
+        level = by_name["fc"].value
+        out = [
+            replace(e, value=level, lower=min(e.lower, level), upper=max(e.upper, level))
+            if e.name == "fs"
+            else e
+            for e in out
+        ]
+    return tuple(out)
+
+
+def speed_of(trial: Trial) -> Array:
+    """Velocity over `WINDOW` seconds at every row, rad/s (m/s)."""
+    reach = max(1, round(0.5 * WINDOW / trial.period))
+    low = np.maximum(np.arange(trial.time.size) - reach, 0)
+    high = np.minimum(np.arange(trial.time.size) + reach, trial.time.size - 1)
+    return (trial.position[high] - trial.position[low]) / (trial.time[high] - trial.time[low])
+
+
+def untold_by_reversals(
+    estimates: Sequence[Estimate], model: Model, sliding: Regression
+) -> tuple[Estimate, ...]:
+    """The estimates, those refused that only reversals tell: there a part of a row counts for as much as they do."""
+    v = np.geomspace(1e-4 * sliding.fastest, sliding.fastest, 40)
+    steady = {*told_by(model, v, ()), *TOLD_BY_SLIDING}
+    return tuple(
+        replace(e, identified=False, verdict=ONLY_REVERSALS)
+        if e.identified and e.name.partition("[")[0] not in steady else e for e in estimates
+    )  # fmt: skip
+
+
+def noted(found: Identification, *more: str) -> Identification:
+    """The same with these notes, and which parameters are not identified."""
+    missing = [e.name for e in found.estimates if not e.identified]
+    last = (
+        [f"Not identified: {', '.join(missing)}; the model's values of them are one choice among many."]
+        if missing
+        else []
+    )
+    return replace(found, notes=(*found.notes, *more, *strange_loop(found), *rising(found.estimates), *last))
+
+
+def strange_loop(found: Identification) -> list[str]:
+    """That the loop does not make the drive's signal that was recorded; nothing where it does, or there is none."""
+    fitted: FittedAxis = found.details["output"]
+    named = fitted.problem.vector.named(fitted.u)
+    if others := doubted_loops(fitted.problem.trials, named["controller_gain"]):
+        return others
+    off = found.misfit.get("drive_relative", 0.0)
+    if off <= LOOP_OFF:
+        return []
+    return [
+        f"The loop simulated makes a drive signal that is {off:.0%} off the recorded one: check its gains and limit."
+    ]
+
+
+def rising(estimates: Sequence[Estimate]) -> list[str]:
+    """That friction rises with the speed where a Stribeck effect would let it fall; empty where the data do not say."""
+    by_name = {e.name: e for e in estimates}
+    if not {"fs", "fc"} <= by_name.keys() or not by_name["fs"].upper < by_name["fc"].lower:
+        return []
+    return ["fs lies below fc: friction rises from rest to vs; these records show no Stribeck effect."]
+
+
+def narrow_note(result: OutputError, ask: bool = True) -> str:
+    """That the intervals are too narrow where noise is coloured; where friction has a velocity of its own, by far."""
+    said = "Intervals come from the covariance of the output error: too narrow where noise is coloured"
+    if result.problem.law.velocity_scale:
+        said += ", most of all for what slow motion and break-away tell"
+    if ask and all(t.drive is not None for t in result.problem.trials):
+        said += ". --intervals prediction gives honest ones"
+    return said + "."
+
+
+def advice(estimates: Sequence[Estimate], law: Law) -> tuple[str, ...]:
+    """What to measure to settle what is not identified."""
+    missing = {e.name.partition("[")[0] for e in estimates if not e.identified}
+    out: list[str] = []
+    units = {f.name: f.par.unit for f in law.fields}
+    if any(units.get(n) == "rad/s" for n in missing):
+        out.append(
+            "Record constant velocities below and around the Stribeck velocity, at least three of them."
+        )
+    stiff = {n for n in missing if units.get(n) == "N·m/rad" or n in ("sigma1", "k")}
+    if any(e.verdict == ONLY_REVERSALS for e in estimates):
+        out.append(
+            "Log the commanded torque at the drive's own rate, or say what the column holds (--torque-is)."
+        )
+    elif stiff:
+        out.append(
+            "Record slow reversals with a finer position sensor: the pre-sliding range was hardly seen."
+        )
+    if "load_motor" in missing:
+        out.append(ADVICE)
+    elif "inertia" in missing:
+        out.append("Record stronger accelerations.")
+    return tuple(out)

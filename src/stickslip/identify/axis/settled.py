@@ -1,0 +1,250 @@
+"""The values that a model takes: what is identified stands, the rest is what explains the whole record best.
+
+A number that a record does not tell is one choice among many; the one that goes best with the numbers that it does
+tell, within the bounds of physics, is the only one that is of use. The record is seen as the plain inverse dynamics
+sees it (Janot, Gautier and Brunot 2019): a model is never to explain its torque worse than plain least squares do,
+as far as the intervals and physics allow it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.axis.gravity import hanging
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.fit.uncertainty import RATIO, SHARE
+from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.model import Model
+
+__all__ = ["ALIKE", "settled"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+PLAIN = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}
+"""Numbers of a model in which its torque is linear, and their names in the plain inverse dynamics."""
+GRAVITY = ("gravity_sin", "gravity_cos")
+LEAST = 1e-6
+"""Of the plain inertia: the least that an axis can have."""
+ALIKE = 1.05
+"""Times the force error of plain least squares up to which identified values stay where they are."""
+PREFERRED = 0.98
+"""Times the force error without a fall of friction, that one which is not identified must stay below."""
+QUANTILE = 1.96
+TIES, HALVINGS = (1e-6, 1e3), 40
+"""Weights between which that is looked for which moves identified values least; halvings of that search."""
+MOVED = "the whole record, reversals included, asks for another value than certain sliding does"
+TURNS = 5
+"""Rounds in which curve and levels are brought together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settling:
+    """Torque and motion of the record, and the model whose values are looked for."""
+
+    inverse: InverseDynamics
+    model: Model
+
+    def column(self, name: str) -> Array:
+        """Torque per unit of a number, shape (n,)."""
+        inverse = self.inverse
+        return inverse.matrix[:, inverse.names.index(PLAIN.get(name, name))]
+
+    def curve(self, values: Mapping[str, float]) -> Array:
+        """What friction's curve has beside level and slope, N·m (N), shape (n,)."""
+        law = self.model.law
+        assert law.steady is not None
+        own = {f.name for f in law.fields}
+        p = self.model.parameters._replace(**{k: v for k, v in values.items() if k in own})
+        v = self.inverse.velocity
+        steady = np.array([law.steady(float(x), p) for x in v])
+        return steady - values["fc"] * np.sign(v) - values["sigma2"] * v
+
+    def solved(
+        self, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], level: bool,
+        halves: Mapping[str, float] | None = None, tie: float = 0.0,
+    ) -> tuple[dict[str, float], float]:  # fmt: skip
+        """All values, those with bounds solved for, and the force error; `level`: without a fall of friction.
+
+        `tie` is the weight with which the values in `halves` are held where they are, in these half-widths.
+        """
+        out, torque = dict(values), self.inverse.torque
+        names, free = [n for n in (*PLAIN, *GRAVITY) if n in out], list(bounds)
+        columns = np.column_stack([self.column(n) for n in free]) if free else np.zeros((torque.size, 0))
+        size = np.linalg.norm(columns, axis=0)
+        size = np.where(size > 0.0, size, 1.0)
+        low, high = (size * np.array([bounds[n][k] for n in free]) for k in (0, 1))
+        held = [n for n in free if tie > 0.0 and n in (halves or {})]
+        pull = tie * float(np.linalg.norm(torque)) / np.array([(halves or {})[n] for n in held])
+        ties = pull[:, None] * np.array([[float(n == m) for m in free] for n in held]).reshape(
+            len(held), len(free)
+        )
+        bent = self.model.law.velocity_scale is not None
+        for _ in range(TURNS if bent and not level else 1):
+            known = sum((out[n] * self.column(n) for n in names if n not in bounds), np.zeros(torque.size))
+            target = torque - known - (self.curve(out) if bent and not level else 0.0)
+            if free:
+                target = np.concatenate([target, pull * np.array([values[n] for n in held])])
+                found = bounded(np.vstack([columns, ties]) / size, target, low, high) / size
+                out |= dict(zip(free, found.tolist(), strict=True))
+        if level and "fs" in out:
+            out["fs"] = out["fc"]
+        left = torque - sum((out[n] * self.column(n) for n in names), np.zeros(torque.size))
+        left = left - (self.curve(out) if bent and not level else 0.0)
+        return out, float(np.linalg.norm(left) / np.linalg.norm(torque))
+
+    def weighed(
+        self, values: Mapping[str, float], held: Mapping[str, tuple[float, float]]
+    ) -> dict[str, float] | None:
+        """What certain sliding and the whole record say together, each by its precision; none where they contradict.
+
+        The values stay within `held`, the intervals of certain sliding: both see the same rows.
+        """
+        if not held:
+            return None
+        inverse, names = self.inverse, list(held)
+        low, high = (np.array([held[n][k] for n in names]) for k in (0, 1))
+        places = [inverse.names.index(PLAIN[n]) for n in names]
+        own, plain = np.array([values[n] for n in names]), inverse.values[places]
+        half = 0.5 * (high - low)
+        if np.any(np.abs(plain - own) > np.hypot(half, QUANTILE * inverse.robust_std[places])):
+            return None
+        std = np.maximum(half, 1e-12 * np.abs(own)) / QUANTILE
+        other = inverse.covariance[np.ix_(places, places)] / np.outer(std, std)
+        toward = np.linalg.solve(np.eye(std.size) + other, (plain - own) / std)
+        found = np.clip(own + std * toward, low, high)
+        return dict(zip(names, found.tolist(), strict=True))
+
+    def nearest(
+        self, values: Mapping[str, float], free: Mapping[str, tuple[float, float]], halves: Mapping[str, float],
+        level: bool,
+    ) -> tuple[dict[str, float], float]:  # fmt: skip
+        """The values nearest to those given, in `halves`, whose force error is `ALIKE` that of plain least squares.
+
+        Those of the least error where physics allows none. Only values that are free or in `halves` move.
+        """
+        bounds = {**physical(self.inverse), **free}
+        bounds = {n: b for n, b in bounds.items() if n in free or n in halves}
+        limit = ALIKE * self.inverse.relative_error
+        best = self.solved(values, bounds, level)
+        if best[1] > limit:
+            return best
+        low, high = TIES
+        for _ in range(HALVINGS):
+            tie = math.sqrt(low * high)
+            found = self.solved(values, bounds, level, halves, tie)
+            if found[1] <= limit:
+                low, best = tie, found
+            else:
+                high = tie
+        return best
+
+
+def bounded(columns: Array, target: Array, low: Array, high: Array) -> Array:
+    """Least squares within bounds."""
+    optimize: Any = importlib.import_module("scipy.optimize")  # it carries no types
+    found = optimize.lsq_linear(columns, target, (low, np.maximum(high, np.nextafter(low, np.inf))))
+    return np.asarray(found.x, dtype=np.float64)
+
+
+def settled(
+    estimates: Sequence[Estimate], model: Model, inverse: InverseDynamics | None, *, believed: bool = True
+) -> tuple[tuple[Estimate, ...], list[str]]:
+    """The estimates, what is not identified chosen so that the record's torque is explained best; and what to say.
+
+    Parameters
+    ----------
+    estimates : sequence of Estimate
+        All free parameters.
+    model : Model
+        With the law's values, those that are not free among them.
+    inverse : InverseDynamics or None
+        Of the same records; nothing is changed without.
+    believed : bool
+        Whether it explains certain sliding as well: else it has no weight in an identified value, and none leaves
+        its interval for it.
+    """
+    by_name = {e.name: e for e in estimates}
+    if inverse is None or model.law.steady is None or not set(PLAIN) <= by_name.keys():
+        return tuple(estimates), []
+    if not all(inverse.has(n) for n in PLAIN.values()):
+        return tuple(estimates), []
+    own = Settling(inverse, model)
+    values = {e.name: e.value for e in estimates}
+    free = {n: b for n, b in physical(inverse).items() if not by_name[n].identified}
+    free |= turned(by_name, values, inverse)
+    chosen, error = own.solved(values, free, False)
+    if "fs" in by_name and not by_name["fs"].identified:
+        plain, flat = own.solved(values, free, True)
+        if not error <= PREFERRED * flat:
+            chosen, error = plain, flat
+    notes: list[str] = []
+    level = chosen.get("fs") == chosen["fc"] and "fs" in by_name and not by_name["fs"].identified
+    held = {n: (by_name[n].lower, by_name[n].upper) for n in PLAIN if by_name[n].identified}
+    both = own.weighed(chosen, held) if believed else None
+    if both is not None:
+        shared, less = own.solved({**chosen, **both}, free, level)
+        if less < error:
+            chosen, error = shared, less
+    asked = set[str]()
+    if held and error > ALIKE * inverse.relative_error:
+        moved, less = own.solved(chosen, {**free, **held}, level)
+        where = "within"
+        if believed and less > ALIKE * inverse.relative_error:
+            halves = {n: max(0.5 * (high - low), 1e-12 * abs(high)) for n, (low, high) in held.items()}
+            moved, less = own.nearest(moved, free, halves, level)
+            where = "within their intervals and, where these cannot explain it, next to"
+        if less < error:
+            chosen, asked = moved, set(held)
+            notes = [
+                f"Of the values {where} their intervals those are given that explain the whole record best, reversals "
+                f"included: relative force error {100.0 * less:.3g} %, at the middle of the intervals "
+                f"{100.0 * error:.3g} %."
+            ]
+    return tuple(placed(e, chosen, inverse, e.name in asked) for e in estimates), notes
+
+
+def physical(inverse: InverseDynamics) -> dict[str, tuple[float, float]]:
+    """Bounds of every number, N·m (N) and so on."""
+    largest = float(np.max(np.abs(inverse.torque)))
+    return {
+        "inertia": (LEAST * abs(inverse["inertia"]), math.inf), "fc": (0.0, largest), "sigma2": (0.0, math.inf),
+        "offset": (-largest, largest),
+    }  # fmt: skip
+
+
+def turned(
+    by_name: Mapping[str, Estimate], values: dict[str, float], inverse: InverseDynamics
+) -> dict[str, tuple[float, float]]:
+    """Adds a pendulum's two amplitudes to the values; their bounds where they are not identified."""
+    if "gravity" not in by_name or not all(inverse.has(n) for n in GRAVITY):
+        return {}
+    size, angle = values["gravity"], values.get("gravity_angle", 0.0)
+    values |= {"gravity_sin": size * math.cos(angle), "gravity_cos": -size * math.sin(angle)}
+    if by_name["gravity"].identified:
+        return {}
+    return dict.fromkeys(GRAVITY, (-math.inf, math.inf))
+
+
+def placed(e: Estimate, values: Mapping[str, float], inverse: InverseDynamics, asked: bool) -> Estimate:
+    """The estimate with its value chosen; its interval holds it, and reaches as far beyond one that the whole record
+    `asked` for."""
+    value = values[e.name]
+    if e.name in ("gravity", "gravity_angle") and "gravity_sin" in values:
+        pair = hanging(values["gravity_sin"], values["gravity_cos"], inverse.position)
+        value = e.value if e.identified else pair[e.name == "gravity_angle"]
+    if not e.identified or value == e.value or not asked:
+        return replace(e, value=value, lower=min(e.lower, value), upper=max(e.upper, value))
+    half = 0.5 * (e.upper - e.lower)
+    lower, upper = min(e.lower, value - half), max(e.upper, value + half)
+    if e.name != "offset":
+        lower = max(lower, 0.0)
+    told = half <= SHARE * values["fc"] if e.name == "offset" else lower > 0.0 and upper <= RATIO * lower
+    told &= e.lower <= value <= e.upper
+    verdict = "" if told else MOVED
+    return replace(e, value=value, lower=lower, upper=upper, identified=told, verdict=verdict)

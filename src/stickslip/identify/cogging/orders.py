@@ -1,0 +1,294 @@
+"""Which orders a torque over the angle holds, in both directions alike or opposed; what is left out says how many.
+
+Orders are taken one by one, the one that explains most first (orthogonal matching pursuit, ``pati1993``). Scores of all
+orders come from one Fourier transform of the residual over the angle; what is taken is fitted exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from stickslip.identify.cogging.rows import Places
+
+__all__ = [
+    "MOST",
+    "Fit",
+    "Orders",
+    "Term",
+    "chosen",
+    "columns",
+    "fit",
+    "grid_of",
+    "interleaved",
+    "left_out",
+    "moving_columns",
+    "path",
+    "sectors",
+]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Integers = np.ndarray[Any, np.dtype[np.intp]]
+Part = Literal["even", "odd"]
+Term = tuple[Part, float]
+PARTS: tuple[Part, Part] = ("even", "odd")
+
+MOST = 60
+"""Orders, of both parts together."""
+SURE = 10.0
+"""Beyond twice the logarithm of how many are tried: what an order explains, in variances of the noise."""
+LAGS = 60
+FADED = 0.05
+"""Correlation of the residual from which on places count as independent."""
+FOLDS, SECTORS = 4, 12
+HIGHEST = 1500
+RESOLVED = 0.8
+"""Of the Nyquist order of the places."""
+STEADY = 1e-3
+"""Acceleration, of the squared speed, below which the speed is constant."""
+BENT = 1.2
+"""Between the speeds of a curve, at least."""
+WHOLE = 0.25
+"""Of a turn, from which on orders are whole numbers a turn; below, halves of the way travelled."""
+STROKES = 4
+"""Strokes in motion, from which on the intervals hold what they differ by."""
+CARRIED = 0.1
+"""Of what velocity and acceleration take out of an order, not believed: both are smoothed, and friction lags."""
+ENOUGH = 1.005
+"""Of the least error, within which fewer orders are taken."""
+
+
+@dataclass(frozen=True)
+class Orders:
+    """What is tried: ``base``, ``2 base``, ... up to ``count base``, 1/rad."""
+
+    base: float
+    count: int
+
+    @property
+    def highest(self) -> float:
+        """1/rad"""
+        return self.base * self.count
+
+    @property
+    def whole(self) -> bool:
+        """Whether orders are whole numbers a turn."""
+        return self.base == 1.0
+
+
+def grid_of(places: Places, gear: float = 1.0) -> Orders:
+    """The orders that the places can show."""
+    way, spacing = float(np.ptp(places.angle)), places.spacing
+    nyquist = math.pi / spacing if math.isfinite(spacing) and spacing > 0.0 else 1.0
+    base = 1.0 if way > WHOLE * 2.0 * math.pi else math.pi / max(way, 1e-9)
+    if gear > 1.0 and way > 1.5 * 2.0 * math.pi:
+        base = 1.0 / gear
+    return Orders(base, max(1, int(min(HIGHEST / min(base, 1.0), RESOLVED * nyquist / base))))
+
+
+def columns(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Array:
+    """Constant, direction, velocity and acceleration where it moved, what else the places name, then cosine and sine of
+    every term."""
+    d = places.direction
+    out = [np.ones(len(places)), d]
+    speed = np.abs(places.velocity)
+    kinds = {"viscous": places.velocity, "curve": speed * places.velocity, "inertia": places.acceleration}
+    out += [*(kinds[name] for name in moving), *places.beside.T]
+    for part, n in terms:
+        # A mean over an angle is smaller than the wave itself.
+        sign = (d if part == "odd" else 1.0) * places.damping(n)
+        out += [sign * np.cos(n * places.angle), sign * np.sin(n * places.angle)]
+    return np.column_stack(out)
+
+
+def moving_columns(places: Places) -> tuple[str, ...]:
+    """ "viscous", where there is more than one speed (else friction's level has it), "curve" where there are three;
+    "inertia", where speed varies."""
+    speed = np.abs(places.velocity)
+    low, middle, high = np.percentile(speed, [10, 50, 90]).tolist()
+    several, three = high > 1.5 * low, high > BENT * middle and middle > BENT * low
+    swings = float(np.percentile(np.abs(places.acceleration), 90)) > STEADY * float(np.median(speed**2))
+    return (
+        *(("viscous",) if several else ()),
+        *(("curve",) if three else ()),
+        *(("inertia",) if swings else ()),
+    )
+
+
+# ---- the pursuit -----------------------------------------------------------------------------------------------------
+
+
+class Scores:
+    """What every order explains of a residual, from sums over a fine grid of the angle."""
+
+    def __init__(self, places: Places, orders: Orders) -> None:
+        self.places, self.orders = places, orders
+        self.size = 1 << max(10, math.ceil(math.log2(16 * orders.count)))
+        self.cell = (
+            np.round(places.angle * orders.base * self.size / (2.0 * math.pi)).astype(np.int64) % self.size
+        )
+        density = np.fft.rfft(np.bincount(self.cell, minlength=self.size))
+        k = np.arange(1, orders.count + 1)
+        twice = density[2 * k]  # sum of exp(-2i n theta)
+        n = float(len(places))
+        self.cc, self.ss, self.cs = 0.5 * (n + twice.real), 0.5 * (n - twice.real), -0.5 * twice.imag
+        self.det = np.maximum(self.cc * self.ss - self.cs**2, 1e-9 * n * n)
+
+    def __call__(self, residual: Array) -> Array:
+        """Power of the residual that cosine and sine of each order explain, shape (count,)."""
+        seen = np.fft.rfft(np.bincount(self.cell, residual, self.size))[1 : self.orders.count + 1]
+        c, s = seen.real, -seen.imag
+        return (self.ss * c * c - 2.0 * self.cs * c * s + self.cc * s * s) / self.det
+
+
+def path(places: Places, orders: Orders, moving: Sequence[str], most: int = MOST) -> list[Term]:
+    """Terms in the order in which they are taken, as long as each explains more than chance does."""
+    scores = Scores(places, orders)
+    basis, _ = np.linalg.qr(columns(places, (), moving))
+    residual = places.torque - basis @ (basis.T @ places.torque)
+    terms: list[Term] = []
+    most = min(most, len(places) // 6)
+    tried = 2.0 * math.log(2.0 * orders.count) + SURE
+    taken = {"even": np.zeros(orders.count, dtype=bool), "odd": np.zeros(orders.count, dtype=bool)}
+    while len(terms) < most:
+        power = float(residual @ residual)
+        every = {"even": scores(residual), "odd": scores(residual * places.direction)}
+        for part, mask in taken.items():
+            every[part][mask] = 0.0
+        part = PARTS[int(every["odd"].max() > every["even"].max())]
+        i = int(np.argmax(every[part]))
+        if power <= 0.0 or len(places) / memory(residual, places.stroke) * every[part][i] / power < tried:
+            break
+        taken[part][i] = True
+        term: Term = (part, orders.base * (i + 1))
+        own = columns(places, [term], ())[:, -2:]
+        for _ in range(2):
+            own = own - basis @ (basis.T @ own)
+        added, size = np.linalg.qr(own)
+        if float(np.min(np.abs(np.diag(size)))) < 1e-3 * math.sqrt(len(places)):
+            continue
+        terms.append(term)
+        basis = np.column_stack([basis, added])
+        residual = residual - added @ (added.T @ residual)
+    return terms
+
+
+def memory(residual: Array, stroke: Integers) -> float:
+    """Places over which a residual is correlated within a stroke: what the variance of a mean is greater by."""
+    power, total = float(residual @ residual), 1.0
+    for lag in range(1, min(LAGS, residual.size - 1)):
+        same = stroke[lag:] == stroke[:-lag]
+        share = float(np.sum((residual[lag:] * residual[:-lag])[same])) / max(power, 1e-300)
+        if share < FADED:
+            break
+        total += 2.0 * share
+    return total
+
+
+# ---- how many --------------------------------------------------------------------------------------------------------
+
+
+def sectors(places: Places) -> Integers:
+    """Fold of every place: whole sectors of the way, every fourth in one fold."""
+    low, way = float(places.angle.min()), float(np.ptp(places.angle))
+    turn = min(way, 2.0 * math.pi)
+    return (
+        np.floor(SECTORS * np.mod(places.angle - low, turn * (1.0 + 1e-9)) / turn).astype(np.intp)
+    ) % FOLDS
+
+
+def interleaved(places: Places) -> Integers:
+    """Fold of every place: every other one, the same in both directions."""
+    return (np.round(places.angle / places.spacing).astype(np.intp)) % 2
+
+
+Fold = Callable[[Places], Integers]
+
+
+def left_out(places: Places, orders: Orders, moving: Sequence[str], fold: Fold) -> tuple[Array, int]:
+    """RMS on what was left out by number of terms, each fold with terms of its own; the largest number."""
+    number = fold(places)
+    squares: list[Array] = []
+    for f in range(int(number.max()) + 1):
+        fitted, out = places.at(number != f), places.at(number == f)
+        terms = path(fitted, orders, moving)
+        squares.append(growing(fitted, out, terms, moving))
+    most = max(len(s) for s in squares)
+    padded = np.array([np.concatenate([s, np.full(most - len(s), s[-1])]) for s in squares])
+    return np.sqrt(padded.sum(axis=0) / len(places)), most - 1
+
+
+def growing(fitted: Places, out: Places, terms: Sequence[Term], moving: Sequence[str]) -> Array:
+    """Sum of squares on `out` with the first 0, 1, 2, ... terms, from one triangular factor."""
+    matrix, other = columns(fitted, terms, moving), columns(out, terms, moving)
+    q, r = np.linalg.qr(matrix)
+    seen = q.T @ fitted.torque
+    first = matrix.shape[1] - 2 * len(terms)
+    found: list[float] = []
+    for k in range(len(terms) + 1):
+        m = first + 2 * k
+        values = np.linalg.solve(r[:m, :m], seen[:m])
+        found.append(float(np.sum((out.torque - other[:, :m] @ values) ** 2)))
+    return np.array(found)
+
+
+def chosen(errors: Array) -> int:
+    """The fewest terms whose error is within `ENOUGH` of the least."""
+    return int(np.flatnonzero(errors <= ENOUGH * float(errors.min()))[0])
+
+
+# ---- the fit ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Terms with their values: ``values`` in the order of `columns`, with their covariance."""
+
+    terms: tuple[Term, ...]
+    values: Array
+    covariance: Array
+    residual: Array
+    first: int
+    """Columns before those of the terms."""
+
+    def pair(self, term: Term) -> Array:
+        """Cosine and sine of a term."""
+        i = self.first + 2 * self.terms.index(term)
+        return self.values[i : i + 2]
+
+    def spread(self, term: Term) -> Array:
+        """Their covariance, shape (2, 2)."""
+        i = self.first + 2 * self.terms.index(term)
+        return self.covariance[i : i + 2, i : i + 2]
+
+
+def fit(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Fit:
+    """Least squares.
+
+    The covariance counts correlated places once. To it come what the strokes differ by (friction and what the motion
+    carries change with the speed), and a share of what velocity and acceleration took out of each order.
+    """
+    matrix = columns(places, terms, moving)
+    q, r = np.linalg.qr(matrix)
+    values: Array = np.asarray(np.linalg.solve(r, q.T @ places.torque), dtype=np.float64)
+    residual = places.torque - matrix @ values
+    free = max(1, len(places) - matrix.shape[1])
+    variance = float(residual @ residual) / free * memory(residual, places.stroke)
+    inverse = np.linalg.inv(r)
+    first = matrix.shape[1] - 2 * len(terms)
+    covariance = variance * inverse @ inverse.T
+    strokes = np.unique(places.stroke)
+    if moving and strokes.size >= STROKES:
+        sums = np.array([matrix[places.stroke == s].T @ residual[places.stroke == s] for s in strokes])
+        spread = inverse @ inverse.T @ sums.T
+        covariance = covariance + strokes.size / (strokes.size - 1.0) * spread @ spread.T
+    carried: Array = matrix[:, 2:first] @ values[2:first]
+    for i in range(first, matrix.shape[1], 2):
+        own = matrix[:, i : i + 2]
+        share = CARRIED * np.linalg.solve(own.T @ own, own.T @ (carried - float(np.mean(carried))))
+        covariance[i : i + 2, i : i + 2] += float(share @ share) * np.eye(2)
+    return Fit(tuple(terms), values, covariance, residual, first)

@@ -1,0 +1,242 @@
+"""From records to places: angle, torque and direction of a standstill map or of a slow rotation.
+
+At a place where the axis stood, friction has the sign of the way that led there; after a turn-round it keeps its old
+sign for a while, so that what follows a reversal closely is left out. Rows of one place are not independent: they are
+averaged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.record import Record
+
+__all__ = ["FASTEST", "Places", "joined", "places_of", "velocity_of"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Integers = np.ndarray[Any, np.dtype[np.intp]]
+
+FASTEST = 1.0
+"""rad/s, beyond which the rotor's inertia, not the motor, carries the cogging."""
+AFTER = 0.1, 0.02
+"""rad, and part of the stroke, left out after a turn-round: the smaller of the two."""
+GAP = 5.0
+"""Median time steps without a row that end a place."""
+STANDS = 8
+"""Places, at least, that make a standstill map."""
+SETTLES = 20
+"""Rows of a place beyond which its first half, the way there, is left out."""
+CELLS = 8192
+"""Of a turn, in which rows of a rotation are averaged."""
+PART = 16
+"""Of a stroke, over which velocity is averaged on each side: friction lags behind faster changes."""
+WINDOW = 0.01
+"""s, over which a velocity is taken on each side."""
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """What is fitted, in the order in which it was measured.
+
+    Attributes
+    ----------
+    angle : array, shape (n,)
+        rad
+    torque : array, shape (n,)
+        Or current.
+    direction : array, shape (n,)
+        +1 or -1.
+    velocity, acceleration : array, shape (n,)
+        rad/s, a running mean along the stroke, and rad/s²; 0 at standstill.
+    stroke : array of int, shape (n,)
+        Number of the way without reversal.
+    width : array, shape (n,)
+        Angle over which the rows were averaged, rad; 0 at standstill.
+    """
+
+    angle: Array
+    torque: Array
+    direction: Array
+    velocity: Array
+    acceleration: Array
+    stroke: Integers
+    width: Array
+
+    def __len__(self) -> int:
+        return int(self.angle.size)
+
+    def at(self, rows: Any) -> Places:
+        """Some of the rows."""
+        return type(self)(*(getattr(self, n)[rows] for n in self.__dataclass_fields__))
+
+    @property
+    def beside(self) -> Array:
+        """Columns of what else the torque may hold, shape (n, k)."""
+        return np.zeros((len(self), 0))
+
+    def damping(self, order: float) -> Array:
+        """What the mean over `width` leaves of a wave of this order, shape (n,)."""
+        return np.sinc(order * self.width / (2.0 * math.pi))
+
+    @property
+    def spacing(self) -> float:
+        """Median angle between neighbours of a stroke, rad."""
+        steps = np.abs(np.diff(self.angle))[np.diff(self.stroke) == 0]
+        return float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else math.inf
+
+
+def places_of(record: Record, torque: str) -> tuple[Places, bool]:
+    """The places of a record; whether it is a standstill map."""
+    t, q, y = record.time, record["position"], record[torque]
+    good = np.isfinite(t) & np.isfinite(q) & np.isfinite(y)
+    t, q, y = t[good], q[good], y[good]
+    if t.size < 2 * STANDS:
+        raise InputError(
+            f"a record of {t.size} rows shows no torque over the angle; record a revolution each way"
+        )
+    reference = next(
+        (record[c][good] for c in ("position_reference", "reference") if c in record.channels), None
+    )
+    group = _stands(t, q, reference)
+    if group is None:
+        velocity = velocity_of(record)[good]
+        return _rotation(t, q, y, velocity), False
+    return _standing(group, q, y, q if reference is None else reference), True
+
+
+def velocity_of(record: Record) -> Array:
+    """The recorded velocity, or the slope of the position over `WINDOW` on each side, rad/s."""
+    if "velocity" in record.channels:
+        return record["velocity"]
+    t, q = record.time, record["position"]
+    reach = max(1, round(WINDOW / max(float(np.median(np.diff(t))), 1e-9)))
+    rows = np.arange(t.size)
+    low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach, t.size - 1)
+    return (q[high] - q[low]) / np.maximum(t[high] - t[low], 1e-9)
+
+
+def joined(parts: Sequence[Places]) -> Places:
+    """All records in one, their strokes counted on."""
+    count, out = 0, list[Places]()
+    for p in parts:
+        out.append(
+            Places(p.angle, p.torque, p.direction, p.velocity, p.acceleration, p.stroke + count, p.width)
+        )
+        count += int(p.stroke.max(initial=-1)) + 1
+    return Places(*(np.concatenate([getattr(p, n) for p in out]) for n in Places.__dataclass_fields__))
+
+
+# ---- standstill ------------------------------------------------------------------------------------------------------
+
+
+def _stands(t: Array, q: Array, reference: Array | None) -> Integers | None:
+    """Number of the place of every row, -1 for none; None where the record is no standstill map."""
+    if reference is not None:
+        new = np.concatenate([[True], np.abs(np.diff(reference)) > 1e-9])
+        if STANDS <= np.count_nonzero(new) <= 0.5 * t.size:
+            return np.cumsum(new) - 1
+    steps = np.diff(t)
+    new = np.concatenate([[True], steps > GAP * float(np.median(steps))])
+    if np.count_nonzero(new) >= max(STANDS, t.size // 50) and np.count_nonzero(new) <= 0.5 * t.size:
+        return np.cumsum(new) - 1
+    still = np.concatenate([np.diff(q) == 0.0, [False]])
+    still = still | np.concatenate([[False], still[:-1]])
+    starts = np.concatenate([[True], (np.diff(q) != 0.0)]) & still
+    group = np.where(still, np.cumsum(starts) - 1, -1)
+    lasting = np.bincount(group[group >= 0]) >= SETTLES if np.any(still) else np.zeros(0, dtype=bool)
+    kept = (group >= 0) & lasting[np.maximum(group, 0)] if lasting.size else np.zeros(t.size, dtype=bool)
+    if np.count_nonzero(lasting) < STANDS or np.count_nonzero(kept) < 0.5 * t.size:
+        return None
+    return np.where(kept, group, -1)
+
+
+def _standing(group: Integers, q: Array, y: Array, way: Array) -> Places:
+    """The mean of every place, with the direction that led there."""
+    names, at = np.unique(group[group >= 0], return_inverse=True)
+    rows = np.flatnonzero(group >= 0)
+    size = np.bincount(at)
+    inside = np.arange(rows.size) - np.concatenate([[0], np.cumsum(size)[:-1]])[at]
+    used = (size[at] <= SETTLES) | (inside >= size[at] // 2)
+    rows, at = rows[used], at[used]
+    count = np.bincount(at, minlength=names.size)
+
+    def mean(x: Array) -> Array:
+        return np.bincount(at, x[rows], minlength=names.size) / count
+
+    zeros = np.zeros(names.size)
+    return _settled(mean(q), mean(y), mean(way), zeros, zeros)
+
+
+def _settled(angle: Array, torque: Array, way: Array, velocity: Array, acceleration: Array) -> Places:
+    """Directions and strokes, without what follows a turn-round too closely."""
+    step = np.diff(way, prepend=way[0])
+    if step.size > 1:
+        step[0] = step[1]
+    sign = np.sign(step)
+    for i in range(1, sign.size):  # where it did not move, the last direction holds
+        if sign[i] == 0.0:
+            sign[i] = sign[i - 1]
+    stroke = np.concatenate([[0], np.cumsum(np.diff(sign) != 0.0)]).astype(np.intp)
+    first = np.asarray(np.searchsorted(stroke, np.arange(int(stroke[-1]) + 1)), dtype=np.intp)
+    start = way[np.maximum(first - 1, 0)]
+    gone = np.abs(way - start[stroke])
+    keep = (sign != 0.0) & (gone >= min(AFTER[0], AFTER[1] * float(np.ptp(way))))
+    return Places(
+        angle[keep], torque[keep], sign[keep], velocity[keep], acceleration[keep], stroke[keep],
+        np.zeros(np.count_nonzero(keep)),
+    )  # fmt: skip
+
+
+# ---- rotation --------------------------------------------------------------------------------------------------------
+
+
+def _rotation(t: Array, q: Array, y: Array, velocity: Array) -> Places:
+    """Slow rows in motion, averaged over cells of the angle within a stroke."""
+    slope = np.gradient(velocity, t + 1e-12 * np.arange(t.size))
+    reach = max(1, round(WINDOW / max(float(np.median(np.diff(t))), 1e-9)))
+    kernel = np.ones(2 * reach + 1) / (2 * reach + 1)
+    acceleration = np.convolve(slope, kernel, "same")
+    speed = np.abs(velocity)
+    usual = float(np.median(speed[speed > 0.0])) if np.any(speed > 0.0) else 0.0
+    moving = (speed <= FASTEST) & (speed > 0.1 * min(usual, FASTEST))
+    turns = np.flatnonzero(np.diff(np.sign(velocity)) != 0.0)
+    for k in range(-reach, reach + 2):  # where slopes are taken across a turn-round
+        moving[np.clip(turns + k, 0, t.size - 1)] = False
+    if not np.any(moving):
+        none = np.zeros(0)
+        return Places(none, none, none, none, none, np.zeros(0, dtype=np.intp), none)
+    sign = np.sign(velocity)
+    stroke = (
+        np.cumsum(np.concatenate([[True], (np.diff(sign) != 0.0) | (np.diff(moving.astype(int)) != 0)])) - 1
+    )
+    cell = np.floor(q * CELLS / (2.0 * math.pi)).astype(np.int64)
+    key = np.concatenate([[True], (np.diff(cell) != 0) | (np.diff(stroke) != 0)])
+    at = np.cumsum(key) - 1
+    count = np.bincount(at)
+    means = [np.bincount(at, x) / count for x in (q, y, velocity, acceleration)]
+    first = np.flatnonzero(key)
+    used, number = moving[first], stroke[first]
+    begin = np.array([q[np.searchsorted(stroke, s)] for s in range(int(stroke[-1]) + 1)])
+    far = np.abs(means[0] - begin[number]) >= min(AFTER[0], AFTER[1] * float(np.ptp(q)))
+    keep = used & far
+    angle, torque, v, a = (m[keep] for m in means)
+    for stretch in np.split(np.arange(v.size), np.flatnonzero(np.diff(number[keep]) != 0) + 1):
+        v[stretch] = _smooth(v[stretch], max(1, stretch.size // PART))
+    spread = np.bincount(at, (q - means[0][at]) ** 2) / count
+    # A uniform spread of this width has this variance.
+    width = np.sqrt(12.0 * spread[keep])
+    return Places(angle, torque, np.sign(v), v, a, number[keep].astype(np.intp), width)
+
+
+def _smooth(x: Array, reach: int) -> Array:
+    """Mean over so many neighbours on both sides, as many as there are."""
+    total = np.concatenate([[0.0], np.cumsum(x)])
+    low = np.maximum(np.arange(x.size) - reach, 0)
+    high = np.minimum(np.arange(x.size) + reach + 1, x.size)
+    return (total[high] - total[low]) / (high - low)

@@ -1,0 +1,1 @@
+"""Two identified models compared: what has changed, and by how much."""

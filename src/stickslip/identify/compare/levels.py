@@ -1,0 +1,144 @@
+"""By how much two identified models differ: one number with its interval, whatever their laws are.
+
+Parameters of different laws have no common meaning; the torque that it takes to move at a speed has. Levels are torques
+at speeds that both records have, and at break-away where both models identified it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.identified_file import Identified
+from stickslip.identify.monte_carlo import curve_band, sliding_torque
+
+__all__ = ["Change", "common_speeds", "levels_of", "said_of", "unseen"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+DRAWS = 400
+PER_STD = 3.92
+"""Width of a 95 % interval in standard deviations."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One number in both models; ``p`` is the chance of such a difference without a change, after Holm.
+
+    It does not decide (``decides``) where other parameters of the law are not identified: the two may trade places.
+    ``lower`` and ``upper`` bound second less first, 95 %.
+    """
+
+    name: str
+    unit: str
+    first: float
+    second: float
+    lower: float
+    upper: float
+    p: float
+    decides: bool = True
+
+    @property
+    def changed(self) -> bool:
+        """At the 5 % level of all parameters together."""
+        return self.decides and self.p < 0.05
+
+    @property
+    def percent(self) -> float:
+        """Change in per cent of the first value; not a number where that is 0, or the two differ in sign."""
+        return 100.0 * (self.second / self.first - 1.0) if self.first * self.second > 0.0 else math.nan
+
+    @property
+    def percent_span(self) -> tuple[float, float]:
+        """The 95 % interval of the change, per cent of the first value; as `percent` not a number."""
+        if math.isnan(self.percent):
+            return math.nan, math.nan
+        low, high = sorted((100.0 * self.lower / self.first, 100.0 * self.upper / self.first))
+        return low, high
+
+    @property
+    def told(self) -> bool:
+        """Whether its own interval leaves 0 out."""
+        return self.lower > 0.0 or self.upper < 0.0
+
+    def words(self) -> str:
+        """Name, change and interval: in per cent, or in its unit where that has no meaning."""
+        if math.isnan(self.percent):
+            by = self.second - self.first
+            return f"{self.name} {by:+.3g} {self.unit} [{self.lower:+.3g}, {self.upper:+.3g}]"
+        low, high = self.percent_span
+        return f"{self.name} {rounded(self.percent)} % [{rounded(low)}, {rounded(high)}]"
+
+
+def rounded(percent: float) -> str:
+    """With its sign; whole numbers from 10 on, below one digit more."""
+    return f"{percent:+.0f}" if abs(percent) >= 9.95 else f"{percent:+.2g}"
+
+
+def common_speeds(first: Identified, second: Identified) -> tuple[float, float] | None:
+    """Least and greatest speed that both records have, in either direction, rad/s; None where a file does not say."""
+    if not (first.speeds and second.speeds):
+        return None
+    ends = [
+        (min(float(v[0]) for v in m.speeds.values()), max(float(v[-1]) for v in m.speeds.values()))
+        for m in (first, second)
+    ]
+    low, high = max(e[0] for e in ends), min(e[1] for e in ends)
+    return (low, high) if low < high else None
+
+
+def levels_of(first: Identified, second: Identified, low: float, high: float) -> tuple[Change, ...]:
+    """Break-away, and the torque at three speeds from `low` to `high`, rad/s; both ways where a law has two sides."""
+    speeds = [low, math.sqrt(low * high), high]
+    two = any(m.model.law.chosen.get("symmetry") == "asymmetric" for m in (first, second))
+    points = [*speeds, *(-v for v in speeds)] if two else speeds
+    names = [f"friction at {v:.3g} {first.unit('rad/s')}" for v in points]
+    if all(any(e.name == "fs" and e.identified for e in m.estimates) for m in (first, second)):
+        points, names = [0.0, *points], ["break-away", *names]
+    velocity = np.array(points)
+    best = [sliding_torque(m.model, velocity) for m in (first, second)]
+    drawn = [
+        curve_band(m.model, *m.law_estimates, velocity, DRAWS, seed) for seed, m in enumerate((first, second))
+    ]
+    count = min(len(d) for d in drawn)
+    if count < 20:
+        return ()
+    off = (drawn[1][:count] - best[1]) - (drawn[0][:count] - best[0])
+    low_, high_ = np.percentile(off, [2.5, 97.5], axis=0)
+    unit = first.unit("N·m")
+    return tuple(
+        Change(name, unit, float(a), float(b), float(b - a + lo), float(b - a + hi), math.nan, decides=False)
+        for name, a, b, lo, hi in zip(names, *best, low_, high_, strict=True)
+    )
+
+
+def said_of(changes: Sequence[Change], levels: Sequence[Change], own: set[str], changed: bool) -> str:
+    """The verdict, by how much: of the friction, and of what is beside it."""
+    beside = [c.words() for c in changes if c.changed and c.name.partition("[")[0] not in own]
+    friction = [c.words() for c in changes if c.changed and c.name.partition("[")[0] in own]
+    friction += [c.words() for c in levels if c.told]
+    text = "No change of the friction that the intervals do not explain."
+    if changed:
+        text = f"The friction has changed{': ' if friction else ''}{', '.join(friction)}."
+    if beside:
+        text += f" Beside it has changed: {', '.join(beside)}."
+    return text
+
+
+def unseen(changes: Sequence[Change], levels: Sequence[Change]) -> tuple[str, ...]:
+    """What could not have been seen: for each number that did not change, how large a change goes unseen."""
+    parts: list[str] = []
+    for c in (*changes, *levels):
+        if c.changed or c.told:
+            continue
+        half = 0.5 * (c.upper - c.lower)
+        size = f"{100.0 * half / abs(c.first):.2g} %" if c.first else f"{half:.2g} {c.unit}"
+        if not math.isnan(c.percent) or not c.first:
+            parts.append(f"{c.name} by {size}")
+        else:
+            parts.append(f"{c.name} by {half:.2g} {c.unit}")
+    return (f"Smaller changes than these would not have been seen: {', '.join(parts)}.",) if parts else ()

@@ -1,0 +1,1 @@
+"""Least squares, noise, intervals, filters: the mathematics that the methods share."""

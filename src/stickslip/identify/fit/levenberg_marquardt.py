@@ -1,0 +1,298 @@
+"""Least squares to the last digit, and the global minimum: Levenberg and Marquardt's method from many starts.
+
+Moré's (1978) scaling; every trial step comes from one singular value decomposition of the Jacobian, so that the
+normal equations, which would square its condition, are never formed. Bounds are kept by projection.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+
+__all__ = [
+    "STEP",
+    "Optimum",
+    "Residuals",
+    "central_differences",
+    "descend",
+    "distinct",
+    "search",
+    "spread_starts",
+]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Residuals = Callable[[Array], Array]
+"""Model minus data at the coordinates, shape (n,); what is not finite counts as infinitely bad."""
+
+Each = Callable[[Callable[[int], Array], Sequence[int]], Iterable[Array]]
+"""Computes the columns of a Jacobian: one after another, or, where they are dear, side by side."""
+
+MOST_TRIES = 60
+"""Damped steps that may fail."""
+STEP = float(np.finfo(np.float64).eps) ** (1.0 / 3.0)
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """A minimum of the sum of squares.
+
+    Attributes
+    ----------
+    u : array, shape (p,)
+    cost : float
+        Sum of squares.
+    residuals : array, shape (n,)
+    jacobian : array, shape (n, p)
+        Zero columns for held coordinates.
+    evaluations : int
+        Calls of the residuals, those for the Jacobian included.
+    """
+
+    u: Array
+    cost: float
+    residuals: Array
+    jacobian: Array
+    evaluations: int
+
+
+def cost_of(r: Array) -> float:
+    """Sum of squares; infinite where a residual is not finite."""
+    total = float(r @ r)
+    return total if math.isfinite(total) else math.inf
+
+
+def central_differences(
+    residuals: Residuals, u: Array, free: Sequence[int], lower: Array, upper: Array, difference: float = STEP,
+    each: Each = map,
+) -> Array:  # fmt: skip
+    """Jacobian by central differences inside the bounds, shape (n, p); error about 1e-10 of its scale.
+
+    Residuals that are exact to fewer digits need a larger `difference`: relative above 1.
+    """
+
+    def column(i: int) -> Array:
+        h = difference * max(1.0, abs(float(u[i])))
+        ahead, behind = u.copy(), u.copy()
+        ahead[i] = min(u[i] + h, upper[i])
+        behind[i] = max(u[i] - h, lower[i])
+        width = ahead[i] - behind[i]
+        return (residuals(ahead) - residuals(behind)) / width if width > 0.0 else 0.0 * residuals(u)
+
+    return np.stack(list(each(column, free)), axis=1)
+
+
+def descend(
+    residuals: Residuals,
+    start: Array,
+    lower: Array,
+    upper: Array,
+    *,
+    held: Sequence[int] = (),
+    iterations: int = 300,
+    tolerance: float = 1e-15,
+    difference: float = STEP,
+    each: Each = map,
+) -> Optimum:
+    """The minimum that is reached from `start`.
+
+    Parameters
+    ----------
+    residuals : callable
+    start, lower, upper : array, shape (p,)
+        The start is moved inside the bounds.
+    held : sequence of int
+        Coordinates that stay.
+    iterations : int
+        Most Jacobians.
+    tolerance : float
+        Relative decrease of the sum of squares below which it ends.
+    difference : float
+        Of coordinates, for the Jacobian; relative above 1.
+    each : callable
+        Computes the columns of a Jacobian; `map`, or `stickslip.identify.fit.parallel.mapped`.
+
+    Returns
+    -------
+    Optimum
+
+    Raises
+    ------
+    InputError
+        If the residuals at the start are not finite.
+    """
+    u = np.clip(np.asarray(start, dtype=np.float64), lower, upper)
+    free = [i for i in range(u.size) if i not in held]
+    r = residuals(u)
+    cost, evaluations = cost_of(r), 1
+    if cost == math.inf:
+        raise InputError("the fit cannot start: the model gives no finite values there; give another start")
+    jacobian = np.zeros((r.size, u.size))
+    damping, scale, known = 1e-3, np.zeros(len(free)), False
+    for _ in range(iterations if free else 0):
+        jacobian[:, free] = central_differences(residuals, u, free, lower, upper, difference, each)
+        evaluations, known = evaluations + 2 * len(free), True
+        part = np.where(np.isfinite(jacobian[:, free]), jacobian[:, free], 0.0)
+        scale = np.maximum(scale, np.linalg.norm(part, axis=0))
+        inside = [
+            i for i, g in enumerate(part.T @ r)
+            if scale[i] > 0.0 and not (g > 0.0 and u[free[i]] <= lower[free[i]])
+            and not (g < 0.0 and u[free[i]] >= upper[free[i]])
+        ]  # fmt: skip
+        if not inside:
+            break
+        places = [free[i] for i in inside]
+        model = Quadratic.of(part[:, inside] / scale[inside], r)
+        step = downhill(residuals, u, cost, model, places, scale[inside], damping, lower, upper, tolerance)
+        evaluations += step.evaluations
+        if step.cost >= cost:
+            break
+        gain, damping = cost - step.cost, step.damping
+        u, r, cost, known = step.u, step.residuals, step.cost, False
+        if gain <= tolerance * cost or cost == 0.0:
+            break
+    if free and not known:
+        jacobian[:, free] = central_differences(residuals, u, free, lower, upper, difference, each)
+        evaluations += 2 * len(free)
+    return Optimum(u, cost, r, jacobian, evaluations)
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """The sum of squares of the linearised residuals, by a singular value decomposition."""
+
+    sizes: Array
+    right: Array
+    pull: Array
+
+    @staticmethod
+    def of(scaled_jacobian: Array, r: Array) -> Quadratic:
+        """Decompose once; every damping then costs a product."""
+        # Rotated onto their common span first: a tall Jacobian's own decomposition takes three times as long.
+        both: Array = np.asarray(np.linalg.qr(np.column_stack([scaled_jacobian, r]), "r"))
+        left, sizes, right = np.linalg.svd(both[:, :-1], full_matrices=False)
+        return Quadratic(sizes, right, left.T @ both[:, -1])
+
+    @staticmethod
+    def normal(scaled_jacobian: Array, r: Array) -> Quadratic:
+        """From the normal equations: half the digits at a tenth of the time, enough for an inexact Jacobian."""
+        values, vectors = np.linalg.eigh(scaled_jacobian.T @ scaled_jacobian)
+        sizes = np.sqrt(np.maximum(values, 1e-16 * max(float(values[-1]), 1e-300)))
+        return Quadratic(sizes, vectors.T, vectors.T @ (scaled_jacobian.T @ r) / sizes)
+
+    def step(self, damping: float) -> Array:
+        """The damped step, in scaled coordinates."""
+        return -(self.right.T @ (self.sizes * self.pull / (self.sizes**2 + damping)))
+
+    def expected(self, damping: float) -> float:
+        """The decrease that this model expects of that step."""
+        s2 = self.sizes**2
+        return float(np.sum(s2 * self.pull**2 * (s2 + 2.0 * damping) / (s2 + damping) ** 2))
+
+
+@dataclass(frozen=True)
+class Step:
+    """A trial step: where it leads, and the damping for the next one."""
+
+    u: Array
+    residuals: Array
+    cost: float
+    damping: float
+    evaluations: int
+
+
+def downhill(
+    residuals: Residuals, u: Array, cost: float, model: Quadratic, places: Sequence[int], scale: Array,
+    damping: float, lower: Array, upper: Array, tolerance: float, tries: int = MOST_TRIES,
+    longest: float = math.inf,
+) -> Step:  # fmt: skip
+    """The first step that lowers the cost, damped more with every failure; the last failure where none does.
+
+    No coordinate goes farther than `longest`.
+    """
+    growth, tried = 2.0, 0
+    while True:
+        trial = u.copy()
+        trial[places] += np.clip(model.step(damping) / scale, -longest, longest)
+        trial = np.clip(trial, lower, upper)
+        r = residuals(trial)
+        new, expected = cost_of(r), model.expected(damping)
+        tried += 1
+        if new < cost:
+            # Nielsen's (1999) rule: less damping, the better the model foresaw the decrease.
+            ratio = (cost - new) / expected if expected > 0.0 else 1.0
+            damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0) ** 3), 1e-16)
+            return Step(trial, r, new, damping, tried)
+        stands = float(np.max(np.abs(trial - u))) <= 1e-15 * (1.0 + float(np.max(np.abs(u))))
+        if tried == tries or stands or expected <= tolerance * cost:
+            return Step(trial, r, new, damping, tried)
+        damping, growth = damping * growth, min(growth * 2.0, 1e3)
+
+
+def spread_starts(
+    start: Array, lower: Array, upper: Array, count: int, *, reach: float = 3.0, seed: int = 0
+) -> Array:
+    """`count` starts: `start` itself, and a Latin hypercube over the bounds, at most `reach` from it."""
+    if start.size == 0:  # everything is held
+        return start[None, :]
+    rng = np.random.default_rng(seed)
+    low, high = np.maximum(lower, start - reach), np.minimum(upper, start + reach)
+    cells = np.stack([rng.permutation(max(count - 1, 0)) for _ in range(start.size)], axis=1)
+    inside = (cells + rng.random(cells.shape)) / max(count - 1, 1)
+    return np.vstack([start[None, :], low + inside * (high - low)])
+
+
+def search(
+    residuals: Residuals,
+    starts: Array,
+    lower: Array,
+    upper: Array,
+    *,
+    rough: int = 15,
+    polished: int = 6,
+    tolerance: float = 1e-15,
+    difference: float = STEP,
+) -> list[Optimum]:
+    """Distinct minima, the best first: a short descent from every start of several, a full one from the best few.
+
+    Raises
+    ------
+    InputError
+        If no start gives finite residuals.
+    """
+    if len(starts) == 1:
+        return [descend(residuals, starts[0], lower, upper, tolerance=tolerance, difference=difference)]
+    found: list[Optimum] = []
+    for start in starts:
+        inside = np.clip(start, lower, upper)
+        if math.isfinite(cost_of(residuals(inside))):
+            found.append(
+                descend(
+                    residuals, inside, lower, upper, iterations=rough, tolerance=1e-6, difference=difference
+                )
+            )
+    if not found:
+        raise InputError(
+            "the fit cannot start: the model gives no finite values at any start; give another start"
+        )
+    found.sort(key=lambda o: o.cost)
+    full = [
+        descend(residuals, o.u, lower, upper, tolerance=tolerance, difference=difference)
+        for o in distinct(found, 1e-3)[:polished]
+    ]
+    full.sort(key=lambda o: o.cost)
+    return distinct(full, 1e-4)
+
+
+def distinct(optima: Sequence[Optimum], distance: float) -> list[Optimum]:
+    """Those that lie farther than `distance` from every better one, in order."""
+    kept: list[Optimum] = []
+    for o in optima:
+        if all(float(np.max(np.abs(o.u - k.u), initial=0.0)) > distance for k in kept):
+            kept.append(o)
+    return kept

@@ -1,0 +1,61 @@
+"""Torque over the angle: cogging, and friction by angle (`stickslip.identify.cogging`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from stickslip.errors import InputError, UnknownName
+from stickslip.identify.cogging import identify_cogging
+from stickslip.identify.estimate import Identification
+from stickslip.identify.methods._records import TORQUES
+from stickslip.identify.methods.method import Method, Options
+from stickslip.record import Record
+
+__all__ = ["METHOD"]
+
+GEAR = "gear_ratio"
+
+
+def channel_of(records: Sequence[Record], options: Options) -> str:
+    """The channel of the torque, or of the current where no torque is known."""
+    have = [set(r.channels) for r in records]
+    for name in (options.torque,) if options.torque else (*TORQUES, "current"):
+        if all(name in channels for channels in have):
+            return name
+    if options.torque:
+        raise UnknownName("channel", options.torque, sorted(set[str]().union(*have)))
+    raise InputError(
+        "cogging needs a torque or a current in every record; map a column with --map current=COLUMN:A or "
+        "--map torque=COLUMN:UNIT"
+    )
+
+
+def identify(records: Sequence[Record], options: Options) -> Identification:
+    """Even and odd part of the torque over the angle."""
+    return identify_cogging(
+        records, torque=channel_of(records, options), gear=gear_of(options), progress=options.progress
+    )
+
+
+def gear_of(options: Options) -> float:
+    """Turns of the position's shaft for one of the slowest."""
+    for name in options.values:
+        if name != GEAR:
+            raise UnknownName("value of --method cogging", name, (GEAR,))
+    gear = float(options.values.get(GEAR, 1.0))
+    if not gear >= 1.0:
+        raise InputError(
+            f"--set {GEAR}={gear:g} must be at least 1: turns of the position's shaft for one of the slowest"
+        )
+    return gear
+
+
+def check(records: Sequence[Record], options: Options) -> None:
+    """Refuse records without torque or current, and values that are not looked at."""
+    channel_of(records, options)
+    gear_of(options)
+
+
+METHOD = Method(
+    "cogging", "torque over the angle: cogging, and friction by angle", identify, check, takes_current=True
+)

@@ -1,0 +1,1 @@
+"""Prediction error: an observer holds a simulated axis to the measured motion."""

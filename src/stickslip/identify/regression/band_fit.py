@@ -1,0 +1,238 @@
+"""What certain sliding says in one band of frequencies: linear least squares, averaged over what is not known.
+
+T = J dv/dt + sigma2 v + (Fc + A exp(-(v/vs)²)) sign(v) + T0 (+ gravity, + cogging): linear but for vs and for the skew
+between the columns of torque and motion. vs is averaged over (Bayesian model averaging, ``hoeting1999``): a level
+that the record does not reach is then as uncertain as it should be. The skew is the one at which the jerk explains
+nothing more.
+
+The columns, and what no law holds among them, are those of `stickslip.identify.regression.band_system`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.regression.band_system import (
+    COULOMB,
+    INERTIA,
+    JERK,
+    OFFSET,
+    VISCOUS,
+    Candidate,
+    System,
+)
+from stickslip.identify.regression.sliding_rows import SlidingRows
+from stickslip.identify.regression.strokes import memory_of
+
+__all__ = ["BandFit", "Number", "fit_band"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Places = np.ndarray[Any, np.dtype[np.int64]]
+
+CORE = 5
+ROUNDS = 12
+SETTLED = 1e-6  # s: the skew's change at which its search ends
+FARTHEST, STRIDE = 40.0, 4.0  # times the skew's usual size: as far as it is looked for, and in a step
+SHOWN = 0.03  # of Fc: a fall of friction that is one
+FORM = 0.003  # of Fc: misfit that is assumed at least
+TENSION, FAR = (
+    2.0,
+    6.0,
+)  # standard deviations: viscous friction below 0 at most; above 0, where the bound does nothing
+MEMORY = 3.0  # rows over which it is correlated at least
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A value and its standard deviation."""
+
+    value: float
+    std: float
+
+
+@dataclass(frozen=True, eq=False)
+class BandFit:
+    """One band's result.
+
+    Attributes
+    ----------
+    corner : float
+        Of the window, Hz.
+    numbers : dict of str to Number
+        ``inertia``, ``sigma2``, ``fc``, ``offset``, ``skew`` (s by which the torque's column lies behind), ``fs`` (the
+        curve's end at rest), ``gravity_sin``, ``gravity_cos``.
+    falls : float
+        Probability that friction falls by more than `SHOWN` of Fc.
+    probability : array, shape (m,)
+        Of no fall of friction (the first), and of every vs tried.
+    stribeck : array, shape (m,)
+        Those vs, rad/s (m/s); the first is 0.
+    harmonics : array, shape (k, 2)
+        Cosine and sine of every order taken in, N·m (N).
+    correlation : array, shape (p, p)
+        Of inertia, sigma2, fc, offset and gravity's two, in the most probable candidate.
+    misfit : float
+        RMS of what is left, N·m (N).
+    relative : float
+        The same over the RMS of the torque.
+    rows, pieces : int
+    """
+
+    corner: float
+    numbers: dict[str, Number]
+    falls: float
+    probability: Array
+    stribeck: Array
+    harmonics: Array
+    correlation: Array
+    misfit: float
+    relative: float
+    rows: int
+    pieces: int
+
+
+def fit_band(
+    records: Sequence[SlidingRows], stribeck: Sequence[float], *, orders: Sequence[float] = (),
+    background: Sequence[float] = (), pendulum: bool = False, skew_size: float = 3e-3, skew: float | None = None,
+    start: float = 0.0, blurred: bool = False,
+) -> BandFit:  # fmt: skip
+    """Fit the rows of certain sliding that one window shows.
+
+    Parameters
+    ----------
+    records : sequence of SlidingRows
+        Fitted together, each with a column of `falling` for every vs.
+    stribeck : sequence of float
+        Those vs, rad/s (m/s).
+    orders, background : sequence of float
+        Cycles a radian (m) of a torque over the position: free ones, and such that are small.
+    pendulum : bool
+        Whether gravity turns with the angle.
+    skew_size : float
+        s: one standard deviation of the skew before the record.
+    skew : float, optional
+        s, where it is known.
+    start : float
+        s: where the search for the skew begins, and what it is expected to be.
+    blurred : bool
+        Whether the way is too short to tell orders apart: what is near those found is then not small.
+    """
+    system = System(records, stribeck, orders, background, pendulum, skew_size)
+    at = start if skew is None else skew
+    system.expected = at
+    torque = system.torque(at)
+    candidates = system.candidates(torque, at)
+    weight = np.zeros(0)
+    for turn in range(ROUNDS):
+        best = min(candidates, key=lambda c: c.cost)
+        residual = system.residual(torque, best)
+        freedom = max(1, residual.size - best.columns.size - system.small.size)
+        system.noise = float(residual @ residual) / freedom + (FORM * system.fc) ** 2
+        system.memory = max(memory_of(residual, system.stroke), MEMORY)
+        weight = system.weights(candidates)
+        if blurred and orders:
+            system.beside(best, len(orders), len(background))
+        inertia, jerk = (
+            sum(w * c.values[i] for w, c in zip(weight, candidates, strict=True)) / system.scale[i]
+            for i in (INERTIA, JERK)
+        )
+        step = (
+            float(np.clip(-jerk / inertia, -STRIDE * skew_size, STRIDE * skew_size)) if inertia > 0.0 else 0.0
+        )
+        if skew is not None or turn == ROUNDS - 1 or (turn > 1 and abs(step) < SETTLED):
+            break
+        at = float(
+            np.clip(at + step, system.expected - FARTHEST * skew_size, system.expected + FARTHEST * skew_size)
+        )
+        torque = system.torque(at)
+        candidates = system.candidates(torque, at)
+    return summed_up(system, torque, candidates, weight, at, stribeck, len(orders), pendulum)
+
+
+def brakes(values: Array, covariance: Array) -> tuple[Array, Array]:
+    """Values and covariance once viscous friction is known to brake: the normal distribution cut off at 0.
+
+    Where it lies below 0 by more than `TENSION` standard deviations, these are too small.
+    """
+    mean, variance = float(values[VISCOUS]), float(covariance[VISCOUS, VISCOUS])
+    if variance <= 0.0 or not math.isfinite(variance):
+        return values, covariance
+    wider = max(1.0, mean * mean / (TENSION * TENSION * variance)) if mean < 0.0 else 1.0
+    covariance, variance = wider * covariance, wider * variance
+    std = math.sqrt(variance)
+    beyond = -mean / std
+    if beyond < -FAR:
+        return values, covariance
+    density = math.exp(-0.5 * beyond * beyond) / math.sqrt(2.0 * math.pi)
+    rate = density / max(0.5 * math.erfc(beyond / math.sqrt(2.0)), 1e-300)
+    along = covariance[:, VISCOUS] / variance
+    left = variance * max(1.0 + beyond * rate - rate * rate, 0.0)
+    moved = values + along * std * rate
+    return moved, covariance - np.outer(along, along) * (variance - left)
+
+
+def element(i: int) -> Callable[[Array, Array], tuple[float, float]]:
+    """Picks a value and its variance."""
+    return lambda v, s: (v[i], s[i, i])
+
+
+def summed_up(
+    system: System, torque: Array, candidates: Sequence[Candidate], weight: Array, skew: float,
+    stribeck: Sequence[float], orders: int, pendulum: bool,
+) -> BandFit:  # fmt: skip
+    """Means over the candidates, their spread among the variances."""
+    kept = [(w, c) for w, c in zip(weight, candidates, strict=True) if w > 1e-4]
+    total = sum(w for w, _ in kept)
+    braking = [
+        brakes(c.values / system.scale[c.columns], system.covariance(torque, c)) for _, c in kept
+    ]  # fmt: skip
+    values, spreads = [v for v, _ in braking], [s for _, s in braking]
+
+    def mean(of: Callable[[Array, Array], tuple[float, float]]) -> Number:
+        pairs = [of(v, s) for v, s in zip(values, spreads, strict=True)]
+        middle = sum(w * x for (w, _), (x, _) in zip(kept, pairs, strict=True)) / total
+        variance = (
+            sum(w * (s + (x - middle) ** 2) for (w, _), (x, s) in zip(kept, pairs, strict=True)) / total
+        )
+        return Number(float(middle), math.sqrt(max(float(variance), 0.0)))
+
+    core = system.core
+    named = {"inertia": INERTIA, "sigma2": VISCOUS, "fc": COULOMB, "offset": OFFSET}
+    if pendulum:
+        named |= {"gravity_sin": CORE, "gravity_cos": CORE + 1}
+
+    def late(v: Array, s: Array) -> tuple[float, float]:
+        return skew - v[JERK] / v[INERTIA], s[JERK, JERK] / v[INERTIA] ** 2
+
+    def at_rest(v: Array, s: Array) -> tuple[float, float]:
+        if v.size == core:
+            return v[COULOMB], s[COULOMB, COULOMB]
+        return v[COULOMB] + v[core], s[COULOMB, COULOMB] + s[core, core] + 2.0 * s[COULOMB, core]
+
+    numbers = {name: mean(element(i)) for name, i in named.items()}
+    numbers |= {"skew": mean(late), "fs": mean(at_rest)}
+    farthest = FARTHEST * system.skew_size
+    found = numbers["skew"]
+    numbers["skew"] = Number(float(np.clip(found.value, skew - farthest, skew + farthest)), found.std)
+    falls = sum(
+        w for (w, _), v in zip(kept, values, strict=True) if v.size > core and v[core] > SHOWN * v[COULOMB]
+    )
+    best = candidates[int(np.argmax(weight))]
+    residual = system.residual(torque, best)
+    first = core - 2 * orders
+    harmonics = np.array([sum(w * v[i] for (w, _), v in zip(kept, values, strict=True)) / total
+                          for i in range(first, core)]).reshape(orders, 2)  # fmt: skip
+    misfit = float(np.sqrt(np.mean(residual**2)))
+    places = list(named.values())
+    joint = system.covariance(torque, best)[np.ix_(places, places)]
+    each = np.sqrt(np.diag(joint))
+    return BandFit(
+        system.records[0].window.corner, numbers, float(falls / total), weight,
+        np.array([0.0, *(stribeck[k] for k in system.levels)]), harmonics, joint / np.outer(each, each), misfit,
+        misfit / max(float(np.sqrt(np.mean(torque**2))), 1e-300), torque.size, int(system.piece[-1]) + 1,
+    )  # fmt: skip

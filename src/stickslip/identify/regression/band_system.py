@@ -1,0 +1,266 @@
+"""The columns of the regression in one band of frequencies, and its solution for every Stribeck velocity.
+
+Friction that no law holds (a curve a little other than assumed, memory after a reversal, friction that lags behind
+velocity, a torque over the position) takes part as columns whose coefficients are small, and what they could do to a
+number is in its variance; so is a misfit that does not average out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.regression.sliding_rows import SlidingRows
+from stickslip.identify.regression.strokes import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
+
+__all__ = ["COULOMB", "INERTIA", "JERK", "OFFSET", "VISCOUS", "Candidate", "System"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Places = np.ndarray[Any, np.dtype[np.int64]]
+
+INERTIA, VISCOUS, COULOMB, OFFSET, JERK = range(5)
+NONE_PRIOR = 0.5  # probability, before the record, that friction does not fall with velocity
+USUAL, OFTEN = (
+    0.2,
+    0.9,
+)  # of the speed exceeded in a tenth of calm rows: a greater vs is less likely, with its square
+FALL = 0.4  # of Fc: what the fall is expected to be at most, one standard deviation
+RISE, DEEPEST = -0.05, 2.0  # of Fc: bounds of A
+
+# Standard deviations of what no law holds, in parts of Fc.
+CURVE, AFTER, UNEVEN, LAGGING, AROUND = 0.002, 0.01, 0.03, 0.013, 0.005
+LEANING, LEANS = (
+    3,
+    0.02,
+)  # order of a slow torque over the travel (cables, a load, gravity), and its part of Fc
+BLURRED = 0.3  # of the largest order found, that those beside it may have where the way is short
+LONGER = 2.0  # times the memory: length of a piece that counts as one observation, at least
+HUNDREDTH = 2.326  # standard deviations that a normal number exceeds in one of a hundred cases
+FEW = 4  # degrees of freedom, below which a variance refutes nothing
+SYSTEMATIC = 0.02  # of the misfit: what may not average out
+STIFF, LATE = 0.15, 0.2  # the same for inertia and skew, of an axis that is not stiff
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """The fit with one vs (or none): places of its columns, and its solution in columns of norm 1."""
+
+    level: int
+    columns: Places
+    mixing: Array
+    inverse: Array
+    values: Array
+    small: Array
+    cost: float
+
+
+def inverse_of(matrix: Array) -> Array:
+    """Of a symmetric positive matrix."""
+    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+
+
+def least_squares(columns: Array, target: Array) -> Array:
+    """Coefficients of columns of whatever size."""
+    size = np.linalg.norm(columns, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    return np.asarray(np.linalg.lstsq(columns / size, target, rcond=1e-9)[0] / size, dtype=np.float64)
+
+
+def student(freedom: int) -> float:
+    """Student's quantile for 95 % over that of the normal distribution (expansion of Cornish and Fisher)."""
+    f = max(freedom, 2)
+    return 1.0 + 1.2104 / f + 1.4402 / f**2
+
+
+def refuted_above(freedom: int) -> float:
+    """Times a variance of so many degrees of freedom, that the true one exceeds in one of a hundred cases (Wilson and
+    Hilferty's quantile of chi-square); infinite for fewer than `FEW`."""
+    if freedom < FEW:
+        return math.inf
+    part = 2.0 / (9.0 * freedom)
+    return (1.0 - part - HUNDREDTH * math.sqrt(part)) ** -3
+
+
+def small_columns(records: Sequence[SlidingRows], fc: float, orders: Sequence[float]) -> tuple[Array, Array]:
+    """Columns of what no law holds, shape (n, k), and the standard deviation of each coefficient."""
+    v, gone = stacked(records, "speed"), stacked(records, "gone")
+    side, speed = np.sign(v), np.abs(v)
+    top = float(speed.max())
+    slow = max(float(np.quantile(speed, 0.01)), 1e-3 * top)
+    knots = np.geomspace(slow, top, 6)
+    along = np.log(np.clip(speed, slow, top))
+    columns = [side * np.interp(along, np.log(knots), hat) for hat in np.eye(knots.size)]
+    std = [CURVE] * knots.size
+    near, usual = float(np.quantile(gone, 0.02)), float(np.quantile(gone, 0.5))
+    for way in np.geomspace(max(near, 1e-12), max(usual, 1e-11), 3).tolist():
+        columns.append(side * np.exp(-gone / way))
+        std.append(AFTER)
+    # About its mean: the constant torque of a law that is the same in both directions holds the mean of both.
+    columns.append((speed - float(np.mean(speed))) / top)
+    std.append(UNEVEN)
+    pull = stacked(records, "fixed")[:, INERTIA]
+    pull = pull / max(float(np.sqrt(np.mean(pull**2))), 1e-300)
+    for scale in np.geomspace(slow, 0.5 * top, 4)[1:].tolist():
+        slowly = np.exp(-speed / scale)
+        columns += [pull * slowly, side * np.abs(pull) * slowly]
+        std += [LAGGING] * 2
+    for order in orders:
+        columns += list(np.concatenate([r.around(order) for r in records]).T)
+        std += [AROUND] * 2
+    along = stacked(records, "position")
+    middle, reach = 0.5 * (along.max() + along.min()), max(0.5 * float(np.ptp(along)), 1e-300)
+    leaning: Array = np.asarray(
+        np.polynomial.legendre.legvander((along - middle) / reach, LEANING), dtype=np.float64
+    )
+    columns += list(leaning.T[1:])
+    std += [LEANS] * LEANING
+    return np.column_stack(columns), fc * np.array(std)
+
+
+class System:
+    """The columns of one band, and their products; only the torque changes with the skew."""
+
+    def __init__(
+        self, records: Sequence[SlidingRows], stribeck: Sequence[float], orders: Sequence[float], background:
+        Sequence[float], pendulum: bool, skew_size: float,
+    ):  # fmt: skip
+        self.records, self.skew_size, self.expected = records, skew_size, 0.0
+        self.stroke = strokes_of(records)
+        self.shortest = rows_in(PIECE, records)
+        core = [stacked(records, "fixed"), stacked(records, "jerk")[:, None]]
+        if pendulum:
+            angle = stacked(records, "position")
+            core.append(np.column_stack([np.sin(angle), np.cos(angle)]))
+        core += [np.concatenate([r.around(o) for r in records]) for o in orders]
+        plain = np.column_stack(core)
+        self.core = plain.shape[1]
+        first = self.torque(0.0)
+        start = least_squares(plain[:, :JERK], first)
+        self.fc = max(abs(float(start[COULOMB])), 1e-3 * float(np.max(np.abs(first))))
+        self.inertia = abs(float(start[INERTIA]))
+        falling = stacked(records, "falling")
+        self.levels = [
+            k for k in range(falling.shape[1]) if np.count_nonzero(np.abs(falling[:, k]) > 0.3) >= 5
+        ]
+        pace = np.abs(stacked(records, "speed"))
+        calm = self.inertia * np.abs(plain[:, INERTIA]) < self.fc
+        often = float(np.quantile(pace[calm] if np.any(calm) else pace, OFTEN))
+        # Levels of friction are told by rows that hardly accelerate: beyond their speeds nothing speaks against a fall.
+        speed = np.array([stribeck[k] for k in self.levels])
+        beyond = np.maximum(speed / max(USUAL * often, 1e-300), 1.0)
+        self.before = beyond**-2.0 / max(float(np.sum(beyond**-2.0)), 1e-300)
+        small, self.std = small_columns(records, self.fc, background)
+        columns = np.column_stack([plain, falling[:, self.levels], small])
+        scale = np.linalg.norm(columns, axis=0)
+        self.scale = np.where(scale > 0.0, scale, 1.0)
+        self.columns = columns / self.scale
+        self.products = self.columns.T @ self.columns
+        self.small: Places = np.arange(columns.shape[1] - small.shape[1], columns.shape[1])
+        residual = first - plain[:, :JERK] @ start
+        self.noise = float(residual @ residual) / first.size
+        self.memory = memory_of(residual, self.stroke)
+
+    @property
+    def piece(self) -> Places:
+        """The piece of every row: so long that what one leaves says little of the next."""
+        return pieces_of(self.stroke, max(self.shortest, round(LONGER * self.memory)))
+
+    def torque(self, skew: float) -> Array:
+        """The torque that acted, N·m (N)."""
+        return np.concatenate([r.torque(skew) for r in self.records])
+
+    def candidates(self, torque: Array, skew: float) -> list[Candidate]:
+        """The fit without a fall of friction, and with one at every vs."""
+        products, small = self.products, self.small
+        seen = self.columns.T @ torque
+        held = np.diag(self.noise * self.memory / (self.std * self.scale[small]) ** 2)
+        inner = inverse_of(products[np.ix_(small, small)] + held)
+        power = float(torque @ torque)
+        out: list[Candidate] = []
+        for level in range(-1, len(self.levels)):
+            own = np.array([*range(self.core), *([self.core + level] if level >= 0 else [])])
+            mixing = inner @ products[np.ix_(small, own)]
+            matrix = products[np.ix_(own, own)] - products[np.ix_(own, small)] @ mixing
+            right = seen[own] - mixing.T @ seen[small]
+            # The skew is known to its usual size before the record is looked at.
+            known = self.noise * self.memory / (self.inertia * self.skew_size * self.scale[JERK]) ** 2
+            matrix[JERK, JERK] += known
+            right[JERK] += known * self.inertia * (skew - self.expected) * self.scale[JERK]
+            inverse = inverse_of(matrix + 1e-11 * np.trace(matrix) / own.size * np.eye(own.size))
+            values = inverse @ right
+            coefficients = inner @ seen[small] - mixing @ values
+            every, both = np.concatenate([own, small]), np.concatenate([values, coefficients])
+            cost = (
+                power - 2.0 * float(seen[every] @ both) + float(both @ products[np.ix_(every, every)] @ both)
+            )
+            cost += float(coefficients @ held @ coefficients)
+            out.append(Candidate(level, own, mixing, inverse, values, coefficients, cost))
+        return out
+
+    def beside(self, c: Candidate, orders: int, background: int) -> None:
+        """Let the torque over the position hold a part of the orders found in those beside them."""
+        found = slice(self.core - 2 * orders, self.core)
+        size = float(np.max(np.abs(c.values[found] / self.scale[found])))
+        last = self.std[-2 * background - LEANING :]
+        self.std[-2 * background - LEANING :] = np.maximum(last, BLURRED * size)
+
+    def residual(self, torque: Array, c: Candidate) -> Array:
+        """What a candidate leaves, N·m (N)."""
+        return torque - self.columns[:, np.concatenate([c.columns, self.small])] @ np.concatenate(
+            [c.values, c.small]
+        )
+
+    def weights(self, candidates: Sequence[Candidate]) -> Array:
+        """Probability of every candidate after the record."""
+        unit = self.noise * self.memory
+        logs: list[float] = []
+        for c in candidates:
+            log = -0.5 * c.cost / unit
+            # Viscous friction brakes: a level that falls all the way up is a fall, not a negative slope.
+            slope = c.values[VISCOUS] / max(math.sqrt(unit * abs(c.inverse[VISCOUS, VISCOUS])), 1e-300)
+            log += math.log(max(0.5 * math.erfc(-slope / math.sqrt(2.0)), 1e-12))
+            if c.level < 0:
+                logs.append(log + math.log(NONE_PRIOR))
+                continue
+            last = self.scale[c.columns[-1]]
+            fall, fc = c.values[-1] / last, c.values[COULOMB] / self.scale[COULOMB]
+            own, before = unit * abs(c.inverse[-1, -1]) / last**2, (FALL * self.fc) ** 2
+            log += -0.5 * math.log1p(before / own) - 0.5 * fall * fall / (before + own)
+            log += math.log(max((1.0 - NONE_PRIOR) * float(self.before[c.level]), 1e-300))
+            logs.append(log if fc > 0.0 and RISE * fc <= fall <= DEEPEST * fc else -math.inf)
+        best = max(logs)
+        if not math.isfinite(best):
+            raise InputError(
+                "certain sliding gives no numbers to compute with; check the units of the record"
+            )
+        weight = np.exp(np.array(logs) - best)
+        return weight / weight.sum()
+
+    def covariance(self, torque: Array, c: Candidate) -> Array:
+        """Of a candidate's values: noise that pieces share, what no law holds, and misfit that does not average out."""
+        residual = self.residual(torque, c)
+        own = self.columns[:, c.columns] - self.columns[:, self.small] @ c.mixing
+        begins = np.flatnonzero(np.concatenate([[True], np.diff(self.piece) != 0]))
+        scores = np.add.reduceat(own * residual[:, None], begins, axis=0)
+        count = student(begins.size - 1) ** 2 * begins.size / max(1, begins.size - 1)
+        noise = c.inverse @ (scores.T @ scores) @ c.inverse * count
+        shrunk = self.products[np.ix_(c.columns, self.small)]
+        shrunk = shrunk - c.mixing.T @ self.products[np.ix_(self.small, self.small)]
+        moved = c.inverse @ shrunk * (self.std * self.scale[self.small])
+        least, plain = self.noise * self.memory * np.diag(c.inverse), np.diag(noise)
+        # Whole pieces tell level and slope of friction: where many of them refute the misfit's say, they decide.
+        # Of acceleration, jerk and offset a piece holds too little.
+        most = refuted_above(begins.size - c.columns.size)
+        decided = np.isin(c.columns, (VISCOUS, COULOMB))
+        least = np.where(decided, np.minimum(least, most * plain), least)
+        noise[np.diag_indices_from(noise)] = np.maximum(plain, least)
+        share = np.full(c.columns.size, SYSTEMATIC)
+        share[[INERTIA, JERK]] = STIFF, LATE
+        coherent = np.diag(share**2 * float(residual @ residual) * np.diag(c.inverse))
+        scale = self.scale[c.columns]
+        return (noise + moved @ moved.T + coherent) / np.outer(scale, scale)

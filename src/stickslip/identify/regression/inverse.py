@@ -1,0 +1,345 @@
+"""Inverse dynamics: inertia, gravity and friction of an axis by linear least squares (IDIM-LS).
+
+T = M dv/dt + Fv v + Fc sign(v) + offset (+ m g l sin(q - q0), + a Fourier series in the position), where velocity and
+acceleration come from the position by a zero-phase Butterworth low-pass and central differences, and both sides pass
+the same decimation filter: Gautier (1997), Janot, Gautier and Brunot (2019). With friction of its own for each
+direction, Fv+, Fc+, Fv-, Fc- take the place of Fv, Fc and the offset.
+
+Where the record is irregular it is put on a regular grid first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.fit.filters import decimated, low_pass, spectrum
+from stickslip.identify.fit.profile import inverse_information, long_run
+from stickslip.identify.trial import Trial
+from stickslip.machines.servo import ServoAxis
+
+__all__ = ["InverseDynamics", "inverse_dynamics", "refuse_harmonics"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+HIGHEST_CUTOFF = 100.0  # Hz, of the position's low-pass, as published for EMPS
+CUTOFF_PER_RATE = 0.1
+BAND_PER_CUTOFF = 0.4  # of the cutoff: the band that is kept after decimation
+TAPER = 10.0  # periods of the cutoff left out at both ends, where the filters have not settled
+NOISE_SHARE = 0.01  # largest share of noise in the acceleration's power
+SPARSE = 100.0  # times as many rows on a regular grid as there are samples, at most
+DEAD_ZONE = 3.0  # standard deviations of the velocity's noise, below which its sign means nothing
+OTHERS = 7  # parameters beside those of harmonics, about
+SECONDS = 6e-6  # s, that a fit by simulation takes a sample and square of the number of parameters
+MOST_HOURS = 24.0
+MOST_BYTES = 8e9  # of the equations
+
+
+@dataclass(frozen=True, eq=False)
+class InverseDynamics:
+    """Result of the inverse dynamics.
+
+    Attributes
+    ----------
+    names, units : tuple of str
+        ``inertia``, ``fv``, ``fc``, ``offset``; per direction ``fv_plus``, ``fc_plus``, ``fv_minus``, ``fc_minus``;
+        with a pendulum ``gravity_sin``, ``gravity_cos``; with harmonics ``cos[i]``, ``sin[i]``.
+    values : array, shape (p,)
+    std : array, shape (p,)
+        Classic standard deviations, for independent residuals: what IDIM-LS publishes.
+    robust_std : array, shape (p,)
+        With the correlation of the residuals (Newey and West 1987).
+    covariance : array, shape (p, p)
+        The robust one.
+    relative_error : float
+        Norm of the residual torque over the norm of the torque.
+    cutoff, band : float
+        Hz.
+    matrix, torque, residual, time, velocity, position : array
+        The decimated system and where it was taken.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Array
+    std: Array
+    robust_std: Array
+    covariance: Array
+    relative_error: float
+    cutoff: float
+    band: float
+    matrix: Array
+    torque: Array
+    residual: Array
+    time: Array
+    velocity: Array
+    position: Array
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self.names.index(name)])
+
+    def has(self, name: str) -> bool:
+        """Whether it estimated that parameter."""
+        return name in self.names
+
+    @property
+    def coulomb(self) -> float:
+        """Fc, or the mean of both directions."""
+        return self["fc"] if self.has("fc") else 0.5 * (self["fc_plus"] + self["fc_minus"])
+
+    @property
+    def viscous(self) -> float:
+        """Fv, or the mean of both directions."""
+        return self["fv"] if self.has("fv") else 0.5 * (self["fv_plus"] + self["fv_minus"])
+
+    @property
+    def usual_speed(self) -> float:
+        """Root mean square of the velocity, rad/s (m/s)."""
+        return float(np.sqrt(np.mean(self.velocity**2)))
+
+    @property
+    def offset(self) -> float:
+        """The constant torque against positive motion."""
+        return self["offset"] if self.has("offset") else 0.5 * (self["fc_plus"] - self["fc_minus"])
+
+
+def inverse_dynamics(
+    trials: Sequence[Trial],
+    axis: ServoAxis,
+    *,
+    per_direction: bool = False,
+    cutoff: float | None = None,
+    harmonics: int = 0,
+    harmonic_period: float = 2.0 * math.pi,
+) -> InverseDynamics:
+    """Identify an axis by linear least squares on its inverse dynamics.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+    axis : ServoAxis
+    per_direction : bool
+        Friction of its own for each direction of motion.
+    cutoff : float, optional
+        Corner of the position's low-pass, Hz. Otherwise the lowest of 100 Hz, a tenth of the sample rate, and
+        where noise would make up 1 % of the acceleration's power.
+    harmonics : int
+        Harmonics of a torque that depends on the position.
+    harmonic_period : float
+        rad (m) after which it repeats.
+
+    Returns
+    -------
+    InverseDynamics
+
+    Raises
+    ------
+    InputError
+        If the records move too little to tell the parameters apart.
+    """
+    if not trials:
+        raise InputError("no record; give at least one")
+    refuse_harmonics(trials, harmonics)
+    if cutoff is not None and not cutoff > 0.0:
+        raise InputError(f"cutoff = {cutoff:g} Hz must be greater than 0")
+    corner = min(suitable_cutoff(t) for t in trials) if cutoff is None else cutoff
+    columns = [_columns(t, axis, corner, per_direction, harmonics, harmonic_period) for t in trials]
+    names, units = _names(axis, per_direction, harmonics)
+    w = np.concatenate([c.matrix for c in columns])
+    y = np.concatenate([c.torque for c in columns])
+    if y.size < 3 * len(names):
+        raise InputError(
+            f"{sum(t.time.size for t in trials)} samples hold {y.size} independent ones in motion (the filters take "
+            f"{TAPER / corner:.2g} s at both ends of a record), too few for {len(names)} parameters; give a longer "
+            "record with more motion"
+        )
+    size = np.linalg.norm(w, axis=0)
+    rank = np.linalg.matrix_rank(w / np.where(size > 0.0, size, 1.0), tol=1e-8)
+    if rank < len(names):
+        still = [n for n, s in zip(names, size, strict=True) if s == 0.0]
+        what = f"nothing excites {', '.join(still)}" if still else "their effects cannot be told apart"
+        raise InputError(
+            f"inverse dynamics: {what} in this motion; record both directions and several speeds"
+        )
+    values: Array = np.linalg.lstsq(w, y, rcond=None)[0].astype(np.float64)
+    residual = y - w @ values
+    inverse, _ = inverse_information(w)
+    variance = float(residual @ residual) / (y.size - len(names))
+    lags = correlation_lags(residual)
+    robust = inverse @ long_run(w * residual[:, None], lags) @ inverse
+    return InverseDynamics(
+        names, units, values, np.sqrt(variance * np.diag(inverse)), np.sqrt(np.diag(robust)), robust,
+        float(np.linalg.norm(residual) / np.linalg.norm(y)), corner, BAND_PER_CUTOFF * corner, w, y, residual,
+        np.concatenate([c.time for c in columns]), np.concatenate([c.velocity for c in columns]),
+        np.concatenate([c.position for c in columns]),
+    )  # fmt: skip
+
+
+def refuse_harmonics(trials: Sequence[Trial], harmonics: int, *, simulated: bool = False) -> None:
+    """Refuse more harmonics than the samples can tell apart, before a column is made for each.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+    harmonics : int
+        Each has two parameters.
+    simulated : bool
+        Whether simulations are fitted: their time goes with the square of the number of parameters.
+
+    Raises
+    ------
+    InputError
+        With the number of parameters, the memory or the time, and how many harmonics may be given.
+    """
+    samples, count = sum(t.time.size for t in trials), OTHERS + 2 * harmonics
+    if harmonics and samples < 3 * count:
+        raise InputError(
+            f"{harmonics} harmonics make {count} parameters, too many for {samples} samples, which tell at most "
+            f"{max(0, (samples // 3 - OTHERS) // 2)} apart; give fewer"
+        )
+    size = 16.0 * samples * count
+    if harmonics and size > MOST_BYTES:
+        raise InputError(
+            f"{harmonics} harmonics over {samples} samples would take {size / 1e9:.3g} GB; give at most "
+            f"{max(0, math.floor(0.5 * (MOST_BYTES / 16.0 / samples - OTHERS)))}"
+        )
+    hours = SECONDS * samples * count**2 / 3600.0
+    if harmonics and simulated and hours > MOST_HOURS:
+        most = (math.sqrt(3600.0 * MOST_HOURS / SECONDS / samples) - OTHERS) / 2.0
+        raise InputError(
+            f"{harmonics} harmonics over {samples} samples would take about {hours:.2g} h; give at most "
+            f"{max(0, math.floor(most))} (a day), or --inverse, which simulates nothing"
+        )
+
+
+def correlation_lags(residual: Array) -> int:
+    """Samples over which a residual is correlated: four times its integral time, at most a fifth of it."""
+    n = residual.size
+    r = residual - residual.mean()
+    spectrum = np.fft.rfft(r, 2 * n)
+    correlation = np.fft.irfft(spectrum * np.conj(spectrum))[:n]
+    if correlation[0] <= 0.0:
+        return 0
+    correlation /= correlation[0]
+    past = np.flatnonzero(correlation < 0.05)
+    reach = int(past[0]) if past.size else n
+    time = 0.5 + float(np.sum(np.abs(correlation[1:reach])))
+    return int(min(max(1, math.ceil(4.0 * time)), n // 5))
+
+
+# ---- from a record to the linear system --------------------------------------------------------------------------
+
+
+def uniform(trial: Trial) -> tuple[Array, Array, Array, float]:
+    """Times, positions and drive signal on a regular grid, and its rate in Hz; unchanged where regular already."""
+    steps = np.diff(trial.time)
+    period = trial.period
+    signal = trial.signal()
+    if np.max(np.abs(steps - period)) <= 1e-3 * period + 1e-9:
+        return trial.time, trial.position, signal, 1.0 / period
+    rows = float(trial.time[-1] - trial.time[0]) / period
+    if not rows <= SPARSE * trial.time.size:
+        raise InputError(
+            f"{trial.name}: {trial.time.size} samples mostly {period:.3g} s apart lie over {rows * period:.3g} s; cut "
+            "the record where it has gaps (--from, --to)"
+        )
+    t = np.arange(trial.time[0], trial.time[-1], period)
+    return t, np.interp(t, trial.time, trial.position), np.interp(t, trial.time, signal), 1.0 / period
+
+
+def white_noise(q: Array, rate: float) -> float:
+    """Spectral density of the position's white part, rad²/Hz: the median over the upper 40 % of its spectrum."""
+    length = int(min(q.size - 2, 1024))
+    f, power = spectrum(np.diff(q, 2), rate, length)
+    high = (f > 0.3 * rate) & (f < 0.49 * rate)
+    # A second difference multiplies the spectrum of white noise by (2 - 2 cos)².
+    return float(np.median(power[high] / (2.0 - 2.0 * np.cos(2.0 * math.pi * f[high] / rate)) ** 2))
+
+
+def suitable_cutoff(trial: Trial) -> float:
+    """Corner of the low-pass at which noise makes up `NOISE_SHARE` of the acceleration's power, within limits, Hz."""
+    _, q, _, rate = uniform(trial)
+    highest = min(HIGHEST_CUTOFF, CUTOFF_PER_RATE * rate)
+    density = white_noise(q, rate)
+    corner = highest
+    for _ in range(40):
+        filtered = low_pass(q, corner, rate)
+        power = float(np.var(np.gradient(np.gradient(filtered, 1.0 / rate), 1.0 / rate)))
+        # Of the noise, the filters pass about the band below the corner.
+        noise = density * (2.0 * math.pi) ** 4 * corner**5 / 5.0
+        if noise <= NOISE_SHARE * power:
+            break
+        corner *= 0.9
+    return corner
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """The decimated linear system of one trial."""
+
+    matrix: Array
+    torque: Array
+    time: Array
+    velocity: Array
+    position: Array
+
+
+def _columns(
+    trial: Trial, axis: ServoAxis, cutoff: float, per_direction: bool, harmonics: int, period: float
+) -> Columns:
+    t, q, u, rate = uniform(trial)
+    dt = 1.0 / rate
+    if q.size < 12 * math.ceil(rate / cutoff):
+        raise InputError(
+            f"{trial.name}: {q.size} samples, {q.size * dt:.3g} s, are too few for a low-pass at {cutoff:.3g} Hz, "
+            f"which takes {12 * math.ceil(rate / cutoff)}; give a longer record"
+        )
+    density = white_noise(q, rate)
+    q = low_pass(q, cutoff, rate)
+    v = np.gradient(q, dt)
+    acceleration = np.gradient(v, dt)
+    gain, loss = axis.drive_gains(trial.quantity)
+    supply = 1.0 if trial.supply is None else np.interp(t, trial.time, trial.supply)
+    torque = gain * supply * u - loss * v
+    ahead, back = (v > 0.0).astype(float), (v < 0.0).astype(float)
+    columns = [acceleration]
+    if per_direction:
+        columns += [v * ahead, ahead, v * back, -back]
+    else:
+        columns += [v, ahead - back, np.ones(v.size)]
+    if axis.gravity == "pendulum":
+        columns += [np.sin(q), np.cos(q)]
+    for i in range(1, harmonics + 1):
+        angle = 2.0 * math.pi * i * q / period
+        columns += [np.cos(angle), np.sin(angle)]
+    factor = max(1, int(rate * 0.8 / (2.0 * BAND_PER_CUTOFF * cutoff)))
+    edge = math.ceil(TAPER / cutoff * rate)
+    floor = DEAD_ZONE * math.sqrt(density * (2.0 * math.pi) ** 2 * cutoff**3 / 3.0)
+    sure = np.abs(v) >= floor
+    rows = np.asarray(np.interp(t, trial.time, trial.rows.astype(float)) > 0.5, dtype=np.bool_)
+    rows[:edge] = rows[v.size - edge :] = False
+    keep = np.arange(0, v.size, factor)
+    chosen = (rows & sure)[keep]
+    matrix = np.column_stack([decimated(c, factor) for c in columns])[chosen]
+    return Columns(
+        matrix, decimated(torque, factor)[chosen], t[keep][chosen], v[keep][chosen], q[keep][chosen]
+    )
+
+
+def _names(axis: ServoAxis, per_direction: bool, harmonics: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    torque, damping = axis.unit("N·m"), axis.unit("N·m·s/rad")
+    named = [("inertia", axis.unit("kg·m²"))]
+    if per_direction:
+        named += [("fv_plus", damping), ("fc_plus", torque), ("fv_minus", damping), ("fc_minus", torque)]
+    else:
+        named += [("fv", damping), ("fc", torque), ("offset", torque)]
+    if axis.gravity == "pendulum":
+        named += [("gravity_sin", torque), ("gravity_cos", torque)]
+    for i in range(harmonics):
+        named += [(f"cos[{i}]", torque), (f"sin[{i}]", torque)]
+    return tuple(n for n, _ in named), tuple(u for _, u in named)

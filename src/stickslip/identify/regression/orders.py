@@ -1,0 +1,120 @@
+"""Which cycles of a torque over the position a record shows: cogging, unbalance, the pitch of a screw.
+
+Orders are taken one by one, the one that explains most first (orthogonal matching pursuit, ``pati1993``), as long as
+what it explains is more than chance would among so many, and helps on the half of the record that it was not fitted to.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stickslip.identify.regression.sliding_rows import SlidingRows
+from stickslip.identify.regression.strokes import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
+
+__all__ = ["candidate_orders", "goes_round", "shown_orders"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+MOST = 8
+HIGHEST_ORDER, PARTS = 60, 40
+WHOLE_TURN = 0.75
+"""Of a turn, from which on orders are whole numbers a turn; below, halves of the way travelled."""
+OWN = 0.05
+"""Part of a harmonic that no other column explains, at least."""
+SURE = 8.0
+"""Beyond twice the logarithm of how many are tried: what a harmonic explains, in variances of the noise."""
+HELPS = 0.25
+"""Of what a harmonic explains where it was fitted, that it must explain where it was not."""
+
+
+def candidate_orders(
+    records: Sequence[SlidingRows], rotary: bool, period: float | None = None
+) -> list[float]:
+    """Cycles a radian (m) that are tried.
+
+    Parameters
+    ----------
+    records : sequence of SlidingRows
+    rotary : bool
+    period : float, optional
+        rad (m) after which the torque repeats, where it is known.
+    """
+    if goes_round(records, rotary, period):
+        turn = 2.0 * math.pi if period is None else period
+        return [k / turn for k in range(1, HIGHEST_ORDER + 1)]
+    return [k / (2.0 * way_of(records)) for k in range(1, PARTS + 1)]
+
+
+def goes_round(records: Sequence[SlidingRows], rotary: bool, period: float | None = None) -> bool:
+    """Whether the way is long enough for orders to be told apart by whole numbers a turn."""
+    turn = period if period is not None else 2.0 * math.pi if rotary else math.inf
+    return way_of(records) > WHOLE_TURN * turn
+
+
+def way_of(records: Sequence[SlidingRows]) -> float:
+    """The longest way between two rows of one record, rad (m)."""
+    return max(float(np.ptp(r.position)) for r in records)
+
+
+def shown_orders(records: Sequence[SlidingRows], skew: float, candidates: Sequence[float]) -> list[float]:
+    """Those of the candidates that the records show, the largest first."""
+    torque = np.concatenate([r.torque(skew) for r in records])
+    columns = np.column_stack(
+        [stacked(records, "fixed"), stacked(records, "jerk"), stacked(records, "falling")[:, ::3]]
+    )
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns[:, size > 0.0] / size[size > 0.0]
+    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
+    basis = left[:, singular > 1e-6 * singular[0]]
+    residual = torque - basis @ (basis.T @ torque)
+    pool = {o: np.concatenate([r.around(o) for r in records]) for o in candidates}
+    stroke = strokes_of(records)
+    piece = pieces_of(stroke, rows_in(PIECE, records))
+    found: list[float] = []
+    while len(found) < MOST and pool:
+        power = float(residual @ residual)
+        explained, order, own = max(
+            (
+                (*explained_by(h, basis, residual)[:1], o, explained_by(h, basis, residual)[1])
+                for o, h in pool.items()
+            ),
+            key=lambda entry: entry[0],
+        )
+        independent = torque.size / memory_of(residual, stroke)
+        if power <= 0.0 or independent * explained / power < 2.0 * math.log(len(candidates)) + SURE:
+            break
+        if held_out_power(own, residual, piece % 2 == 0) > power - HELPS * explained:
+            break
+        found.append(order)
+        del pool[order]
+        added, _ = np.linalg.qr(own)
+        basis = np.column_stack([basis, added])
+        residual = residual - added @ (added.T @ residual)
+    return found
+
+
+def explained_by(harmonic: Array, basis: Array, residual: Array) -> tuple[float, Array]:
+    """Power of the residual that a harmonic's own part explains, and that part."""
+    own = harmonic - basis @ (basis.T @ harmonic)
+    # A harmonic that no row resolves is 0 throughout.
+    if np.min(np.linalg.norm(own, axis=0)) <= OWN * np.max(np.linalg.norm(harmonic, axis=0)):
+        return 0.0, own
+    products = own.T @ own
+    seen = own.T @ residual
+    told = np.asarray(
+        np.linalg.solve(products + 1e-9 * np.trace(products) * np.eye(2), seen), dtype=np.float64
+    )
+    return float(seen @ told), own
+
+
+def held_out_power(own: Array, residual: Array, half: np.ndarray[Any, np.dtype[np.bool_]]) -> float:
+    """Power that is left where each half is explained by what the other half shows."""
+    total = 0.0
+    for fitted in (half, ~half):
+        values = np.linalg.lstsq(own[fitted], residual[fitted], rcond=1e-9)[0]
+        total += float(np.sum((residual[~fitted] - own[~fitted] @ values) ** 2))
+    return total

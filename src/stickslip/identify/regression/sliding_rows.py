@@ -1,0 +1,229 @@
+"""The rows of a record in which the axis slides for certain, and what each says about inertia and friction.
+
+Every row is seen through a window (`stickslip.identify.fit.smooth`), torque and motion through the same. Rows whose
+window holds a reversal, a stop, or the distance over which a contact builds up its torque again are left out: nothing
+about the moment at which friction turned round is assumed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.fit.smooth import CORNER, NARROWEST, Window, seen
+from stickslip.identify.regression.inverse import uniform, white_noise
+from stickslip.identify.trial import Trial
+from stickslip.machines.servo import ServoAxis
+
+__all__ = ["Signals", "SlidingRows", "narrowest_width", "signals_of", "sliding_rows"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+HIGHEST_CORNER = 60.0  # Hz, of the narrowest window
+NOISE_SHARE = 2e-3  # largest share of noise in the acceleration's power
+WIDENED, WIDEST = 1.15, 0.02  # from one window to the next; of the record's length, at most
+FINER = 3.0  # times narrower: the window that tells whether the axis moves
+CERTAIN = 6.0  # standard deviations of the fine velocity's noise from which on its sign is certain
+CREEPING = 3e-3  # of the usual speed
+FEWEST = 30  # rows
+DIRECTION = 2  # its column
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """A trial on a regular grid, without gaps: what the windows look at.
+
+    Attributes
+    ----------
+    time, position, drive : array, shape (n,)
+        s, rad (m), and the torque that the drive's signal means before what its speed takes of it, N·m (N).
+    loss : float
+        Torque lost per velocity, N·m·s/rad.
+    rows : array of bool, shape (n,)
+        Which count.
+    noise : float
+        Standard deviation of the position's white part, rad (m).
+    origin : float
+        What was taken off the position, rad (m).
+    """
+
+    time: Array
+    position: Array
+    drive: Array
+    loss: float
+    rows: np.ndarray[Any, np.dtype[np.bool_]]
+    noise: float
+    origin: float
+
+    @property
+    def period(self) -> float:
+        """From row to row, s."""
+        return float((self.time[-1] - self.time[0]) / (self.time.size - 1))
+
+
+def signals_of(trial: Trial, axis: ServoAxis) -> Signals:
+    """The trial on a regular grid."""
+    t, q, u, rate = uniform(trial)
+    gain, loss = axis.drive_gains(trial.quantity)
+    supply = 1.0 if trial.supply is None else np.interp(t, trial.time, trial.supply)
+    rows = np.interp(t, trial.time, trial.rows.astype(np.float64)) > 0.5
+    noise = math.sqrt(white_noise(q, rate) * rate / 2.0)
+    return Signals(t, q - q[0], gain * supply * u, loss, np.asarray(rows, dtype=np.bool_), noise, float(q[0]))
+
+
+def narrowest_width(signals: Signals) -> float:
+    """Width of the narrowest window through which noise leaves the acceleration alone, s.
+
+    Raises
+    ------
+    InputError
+        If that window is long beside the record.
+    """
+    width = max(NARROWEST * signals.period, CORNER / HIGHEST_CORNER)
+    seconds = signals.time.size * signals.period
+    while True:
+        if width > WIDEST * seconds:
+            raise InputError(
+                f"the position is so coarse that certain sliding shows over {width:.2g} s alone, and the record lasts "
+                f"{seconds:.3g} s; record faster motion, or a finer position"
+            )
+        window = Window(width, signals.period)
+        (acceleration,) = seen(signals.position, window.weights(2))
+        if (signals.noise * window.noise(2)) ** 2 <= NOISE_SHARE * float(np.var(acceleration)):
+            break
+        width *= WIDENED
+    return width
+
+
+@dataclass(frozen=True, eq=False)
+class SlidingRows:
+    """What certain sliding says, seen through one window.
+
+    Attributes
+    ----------
+    time, position, speed : array, shape (n,)
+        s, rad (m), rad/s (m/s; signed).
+    fixed : array, shape (n, p)
+        Acceleration, velocity, direction, 1.
+    jerk : array, shape (n,)
+        rad/s³ (m/s³).
+    falling : array, shape (n, m)
+        exp(-(v/vs)²) in the direction of motion, for every Stribeck velocity that `falling_at` was asked for.
+    stroke : array of int, shape (n,)
+        Stretch of sliding in one direction that a row belongs to, 0 ...
+    signals : Signals
+    window : Window
+    places : array of int, shape (n,)
+        Rows of the signals.
+    gone : array, shape (n,)
+        Way since the last reversal or stop, rad (m).
+    quick : array
+        Velocity of every row of the signals, seen through a narrower window, rad/s (m/s).
+    """
+
+    time: Array
+    position: Array
+    speed: Array
+    fixed: Array
+    jerk: Array
+    falling: Array
+    stroke: np.ndarray[Any, np.dtype[np.int64]]
+    signals: Signals
+    window: Window
+    places: np.ndarray[Any, np.dtype[np.int64]]
+    gone: Array
+    quick: Array
+
+    def falling_at(self, stribeck: Sequence[float]) -> SlidingRows:
+        """The same rows, with the fall of friction laid out for every Stribeck velocity vs, rad/s (m/s)."""
+        sign, middle = self.fixed[:, DIRECTION], self.window.weights(0)
+        falling = [
+            seen(np.exp(-np.minimum((self.quick / vs) ** 2, 700.0)), middle)[0][self.places] * sign for vs in stribeck
+        ]  # fmt: skip
+        return replace(self, falling=np.column_stack(falling))
+
+    @property
+    def spacing(self) -> float:
+        """From one row to the next of the same stroke, s."""
+        return stride_of(self.window) * self.window.period
+
+    def farther(self, distance: float) -> SlidingRows:
+        """Only the rows that lie farther behind a reversal or stop, rad (m)."""
+        kept = self.gone > distance
+        return SlidingRows(
+            self.time[kept], self.position[kept], self.speed[kept], self.fixed[kept], self.jerk[kept],
+            self.falling[kept], np.unique(self.stroke[kept], return_inverse=True)[1].astype(np.int64),
+            self.signals, self.window, self.places[kept], self.gone[kept], self.quick,
+        )  # fmt: skip
+
+    def torque(self, skew: float) -> Array:
+        """The torque that acted, if the recorded one lies `skew` seconds behind it, N·m (N), shape (n,)."""
+        (drive,) = seen(self.signals.drive, self.window.weights(0, late=skew))
+        return drive[self.places] - self.signals.loss * self.speed
+
+    def around(self, order: float) -> Array:
+        """Cosine and sine of `order` cycles a radian (m) of position, as seen through the window, shape (n, 2)."""
+        angle = 2.0 * math.pi * order * self.position
+        # Over a window the speed hardly changes: the mean of a harmonic over it.
+        damped = np.exp(-0.5 * (2.0 * math.pi * order * self.speed * self.window.width) ** 2)
+        return np.column_stack([np.cos(angle) * damped, np.sin(angle) * damped])
+
+
+def stride_of(window: Window) -> int:
+    """Rows of the signals from one that is looked at to the next: neighbours within a window say the same."""
+    return max(1, int(window.width / window.period))
+
+
+def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
+    """The rows of certain sliding.
+
+    Parameters
+    ----------
+    signals : Signals
+    window : Window
+
+    Raises
+    ------
+    InputError
+        If there are hardly any.
+    """
+    q, period = signals.position, signals.period
+    v, a, jerk = seen(q, window.weights(1), window.weights(2), window.weights(3))
+    fine = Window(max(NARROWEST * period, window.width / FINER), period)
+    (quick,) = seen(q, fine.weights(1))
+    certain = max(CERTAIN * signals.noise * fine.noise(1), CREEPING * float(np.sqrt(np.mean(quick**2))))
+    direction = np.sign(quick)
+    turned = np.concatenate([[False], direction[1:] != direction[:-1]])
+    doubtful = turned | (np.abs(quick) < certain) | ~signals.rows
+    clear = ~within(doubtful, window.reach)
+    clear[: window.reach] = clear[q.size - window.reach :] = False
+    stride = stride_of(window)
+    places = np.flatnonzero(clear[::stride]) * stride
+    if places.size < FEWEST:
+        raise InputError(
+            f"{places.size * stride * period:.3g} s of certain sliding are too little; record longer motion in one "
+            "direction, or a finer position"
+        )
+    stopped = np.maximum.accumulate(np.where(doubtful, np.arange(q.size), 0))
+    sign = direction[places]
+    rises = np.concatenate([[True], (np.diff(places) > stride) | (sign[1:] != sign[:-1])])
+    stroke = np.cumsum(rises) - 1
+    return SlidingRows(
+        signals.time[places], q[places] + signals.origin, v[places],
+        np.column_stack([a[places], v[places], sign, np.ones(places.size)]), jerk[places],
+        np.zeros((places.size, 0)), stroke, signals, window, places, np.abs(q[places] - q[stopped[places]]), quick,
+    )  # fmt: skip
+
+
+def within(marked: np.ndarray[Any, np.dtype[np.bool_]], reach: int) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Rows that have a marked one within so many rows."""
+    counted = np.concatenate([[0], np.cumsum(marked)])
+    n = marked.size
+    low = np.maximum(np.arange(n) - reach, 0)
+    high = np.minimum(np.arange(n) + reach + 1, n)
+    return counted[high] > counted[low]

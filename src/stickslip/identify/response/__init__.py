@@ -1,0 +1,1 @@
+"""The frequency response of an axis: inertia, and the drivetrain's modes."""

@@ -1,0 +1,1 @@
+"""From an identified model to a setting of a compensator that is safe to switch on."""

@@ -1,0 +1,210 @@
+"""Axes on which a setting is tried: the best estimate, and others that the record allows.
+
+Drawn are the identified numbers (friction, inertia, offset) from their intervals, and what no model holds but every
+machine has: a torque over the position of up to the misfit of the model, a current loop, a delay below one sample, and
+friction that comes later than the contact's own springs bring it (an elastic drivetrain, backlash), and a reference
+velocity of the instant or of the sample before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import ParameterError
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.identified_file import Identified
+from stickslip.identify.monte_carlo import draw_models, sliding_torque
+from stickslip.identify.setting.plant import Plant
+from stickslip.machines.machine import Machine
+from stickslip.model import Model
+
+__all__ = ["plants_of"]
+
+CURRENT_LOOP = (200.0, 2000.0)
+"""Hz, bandwidths drawn."""
+PROMPT = 0.3
+"""Chance of a drive that follows at once."""
+ORDERS = (1.0, 50.0)
+"""Per revolution (rotary), of torques over the position."""
+WAVELENGTHS = (1e-3, 5e-2)
+"""m (linear)"""
+WAVES = 3
+"""At most so many at once."""
+BREAKAWAY = (3e-5, 3e-3)
+"""rad (a tenth of it in m), displacement at which a contact without springs in its law is taken to break away."""
+LOST = 0.5
+"""Chance of a drawn axis that friction comes later than the contact's own springs bring it."""
+LOST_MOTION = (1e-4, 1e-2)
+"""rad (a tenth of it in m), displacement over which it then comes."""
+MOST_STATIC = 2.0
+"""Static over Coulomb torque at most, where the record does not tell it: contacts of machines have 1 to 2."""
+MOST_VISCOUS = 9.0
+"""Times the viscous friction found, where the record does not tell it."""
+GIVEN = 0.1
+"""Part of an inertia to which a user knows it."""
+DAMPING = 0.3
+"""Of the bristles, part of critical."""
+
+
+def plants_of(
+    found: Identified,
+    inertia: float,
+    count: int,
+    seed: int,
+    start: float = 0.0,
+    given: bool = False,
+    machine: Machine | None = None,
+) -> Iterator[Plant]:
+    """The best estimate, and `count` axes drawn; about another inertia as wide in proportion.
+
+    Parameters
+    ----------
+    found : Identified
+    inertia : float
+        kg·m²
+    count : int
+    seed : int
+    start : float
+        Position at which the motion begins, rad: where a pendulum hangs.
+    given : bool
+        Whether the inertia is one that the user knows: then to `GIVEN`, where the record does not tell it.
+    machine : Machine, optional
+        The machine at hand: its delay, current loop and torques over the position are not drawn then, but the angle at
+        which the motion begins, and the noise.
+    """
+    known = {name: float(found.axis.get(name, 0.0) or 0.0) for name in ("offset", "gravity", "gravity_angle")}
+    yield Plant(
+        inertia,
+        found.model,
+        offset=known["offset"],
+        waves=_hanging(known["gravity"], known["gravity_angle"], start),
+        machine=machine,
+    )
+    told = next((e for e in found.estimates if e.name == "inertia"), None)
+    identified = told.value if told else inertia
+    known_to = GIVEN if given and told and not told.identified else math.inf
+    rng = np.random.default_rng(seed)
+    misfit = next(
+        (v for k, v in found.misfit.items() if k in ("force_rms", "drive_rms") and math.isfinite(v)), 0.0
+    )
+    drawn = draw_models(
+        found.model, found.estimates, found.correlation, count, seed, plausible(found.estimates, seed)
+    )
+    for model, named in drawn:
+        here = {name: named.get(name, value) for name, value in known.items()}
+        part = named.get("inertia", identified) / identified
+        own = inertia * min(max(part, 1.0 / (1.0 + known_to)), 1.0 + known_to)
+        yield Plant(
+            own, _with_springs(model, own, found.motion, rng), offset=here["offset"],
+            waves=(
+                *_hanging(here["gravity"], here["gravity_angle"], start),
+                *(() if told_of(machine) else _unmodelled(misfit * float(rng.uniform()), found.motion, rng)),
+            ),
+            **(_late(rng) if machine is None else _turned(machine, rng)),
+        )  # fmt: skip
+
+
+def plausible(estimates: Sequence[Estimate], seed: int) -> Callable[[dict[str, float]], None]:
+    """Brings what no record told to what machines have.
+
+    Static torque lies between Coulomb's and `MOST_STATIC` times it; viscous friction anywhere from none to the upper
+    end of its interval: what one record puts on it may be another's Coulomb torque.
+    """
+    untold = {e.name: e for e in estimates if not e.identified}
+    rng = np.random.default_rng([seed, 1])
+
+    def change(named: dict[str, float]) -> None:
+        for name, e in untold.items():
+            level = named.get(name.replace("fs", "fc"), 0.0)
+            if name.startswith("fs") and level > 0.0:
+                named[name] = min(max(named[name], level), MOST_STATIC * level)
+            elif name.startswith("sigma2"):
+                named[name] = float(rng.uniform()) * min(e.upper, MOST_VISCOUS * e.value)
+
+    return change
+
+
+def _between(rng: np.random.Generator, low: float, high: float) -> float:
+    """Log-uniform."""
+    return math.exp(float(rng.uniform(math.log(low), math.log(high))))
+
+
+def _late(rng: np.random.Generator) -> dict[str, Any]:
+    """Delay and current loop of a drive; of some, none."""
+    prompt, delay, bandwidth = float(rng.uniform()), float(rng.uniform()), _between(rng, *CURRENT_LOOP)
+    late = {} if prompt < PROMPT else {"delay": delay, "bandwidth": bandwidth}
+    return {**late, "backward": bool(rng.uniform() < 0.5)}
+
+
+def told_of(machine: Machine | None) -> bool:
+    """Whether the torques over the position are the machine's own."""
+    return machine is not None and bool(machine.cogging.order or machine.contact.ripple.order)
+
+
+def _turned(machine: Machine, rng: np.random.Generator) -> dict[str, Any]:
+    """The machine at hand, begun at another angle, with other noise."""
+    angle, seed = float(rng.uniform(0.0, 2.0 * math.pi)), int(rng.integers(1 << 31))
+    return {
+        "machine": replace(machine, start_angle=angle, seed=seed), "backward": bool(rng.uniform() < 0.5),
+    }  # fmt: skip
+
+
+def _hanging(gravity: float, angle: float, start: float) -> tuple[tuple[float, float, float], ...]:
+    """- gravity sin(q - angle) as a wave of the position from where the motion begins."""
+    return ((1.0, gravity, 0.5 * math.pi + start - angle),) if gravity else ()
+
+
+def _unmodelled(rms: float, motion: str, rng: np.random.Generator) -> tuple[tuple[float, float, float], ...]:
+    """A torque over the position, such as cogging, of this size, N·m RMS."""
+    count = int(rng.integers(1, WAVES + 1))
+    out: list[tuple[float, float, float]] = []
+    for _ in range(count):
+        order = _between(rng, *ORDERS)
+        if motion == "linear":
+            order = 2.0 * math.pi / _between(rng, *WAVELENGTHS)
+        out.append((order, rms * math.sqrt(2.0 / count), float(rng.uniform(0.0, 2.0 * math.pi))))
+    return tuple(out) if rms > 0.0 else ()
+
+
+def _with_springs(model: Model, inertia: float, motion: str, rng: np.random.Generator) -> Model:
+    """LuGre with the law's own sliding curve, that breaks away after a way that is drawn: where the law has no springs,
+    and else with a chance of `LOST`, for an elastic drivetrain or backlash between the encoder and the friction."""
+    if model.law.name not in ("coulomb", "stribeck", "lugre") or not _plain(model):
+        return model
+    lost = float(rng.uniform()) < LOST
+    springs = model.law.name == "lugre"
+    if springs and not lost:
+        return model
+    size = 0.1 if motion == "linear" else 1.0
+    way = size * _between(rng, *(LOST_MOTION if lost else BREAKAWAY))
+    own: Any = model.parameters
+    curve = {n: getattr(own, n) for n in ("fs", "fc", "vs", "delta_s", "sigma2") if hasattr(own, n)}
+    if model.law.name == "coulomb":
+        scale = float(model.law.velocity_scale(own)) if model.law.velocity_scale else 0.0
+        curve |= {"fs": own.fc, "vs": scale or 0.01 * size}
+    level = float(np.abs(sliding_torque(model, np.zeros(1)))[0])
+    if not level > 0.0:
+        return model
+    stiffness = level / way
+    if springs:
+        stiffness = 1.0 / (1.0 / stiffness + 1.0 / own.sigma0)
+    damper = 2.0 * DAMPING * math.sqrt(stiffness * inertia)
+    try:
+        return Model("lugre", _choices(model), sigma0=stiffness, sigma1=damper, **curve)
+    except (ParameterError, TypeError):
+        return model
+
+
+def _plain(model: Model) -> bool:
+    """Whether the law is the same in both directions."""
+    return model.law.chosen.get("symmetry", "symmetric") == "symmetric"
+
+
+def _choices(model: Model) -> dict[str, str]:
+    """Curve and viscous part, where the law has the choice."""
+    return {k: v for k, v in model.law.chosen.items() if k in ("curve", "viscous")}

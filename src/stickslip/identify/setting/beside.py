@@ -1,0 +1,201 @@
+"""Compensators of the catalogue on the axes of a recommendation: observers, adaptation, sliding modes, resets.
+
+Each is made for the axis from the identified law and run as the settings of a law are; besides, on the best estimate it
+rests for as long as slow limit cycles take. What has been found not worth switching on is not run, and the reason said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.analyse.observer_guard import objection
+from stickslip.control.belief import Belief, believed
+from stickslip.control.catalogue import CATALOGUE, LOOPS, compensated
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Cascade
+from stickslip.control.sampled_controller import SampledController
+from stickslip.errors import ParameterError
+from stickslip.identify.setting.candidate_run import AT_REST, Drive, Trial, dangers, run, simulated
+from stickslip.identify.setting.candidates import Bench
+from stickslip.model import Model
+
+__all__ = ["Beside", "belief_of", "limit_cycle", "tried_beside"]
+
+RESTS = 20.0
+"""s at rest, of which the second half is judged: an integral that is reset on a soft contact cycles in 6 to 12 s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """A compensator of the catalogue in a loop, and what it did on every axis.
+
+    Attributes
+    ----------
+    name, loop : str
+        Of `stickslip.control.catalogue`; loop is empty where the compensator is the loop.
+    errors : tuple of float
+        RMS position error along the motion over that of the linear controller alone, one per axis, the best estimate
+        first; empty where it was not run.
+    why_not : str
+        Why it is not to be switched on, or "".
+    controller : SampledController or None
+        None where it cannot be made for this axis.
+    """
+
+    name: str
+    loop: str
+    errors: tuple[float, ...]
+    why_not: str
+    controller: SampledController | None
+
+    @property
+    def label(self) -> str:
+        """``PD + dob``"""
+        parts = [part for part in (self.loop, self.name if self.name != "none" else "") if part]
+        return " + ".join(parts)
+
+    @property
+    def worst(self) -> float:
+        """The greatest remaining part of the error."""
+        return max(self.errors, default=math.inf)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {"compensator": self.name, "loop": self.loop, "errors": list(self.errors), "why_not": self.why_not,
+                "controller": self.controller.as_dict() if self.controller else None}  # fmt: skip
+
+
+def belief_of(model: Model, drive: Drive, inertia: float) -> Belief:
+    """What is believed of an axis: its identified law, and the drive; of a given loop the bandwidth that it comes to.
+
+    Raises
+    ------
+    ParameterError
+        If the loop is made of control laws, or the law has no sliding curve.
+    """
+    if drive.controller is not None:
+        raise ParameterError(
+            "compensators of the catalogue bring their own loop; leave controller out, or the compensators"
+        )
+    bandwidth = drive.bandwidth
+    if drive.gains is not None:
+        gains = drive.gains
+        stiffness = gains.kv * gains.kvp if isinstance(gains, Cascade) else gains.kp
+        bandwidth = math.sqrt(stiffness / inertia) / (2.0 * math.pi)
+    return believed(
+        model, inertia, sample_time=drive.sample_time, torque_limit=drive.torque_limit, bandwidth=bandwidth,
+        counts=drive.encoder_counts,
+    )  # fmt: skip
+
+
+def tried_beside(names: Sequence[str], belief: Belief, bench: Bench, others: Bench) -> tuple[Beside, ...]:
+    """The compensators of those names, best first: those to be switched on, then the others.
+
+    The best is confirmed on the other axes, where its errors then are.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the catalogue.
+    belief : Belief
+    bench, others : Bench
+        Axes on which they are chosen, and confirmed.
+    """
+    found = [judged(name, loop, belief, bench) for name in names for loop in CATALOGUE[name].loops or ("",)]
+    ready = sorted((b for b in found if not b.why_not), key=lambda b: b.worst)
+    left = [b for b in found if b.why_not]
+    while ready:
+        best = confirmed(ready[0], bench, others)
+        if not best.why_not:
+            return (best, *ready[1:], *left)
+        left.append(best)
+        ready = ready[1:]
+    return tuple(left)
+
+
+def judged(name: str, loop: str, belief: Belief, bench: Bench) -> Beside:
+    """One of them on every axis, up to the first on which it is not safe."""
+    try:
+        made = compensated(name, loop or LOOPS[0], belief)
+    except ParameterError as error:
+        return Beside(name, loop, (), str(error).removeprefix("belief: "), None)
+    made = replace(made, encoder_counts=bench.drive.encoder_counts)
+    if why := refused(name, made, belief, bench.drive):
+        return Beside(name, loop, (), why, made)
+    return on_axes(Beside(name, loop, (), "", made), bench, " ")
+
+
+def refused(name: str, made: SampledController, belief: Belief, drive: Drive) -> str:
+    """Why it is not even run, or ""."""
+    if name == "lugre-observer":
+        delay = math.ceil(drive.machine.delay) if drive.machine else 0
+        stiffness = belief.number("sigma0")
+        said = objection(made, belief.inertia, stiffness, drive.encoder_counts, delay=delay)
+        if said:
+            return said
+    if CATALOGUE[name].against:
+        return CATALOGUE[name].against
+    laws = [block.law for block in made.blocks.values()]
+    if any(law.adapts for law in laws) and not any(law.integrates for law in laws):
+        return "it adapts, and nothing under it moves an axis that sticks"
+    return ""
+
+
+def confirmed(best: Beside, bench: Bench, others: Bench) -> Beside:
+    """It on the other axes, and at rest for long on the best estimate."""
+    assert best.controller is not None
+    if cycle := limit_cycle(best.controller, bench):
+        return replace(best, why_not=cycle)
+    return on_axes(best, others, " on an axis sampled later ")
+
+
+def on_axes(beside: Beside, bench: Bench, where: str) -> Beside:
+    """It on every axis of a bench; why it is not safe on one of them."""
+    assert beside.controller is not None
+    errors: list[float] = []
+    for i, plant in enumerate(bench.plants):
+        before, after = bench.before(i), run(plant, beside.controller, bench.drive)
+        bench.ran()
+        if isinstance(after, str) or isinstance(before, str):
+            why = after if isinstance(after, str) else "the linear controller alone fails"
+            return replace(beside, errors=tuple(errors), why_not=why + where.rstrip())
+        errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
+        if unsafe := unsafe_at(beside, before, after, bench.drive):
+            return replace(beside, errors=tuple(errors), why_not=", ".join(unsafe) + where.rstrip())
+    return replace(beside, errors=tuple(errors))
+
+
+def unsafe_at(beside: Beside, before: Trial, after: Trial, drive: Drive) -> list[str]:
+    """What it makes worse; the linear controller itself makes nothing worse.
+
+    A feedforward kicks where the motion turns, also one that has an observer under it: it may be as rough as one alone.
+    """
+    assert beside.controller is not None
+    if math.isclose(after.moving["position_rms_rad"], before.moving["position_rms_rad"], rel_tol=1e-3):
+        return []
+    found = list(dangers(before, after, drive))
+    if beside.controller.feedforward is not None:
+        bearable = list(dangers(before, after, drive, feedforward=True))
+        found = [said for said in found if said == AT_REST or said in bearable]
+    return found
+
+
+def limit_cycle(controller: Controller | SampledController, bench: Bench) -> str:
+    """What it does at rest for long after the motion on the best estimate, where it goes to and fro, or ""."""
+    drive, before = bench.drive, bench.before(0)
+    assert isinstance(before, Trial)
+    last = drive.wanted[-1] * np.array([1.0, 0.0, 0.0])
+    held = np.tile(last, (round(RESTS / drive.sample_time), 1))
+    wanted = np.vstack([drive.wanted, held])
+    position = simulated(bench.plants[0], controller, wanted)
+    bench.ran()
+    if position is None:
+        return "at rest position or velocity left every reasonable bound"
+    late = position[-held.shape[0] // 2 :]
+    swing = float(np.ptp(late)) - abs(float(late[-1] - late[0]))
+    return f"hunts at rest, {1e6 * swing:.0f} µrad peak to peak" if swing > before.swing(drive) else ""

@@ -1,0 +1,403 @@
+"""One setting of a compensator on one axis, as a drive runs it: along a motion, and at rest behind it; and the linear
+controller alone, which may ring by itself: a count of the encoder looks like kd count / sample time of speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Cascade, Gains, place
+from stickslip.control.sampled_controller import SampledController
+from stickslip.errors import ParameterError
+from stickslip.identify.motion import HOLD, Motion, sinusoid
+from stickslip.identify.setting.plant import Plant, arrays_of, stand_at
+from stickslip.jit import kernel
+from stickslip.machines.machine import Machine
+from stickslip.machines.rigid import RigidAxis
+from stickslip.rigs._control import COLUMNS, Control, control_of, decide, finished
+from stickslip.rigs.rig import Limits, setpoints
+from stickslip.simulation.machine import step as places
+from stickslip.simulation.machine.layout import look
+from stickslip.simulation.machine.step import plant_of, sample
+
+__all__ = ["AT_REST", "Drive", "Plant", "Trial", "dangers", "rings", "run"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+AT_REST = "limit cycle at rest"
+
+BUSY = 1.0
+"""Reversals per second beyond those of the linear controller alone from which an axis hunts."""
+BOUNCES = 2.0
+"""Swings that a compensating torque may make where the motion stops or turns: its springs give back the step."""
+LIVELIER, ROUGH = 3.0, 0.1
+"""Rough is a velocity above 50 Hz beyond so many times the linear controller's and this part of the reference's RMS."""
+KICKS = 0.5
+"""The same of a feedforward, which excites the contact's springs where it turns but cannot ring with them."""
+SWINGS = (2.0, 0.03)
+"""Counts, and part of the linear controller's RMS error, that a swing back has at least: less is none."""
+TRIGGER = 1e-3
+"""rad/s: a slower reversal between two counts is none."""
+FAST = 50.0
+"""Hz"""
+STARTS = (0.45, 1.4)
+"""Counts from which the linear controller goes to rest half way between two counts, where a creeping axis ends up."""
+SLOWEST = 0.01
+"""Of the motion's frequency: the least bandwidth that is looked at."""
+SMALLEST = 1e-12
+"""rad (m), of a motion."""
+HELD = 2.0
+"""s, of which the second half is judged."""
+UNLIMITED = Limits(torque=1e300, speed=1e300)
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The drive that will run it, and the motion that matters.
+
+    Attributes
+    ----------
+    bandwidth, damping : float
+        Of the position loop's poles, Hz and -; the linear controller is placed with the model's inertia.
+    sample_time : float
+        s
+    encoder_counts : float
+        Per revolution (2 pi); 0 measures exactly.
+    torque_limit : float
+        N·m
+    amplitude : float or None
+        Of a slow sinusoid as the motion, rad; None: `motion`, or that of the log.
+    frequency : float
+        Of that sinusoid, Hz.
+    linear : str
+        "PD", "PID" or "PR", placed by bandwidth and damping.
+    gains : Gains, Cascade or None
+        Of the loop as it is; None: of the placement.
+    velocity_filter : float
+        Corner of the first-order low-pass on the velocity that the linear controller sees, Hz; 0 for none.
+    motion : Motion or None
+        None: that of the log, or the sinusoid.
+    controller : SampledController or None
+        The loop as it is where it is made of control laws, without friction laws: gains, placement and filter are not
+        used then, and its sample time is the drive's.
+    machine : Machine or None
+        The machine at hand, with its resonances, encoder, amplifier and delay; None: rigid axes.
+    """
+
+    bandwidth: float = 10.0
+    damping: float = 1.0
+    sample_time: float = 1e-3
+    encoder_counts: float = 0.0
+    torque_limit: float = math.inf
+    amplitude: float | None = None
+    frequency: float = 0.5
+    linear: str = "PD"
+    gains: Gains | Cascade | None = None
+    velocity_filter: float = 0.0
+    motion: Motion | None = None
+    controller: SampledController | None = None
+    machine: Machine | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("bandwidth", "damping", "sample_time", "torque_limit", "amplitude", "frequency"):
+            value = getattr(self, name)
+            if value is not None and not value > 0.0:
+                raise ParameterError(f"drive: {name} = {value:g} must be greater than 0")
+        for name in ("encoder_counts", "velocity_filter"):
+            if not getattr(self, name) >= 0.0:
+                raise ParameterError(f"drive: {name} = {getattr(self, name):g} must be 0 or greater")
+        if self.amplitude is not None and self.amplitude < SMALLEST:
+            raise ParameterError(
+                f"drive: amplitude = {self.amplitude:g} must be at least {SMALLEST:g} rad (m)"
+            )
+        for name in ("bandwidth", "frequency"):
+            used = not self.given if name == "bandwidth" else self.amplitude is not None
+            if used and getattr(self, name) * self.sample_time > 0.1:
+                raise ParameterError(
+                    f"drive: {name} = {getattr(self, name):g} Hz is more than a tenth of the sample rate "
+                    f"{1.0 / self.sample_time:g} Hz; take a lower one, or a shorter sample time"
+                )
+        if self.machine is not None:
+            refuse_other(self.machine, self.sample_time, self.encoder_counts)
+        if self.controller is not None:
+            refuse_unfit(self.controller, self.sample_time)
+        if not self.given and self.bandwidth < SLOWEST * self.frequency:
+            raise ParameterError(
+                f"drive: bandwidth = {self.bandwidth:g} Hz is less than {SLOWEST:g} of the motion's "
+                f"{self.frequency:g} Hz, which the loop would not follow at all; give a higher one"
+            )
+
+    @property
+    def steps(self) -> float:
+        """Steps of the simulations of one axis, about: the motion, the rest behind it, what is held at rest."""
+        return (self.path.duration + HOLD + len(STARTS) * HELD) / min(5e-4, self.sample_time)
+
+    def deadband(self, counts: float) -> float:
+        """The velocity of so many counts of the encoder per sample time, rad/s; 0 where it measures exactly."""
+        return counts * 2.0 * math.pi / self.encoder_counts / self.sample_time if self.encoder_counts else 0.0
+
+    @property
+    def given(self) -> bool:
+        """Whether the loop is somebody's own, and not placed by bandwidth and damping."""
+        return self.gains is not None or self.controller is not None
+
+    def loop(self, inertia: float) -> Controller | SampledController:
+        """The linear controller, or the one made of control laws, alone."""
+        if self.controller is not None:
+            limit = min(self.torque_limit, self.controller.torque_limit)
+            return replace(self.controller, torque_limit=limit, encoder_counts=self.encoder_counts)
+        gains = self.gains or place(self.linear, inertia, self.bandwidth, self.damping)
+        return Controller(
+            gains, None, self.torque_limit, self.sample_time, self.encoder_counts, self.velocity_filter
+        )
+
+    @cached_property
+    def path(self) -> Motion:
+        """The motion: `motion`, or the sinusoid.
+
+        Raises
+        ------
+        ParameterError
+            If there is neither.
+        """
+        if self.motion is not None:
+            return self.motion
+        if self.amplitude is None:
+            raise ParameterError(
+                "drive: there is no motion to try a setting along; give a motion or an amplitude"
+            )
+        return sinusoid(self.amplitude, self.frequency)
+
+    @cached_property
+    def wanted(self) -> Array:
+        """Position, velocity and acceleration of the motion at every sample, shape (n, 3), `HOLD` at rest behind it."""
+        return self.path.sampled(self.sample_time)
+
+    @cached_property
+    def wanted_backward(self) -> Array:
+        """The same, its velocity the mean over the sample before."""
+        out = self.wanted.copy()
+        out[:, 1] = np.diff(out[:, 0], prepend=out[0, 0]) / self.sample_time
+        return out
+
+    @cached_property
+    def stops(self) -> float:
+        """How often the motion stops or turns, 1/s."""
+        side = np.sign(np.diff(self.wanted[:, 0]))
+        return float(np.sum((side[:-1] != 0.0) & (side[1:] != side[:-1]))) / (side.size * self.sample_time)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        out = {
+            f.name: getattr(self, f.name)
+            for f in fields(self)
+            if f.name not in ("gains", "motion", "controller", "machine")
+        }
+        path = self.path
+        return out | {
+            "gains": self.gains._asdict() if self.gains else None,
+            "controller": self.controller.as_dict() if self.controller else None,
+            "machine": self.machine.name if self.machine else None,
+            "motion": {"source": path.source, "amplitude": path.amplitude, "duration": path.duration},
+        }
+
+
+def refuse_other(machine: Machine, sample_time: float, counts: float) -> None:
+    """Refuse a drive that is not the machine's.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for name, given, own in (
+        ("sample_time", sample_time, machine.sample_time),
+        ("encoder_counts", counts, machine.encoder.counts),
+    ):
+        if given != own:
+            raise ParameterError(
+                f"drive: {name} = {given:g}, that of the machine {machine.name} is {own:g}; leave it out"
+            )
+
+
+def refuse_unfit(controller: SampledController, sample_time: float) -> None:
+    """Refuse a loop made of control laws that the drive cannot be.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if controller.sample_time != sample_time:
+        raise ParameterError(
+            f"drive: sample_time = {sample_time:g} s, the controller's is {controller.sample_time:g} s; give the same"
+        )
+    for part, block in controller.blocks.items():
+        if block.friction is not None:
+            raise ParameterError(
+                f"drive: {part} = {block.law.name!r} holds a friction law, which is what is looked for; leave it out"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One axis under one controller: along the motion, and at rest behind it.
+
+    Attributes
+    ----------
+    moving : mapping of str to float
+        Metrics of the motion: ``position_rms_rad``, ``velocity_above_50Hz_rms_rad_s``, ``speed_rms_rad_s`` (wanted).
+    position, wanted : array, shape (n,)
+        Of the axis and its reference at every sample, rad.
+    sample_time : float
+        s
+    """
+
+    moving: dict[str, float]
+    position: Array
+    wanted: Array
+    sample_time: float
+
+    def restless(self, swing: float) -> tuple[float, float]:
+        """Swings per second by more than `swing`, rad: beyond those of the reference in all, and at rest behind it."""
+        last = self.position.size - round(0.5 * HOLD / self.sample_time)
+        beyond = turns(self.position, swing) - turns(self.wanted, swing)
+        return beyond / (self.position.size * self.sample_time), turns(self.position[last:], swing) / (
+            0.5 * HOLD
+        )
+
+    def swing(self, drive: Drive) -> float:
+        """What a swing has at least to be one: counts, or a part of this trial's error, rad."""
+        count = drive.deadband(1.0) * drive.sample_time
+        return max(SWINGS[0] * count, SWINGS[1] * self.moving["position_rms_rad"])
+
+
+def run(plant: RigidAxis, controller: Controller | SampledController, drive: Drive) -> Trial | str:
+    """The motion and the rest behind it; the reason where it cannot be run to its end."""
+    wanted = drive.wanted_backward if isinstance(plant, Plant) and plant.backward else drive.wanted
+    position = simulated(plant, controller, wanted)
+    if position is None:
+        return "position or velocity left every reasonable bound"
+    time = controller.sample_time
+    moving = len(wanted) - round(HOLD / time)
+    velocity = np.diff(position, append=position[-1]) / time
+    return Trial(
+        {
+            "position_rms_rad": math.sqrt(float(np.mean((wanted[:moving, 0] - position[:moving]) ** 2))),
+            "velocity_above_50Hz_rms_rad_s": above(velocity, FAST, time),
+            "speed_rms_rad_s": math.sqrt(float(np.mean(wanted[:moving, 1] ** 2))),
+        },
+        position, np.ascontiguousarray(wanted[:, 0]), time,
+    )  # fmt: skip
+
+
+def simulated(
+    plant: RigidAxis, controller: Controller | SampledController, wanted: Array, start: float = 0.0
+) -> Array | None:
+    """Positions of the axis itself at every sample along a reference, rad; None where it diverges.
+
+    The axis starts at rest at `start`, rad.
+    """
+    control = control_of(controller, UNLIMITED, controller.sample_time)
+    arrays = arrays_of(plant, controller.sample_time, controller.encoder_counts)
+    stand_at(start, arrays[0], arrays[2])
+    look(*arrays, control.measured)
+    path = setpoints(
+        len(wanted), position=wanted[:, 0], velocity=wanted[:, 1], acceleration=wanted[:, 2], closed=1.0
+    )
+    positions = np.empty(len(path))
+    done = follow(*arrays, control, path, np.empty(len(COLUMNS)), positions)
+    return positions if done == len(path) and bool(np.all(np.isfinite(positions))) else None
+
+
+@kernel()
+def follow(
+    numbers: Any, matrix: Any, memory: Any, parameters: Any, surroundings: Any, law: int, holding: int,
+    control: Control, path: Any, row: Any, positions: Any,
+) -> int:  # fmt: skip
+    """The loop of `stickslip.rigs._virtual.run_block`, that keeps the axis's own positions; how many samples ran."""
+    plant = plant_of(numbers, matrix, memory, parameters, surroundings, law, holding)
+    shaft = places.HEAD + int(numbers[places.SHAFT])
+    for k in range(path.shape[0]):
+        positions[k] = memory[shaft]
+        torque = decide(control, path[k], row)
+        sample(plant, torque, control.measured)
+        if finished(control):
+            return k + 1
+    return path.shape[0]
+
+
+def reversals(velocity: Array, trigger: float) -> int:
+    """Changes of sign between velocities beyond a trigger."""
+    sides = np.sign(velocity[np.abs(velocity) > trigger])
+    return int(np.sum(sides[1:] != sides[:-1]))
+
+
+@kernel()
+def turns(position: Any, swing: float) -> int:
+    """Turning points after which the position goes back by more than a swing."""
+    count, side = 0, 0
+    low = high = position[0]
+    for x in position:
+        if side >= 0 and x < high - swing:
+            count += 1 if side > 0 else 0
+            side, low = -1, x
+        elif side <= 0 and x > low + swing:
+            count += 1 if side < 0 else 0
+            side, high = 1, x
+        high, low = max(high, x), min(low, x)
+    return count
+
+
+def above(velocity: Array, corner: float, sample_time: float) -> float:
+    """RMS of what is faster than a corner, Hz, by the spectrum of the whole motion."""
+    spectrum = np.fft.rfft(velocity)
+    fast = np.fft.rfftfreq(velocity.size, sample_time) > corner
+    return math.sqrt(2.0 * float(np.sum(np.abs(spectrum[fast]) ** 2))) / velocity.size
+
+
+def rings(plant: RigidAxis, linear: Controller | SampledController, drive: Drive, alone: Trial | str) -> str:
+    """Where the linear controller alone oscillates on an axis, "at rest" or "in motion"; empty where it is calm.
+
+    `alone` is its trial. Besides, it holds a position between two counts, from near it: whether it happens to stop
+    there after a way is luck, and a compensator that leaves less error brings it there.
+    """
+    if isinstance(alone, str):
+        return "at rest"
+    beyond, resting = alone.restless(alone.swing(drive))
+    if resting > BUSY:
+        return "at rest"
+    count = drive.deadband(1.0) * drive.sample_time
+    held = np.zeros((round(HELD / drive.sample_time), 3))
+    held[:, 0] = 0.5 * count
+    for start in STARTS if count > 0.0 else ():
+        position = simulated(plant, linear, held, start * count)
+        if position is None:
+            return "at rest"
+        late = np.diff(position[position.size // 2 :]) / drive.sample_time
+        if reversals(late, TRIGGER) / (0.5 * HELD) > BUSY:
+            return "at rest"
+    return "in motion" if beyond > BUSY else ""
+
+
+def dangers(before: Trial, after: Trial, drive: Drive, feedforward: bool = False) -> Iterator[str]:
+    """What a compensator makes worse than the linear controller alone.
+
+    At rest a feedforward's torque is constant, so that what rings there is the linear controller alone.
+    """
+    swing = before.swing(drive)
+    (was, rested), (now, resting) = before.restless(swing), after.restless(swing)
+    if resting > rested + BUSY and not feedforward:
+        yield AT_REST
+    if now > max(was, 0.0) + BUSY + BOUNCES * drive.stops:
+        yield "oscillates in motion"
+    rough = "velocity_above_50Hz_rms_rad_s"
+    bearable = (KICKS if feedforward else ROUGH) * after.moving["speed_rms_rad_s"]
+    if after.moving[rough] > max(LIVELIER * before.moving[rough], bearable):
+        yield "rough motion"
+    if after.moving["position_rms_rad"] > before.moving["position_rms_rad"]:
+        yield "a larger error than without it"

@@ -1,0 +1,280 @@
+"""Settings of a compensator on a bench of axes, judged against what the linear controller alone does there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.control.block import ControlBlock
+from stickslip.control.compensator import COMPENSATORS
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Cascade, Gains, place
+from stickslip.control.sampled_controller import SampledController
+from stickslip.identify.monte_carlo import sliding_torque
+from stickslip.identify.setting.candidate_run import Drive, Trial, dangers, rings, run
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model
+
+__all__ = ["TRIES", "Account", "Bench", "Candidate", "Setting", "on_both", "resistance", "rings_alone"]
+
+FOLLOWS, LIVELY = 3.0, 5.0
+"""An axis that the drive's own loop does not hold is not the user's: times the best estimate's error, and swings per
+second beyond the best estimate's, from which on it does not."""
+TRIES = 4
+"""Times as many axes are drawn at most, for so many that are held."""
+LOOKED_AT = 16
+"""Axes on which the linear controller alone is judged: the best estimate and some drawn ones."""
+Alone = Controller | SampledController
+"""The controller without a compensator."""
+SLOWER = (0.7, 0.5, 0.35, 0.25, 0.1)
+"""Of the bandwidth: where a linear controller that rings alone is tried for one that is calm."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is switched on: a law with its numbers.
+
+    Attributes
+    ----------
+    law, kind : str
+        ``kind`` is "feedforward" or "feedback".
+    gain : float
+    lead : float
+        s, by which a feedforward looks ahead of the reference.
+    deadband : float
+        rad/s, velocities below which a feedback's law sees rest.
+    inertia_feedforward : float
+        kg·m², times the reference's acceleration: torque that is given too.
+    offset : float
+        N·m, constant torque that is given too.
+    """
+
+    law: str
+    kind: str
+    gain: float
+    lead: float = 0.0
+    deadband: float = 0.0
+    inertia_feedforward: float = 0.0
+    offset: float = 0.0
+
+    def on(self, linear: Alone, model: Model) -> Alone:
+        """The linear controller with this compensator."""
+        if isinstance(linear, SampledController):
+            return self.beside(linear, model)
+        compensator = COMPENSATORS[self.kind](
+            model, self.gain, lead=self.lead, deadband=self.deadband,
+            inertia_feedforward=self.inertia_feedforward, offset=self.offset,
+        )  # fmt: skip
+        return replace(linear, compensator=compensator)
+
+    def beside(self, loop: SampledController, model: Model) -> SampledController:
+        """The loop made of control laws with this compensator's beside its own."""
+        own = {
+            place: [b for b in loop.blocks.values() if b.law.place == place]
+            for place in ("feedforward", "observer")
+        }
+        if self.inertia_feedforward or self.offset:
+            block = ControlBlock("inertia_feedforward", inertia=self.inertia_feedforward, offset=self.offset)
+            own["feedforward"].append(block)
+        numbers: dict[str, Any] = {"gain": self.gain, "deadband": self.deadband}
+        if self.kind == "feedforward":
+            own["feedforward"].append(ControlBlock("friction_feedforward", model, lead=self.lead, **numbers))
+        else:
+            own["observer"].append(ControlBlock("friction_feedback", model, **numbers))
+        return replace(loop, feedforward=own["feedforward"], observer=own["observer"])
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One setting and what it did on every axis.
+
+    Attributes
+    ----------
+    setting : Setting
+    errors : tuple of float
+        RMS position error along the motion over that of the linear controller alone, one per axis; the best
+        estimate first. The first axis on which it is not safe is the last.
+    unsafe : tuple of str
+        Why it is not safe to switch on; empty where it is.
+    useless : str
+        Why it is not worth it where it is safe; empty where that is not known.
+    """
+
+    setting: Setting
+    errors: tuple[float, ...]
+    unsafe: tuple[str, ...]
+    useless: str = ""
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        """Why it is not to be switched on; empty where it may be."""
+        return (*self.unsafe, *([self.useless] if self.useless else []))
+
+    @property
+    def worst(self) -> float:
+        """The greatest remaining part of the error."""
+        return max(self.errors)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {**asdict(self.setting), "errors": list(self.errors), "unsafe": list(self.unsafe),
+                "useless": self.useless}  # fmt: skip
+
+
+class Account:
+    """How many axes are simulated, of how many at most; what is unsafe is left early, and the rest of it counted."""
+
+    def __init__(self, progress: Callable[[int, int], None], settings: int, axes: int, more: int) -> None:
+        self.progress, self.axes, self.done = progress, axes, 0
+        self.total = axes * settings + more
+        progress(0, self.total)
+
+    def one(self) -> None:
+        """Another axis is simulated."""
+        self._reach(self.done + 1)
+
+    def tried(self, settings: int) -> None:
+        """So many settings have been judged on the first axes."""
+        self._reach(max(self.done, self.axes * settings))
+
+    def end(self) -> None:
+        """Nothing is left."""
+        self._reach(self.total)
+
+    def _reach(self, done: int) -> None:
+        self.done = min(done, self.total)
+        self.progress(self.done, self.total)
+
+
+class Bench:
+    """Axes, each with what the linear controller alone does on it, and the laws that may be switched on.
+
+    `ran` is called after every axis that was simulated. `left_out` counts axes that were drawn and not held.
+    """
+
+    def __init__(
+        self, plants: Sequence[RigidAxis], linear: Alone, drive: Drive, laws: dict[str, Model],
+        ran: Callable[[], None] = lambda: None,
+    ) -> None:  # fmt: skip
+        self.plants, self.linear, self.drive, self.laws, self.ran = plants, linear, drive, laws, ran
+        self.alone: list[Trial | str] = []
+        self.left_out = 0
+
+    @staticmethod
+    def held(
+        drawn: Iterator[RigidAxis], count: int, linear: Alone, drive: Drive, laws: dict[str, Model],
+        ran: Callable[[], None] = lambda: None,
+    ) -> Bench:  # fmt: skip
+        """The best estimate, which is drawn first, and the first `count` others that the linear controller holds."""
+        bench = Bench([next(drawn)], linear, drive, laws, ran)
+        best, kept, alone = bench.before(0), list(bench.plants), list(bench.alone)
+        for plant in drawn:
+            if len(kept) > count:
+                break
+            trial = run(plant, linear, drive)
+            ran()
+            if lost(trial, best, drive):
+                bench.left_out += 1
+                continue
+            kept.append(plant)
+            alone.append(trial)
+        bench.plants, bench.alone = kept, alone
+        return bench
+
+    def before(self, i: int) -> Trial | str:
+        """The linear controller alone on axis i."""
+        while len(self.alone) <= i:
+            self.alone.append(run(self.plants[len(self.alone)], self.linear, self.drive))
+            self.ran()
+        return self.alone[i]
+
+    def ringing(self) -> Iterator[tuple[RigidAxis, str]]:
+        """The axes, of the first `LOOKED_AT`, on which the linear controller alone oscillates, and where."""
+        for i, plant in enumerate(self.plants[:LOOKED_AT]):
+            if where := rings(plant, self.linear, self.drive, self.before(i)):
+                yield plant, where
+
+    def judged(self, setting: Setting) -> Candidate:
+        """The setting on every axis, up to the first on which it is not safe."""
+        controller = setting.on(self.linear, self.laws[setting.law])
+        errors: list[float] = []
+        for i, plant in enumerate(self.plants):
+            before, after = self.before(i), run(plant, controller, self.drive)
+            self.ran()
+            if isinstance(after, str) or isinstance(before, str):
+                why = after if isinstance(after, str) else "the linear controller alone fails"
+                return Candidate(setting, (*errors, math.inf), (why,))
+            errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
+            if unsafe := tuple(dangers(before, after, self.drive, setting.kind == "feedforward")):
+                return Candidate(setting, tuple(errors), unsafe)
+        return Candidate(setting, tuple(errors), ())
+
+
+def lost(trial: Trial | str, best: Trial | str, drive: Drive) -> bool:
+    """Whether a linear controller does not hold an axis, where it holds the best estimate."""
+    if isinstance(trial, str) or isinstance(best, str):
+        return isinstance(trial, str) and not isinstance(best, str)
+    swing = best.swing(drive)
+    (beyond, _), (usual, _) = trial.restless(swing), best.restless(swing)
+    error, least = (x.moving["position_rms_rad"] for x in (trial, best))
+    return error > FOLLOWS * least or beyond > max(usual, 0.0) + LIVELY
+
+
+def on_both(setting: Setting, bench: Bench, others: Bench) -> Candidate:
+    """The setting on the bench; if it is safe there but not on the other axes, that is why it is not safe."""
+    here = bench.judged(setting)
+    there = here if here.unsafe else others.judged(setting)
+    return replace(here, unsafe=there.unsafe)
+
+
+def breakaway(model: Model) -> float:
+    """The torque that the contact withstands at rest, of both directions the greater, N·m; 0 where the law does not
+    tell it."""
+    if not model.law.steady:
+        return 0.0
+    # The least velocity there is stands for rest on the negative side.
+    return float(np.max(np.abs(sliding_torque(model, np.array([0.0, -np.finfo(float).tiny])))))
+
+
+def resistance(model: Model, drive: Drive) -> float:
+    """The greatest friction along the motion, break-away among it, N·m; 0 where the law does not tell it."""
+    if not model.law.steady:
+        return 0.0
+    v = drive.path.top_speed * np.concatenate([np.linspace(0.0, 1.0, 200), -np.linspace(1e-9, 1.0, 200)])
+    return float(np.max(np.abs(sliding_torque(model, v))))
+
+
+def rings_alone(bench: Bench, inertia: float, torque: str) -> str:
+    """Where the linear controller alone oscillates, and at which bandwidth it does not; empty where it is calm."""
+    ringing = list(bench.ringing())
+    if not ringing:
+        return ""
+    drive, count = bench.drive, len(bench.plants[:LOOKED_AT])
+    where = " and ".join(sorted({where for _, where in ringing}))
+    on = f"on {len(ringing)} of {count} axes" if count > 1 else "on the best estimate"
+    if isinstance(bench.linear, SampledController):
+        return f"{where} {on}; lower its gains, or take a finer encoder or a shorter sample time"
+    push = bench.linear.linear.kd * drive.deadband(1.0)
+    why = f": a count of the encoder makes it push {push:.2g} {torque} for a sample" if push else ""
+    plants = [plant for plant, _ in ringing]
+    finer = ", or take a finer encoder" if push else ", or a shorter sample time"
+    if drive.gains is not None:
+        return f"{where} {on}{why}; lower the gain on the velocity ({velocity_gain(drive.gains):.4g}){finer}"
+    for share in SLOWER:
+        slower = replace(drive, bandwidth=share * drive.bandwidth)
+        linear = replace(bench.linear, gains=place(drive.linear, inertia, slower.bandwidth, drive.damping))
+        if not any(Bench(plants, linear, slower, {}).ringing()):
+            calm = f"lower the bandwidth ({slower.bandwidth:.3g} Hz is calm)"
+            break
+    else:
+        calm = f"no bandwidth down to {SLOWER[-1] * drive.bandwidth:.3g} Hz is calm"
+    return f"{where} {on}{why}; {calm}{finer}"
+
+
+def velocity_gain(gains: Gains | Cascade) -> float:
+    """On the measured velocity, N·m·s/rad."""
+    return gains.kvp if isinstance(gains, Cascade) else gains.kd

@@ -1,0 +1,101 @@
+"""recommended.toml of what `stickslip.identify.setting.recommend` found: the law to run with ``[recommended]``."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.config import Table
+from stickslip.control.controller import Controller
+from stickslip.control.recommended import Recommended
+from stickslip.control.sampled_controller import SampledController
+from stickslip.control.written import tables_of
+from stickslip.errors import InputError
+from stickslip.identify.estimate import Identification
+from stickslip.identify.identified_file import Identified
+from stickslip.identify.model_file import in_memory, model_content, write_model
+from stickslip.identify.setting.candidates import Setting
+from stickslip.identify.setting.recommend import Recommendation
+from stickslip.machines.servo import ServoAxis
+
+__all__ = ["setting_table", "write_setting"]
+
+
+def write_setting(path: str | os.PathLike[str], found: Identified, advice: Recommendation) -> Path:
+    """Write what is recommended: the same form as that of `stickslip rig commission`, without a machine's name.
+
+    Beside a loop made of control laws, or with a compensator of the catalogue: the whole controller, as
+    `stickslip.control.files` reads it.
+
+    Parameters
+    ----------
+    path : path
+    found : Identified
+        What the advice was made for.
+    advice : Recommendation
+
+    Raises
+    ------
+    InputError
+        If nothing is recommended, or it cannot be written.
+    """
+    target = Path(path)
+    if advice.chosen is None and advice.instead is None:
+        raise InputError(f"no compensator is recommended, so that there is nothing to write to {target}")
+    result, law, more = _parts(found, advice)
+    return write_model(target, result, data=found.data, law=law, more=more)
+
+
+def setting_table(found: Identified, advice: Recommendation) -> Table:
+    """What `write_setting` writes, as the table that reading it gives.
+
+    Raises
+    ------
+    InputError
+        If nothing is recommended.
+    """
+    if advice.chosen is None and advice.instead is None:
+        raise InputError("no compensator is recommended, so that there is nothing to export")
+    result, law, more = _parts(found, advice)
+    return in_memory(model_content(result, found.data, str(Path(law).resolve()) if law else "", more))
+
+
+def _parts(found: Identified, advice: Recommendation) -> tuple[Identification, str, dict[str, Any]]:
+    """The law, the path of its file, and the further tables."""
+    further = _further(advice)
+    model = advice.model or found.model
+    motion = ServoAxis(motion="linear") if found.motion == "linear" else ServoAxis()
+    result = Identification(
+        "recommendation", model, (), np.eye(0), {}, advice.notes,
+        details={"axis": motion},
+    )  # fmt: skip
+    kept = found.law_file if model.law.name == found.model.law.name else ""
+    more = {"axis": {**found.axis, "inertia": advice.inertia}, **further}
+    return result, kept, more
+
+
+def _further(advice: Recommendation) -> dict[str, Any]:
+    """The controller, where it is made of control laws, or the setting beside the linear one."""
+    if advice.instead is not None:
+        assert advice.instead.controller is not None
+        return tables_of(advice.instead.controller)
+    assert advice.chosen is not None
+    assert advice.model is not None
+    setting, loop = advice.chosen.setting, advice.drive.loop(advice.inertia)
+    if isinstance(loop, SampledController):
+        return tables_of(setting.beside(loop, advice.model))
+    return {"recommended": _recommended(advice, setting, loop)}
+
+
+def _recommended(advice: Recommendation, setting: Setting, loop: Controller) -> dict[str, Any]:
+    """The table of a setting beside a linear controller."""
+    drive = advice.drive
+    own = drive.gains is not None or drive.linear != "PD"
+    return Recommended(
+        setting.kind, setting.gain, drive.bandwidth, drive.damping, advice.inertia, setting.lead, setting.deadband,
+        sample_time=drive.sample_time, offset=setting.offset, inertia_feedforward=setting.inertia_feedforward,
+        gains=loop.gains if own else None, velocity_filter=drive.velocity_filter,
+    ).table()  # fmt: skip

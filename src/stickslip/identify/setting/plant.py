@@ -1,0 +1,92 @@
+"""An axis on which a setting is tried, as the machine engine runs it: rigid, or on the machine at hand.
+
+The machine at hand brings what was measured of it: its inertias and springs (resonances), encoder, amplifier, delay,
+cogging and ripple. Friction and the whole inertia are the drawn axis's: they are what was identified, bearings and
+direction included.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.machines.contact import Contact
+from stickslip.machines.encoder import Encoder
+from stickslip.machines.machine import Machine
+from stickslip.machines.motor import Amplifier
+from stickslip.machines.rigid import RigidAxis
+from stickslip.simulation.machine import step as places
+from stickslip.simulation.machine.layout import lay_out_machine
+
+__all__ = ["Plant", "arrays_of", "stand_at"]
+
+
+@dataclass(frozen=True)
+class Plant(RigidAxis):
+    """An axis with what acts beside its friction, and how late the drive's torque acts.
+
+    Attributes
+    ----------
+    offset : float
+        Constant torque against positive motion, N·m.
+    waves : tuple of (float, float, float)
+        Torques over the position, amplitude cos(order x + phase): order (1/rad), amplitude (N·m), phase (rad).
+    delay : float
+        Part of a sample by which the torque acts late, from 0 to 1.
+    bandwidth : float
+        Of the current loop, Hz; infinite follows at once.
+    backward : bool
+        Whether the drive's reference velocity is the mean over the sample before, half a sample late, as the velocity
+        that it measures; else that of the instant.
+    machine : Machine or None
+        The machine at hand, in place of ``delay`` and ``bandwidth``; None: a rigid axis.
+    """
+
+    offset: float = 0.0
+    waves: tuple[tuple[float, float, float], ...] = ()
+    delay: float = 0.0
+    bandwidth: float = math.inf
+    backward: bool = False
+    machine: Machine | None = None
+
+    def built(self, sample_time: float, counts: float) -> Machine:
+        """The machine that it is, sampled every `sample_time` s, with an encoder of `counts` where it is rigid."""
+        if self.machine is None:
+            return Machine(
+                "axis", self.inertia, Contact(self.friction), amplifier=Amplifier(1.0, bandwidth=self.bandwidth),
+                delay=self.delay, sample_time=sample_time, encoder=Encoder(counts),
+            )  # fmt: skip
+        known = self.machine.without("bearings", "direction")
+        part = self.inertia / known.inertia
+        flexible = known.flexible
+        if flexible is not None:
+            flexible = replace(
+                flexible, rotor=part * flexible.rotor, shaft=part * flexible.shaft, disk=part * flexible.disk
+            )
+        return replace(
+            known, inertia=self.inertia, flexible=flexible, flexible_stiffness=0.0, models={},
+            contact=replace(known.contact, friction=self.friction),
+            encoder=replace(known.encoder, max_speed=math.inf),
+        )  # fmt: skip
+
+
+def arrays_of(plant: RigidAxis, sample_time: float, counts: float) -> tuple[Any, ...]:
+    """Arrays of a machine at rest that is this axis, as the machine engine takes them."""
+    own = plant if isinstance(plant, Plant) else Plant(plant.inertia, plant.friction)
+    laid = lay_out_machine(own.built(sample_time, counts))
+    laid.surroundings[1], laid.surroundings[2] = plant.load, plant.temperature
+    waves = [(0.0, -own.offset, 0.0), *own.waves]
+    numbers = np.concatenate([laid.numbers, np.array(waves).ravel()])
+    numbers[places.COGS] += float(len(waves))
+    return (
+        numbers, laid.matrix, laid.memory, laid.parameters, laid.surroundings, laid.step, laid.holding,
+    )  # fmt: skip
+
+
+def stand_at(position: float, numbers: Any, memory: Any) -> None:
+    """Put the whole machine at rest at a position, rad: its inertias, and what the encoder shows."""
+    for place in (places.ROTOR, places.SHAFT, places.DISK, places.MODE):
+        memory[places.HEAD + int(numbers[place])] = position

@@ -1,0 +1,400 @@
+"""From an identified model to a setting that is safe to switch on: by simulating the axes that the data allow.
+
+A compensator that gives more than the friction there is pushes the axis: around rest it limit-cycles (thesis 3.2.3).
+The true friction is unknown but for the model's intervals, so every candidate (law, feedforward or feedback, gain,
+deadband) is run on axes drawn from them, sampled, counted, held and limited as in the drive. The best is then run on
+other axes, with a tenth more gain too: what it does there, not where it was picked, is what to expect of it. The linear
+controller alone is judged first: what rings without a compensator is not the compensator's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.control.controller import Controller
+from stickslip.control.sampled_controller import SampledController
+from stickslip.errors import InputError
+from stickslip.identify.identified_file import Identified
+from stickslip.identify.monte_carlo import sliding_torque, with_values
+from stickslip.identify.setting.axes import plants_of
+from stickslip.identify.setting.beside import Beside, belief_of, limit_cycle, tried_beside
+from stickslip.identify.setting.candidate_run import Drive
+from stickslip.identify.setting.candidates import (
+    TRIES,
+    Account,
+    Bench,
+    Candidate,
+    Setting,
+    on_both,
+    rings_alone,
+)
+from stickslip.identify.setting.notes import ALLOWANCE, BETTER, axes_left_out, lag_of, notes_on, weak_on
+from stickslip.identify.setting.refusals import held, refuse_endless, refuse_unknown, refuse_weak
+from stickslip.model import Model
+
+__all__ = ["Candidate", "Drive", "Recommendation", "Setting", "recommend"]
+
+GAINS = (0.5, 0.7, 0.8, 0.9, 1.0)
+BEYOND = (1.1, 1.25, 1.5)
+"""Gains above 1, for the margin only."""
+GUARD = 1.1
+"""What is recommended is safe with so many times its gain too: friction falls as an axis warms up."""
+LEADS = (0.0, 0.5, 1.0, 2.0)
+"""In sample times."""
+DEADBAND = 1.5
+"""In counts per sample time: a single count, which an axis at rest may give, is then rest."""
+WORTH = 0.95
+"""A compensator that leaves more than this part of the error is not worth its risk."""
+NEAR = 1.1
+"""Errors within this factor of the best are alike; the lower gain is then taken."""
+ALIKE = 1.02
+"""The same for leads: the shorter one is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recommendation:
+    """What to switch on.
+
+    Attributes
+    ----------
+    chosen : Candidate or None
+        None: switch no compensator on. Its errors are those on the axes that it was not picked on.
+    model : Model or None
+        The law to run, with its parameters.
+    gains : mapping
+        Of the linear controller; of a loop made of control laws the parameters of all of them.
+    linear_error : float
+        RMS error of the linear controller alone on the best estimate, rad.
+    margin : float
+        Highest gain tried, over the chosen one, up to which it is safe on all axes.
+    unsafe_gain : float
+        Lowest gain tried above the chosen one at which it is not safe on some axis; infinite where there is none.
+    candidates : tuple of Candidate
+    axes : int
+        On how many the candidates were simulated, the best estimate among them.
+    notes : tuple of str
+    rings : str
+        Where the linear controller rings alone, why, and what to change; empty where it does not.
+    inertia : float
+        kg·m², that the PD is placed with.
+    beside : tuple of Beside
+        Compensators of the catalogue that were tried besides, best first.
+    hunts : str
+        What the chosen setting does at rest for long, where compensators were tried besides and it goes to and fro.
+    """
+
+    chosen: Candidate | None
+    model: Model | None
+    gains: dict[str, float]
+    linear_error: float
+    margin: float
+    unsafe_gain: float
+    candidates: tuple[Candidate, ...]
+    axes: int
+    notes: tuple[str, ...] = ()
+    drive: Drive = field(default_factory=Drive)
+    rings: str = ""
+    inertia: float = math.nan
+    beside: tuple[Beside, ...] = ()
+    hunts: str = ""
+
+    @property
+    def instead(self) -> Beside | None:
+        """The compensator of the catalogue to be switched on instead of the chosen setting; None: none is better."""
+        best = next((b for b in self.beside if not b.why_not), None)
+        if best is None or best.name == "none" or ALLOWANCE * best.worst > 1.0:
+            return None
+        return best if self.chosen is None or self.hunts or NEAR * best.worst < self.chosen.worst else None
+
+    @property
+    def reduction(self) -> tuple[float, float]:
+        """Least and greatest part of the error that is taken away, over the axes that the setting was not picked on
+        and the best estimate.
+
+        Of n drawn axes they hold the reduction on another one with a probability of (n - 1)/(n + 1), 95 % for 39, or a
+        little more: the best estimate may widen them. They are moved apart by `ALLOWANCE` and `BETTER`,
+        for what machines have and the simulation has not.
+        """
+        if self.chosen is None:
+            return 0.0, 0.0
+        return 1.0 - ALLOWANCE * max(self.chosen.errors), 1.0 - min(self.chosen.errors) / BETTER
+
+    @property
+    def confirmed_on(self) -> int:
+        """How many drawn axes the chosen setting was confirmed on."""
+        return len(self.chosen.errors) - 1 if self.chosen else 0
+
+    @property
+    def confidence(self) -> float:
+        """Probability that `reduction` holds another axis from the model's intervals."""
+        n = self.confirmed_on
+        return max(0.0, (n - 1) / (n + 1))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "chosen": self.chosen.as_dict() if self.chosen else None,
+            "model": self.model.as_dict() if self.model else None, "gains": self.gains,
+            "linear_error_rms": self.linear_error, "margin": self.margin, "unsafe_gain": self.unsafe_gain,
+            "reduction": list(self.reduction) if self.chosen else None, "reduction_confidence": self.confidence,
+            "axes": self.axes, "axes_confirmed": self.confirmed_on, "notes": list(self.notes),
+            "linear_alone_rings": self.rings, "drive": self.drive.as_dict(),
+            "candidates": [c.as_dict() for c in self.candidates],
+            "compensators": [b.as_dict() for b in self.beside],
+            "instead": self.instead.label if self.instead else None,
+        }  # fmt: skip
+
+
+def recommend(
+    found: Identified, drive: Drive, *, inertia: float | None = None, axes: int = 6, confirm: int = 39, seed: int = 0,
+    feed_inertia: bool = True, compensators: Sequence[str] = (),
+    progress: Callable[[int, int], None] = lambda done, of: None,
+) -> Recommendation:  # fmt: skip
+    """Choose law, structure, gain, lead and deadband.
+
+    Parameters
+    ----------
+    found : Identified
+    drive : Drive
+    inertia : float, optional
+        kg·m², where the model has none.
+    axes : int
+        Besides the best estimate, drawn from the model's intervals: for all candidates; none where the law has none.
+    confirm : int
+        Drawn besides, on which the best candidate is confirmed: its `Recommendation.reduction` is theirs.
+    seed : int
+        Of the draws.
+    feed_inertia : bool
+        Whether the inertia times the reference's acceleration is part of every setting; not where the drive feeds it
+        forward itself, or knows no acceleration.
+    compensators : sequence of str
+        Of `stickslip.control.catalogue.CATALOGUE`, which are tried besides.
+    progress : callable
+        Called with the axes that are simulated, and all of them that may be.
+
+    Returns
+    -------
+    Recommendation
+
+    Raises
+    ------
+    InputError
+        If there is no inertia, friction's level is not identified, the drive is too weak for the motion, or the linear
+        controller alone cannot be simulated or is unstable.
+    """
+    j = inertia if inertia is not None else found.axis.get("inertia")
+    unit = found.unit("kg·m²")
+    if j is None:
+        raise InputError(f"{found.path} holds no inertia; give --inertia in {unit}")
+    if not 0.0 < j < math.inf:
+        raise InputError(f"inertia = {j:g} {unit} must be greater than 0; give another one with --inertia")
+    drive = with_motion(found, drive)
+    refuse_unknown(found)
+    refuse_weak(found, drive)
+    linear, start = drive.loop(float(j)), float(drive.path.position[0])
+    if not found.law_estimates[0]:
+        axes = confirm = 0  # Nothing of the friction would be drawn.
+    laws = laws_of(cautious(found))
+    offset = float(found.axis.get("offset", 0.0) or 0.0)
+    settings = [
+        replace(setting, offset=offset)
+        for setting in settings_of(
+            laws, drive, float(j) if feed_inertia and not feeds_inertia(linear) else 0.0
+        )
+    ]
+    # Each with the linear controller alone; then leads, the guard and the gains beyond.
+    more = (axes + 1) * (len(LEADS) + 1 + len(BEYOND)) + (confirm + 1) * (3 + len(BEYOND))
+    account = Account(progress, len(settings), axes + 1, more)
+    refuse_endless(account.total, drive, axes, confirm)
+
+    def drawn(count: int, seed: int) -> Bench:
+        own = drive.given  # Only of a loop that somebody runs is it known that it holds the axis.
+        plants = plants_of(
+            found, float(j), (TRIES if own else 1) * count, seed, start, inertia is not None, drive.machine
+        )
+        return (Bench.held(plants, count, linear, drive, laws, account.one) if own
+                else Bench(list(plants), linear, drive, laws, account.one))  # fmt: skip
+
+    bench, others = drawn(axes, seed), drawn(confirm, seed + 1)
+    first = held(found, bench.before(0), drive)
+    # By the axes of the confirmation, if there are more of them: what is said is then the same for any `axes`.
+    rung = rings_alone(max(others, bench, key=lambda b: len(b.plants)), float(j), found.unit("N·m"))
+    candidates: list[Candidate] = []
+    for setting in settings:
+        candidates.append(bench.judged(setting))
+        account.tried(len(candidates))
+    chosen, rejected, unsafe = confirmed(candidates, bench, others)
+    unsafe += [c.setting for c in candidates if c.unsafe]
+    candidates = [rejected.get(c.setting, c) for c in candidates]
+    margin, unsafe_gain = math.nan, math.inf
+    if chosen:
+        beyond = [on_both(replace(chosen.setting, gain=gain), bench, others) for gain in BEYOND]
+        candidates += beyond
+        unsafe += [c.setting for c in beyond if c.unsafe]
+        margin, unsafe_gain = margin_of(chosen.setting, unsafe, [c.setting for c in beyond if not c.unsafe])
+    beside, hunts = (), ""
+    if compensators:
+        beside = tried_beside(compensators, belief_of(found.model, drive, float(j)), bench, others)
+        hunts = limit_cycle(chosen.setting.on(linear, laws[chosen.setting.law]), bench) if chosen else ""
+    account.end()
+    notes = [
+        *axes_left_out(bench, others, found), *lag_of(first, drive),
+        *notes_on(found, chosen, candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine),
+    ]  # fmt: skip
+    return Recommendation(
+        chosen, laws[chosen.setting.law] if chosen else None, numbers_of(linear),
+        first.moving["position_rms_rad"], margin, unsafe_gain, tuple(candidates), len(bench.plants),
+        tuple(notes), drive, rung, float(j), beside, hunts,
+    )  # fmt: skip
+
+
+def feeds_inertia(loop: Controller | SampledController) -> bool:
+    """Whether the loop feeds the inertia forward itself."""
+    return isinstance(loop, SampledController) and loop.answers_to_acceleration
+
+
+def numbers_of(loop: Controller | SampledController) -> dict[str, float]:
+    """Gains of a linear controller; of one made of control laws the parameters of all of them."""
+    return loop.values() if isinstance(loop, SampledController) else dict(loop.gains._asdict())
+
+
+def with_motion(found: Identified, drive: Drive) -> Drive:
+    """The drive with the motion of the record where it names none.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if drive.motion is not None or drive.amplitude is not None:
+        return drive
+    if found.trajectory is None:
+        raise InputError(
+            f"{found.path} holds no motion ([trajectory]): identify the axis again, or give the motion to try a "
+            f"setting along, --motion FILE.csv, or the --amplitude of a slow sinusoid in {found.unit('rad')}"
+        )
+    return replace(drive, motion=found.trajectory)
+
+
+def cautious(found: Identified) -> Model:
+    """The law as it is fed forward: viscous friction that no record told at the lower end of its interval.
+
+    Too much of it pushes at every speed; too little leaves what the loop had to do anyway.
+    """
+    least = {
+        e.name: max(e.lower, 0.0) for e in found.estimates if e.name.startswith("sigma2") and not e.identified
+    }
+    return with_values(found.model, least)
+
+
+def laws_of(model: Model) -> dict[str, Model]:
+    """The law itself, and Coulomb with viscous friction through its sliding curve: what every drive can run."""
+    laws = {model.law.name: model}
+    if model.law.name == "coulomb" or not model.law.steady:
+        return laws
+    scale = float(model.law.velocity_scale(model.parameters)) if model.law.velocity_scale else 0.1
+    (level, slope), (back, falling) = (line_through(model, d * scale) for d in (1.0, -1.0))
+    if level <= 0.0 or back <= 0.0:
+        return laws
+    if model.law.chosen.get("symmetry") != "asymmetric":
+        laws["coulomb"] = Model("coulomb", fc=level, sigma2=slope)
+        return laws
+    each = {"fc": level, "sigma2": slope, "fc_negative": back, "sigma2_negative": falling}
+    laws["coulomb"] = Model("coulomb", {"symmetry": "asymmetric"}, **each)
+    return laws
+
+
+def line_through(model: Model, scale: float) -> tuple[float, float]:
+    """Level (N·m) and slope (N·m·s/rad) of friction in the direction of `scale`, rad/s, the velocity over which it
+    changes: beyond the Stribeck effect, which Coulomb's law does not have."""
+    v = np.linspace(5.0, 50.0, 20) * scale
+    slope, level = (float(x) for x in np.polyfit(np.abs(v), np.abs(sliding_torque(model, v)), 1))
+    return level, max(slope, 0.0)
+
+
+def settings_of(laws: dict[str, Model], drive: Drive, inertia: float) -> Iterator[Setting]:
+    """All settings that are tried, each with this inertia fed forward, kg·m²."""
+    for law in laws:
+        for gain in GAINS:
+            yield Setting(law, "feedforward", gain, inertia_feedforward=inertia)
+        for deadband in (0.0, drive.deadband(DEADBAND)) if drive.encoder_counts else (0.0,):
+            for gain in GAINS:
+                yield Setting(law, "feedback", gain, deadband=deadband, inertia_feedforward=inertia)
+
+
+def alike(one: Setting, other: Setting) -> bool:
+    """Whether they differ at most in gain and lead."""
+    return (one.law, one.kind, one.deadband) == (other.law, other.kind, other.deadband)
+
+
+def margin_of(chosen: Setting, unsafe: Sequence[Setting], safe: Sequence[Setting]) -> tuple[float, float]:
+    """The highest gain up to which all are safe, over the chosen one, and the lowest higher one that is not.
+
+    `safe` are those that are safe on all axes, besides the chosen one with `GUARD` times its gain: it was insisted on.
+    """
+    first = min((s.gain for s in unsafe if alike(s, chosen) and s.gain > chosen.gain), default=math.inf)
+    last = max(g for g in (chosen.gain, GUARD * chosen.gain, *(s.gain for s in safe)) if g < first)
+    return last / chosen.gain, first
+
+
+def best_of(candidates: Sequence[Candidate]) -> Candidate | None:
+    """The safe candidate with the least worst error; among those alike the lowest gain, feedforward first."""
+    safe = [c for c in candidates if not c.unsafe and c.worst <= WORTH]
+    if not safe:
+        return None
+    least = min(c.worst for c in safe)
+    return min(
+        (c for c in safe if c.worst <= NEAR * least),
+        key=lambda c: (c.setting.kind == "feedback", c.setting.gain, c.worst),
+    )
+
+
+def confirmed(
+    candidates: Sequence[Candidate], bench: Bench, others: Bench
+) -> tuple[Candidate | None, dict[Setting, Candidate], list[Setting]]:
+    """The best that is safe on other axes too, with its errors there; those that were not taken; what was not safe."""
+    rejected: dict[Setting, Candidate] = {}
+    unsafe: list[Setting] = []
+    while best := best_of([c for c in candidates if c.setting not in rejected]):
+        final, where = insisted(with_lead(best, bench).setting, bench, others)
+        if not final.refused:
+            return final, rejected, unsafe
+        if final.unsafe:
+            unsafe.append(final.setting)
+        rejected[best.setting] = replace(
+            best, unsafe=tuple(w + where for w in final.unsafe), useless=final.useless
+        )
+    return None, rejected, unsafe
+
+
+def insisted(setting: Setting, bench: Bench, others: Bench) -> tuple[Candidate, str]:
+    """The setting on other axes; or what is not safe, and where: that, or more of its gain here or there."""
+    guarded, later = f" with {GUARD:g} times the gain", " on an axis sampled later"
+    more = replace(setting, gain=GUARD * setting.gain)
+    if (trial := bench.judged(more)).unsafe:
+        return trial, guarded
+    final = others.judged(setting)
+    if final.unsafe:
+        return final, later
+    if ALLOWANCE * final.worst > 1.0:
+        return replace(final, useless=f"hardly less error{later}"), ""
+    if (trial := others.judged(more)).unsafe:
+        return trial, guarded + later
+    return final, ""
+
+
+def with_lead(candidate: Candidate, bench: Bench) -> Candidate:
+    """The candidate with the lead under which its worst error is least; the shortest of those alike."""
+    if candidate.setting.kind != "feedforward":
+        return candidate
+    tried = [candidate]
+    for lead in LEADS[1:]:
+        tried.append(bench.judged(replace(candidate.setting, lead=lead * bench.drive.sample_time)))
+    safe = [c for c in tried if not c.unsafe]
+    least = min(c.worst for c in safe)
+    return next(c for c in safe if c.worst <= ALIKE * least)

@@ -1,0 +1,93 @@
+"""What a recommendation is refused for: a weak drive, unknown friction, a loop that holds no axis, a day of work."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.identified_file import Identified
+from stickslip.identify.setting.candidate_run import Drive, Trial
+from stickslip.identify.setting.candidates import breakaway, resistance
+
+__all__ = ["held", "refuse_endless", "refuse_unknown", "refuse_weak"]
+
+MOST_STEPS = 1e10
+"""Of all simulations together; more would take half a day."""
+STEPS_PER_HOUR = 1e9
+"""Of a law with memory on one core, about."""
+LOST = 2.0
+"""RMS error of the linear controller alone, in parts of the motion's RMS, from which on it does not hold the axis: one
+that friction keeps from moving at all has 1."""
+
+
+def refuse_weak(found: Identified, drive: Drive) -> None:
+    """Refuse a torque limit at which the axis does not move, or does not follow.
+
+    Raises
+    ------
+    InputError
+    """
+    limit, torque = drive.torque_limit, found.unit("N·m")
+    if limit <= (held := breakaway(found.model)):
+        raise InputError(
+            f"torque limit {limit:g} {torque}: the drive cannot move the axis, whose friction is {held:.3g} {torque}; "
+            "give a --torque-limit above it"
+        )
+    if limit <= (friction := resistance(found.model, drive)):
+        raise InputError(
+            f"torque limit {limit:g} {torque}: the drive cannot follow this motion, along which friction reaches "
+            f"{friction:.3g} {torque}; give a --torque-limit above it, or a slower motion: another --motion, or a "
+            "smaller --amplitude or --frequency"
+        )
+
+
+def refuse_unknown(found: Identified) -> None:
+    """Refuse a law whose level the record does not tell: what is fed forward would be one choice among many.
+
+    Raises
+    ------
+    InputError
+    """
+    levels = [e for e in found.law_estimates[0] if e.unit in ("N·m", "N")]
+    if levels and not any(e.identified for e in levels):
+        listed = ", ".join(f"{e.name} {e.value:.3g} [{e.lower:.3g}, {e.upper:.3g}]" for e in levels)
+        raise InputError(
+            f"{found.path}: the record does not determine the friction level ({listed} {levels[0].unit}, not "
+            "identified); identify a record that slides both ways at several speeds"
+        )
+
+
+def held(found: Identified, alone: Trial | str, drive: Drive) -> Trial:
+    """The linear loop alone on the axis as it was identified, if it holds it: else no compensator is to blame.
+
+    Raises
+    ------
+    InputError
+    """
+    size = float(np.std(drive.wanted[:, 0]))
+    if not isinstance(alone, str):
+        error = alone.moving["position_rms_rad"]
+        if error <= LOST * size:
+            return alone
+        alone = f"RMS error {error:.3g} {found.unit('rad')} along a motion of {size:.3g}"
+    unsure = [e.name for e in found.estimates if not e.identified]
+    doubt = f", which does not tell {', '.join(unsure)}," if unsure else ""
+    raise InputError(
+        f"on the axis of {found.path}{doubt} the linear loop alone is unstable: {alone}; check its gains, or identify "
+        "a record with faster motion"
+    )
+
+
+def refuse_endless(trials: int, drive: Drive, axes: int, confirm: int) -> None:
+    """Refuse what would take more than `MOST_STEPS`, before anything is drawn or simulated.
+
+    Raises
+    ------
+    InputError
+    """
+    if (steps := trials * drive.steps) > MOST_STEPS:
+        raise InputError(
+            f"up to {trials:.3g} simulations ({axes} axes, {confirm} to confirm) of {drive.steps:.2g} steps (sample "
+            f"time {drive.sample_time:g} s, a motion of {drive.path.duration:.3g} s) would take about "
+            f"{steps / STEPS_PER_HOUR:.2g} h; give fewer axes, a longer sample time or a shorter motion"
+        )

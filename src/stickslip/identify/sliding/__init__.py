@@ -1,0 +1,1 @@
+"""The sliding curve from constant-velocity records."""

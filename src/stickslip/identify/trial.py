@@ -1,0 +1,225 @@
+"""A record as the identification of an axis sees it: one motion, what drove it, and the loop around it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.machines.servo import ServoAxis
+from stickslip.record import Record
+from stickslip.simulation.recorded_input.simulation import Loop, control_signal
+
+__all__ = ["Trial", "trial_of"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Mask = np.ndarray[Any, np.dtype[np.bool_]]
+
+DRIVES = {
+    "torque": "torque", "motor_torque": "torque", "current": "current", "torque_percent": "rated_torque",
+    "voltage": "voltage",
+}  # fmt: skip
+"""Channels that may hold the drive's signal, in the order in which they are looked for, and what they are."""
+REFERENCES = ("position_reference", "reference")
+FASTER, WINDOW = 1.5, 0.1
+"""Times as fast that the end of a trial must be to be fitted instead of its begin; s over which a speed is averaged."""
+FEWEST = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One motion of an axis.
+
+    Attributes
+    ----------
+    name : str
+    time : array, shape (n,)
+        s, strictly ascending; may be irregular.
+    position : array, shape (n,)
+        At the axis's `seen_from`, rad (m).
+    drive : array, shape (n,), or None
+        The recorded signal of the drive.
+    quantity : str
+        What it is: one of `stickslip.machines.servo.DRIVE_QUANTITIES`.
+    reference : array, shape (n,), or None
+        The reference position, at `seen_from`.
+    loop : Loop or None
+        The controller that makes the drive's signal from reference and position. With reference and loop the
+        closed loop is simulated; without, the recorded drive.
+    supply : array, shape (n,), or None
+        Factor on the drive's signal, such as the supply voltage under a duty cycle.
+    gain : float
+        Factor on the controller's output that belongs to this record (a gain of the firmware).
+    used : array of bool, shape (n,), or None
+        Rows that the fit looks at; all where None. The whole record is simulated in any case.
+    """
+
+    name: str
+    time: Array
+    position: Array
+    drive: Array | None = None
+    quantity: str = "torque"
+    reference: Array | None = None
+    loop: Loop | None = None
+    supply: Array | None = None
+    gain: float = 1.0
+    used: Mask | None = None
+
+    def __post_init__(self) -> None:
+        if self.time.size < FEWEST:
+            raise InputError(f"{self.name}: {self.time.size} samples are too few; give at least {FEWEST}")
+        for name in ("time", "position", "drive", "reference", "supply"):
+            values = getattr(self, name)
+            if values is None:
+                continue
+            if values.shape != self.time.shape:
+                raise InputError(f"{self.name}: {name} has shape {values.shape}, time has {self.time.shape}")
+            bad = np.flatnonzero(~np.isfinite(values))
+            if bad.size:
+                raise InputError(
+                    f"{self.name}: {name} is not a number in row {bad[0]}; cut or correct the record"
+                )
+        back = np.flatnonzero(np.diff(self.time) <= 0.0)
+        if back.size:
+            raise InputError(
+                f"{self.name}: time does not ascend at row {back[0] + 1} (t = {self.time[back[0] + 1]:g} s); sort it"
+            )
+        if self.drive is None and not self.closed_loop:
+            raise InputError(
+                f"{self.name}: neither the drive's signal nor a reference position with its controller is known; map "
+                "the torque or current (--map torque=COLUMN:UNIT), or the reference (--map position_reference=COLUMN) "
+                "and give its controller (--loop kp=..,kd=..)"
+            )
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether the controller is simulated."""
+        return self.reference is not None and self.loop is not None
+
+    @property
+    def rows(self) -> Mask:
+        """Which rows the fit looks at."""
+        return np.ones(self.time.size, dtype=np.bool_) if self.used is None else self.used
+
+    @property
+    def period(self) -> float:
+        """The usual time between samples, s."""
+        return float(np.median(np.diff(self.time)))
+
+    def signal(self) -> Array:
+        """The drive's signal: the recorded one, or what the controller makes of the recorded position."""
+        if self.drive is not None:
+            return self.drive
+        assert self.reference is not None
+        assert self.loop is not None
+        return control_signal(self.loop, self.time, self.reference, self.position, self.gain)
+
+    def torque(self, axis: ServoAxis, velocity: Array) -> Array:
+        """Torque on the axis, N·m, with the motor's own constants."""
+        gain, loss = axis.drive_gains(self.quantity)
+        supply = 1.0 if self.supply is None else self.supply
+        return gain * supply * self.signal() - loss * velocity
+
+    def start(self) -> tuple[float, float]:
+        """Position and velocity at the begin: a parabola through the first rows, at rest where it does not move."""
+        count = min(15, self.time.size)
+        t, q = self.time[:count] - self.time[0], self.position[:count]
+        distinct = np.unique(q).size
+        # At rest, or within one step of the encoder, a slope would be noise.
+        if distinct <= 3:
+            return float(np.median(q)), 0.0
+        powers = np.vander(t, 3 if distinct > 7 else 2, increasing=True)
+        line, *_ = np.linalg.lstsq(powers, q, rcond=None)
+        return float(line[0]), float(line[1])
+
+    def split(self, share: float) -> tuple[Trial, Trial]:
+        """Most of this trial, and the whole of it looked at in the rest: the last `share` of its time.
+
+        Where the end is faster than all before, the first `share` is looked at instead: laws are judged at speeds that
+        they were fitted to.
+        """
+        first, last = self.time[0], self.time[-1]
+        late = self.time >= last - share * (last - first)
+        if self.can_begin_later and self.top_speed(late) > FASTER * self.top_speed(~late):
+            early = self.time < first + share * (last - first)
+            return self.since(int(np.sum(early))), replace(self, used=self.rows & early)
+        return self.until(int(np.sum(~late))), replace(self, used=self.rows & late)
+
+    @property
+    def can_begin_later(self) -> bool:
+        """Whether it can be simulated from any row: what a controller has integrated is not recorded."""
+        return not self.closed_loop or (self.loop is not None and self.loop.ki == 0.0)
+
+    def top_speed(self, rows: Mask) -> float:
+        """The highest mean speed over `WINDOW` seconds in these rows, rad/s (m/s)."""
+        step = max(1, round(WINDOW / self.period))
+        q, t = self.position[rows], self.time[rows]
+        if q.size <= step:
+            return 0.0
+        return float(np.max(np.abs(q[step:] - q[:-step]) / (t[step:] - t[:-step])))
+
+    def since(self, row: int) -> Trial:
+        """Its rows from this one on, at least as many as a trial needs."""
+        begin = min(row, self.time.size - FEWEST)
+        arrays = ("time", "position", "drive", "reference", "supply", "used")
+        cut = {n: None if (a := getattr(self, n)) is None else a[begin:] for n in arrays}
+        return replace(self, **cut)
+
+    def until(self, rows: int) -> Trial:
+        """Its first rows, at least as many as a trial needs."""
+        end = max(rows, FEWEST)
+        arrays = ("time", "position", "drive", "reference", "supply", "used")
+        cut = {n: None if (a := getattr(self, n)) is None else a[:end] for n in arrays}
+        return replace(self, **cut)
+
+
+def trial_of(
+    record: Record, axis: ServoAxis, *, loop: Loop | None = None, gain: float = 1.0, name: str = "",
+    channels: Sequence[str] = tuple(DRIVES), output: str = "torque",
+) -> Trial:  # fmt: skip
+    """Take a trial from a record.
+
+    Parameters
+    ----------
+    record : Record
+        With ``position`` (rad or m); the drive's signal as ``torque`` or ``motor_torque`` (N·m), ``current`` (A),
+        ``torque_percent`` (% of rated) or ``voltage`` (V); perhaps ``position_reference`` and ``supply``.
+    axis : ServoAxis
+    loop, gain
+        As in `Trial`.
+    channels : sequence of str
+        Channels that may hold the drive's signal, in the order of preference.
+    output : str
+        What the loop's output is where no drive signal is recorded: one of `DRIVE_QUANTITIES`. Times the channel
+        ``supply`` where the record has one: of a voltage the loop then gives the duty cycle.
+
+    Raises
+    ------
+    InputError
+        If a channel is missing, or the record cannot be used as it is.
+    """
+    if "position" not in record.channels:
+        raise InputError("the record has no channel 'position'; map one to it")
+    found = next((c for c in channels if c in record.channels), None)
+    wanted = next((c for c in REFERENCES if c in record.channels), None)
+    factor = axis.position_factor
+    # A time may occur twice where a simulated signal jumps: the later row counts.
+    keep = np.concatenate([np.diff(record.time) != 0.0, [True]])
+
+    def column(name: str) -> Array:
+        return np.ascontiguousarray(record[name][keep], dtype=np.float64)
+
+    return Trial(
+        name or str(record.meta.get("source", "record")),
+        np.ascontiguousarray(record.time[keep], dtype=np.float64),
+        factor * column("position"),
+        column(found) if found else None,
+        DRIVES.get(found, "torque") if found else output,
+        factor * column(wanted) if wanted else None,
+        loop,
+        column("supply") if "supply" in record.channels else None,
+        gain,
+    )
