@@ -1,9 +1,9 @@
 """Candidates for what to switch on, simulated on the machine as it was identified.
 
-`stickslip.identify.recommend`, which needs a model only, has a rigid axis: a feedback that it finds safe may ring on
-this one. Here are two inertias on a spring, the friction found with its ripple, the delay and the encoder's resolution,
-run by the procedure that then runs on the machine itself. Friction is not known to better than a few percent, so that a
-candidate must be calm, and is judged, with less and with more than was found.
+`stickslip.identify.setting.recommend`, which needs a model only, has a rigid axis: a feedback that it finds safe may
+ring on this one. Here are two inertias on a spring, the friction found with its ripple, the delay and the encoder's
+resolution, run by the procedure that then runs on the machine itself. Friction is not known to better than a few
+percent, so that a candidate must be calm, and is judged, with less and with more than was found.
 """
 
 from __future__ import annotations
@@ -18,14 +18,13 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.analyse.tracking import tracking_metrics
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import COMPENSATORS
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import LimitCrossed
-from stickslip.identify.nyquist import Fastest
-from stickslip.identify.recommend import laws_of
-from stickslip.identify.train import Train
+from stickslip.identify.response.drivetrain import Drivetrain
+from stickslip.identify.response.nyquist import Fastest
+from stickslip.identify.setting.recommend import laws_of
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.contact import Contact, Drift
 from stickslip.machines.encoder import Encoder
@@ -54,7 +53,6 @@ LEADS = (0.5, 1.0, 2.0)
 """In samples."""
 ALIKE = 0.98
 """Of the error, that a lead must leave at most to be worth it."""
-KINDS = {"feedforward": Feedforward, "feedback": Feedback}
 CALM = 0.05
 """Of the reference's amplitude: motion above 5 Hz, RMS, up to which a run is calm, on the sinusoid and at rest after a
 step."""
@@ -67,7 +65,7 @@ SETTLED = 1e-3
 
 
 NOTHING = AngleMap()
-Helper = tuple[Model, str, float, float]
+Compensation = tuple[Model, str, float, float]
 """Law, structure, gain and lead (s) of a compensator."""
 
 
@@ -90,18 +88,18 @@ class Following(Track):
     def plan(self, rig: Rig) -> Plan:
         """As `Track`, with what the controller has."""
         assert self.using is not None
-        helper, whole = self.using.compensator, super().plan(rig)
-        what = f"{helper.name} of law {helper.model.law.name!r}" if helper else "the PD alone"
+        compensator, whole = self.using.compensator, super().plan(rig)
+        what = f"{compensator.name} of law {compensator.model.law.name!r}" if compensator else "the PD alone"
         return dataclasses.replace(whole, text=(f"follow {self.reference}, {what}",))
 
     def options(self) -> dict[str, Any]:
         """Plain data."""
         assert self.using is not None
-        helper = self.using.compensator
+        used = self.using.compensator
         return {
             "reference": self.reference, "gains": self.using.gains._asdict(),
-            "compensator": helper
-            and {"kind": helper.name, "gain": helper.gain, "lead": helper.lead, **helper.model.as_dict()},
+            "compensator": used
+            and {"kind": used.name, "gain": used.gain, "lead": used.lead, **used.model.as_dict()},
             "angle": self.over.as_dict(),
         }  # fmt: skip
 
@@ -117,7 +115,7 @@ class Known:
     model : Model
         Friction as the encoder sees it.
     angle : AngleMap
-    train : Train
+    drivetrain : Drivetrain
     stiffness : float
         Before sliding, at the encoder, N·m/rad.
     resolution : float
@@ -129,7 +127,7 @@ class Known:
     inertia: float
     model: Model
     angle: AngleMap
-    train: Train
+    drivetrain: Drivetrain
     stiffness: float
     resolution: float
     fastest: Fastest
@@ -141,7 +139,7 @@ class Known:
 
     def machine(self, rig: Rig, level: float = 1.0) -> Machine:
         """The machine to simulate, with `level` times the friction; its offset is left out, as in the compensator."""
-        axis = self.train.axis
+        axis = self.drivetrain.axis
         stiff = 0.0
         if axis:
             most = STIFFEST * axis.elasticity
@@ -153,7 +151,7 @@ class Known:
             Contact(self.model, self.angle.ripple, drift=Drift(level - 1.0, SETTLED) if level != 1.0 else Drift()),
             flexible=axis, flexible_stiffness=stiff, amplifier=Amplifier(1.0, rig.limits.torque),
             cogging=turned, encoder=Encoder(2.0 * math.pi / self.resolution if self.resolution > 0.0 else 0.0),
-            delay=min(max(self.train.delay, 0.0), 1.0), sample_time=rig.sample_time,
+            delay=min(max(self.drivetrain.delay, 0.0), 1.0), sample_time=rig.sample_time,
             limits={"torque": rig.limits.torque, "following_error": rig.limits.following_error},
         )  # fmt: skip
 
@@ -181,7 +179,7 @@ class Candidate:
     errors: tuple[float, ...] = ()
     restless: str = ""
 
-    def helper(self, model: Model) -> Helper:
+    def compensation(self, model: Model) -> Compensation:
         """With a law."""
         return model, self.kind, self.gain, self.lead
 
@@ -196,14 +194,18 @@ def resolution_of(record: Record) -> float:
     return encoder_step(record["position"][:20000])
 
 
-def controller_of(known: Known, rig: Rig, bandwidth: float, helper: Helper | None = None) -> Controller:
+def controller_of(
+    known: Known, rig: Rig, bandwidth: float, compensation: Compensation | None = None
+) -> Controller:
     """The PD, with the compensator or without."""
     gains = place("PD", known.inertia, bandwidth, DAMPING)
     limit = ROOM * rig.limits.torque - known.angle.largest
-    if helper is None:
+    if compensation is None:
         return Controller(gains, None, limit, rig.sample_time)
-    model, kind, gain, lead = helper
-    return Controller(gains, KINDS[kind](known.angle.on(model), gain, lead=lead), limit, rig.sample_time)
+    model, kind, gain, lead = compensation
+    return Controller(
+        gains, COMPENSATORS[kind](known.angle.on(model), gain, lead=lead), limit, rig.sample_time
+    )
 
 
 def laws_to_try(model: Model, lugre: Model | None) -> dict[str, Model]:
@@ -228,7 +230,7 @@ def candidates_of(
     plants = [known.machine(rig, level) for level in LEVELS]
     return [
         judged(known, rig, plants, laws[name], Candidate(name, kind, gain))
-        for name, kind, gain in itertools.product(laws, KINDS, gains)
+        for name, kind, gain in itertools.product(laws, COMPENSATORS, gains)
     ]
 
 
@@ -247,7 +249,7 @@ def with_lead(known: Known, rig: Rig, model: Model, chosen: Candidate) -> Candid
 
 def judged(known: Known, rig: Rig, plants: Sequence[Machine], model: Model, setting: Candidate) -> Candidate:
     """The setting with what it does on every machine, up to the first on which it is not calm."""
-    controller = controller_of(known, rig, known.bandwidth, setting.helper(model))
+    controller = controller_of(known, rig, known.bandwidth, setting.compensation(model))
     errors: list[float] = []
     restless = ""
     for plant in plants:

@@ -11,42 +11,46 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from stickslip.commission.candidates import Following, Known, resolution_of
 from stickslip.commission.curve import fitted_curve, moving
-from stickslip.commission.kept import kept, stamped
-from stickslip.commission.lag import lag_of
+from stickslip.commission.friction_lag import lag_of
 from stickslip.commission.recommended import (
     SLOWER,
     Recommended,
     recommend_on,
 )
 from stickslip.commission.result import Stage, result_of
-from stickslip.commission.springs import joined_model, resolved, with_lag, with_stiffness
+from stickslip.commission.resume import kept, stamped
+from stickslip.commission.stiffness import joined_model, resolved, with_lag, with_stiffness
 from stickslip.errors import InputError, LimitCrossed
-from stickslip.identify.angle import identify_angle
-from stickslip.identify.axis_trial import trial_of
-from stickslip.identify.breakaway import WINDOW, identify_breakaway
+from stickslip.identify.cogging import identify_cogging
 from stickslip.identify.estimate import Identification
-from stickslip.identify.hysteresis import Loop as Hysteresis
-from stickslip.identify.inertia import inertia
-from stickslip.identify.lugre_dynamics import Response, identify_lugre_dynamics
-from stickslip.identify.nyquist import fastest_pd
-from stickslip.identify.presliding import identify_presliding
-from stickslip.identify.train import fit_train, identified_train, loop_response
+from stickslip.identify.presliding.breakaway import WINDOW, identify_breakaway
+from stickslip.identify.presliding.hysteresis import Loop as Hysteresis
+from stickslip.identify.presliding.lugre_dynamics import Response, identify_lugre_dynamics
+from stickslip.identify.presliding.presliding import identify_presliding
+from stickslip.identify.response.drivetrain import fit_drivetrain, identified_drivetrain, loop_response
+from stickslip.identify.response.inertia import inertia
+from stickslip.identify.response.nyquist import fastest_pd
+from stickslip.identify.sliding.position_dependence import identify_angle
+from stickslip.identify.trial import trial_of
 from stickslip.machines.angle import AngleMap
+from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.rigs.procedures.attraction import Attraction
 from stickslip.rigs.procedures.base import CheckFailed, Performed, Plan, Procedure, perform
 from stickslip.rigs.procedures.breakaway import Breakaway
+from stickslip.rigs.procedures.cogging import Cogging
 from stickslip.rigs.procedures.inertia import Inertia
 from stickslip.rigs.procedures.presliding import Presliding
 from stickslip.rigs.procedures.resonance import Resonance
 from stickslip.rigs.procedures.sliding import Sliding
+from stickslip.rigs.procedures.standstill import Standstill
 from stickslip.rigs.procedures.stickslip import Stickslip
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
@@ -65,6 +69,8 @@ RAMP = 1.5
 """s in which a break-away ramp reaches the torque of running, at least."""
 SLOWEST, COUNTS = 0.01, 4.0
 """rad/s, and counts of the encoder within `WINDOW`, that are motion."""
+MAPS = {"rotation": Cogging, "standstill": Standstill}
+"""Procedures that map the torque over the angle."""
 GENTLER = 5
 """Amplitudes of the stick-slip stage that are tried."""
 SWUNG, LIVELY = ((0.3, 0.5), (0.3, 0.25), (0.6, 0.5), (0.6, 0.25)), 4.0
@@ -139,7 +145,9 @@ class _Course:
         self.stages.append(Stage(name, done, found, note))
 
 
-def planned(rig: Rig, velocities: tuple[float, ...] = VELOCITIES, duration: float = 60.0) -> tuple[Plan, ...]:
+def planned(
+    rig: Rig, velocities: tuple[float, ...] = VELOCITIES, duration: float = 60.0, cogging: str = ""
+) -> tuple[Plan, ...]:
     """The plans of all stages, with what is known before the first of them."""
     speeds = tuple(v for v in velocities if v <= 0.5 * rig.limits.speed)
     if len(speeds) < FEWEST:
@@ -150,6 +158,7 @@ def planned(rig: Rig, velocities: tuple[float, ...] = VELOCITIES, duration: floa
     stages: tuple[Procedure, ...] = (
         Inertia(duration=duration), Breakaway(), Sliding(velocities=speeds), Presliding(), Stickslip(),
         *(Attraction(mean=m, swing=s * m, frequency=LIVELY) for m, s in SWUNG), Resonance(),
+        *((MAPS[cogging](),) if cogging else ()),
     )  # fmt: skip
     track, shares = Track().plan(rig), (1.0, *SLOWER)
     runs = 3 * len(shares)
@@ -171,6 +180,7 @@ def commission(
     interval: float = 10.0,
     lugre_too: bool = True,
     track_too: bool = True,
+    cogging: Literal["", "rotation", "standstill"] = "",
     without_watchdog: bool = False,
     resume: bool = False,
 ) -> Commissioned:
@@ -193,6 +203,8 @@ def commission(
         Whether LuGre's dynamics are identified as well, from a stick-slip response: the longest of the computations.
     track_too : bool
         Whether a compensator is recommended and tried.
+    cogging : {"", "rotation", "standstill"}
+        Whether the torque over the angle is mapped besides, up to high orders, and by which procedure.
     without_watchdog : bool
         Arm a rig that declares no watchdog.
     resume : bool
@@ -215,13 +227,15 @@ def commission(
     said = (*said, *unknown)
     lugre, missed = _stickslip(course, j, fs, sliding) if lugre_too else (None, ())
     said = (*said, *missed)
+    the_map, unmapped = _cogging(course, j, cogging) if cogging else (None, ())
+    said = (*said, *unmapped)
     recommended = None
     if track_too:
         recommended, unsaid = tried(
             lambda: _recommended(course, j, top, fs, model, stiffness, angle, lugre.model if lugre else None)
         )
         said = (*said, *unsaid)
-    result = result_of(course.stages, model, j, stiffness, said, angle, recommended)
+    result = result_of(course.stages, model, j, stiffness, said, angle, recommended, the_map)
     return Commissioned(
         tuple(course.stages), j, model, lugre.model if lugre else None, angle, recommended, stiffness, result,
     )  # fmt: skip
@@ -295,6 +309,17 @@ def _presliding(
     return found
 
 
+def _cogging(course: _Course, j: float, by: str) -> tuple[PositionMap | None, tuple[str, ...]]:
+    """The torque over the angle, or why there is none."""
+    try:
+        done = course.run(MAPS[by](inertia=j), insist=False)
+        found = identify_cogging([done.record])
+    except (InputError, LimitCrossed) as error:
+        return None, (f"cogging: {str(error).rstrip('.')}.",)
+    course.add("cogging", done, found)
+    return found.details["map"], ()
+
+
 def _attraction(
     course: _Course, j: float, angle: AngleMap, model: Model
 ) -> tuple[Identification | None, tuple[str, ...]]:
@@ -360,9 +385,9 @@ def _recommended(
     """The response of the loop, the bandwidth that it bears, the compensator, and what both do."""
     done = course.run(Resonance(speed=0.6 * top, inertia=j, stuck=QUIET * fs))
     sliding, sticking = (loop_response(done.part(label), label) for label in ("sliding", "sticking"))
-    train, fastest = fit_train(sliding, sticking, j), fastest_pd([sliding, sticking], j)
-    known = Known(j, model, angle, train, stiffness, resolution_of(done.part("sticking")), fastest)
-    course.add("resonance", done, identified_train([sliding, sticking], train, fastest.sentence))
+    drivetrain, fastest = fit_drivetrain(sliding, sticking, j), fastest_pd([sliding, sticking], j)
+    known = Known(j, model, angle, drivetrain, stiffness, resolution_of(done.part("sticking")), fastest)
+    course.add("resonance", done, identified_drivetrain([sliding, sticking], drivetrain, fastest.sentence))
     course.progress("recommend: simulating the machine that was identified")
 
     def follow(procedure: Following, name: str) -> Performed:

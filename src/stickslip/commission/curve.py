@@ -12,13 +12,14 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
-from stickslip.identify.segments import Segment, constant_velocity_segments
-from stickslip.identify.sliding import SlidingPoints, identify_sliding
-from stickslip.identify.sliding_choice import choose_sliding
+from stickslip.identify.sliding.choice import choose_sliding
+from stickslip.identify.sliding.curve import identify_sliding
+from stickslip.identify.sliding.points import SlidingPoints
+from stickslip.identify.sliding.segments import Segment, constant_velocity_segments
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.rigs.procedures._resting import RESTING, resting
-from stickslip.simulation.steady import Steady
+from stickslip.simulation.prescribed.steady import Steady
 
 __all__ = ["Slid", "fitted_curve", "moving"]
 

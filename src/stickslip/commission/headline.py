@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stickslip.identify.draws import sliding_torque
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.monte_carlo import sliding_torque
 
 if TYPE_CHECKING:
     from stickslip.commission.commission import Commissioned

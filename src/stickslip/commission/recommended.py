@@ -40,7 +40,7 @@ from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.rigs.procedures.base import Performed
 from stickslip.rigs.rig import Rig
-from stickslip.simulation.driven import Mechanics
+from stickslip.simulation.recorded_input.simulation import Mechanics
 
 __all__ = ["SLOWER", "Recommended", "Tracked", "picture_of_candidates", "recommend_on", "write_recommended"]
 
@@ -104,8 +104,8 @@ class Recommended:
         flat = dataclasses.replace(k, angle=AngleMap())
         return {
             "alone": (controller_of(k, rig, bandwidth), AngleMap()),
-            "mean": (controller_of(flat, rig, bandwidth, c.helper(self.model)), AngleMap()),
-            "helped": (controller_of(k, rig, bandwidth, c.helper(self.model)), k.angle),
+            "mean": (controller_of(flat, rig, bandwidth, c.compensation(self.model)), AngleMap()),
+            "helped": (controller_of(k, rig, bandwidth, c.compensation(self.model)), k.angle),
         }
 
     def lines(self) -> Iterator[str]:
@@ -119,7 +119,7 @@ class Recommended:
         c = self.chosen
         yield (
             f"Recommended compensator: {c.kind} of law {c.law!r}, gain {c.gain:g}, lead {1e3 * c.lead:g} ms, "
-            "with the ripple and the torque beside friction by angle; "
+            "with ripple and torque offset over the angle; "
             f"simulated with friction {', '.join(f'{100 * x:g}' for x in LEVELS)} % of that "
             f"identified: error {', '.join(f'{self.alone / e:.3g}' for e in c.errors)} times smaller than with the "
             f"PD alone ({1e3 * self.alone:.3g} mrad RMS)."

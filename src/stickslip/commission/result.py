@@ -12,9 +12,10 @@ import numpy as np
 from stickslip.commission.recommended import Recommended, picture_of_candidates, picture_of_tracking
 from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.machines.angle import AngleMap
+from stickslip.machines.position_map import PositionMap
 from stickslip.model import Model
 from stickslip.rigs.procedures.base import Performed
-from stickslip.simulation.driven import Mechanics
+from stickslip.simulation.recorded_input.simulation import Mechanics
 
 __all__ = ["Stage", "result_of"]
 
@@ -34,7 +35,7 @@ class Stage:
 
 def result_of(
     stages: Sequence[Stage], model: Model, j: float, stiffness: float, said: tuple[str, ...], angle: AngleMap,
-    recommended: Recommended | None,
+    recommended: Recommended | None, the_map: PositionMap | None = None,
 ) -> Identification:  # fmt: skip
     """All that the stages found, as one identification of the joined law."""
     estimates: list[Estimate] = []
@@ -64,7 +65,7 @@ def result_of(
     correlation = blocks([s.found for s in stages if s.found])
     return Identification(
         "commission", model, tuple(estimates), correlation, misfit, tuple(notes), (), tuple(pictures),
-        {"mechanics": Mechanics(j), "stiffness": stiffness, "angle": angle},
+        {"mechanics": Mechanics(j), "stiffness": stiffness, "angle": angle, **({"map": the_map} if the_map else {})},
     )  # fmt: skip
 
 
@@ -84,7 +85,9 @@ def owned(stage: Stage, e: Estimate, model: Model) -> Estimate:
     if own and e.name == "c":
         # Within the range that the record allows a rule may have chosen another than the least misfit does.
         return dataclasses.replace(e, value=float(model.parameters.c))
-    return e if own or e.name == "inertia" else dataclasses.replace(e, name=f"{stage.name}.{e.name}")
+    # The rotations' own inertia is what they need of it, not the machine's.
+    whole = e.name == "inertia" and stage.name != "cogging"
+    return e if own or whole else dataclasses.replace(e, name=f"{stage.name}.{e.name}")
 
 
 def blocks(found: Sequence[Identification]) -> Array:

@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.control.composed import composed_of
 from stickslip.control.composition import MEMORY
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.control.sampled import Memory, Settings, design_filter, settings
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.jit import call_guarded, compiled_guarded, flat, kernel, pointer, pointer_at
 from stickslip.rigs.rig import Limits, Measurement, Setpoint
-from stickslip.rigs.safety import ENDED, STOPPED, Safety, bounds, guarded_by, guarded_with
+from stickslip.rigs.safety import ENDED, STOPPED, Safety, bounds, guarded_by
 from stickslip.rigs.safety import Bounds as BoundNames
-from stickslip.spec import Law, Surroundings, fields_of
-from stickslip.subset import Layout, law_layouts
+from stickslip.spec import Surroundings, fields_of
+from stickslip.subset import Layout
 
 __all__ = [
     "COLUMNS",
+    "NAMES",
     "UNITS",
     "Control",
     "addresses",
@@ -44,6 +43,8 @@ UNITS = {
 """A row of a record: its columns and their units, in order."""
 COLUMNS = tuple(UNITS)
 
+NAMES = tuple(f.name for f in MEMORY)
+"""The fields of a controller's memory."""
 NOTHING = Controller(Gains(0.0))
 
 STATE, REASON, VELOCITY = (Safety._fields.index(name) for name in ("state", "reason", "velocity"))
@@ -65,11 +66,6 @@ class Control(NamedTuple):
     surroundings: Any
     compensation: int
     """Place of the compensating torque in the memory"""
-
-
-def memory_names(controller: object) -> tuple[str, ...]:
-    """The fields of the memory of a controller's `Control`."""
-    return tuple(f.name for f in MEMORY) if isinstance(controller, SampledController) else Memory._fields
 
 
 def control_of(
@@ -99,59 +95,33 @@ def control_of(
         raise InputError(
             f"controller: sample_time = {controller.sample_time:g} s, the rig's is {sample_time:g} s; give the rig's"
         )
-    if isinstance(controller, SampledController):
-        return composed(controller, limits, travel)
-    chosen = replace(controller or NOTHING, sample_time=sample_time)
-    numbers = settings(chosen)
-    if controller is None:
-        numbers = numbers._replace(fade=0.0)  # the setpoints' torques are given as they are
-    memory = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0))
-    memory.open = 1.0
-    design_filter(numbers, memory)
-    helper = chosen.compensator
-    law = helper.model.law if helper else None
-    parameters = helper.model.parameters if helper else None
+    chosen = composed_of(replace(controller or NOTHING, sample_time=sample_time))
+    # The setpoints' torques alone are given as they are.
+    numbers = chosen.settings if controller else chosen.settings._replace(fade=0.0)
+    memory = np.zeros(len(NAMES))
+    memory[NAMES.index("open")] = 1.0
     return Control(
-        sampler(law),
+        sampler(chosen),
         np.zeros(len(Measurement._fields)),
         np.array(bounds(limits, sample_time, travel)),
         np.zeros(len(Safety._fields)),
         np.array(numbers),
-        np.array([getattr(memory, name) for name in Memory._fields]),
-        flat(law.pack_state(law.state(parameters)) if law else []),
-        flat(law.pack(parameters) if law else []),
-        np.array(Surroundings()),
-        Memory._fields.index("compensation"),
-    )
-
-
-def composed(controller: SampledController, limits: Limits, travel: float) -> Control:
-    """As `control_of`, of a controller made of control laws."""
-    names = memory_names(controller)
-    memory = np.zeros(len(names))
-    memory[names.index("open")] = 1.0
-    return Control(
-        composed_sampler(controller),
-        np.zeros(len(Measurement._fields)),
-        np.array(bounds(limits, controller.sample_time, travel)),
-        np.zeros(len(Safety._fields)),
-        np.array(controller.settings),
         memory,
-        flat(controller.packed_state()),
-        flat(controller.packed()),
+        flat(chosen.packed_state()),
+        flat(chosen.packed()),
         np.array(Surroundings()),
-        names.index("others"),
+        NAMES.index("others"),
     )
 
 
 _compiled: dict[Any, int] = {}
 
 
-def composed_sampler(controller: SampledController) -> int:
-    """Address of one guarded sample of a controller made of control laws."""
+def sampler(controller: SampledController) -> int:
+    """Address of one guarded sample of a controller."""
     laws = controller.laws
     if laws not in _compiled:
-        function = guarded_with(controller.functions)
+        function = guarded_by(controller.functions)
         _compiled[laws] = compiled_guarded("guarded_controller", function, {**controller.layouts, **GUARD})
     return _compiled[laws]
 
@@ -163,19 +133,6 @@ GUARD = {
     "s": Layout.of(fields_of(Safety), counted=False),
 }
 """Layouts of what the guard reads and writes."""
-
-
-@functools.cache
-def sampler(law: Law | None) -> int:
-    """Address of one guarded sample of the controller with this compensator."""
-    empty = {"z": Layout(()), "p": Layout(()), "u": Layout(Surroundings._fields)}
-    layouts = {
-        **(law_layouts(law) if law else empty),
-        **GUARD,
-        "n": Layout.of(fields_of(Settings), counted=False),
-        "m": Layout.of(fields_of(Memory), counted=False),
-    }
-    return compiled_guarded(f"guarded_{law.name}" if law else "guarded", guarded_by(law), layouts)
 
 
 @kernel(inline=True)

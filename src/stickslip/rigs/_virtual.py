@@ -6,7 +6,7 @@ from typing import Any
 
 from stickslip.jit import kernel
 from stickslip.rigs._control import Control, decide, finished
-from stickslip.simulation._machine_step import plant_of, sample
+from stickslip.simulation.machine.step import plant_of, sample
 
 __all__ = ["run_block"]
 

@@ -19,10 +19,10 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from stickslip import plugins
 from stickslip.config import Table, read_toml
 from stickslip.errors import InputError, StickslipError
 from stickslip.rigs.declared import checked
+from stickslip.rigs.kinds import rig_kind, rig_kind_names
 from stickslip.rigs.rig import Limits, Rig, RigKind
 
 __all__ = ["limits_in", "read_rig"]
@@ -41,9 +41,9 @@ def read_rig(path: str | os.PathLike[str]) -> Rig:
     with read_toml(Path(path)) as document, document.table("rig") as table:
         name = table.text("kind")
         if name.endswith(".py"):
-            kind = plugins.rig_kind(str(table.document.locate(name)), table.label("kind"))
+            kind = rig_kind(str(table.document.locate(name)), table.label("kind"))
         else:
-            kind = plugins.rig_kind(table.choice("kind", plugins.rig_kind_names()))
+            kind = rig_kind(table.choice("kind", rig_kind_names()))
         if not isinstance(kind, RigKind):  # type: ignore[reportUnnecessaryIsInstance]
             raise InputError(f"{name}: RIG = {kind!r} is no `RigKind(name, build, title)`")
         with table.blamed():

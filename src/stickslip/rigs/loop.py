@@ -21,20 +21,19 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from stickslip.control.controller import Controller
-from stickslip.control.sampled import FROM_REFERENCE, Memory, Settings
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, Interrupted, RigError
 from stickslip.record import Record
 from stickslip.rigs import safety
-from stickslip.rigs._control import COLUMNS, REASON, STATE, UNITS, Control, control_of, memory_names
+from stickslip.rigs._control import COLUMNS, NAMES, REASON, STATE, UNITS, Control, control_of
 from stickslip.rigs.budget import BUDGET, Budget
 from stickslip.rigs.declared import FIELDS, answer, blamed, checked
-from stickslip.rigs.pace import TIMES, Account, Pace, soft_real_time
-from stickslip.rigs.reasons import crossed, told
+from stickslip.rigs.interrupts import Signals
+from stickslip.rigs.realtime import TIMES, Account, Pace, soft_real_time
 from stickslip.rigs.rig import BlockRig, Limits, Measurement, Rig, Setpoint, insist_on_setpoints, setpoints
 from stickslip.rigs.safety import ASKED, RUNNING, STOPPED, STOPPING, Bounds, Safety
-from stickslip.rigs.signals import Signals
 from stickslip.rigs.step import Step
+from stickslip.rigs.stop_reasons import crossed, told
 from stickslip.stream import Stream
 
 __all__ = ["Loop", "PythonController"]
@@ -48,10 +47,8 @@ BLOCK = 50
 """Samples of one compiled block: a signal is heard, and rows are committed, at least that often"""
 TIME, POSITION = Measurement._fields.index("time"), Measurement._fields.index("position")
 TORQUE, STARTED, ORIGIN, VALUE = (Safety._fields.index(n) for n in ("torque", "started", "origin", "value"))
-KNOWN = Memory._fields[: Memory._fields.index("seen")]
-"""What one controller takes over from another: position and velocities, but nothing of its compensator"""
-SEEN = Memory._fields[Memory._fields.index("seen") : Memory._fields.index("forward")]
-SOURCE = Settings._fields.index("source")
+KNOWN = ("started", "turns", "position", "velocity", "slow_velocity", "error")
+"""What one controller takes over from another: position and velocities, but nothing of its laws"""
 TRAVEL = Bounds._fields.index("travel")
 
 
@@ -110,7 +107,6 @@ class Loop:
         self._stream: Stream | None = None
         self._path, self._meta = path, dict(meta or {})
         self._controls: dict[int, tuple[Any, Control]] = {}
-        self._names: dict[int, tuple[str, ...]] = {}
         self._control = self.prepare(None)
         self._fault: BaseException | None = None
         self._late = False
@@ -186,7 +182,6 @@ class Loop:
             compiled = controller if isinstance(controller, (Controller, SampledController)) else None
             control = self.meanwhile(lambda: control_of(compiled, self.limits, self.rig.sample_time))
             self._controls[id(controller)] = (controller, control)
-            self._names[id(control)] = memory_names(compiled)
         return self._controls[id(controller)][1]
 
     def run(
@@ -296,24 +291,17 @@ class Loop:
         control.measured[:] = last.measured
         control.safety[:] = last.safety
         if control is not last:
-            before: dict[str, float] = dict(zip(self._names[id(last)], last.memory))
-            known = {name: before[name] for name in KNOWN if name in before}
-            self._remember(control, **{**known, "error_sum": 0.0, "open": 1.0})
-            if "seen" in self._names[id(control)]:
-                ahead = control.settings[SOURCE] == FROM_REFERENCE
-                seen = known.get("wanted_velocity" if ahead else "velocity", 0.0)
-                self._remember(control, **dict.fromkeys(SEEN, seen))
+            known = {name: last.memory[NAMES.index(name)] for name in KNOWN}
+            self._remember(control, **known, open=1.0)
         control.safety[ORIGIN] = control.measured[POSITION]
         if self._fault is None:
             control.safety[STATE] = RUNNING
         self._control, self._step = control, Step(control)
 
     def _remember(self, control: Control, **values: float) -> None:
-        """Write into a controller's memory; what it has no place for is left out."""
-        names = self._names[id(control)]
+        """Write into a controller's memory."""
         for name, value in values.items():
-            if name in names:
-                control.memory[names.index(name)] = value
+            control.memory[NAMES.index(name)] = value
 
     # ---- samples -------------------------------------------------------------------------------------------
 

@@ -1,13 +1,15 @@
 """The safety of the loop: limits, the reasons to stop, and the stop itself, one sample at a time.
 
 `guarded` is one whole sample of the loop: it watches the limits, runs the controller
-(`stickslip.control.sampled`), and from the sample that sees a reason to stop on it ramps the torque to zero. It is
+(`stickslip.control.composition`), and from the sample that sees a reason to stop on it ramps the torque to zero. It is
 written in the scalar subset (`stickslip.subset`), so that it is the same compiled code in every loop, and plain
 Python in a test. Once the ramp has begun nothing but the number of samples decides the torque: no measurement, no
 setpoint and no controller can prolong it.
 
+While the loop is open the laws run, so that an observer knows the disturbance when it is closed.
+
 Arguments: what is measured ``y`` (`Measurement`) and wanted ``w`` (`Setpoint`), the bounds ``b``, the memory of the
-safety ``s``, and the controller's settings ``n``, memory ``m``, and law ``z``, ``p``, ``u``.
+safety ``s``, and the controller's settings ``n``, memory ``m``, and laws ``z``, ``p``, ``u``.
 """
 
 from __future__ import annotations
@@ -17,12 +19,11 @@ from collections.abc import Callable, Mapping
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.binding import bound
-from stickslip.control.composition import follow
-from stickslip.control.sampled import FROM_REFERENCE, observe, sample, sampled_by
+from stickslip.control.composition import follow, sample
 from stickslip.rigs.rig import Limits
-from stickslip.spec import Law, Par
+from stickslip.spec import Par
 
-__all__ = ["REASONS", "Bounds", "Safety", "bounds", "guarded", "guarded_by", "guarded_with"]
+__all__ = ["REASONS", "Bounds", "Safety", "bounds", "guarded", "guarded_by"]
 
 # States. ENDED: the segment's travel is reached, which is no fault; the next segment goes on.
 RUNNING, STOPPING, STOPPED, ENDED = 0.0, 1.0, 2.0, 3.0
@@ -64,7 +65,7 @@ class Safety(NamedTuple):
     started: Annotated[float, Par("-", "", "1 after the first sample")]
     position: Annotated[float, Par("rad", "", "position one sample ago")]
     velocity: Annotated[float, Par("rad/s", "", "difference of the positions over the sample time")]
-    origin: Annotated[float, Par("rad", "", "position at the begin of the segment")]
+    origin: Annotated[float, Par("rad", "", "position at the start of the segment")]
     value: Annotated[float, Par("-", "", "the value that crossed its limit")]
 
 
@@ -127,49 +128,20 @@ def watch_state(y: Any, b: Any, s: Any) -> None:
 
 def idle(y: Any, w: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
     """The loop is open: the controller watches, so that it can be closed at any sample. Returns no torque."""
-    observe(0.0, y.position, 0.0, y.position, n, m)
-    m.open = 1.0
-    m.error_sum = 0.0
-    m.filtered = m.velocity
-    m.compensation = 0.0
-    m.started = 1.0
-    m.seen = m.velocity
-    m.wanted_velocity = w.velocity
-    if n.source == FROM_REFERENCE:
-        m.seen = w.velocity
-    m.in_1 = m.seen
-    m.in_2 = m.seen
-    m.out_1 = m.seen
-    m.out_2 = m.seen
-    return 0.0
-
-
-def start_from(torque: float, m: Any) -> None:
-    """The command that a controller which takes over starts from, N·m."""
-    m.torque = torque
-
-
-def composed_idle(y: Any, w: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
-    """As `idle`, of a controller made of control laws: they run, so that an observer knows the disturbance."""
     follow(y.position, y.position, w.velocity, 0.0, w.torque, n, m, z, p, u)
     m.others = 0.0
     return 0.0
 
 
-def composed_start_from(torque: float, m: Any) -> None:
-    """As `start_from`, of a controller made of control laws."""
-    m.applied = torque
-
-
 def control(y: Any, w: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
     """The torque that is wanted, N·m; a controller that takes over starts where the last command left the axis."""
-    if w.closed == 0.0:
-        return w.torque + idle(y, w, n, m, z, p, u)
-    if m.open != 0.0:
-        start_from(s.torque - w.torque, m)
     u.time = y.time
     if abs(y.temperature) < UNBOUNDED:
         u.temperature = y.temperature
+    if w.closed == 0.0:
+        return w.torque + idle(y, w, n, m, z, p, u)
+    if m.open != 0.0:
+        m.applied = s.torque - w.torque
     return w.torque + sample(y.position, w.position, w.velocity, w.acceleration, n, m, z, p, u)
 
 
@@ -203,18 +175,6 @@ def guarded(y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: A
     return s.torque
 
 
-def guarded_by(law: Law | None) -> Callable[..., float]:
-    """`guarded` with the law of the compensator in its place; None compensates nothing."""
-    return bound(guarded, {"sample": sampled_by(law)})
-
-
-def guarded_with(functions: Mapping[str, Callable[..., float]]) -> Callable[..., float]:
-    """`guarded` with the functions of a controller made of control laws (`SampledController.functions`)."""
-    return bound(
-        guarded,
-        {
-            "sample": functions["sample"],
-            "idle": bound(composed_idle, {"follow": functions["follow"]}),
-            "start_from": composed_start_from,
-        },
-    )
+def guarded_by(functions: Mapping[str, Callable[..., float]]) -> Callable[..., float]:
+    """`guarded` with the functions of a controller (`SampledController.functions`)."""
+    return bound(guarded, {name: functions[name] for name in ("sample", "follow")})

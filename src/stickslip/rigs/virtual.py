@@ -18,8 +18,8 @@ from stickslip.machines.machine import IMPERFECTIONS, Machine, machine
 from stickslip.rigs._control import Control
 from stickslip.rigs._virtual import run_block
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
-from stickslip.simulation import _machine_step as place
-from stickslip.simulation.machine import lay_out_machine, look, run, wait
+from stickslip.simulation.machine import step as place
+from stickslip.simulation.machine.layout import lay_out_machine, look, run, wait
 
 __all__ = ["RIG", "VirtualRig", "virtual_rig"]
 
@@ -144,9 +144,10 @@ def virtual_rig(name: str, without: Sequence[str] = ()) -> VirtualRig:
 
 
 def build(settings: Table) -> VirtualRig:
-    """From ``machine`` (a name of the library or a file) and ``without`` (a list of imperfections)."""
+    """From ``machine`` (a name of the library, or a file beside this one) and ``without`` (a list of imperfections)."""
     without = settings.texts("without", IMPERFECTIONS) if settings.has("without") else []
-    return virtual_rig(settings.text("machine"), without)
+    name = settings.text("machine")
+    return virtual_rig(str(settings.document.locate(name)) if name.endswith(".toml") else name, without)
 
 
 RIG = RigKind("virtual", build, "a simulated machine, with every imperfection of a real one")

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import csv
-import importlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from stickslip import plugins
 from stickslip.config import Table, refuse_endless
-from stickslip.control import compensators
-from stickslip.control.compensators._base import Compensator
+from stickslip.control.compensator import COMPENSATORS, Compensator
 from stickslip.control.controller import Controller
 from stickslip.control.files import Placement, composed, is_composed, placement
 from stickslip.control.linear import LINEAR, Cascade, Gains, place
+from stickslip.control.registry import law_files
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import ConfigError, InputError
 from stickslip.machines.machine import IMPERFECTIONS, Machine, machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.model_tables import friction_laws, law_files, model, models, refuse_unknown
+from stickslip.model_tables import friction_laws, model, models, refuse_unknown
 from stickslip.simulation.closed_loop import INTEGRATORS
 from stickslip.spec import Law
 
@@ -38,9 +37,6 @@ __all__ = [
     "placement",
     "reference",
 ]
-
-for _name in compensators.COMPENSATORS:
-    importlib.import_module(f"{compensators.__name__}.{_name}")
 
 
 @dataclass(frozen=True)
@@ -185,7 +181,7 @@ def controller(
         ``lead``, ``deadband``, ``offset``, ``inertia_feedforward``, ``substeps``;
         ``torque_limit``, ``sample_time``, ``encoder_counts``, ``velocity_filter``.
     inertia : float
-        Of the axis, kg·m²: what pole placement reckons with.
+        Of the axis, kg·m²: used for pole placement.
     default : Placement or None
         Where the poles lie if the table has no ``placement``.
     laws : mapping of str to Model
@@ -238,7 +234,6 @@ def _gains(table: Table, inertia: float, default: Placement | None) -> Gains | C
 
 
 def _compensator(table: Table, laws: Mapping[str, Model]) -> Compensator | None:
-    kinds = {kind.name: kind for kind in Compensator.__subclasses__()}
     if not table.has("compensator"):
         for key in (
             "law",
@@ -251,9 +246,9 @@ def _compensator(table: Table, laws: Mapping[str, Model]) -> Compensator | None:
             "substeps",
         ):
             if key in table.values:
-                table.choice("compensator", kinds)
+                table.choice("compensator", COMPENSATORS)
         return None
-    kind = kinds[table.choice("compensator", kinds)]
+    kind = COMPENSATORS[table.choice("compensator", COMPENSATORS)]
     law = laws[table.choice("law", laws, family="laws")]
     gain = table.number("gain", "", 1.0)
     corner = table.positive("filter_hz", "Hz") if table.has("filter_hz") else None

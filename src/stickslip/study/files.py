@@ -22,7 +22,8 @@ from stickslip.study.provenance import engine_hash, file_hash, versions
 from stickslip.study.result import Run
 
 if TYPE_CHECKING:
-    from stickslip.study.plan import PlannedRun, Study
+    from stickslip.study.plan import Study
+    from stickslip.study.planned_run import PlannedRun
 
 __all__ = [
     "KEYS",

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.model import Model, Reference
@@ -115,5 +114,5 @@ def cases_of(group: Group, models: Mapping[str, Model], sample_time: float, torq
     helped["FB-gms10"] = Feedback(models["gms"], filter_hz=FILTER)
     for name, controller in plain.items():
         yield Case(group, name, controller, reference, duration)
-    for name, helper in helped.items():
-        yield Case(group, name, Controller(gains, helper, torque, sample_time), reference, duration)
+    for name, compensator in helped.items():
+        yield Case(group, name, Controller(gains, compensator, torque, sample_time), reference, duration)

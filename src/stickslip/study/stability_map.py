@@ -18,7 +18,7 @@ from stickslip.analyse.machine_axis import axis_of
 from stickslip.analyse.presliding_loop import Drive, Loop, Poles
 from stickslip.analyse.stability import with_law
 from stickslip.analyse.stability_result import Map, Recommended
-from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.control.sampled_controller import SampledController
@@ -184,8 +184,10 @@ def point(
 ) -> Point:
     """One setting: its poles, and what it does."""
     poles = poles_at(machine, gains, model, filter_hz, gain, most)
-    helper = Feedback(model, gain, filter_hz or None)
-    found = moved(machine, Controller(gains, helper, VirtualRig(machine).limits.torque, machine.sample_time))
+    compensator = Feedback(model, gain, filter_hz or None)
+    found = moved(
+        machine, Controller(gains, compensator, VirtualRig(machine).limits.torque, machine.sample_time)
+    )
     return Point(name, filter_hz, gain, poles.growth, poles.frequency, found, found < most)
 
 
@@ -200,8 +202,8 @@ def poles_at(
     drive = Drive(gains, filter_hz=filter_hz, sample_time=machine.sample_time, delay=machine.delay)
     found = poles = Poles(1.0, 0.0, axis.ringing)
     for _ in range(ROUNDS):
-        train, there = with_law(axis, drive, model, axis.amplitude, max(poles.frequency, SLOWEST))
-        found = Loop(train, replace(there, gain=gain)).poles()
+        drivetrain, there = with_law(axis, drive, model, axis.amplitude, max(poles.frequency, SLOWEST))
+        found = Loop(drivetrain, replace(there, gain=gain)).poles()
         # Half-way on a logarithmic scale, so that it settles.
         between = math.sqrt(max(found.frequency, SLOWEST) * max(poles.frequency, SLOWEST))
         poles = replace(found, frequency=between)
@@ -218,8 +220,8 @@ def _background(machine: Machine, gains: Gains, name: str, model: Model, most: f
     return Map(name, growth, frequency)
 
 
-def moved(machine: Machine, controller: Controller | SampledController) -> float:
-    """Motion at the end of a push and a rest, rad."""
+def moved(machine: Machine, controller: Controller | SampledController | None) -> float:
+    """Motion at the end of a push and a rest, rad; without a controller the axis is left to itself."""
     dt = machine.sample_time
     before, after = round(0.2 / dt), round(REST / dt)
     torque = np.zeros(before + after)

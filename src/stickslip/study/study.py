@@ -19,7 +19,8 @@ from stickslip.machines.machine import Machine
 from stickslip.record import Record
 from stickslip.simulation.closed_loop import prepare, run_case, simulate
 from stickslip.study import files
-from stickslip.study.plan import PlannedRun, Study, load, load_run, select
+from stickslip.study.plan import Study, load, load_run, select
+from stickslip.study.planned_run import PlannedRun
 from stickslip.study.result import Run, StudyResult
 
 __all__ = ["PlannedRun", "Study", "execute", "load", "load_run", "run", "select"]
@@ -123,7 +124,7 @@ def run(
     return StudyResult(folder, runs, manifest, study.config, more)
 
 
-STOPPING = "stopping: what is in hand is finished and kept; Ctrl-C again drops it"
+STOPPING = "finishing the running cases; press Ctrl-C again to abort"
 
 
 @contextmanager

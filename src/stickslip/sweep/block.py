@@ -9,19 +9,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.controller import Controller
 from stickslip.errors import InputError, ParameterError, SimulationError
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.simulation import _case, batch, lanes
-from stickslip.simulation._machine_step import SUBSTEPS
+from stickslip.simulation import _case
 from stickslip.simulation._meter import metrics as read_meter
-from stickslip.simulation.accuracy import KICKS, LOOSER
+from stickslip.simulation.accuracy import LOOSER, PERTURBATIONS
 from stickslip.simulation.closed_loop import REASONS, integrator_for, prepare
-from stickslip.simulation.machine import lay_out_machine
-from stickslip.simulation.machine_loop import simulate_machine
-from stickslip.study.plan import PlannedRun
+from stickslip.simulation.machine.layout import lay_out_machine
+from stickslip.simulation.machine.loop import simulate_machine
+from stickslip.simulation.machine.step import SUBSTEPS
+from stickslip.simulation.many import batch, simd_batch
+from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.numbers import as_columns, varied
 from stickslip.sweep.plan import BLOCK, Sweep
 
@@ -104,9 +103,9 @@ def compute_cases(sweep: Sweep, run: int, start: int, numbers: Array) -> Block:
     return Block(run, start, numbers, found.metrics, flagged, found.failures, found.integrators)
 
 
-def doubtful(many: lanes.Lanes, sweep: Sweep, found: Measured) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def doubtful(many: simd_batch.Lanes, sweep: Sweep, found: Measured) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Which cases in lanes differ at twice the step."""
-    wide = lanes.prepare(many.case, many.varied, LONGER * sweep.step)
+    wide = simd_batch.prepare(many.case, many.varied, LONGER * sweep.step)
     again = _read(wide.run(sweep.metrics, device=sweep.device), sweep.metrics, "lanes")
     duration = float(many.case.numbers[_case.DURATION])
     ends = np.array([a != b for a, b in zip(found.failures, again.failures)], dtype=np.bool_)
@@ -126,28 +125,31 @@ def checked(
     best = Measured(found.metrics.copy(), list(found.failures), list(found.integrators))
     flagged = np.zeros(len(best.metrics), dtype=np.bool_)
 
-    def again(cases: Any, times: float, kick: float = 0.0) -> Measured:
+    def again(cases: Any, times: float, perturbation: float = 0.0) -> Measured:
         n = planned.numerics
         # The fixed integrator is of second order in its step.
         finer = replace(n, tolerance=times * n.tolerance, time_step=math.sqrt(times) * n.time_step)
         some = {k: v[cases] for k, v in values.items()}
-        return measured(replace(planned, numerics=finer), some, metrics, len(cases), kick)
+        return measured(replace(planned, numerics=finer), some, metrics, len(cases), perturbation)
 
     def differs(cases: Any, other: Measured, part: float) -> Any:
         ends = np.array([best.failures[i] != why for i, why in zip(cases, other.failures)], dtype=np.bool_)
         return differ(best.metrics[cases], other.metrics, metrics, planned.duration, part) | ends
 
-    def kicked(cases: Any, times: float) -> None:
-        for kick in KICKS:
+    def perturbed(cases: Any, times: float) -> None:
+        for perturbation in PERTURBATIONS:
             # Only the exact integrator can be wrong in two ways.
-            some = cases if kick == KICKS[0] else cases[[best.integrators[i] == "exact" for i in cases]]
+            some = (
+                cases
+                if perturbation == PERTURBATIONS[0]
+                else cases[[best.integrators[i] == "exact" for i in cases]]
+            )
             if some.size:
-                flagged[some] |= differs(some, again(some, times, kick), SETTLED)
+                flagged[some] |= differs(some, again(some, times, perturbation), SETTLED)
 
-    kicked(np.arange(len(flagged)), 1.0)
+    perturbed(np.arange(len(flagged)), 1.0)
     unmoved = np.flatnonzero(~flagged)
-    control = planned.control
-    if isinstance(control, Controller) and isinstance(control.compensator, Feedback) and unmoved.size:
+    if unmoved.size and _case.feeds_back(planned.control):
         # It acts on the motion itself, which may turn where the tolerance does not see it, wrong steps or not.
         flagged[unmoved] = differs(unmoved, again(unmoved, TIGHTER[0]), SURE)
     for times in TIGHTER:
@@ -159,7 +161,7 @@ def checked(
         best.metrics[cases] = fine.metrics
         for i, why in zip(cases, fine.failures):
             best.failures[i] = why
-        kicked(cases, times)
+        perturbed(cases, times)
     return best, flagged
 
 
@@ -186,9 +188,13 @@ def _floor(name: str, duration: float) -> float:
 
 
 def measured(
-    planned: PlannedRun, values: Mapping[str, Array], metrics: Sequence[str], n: int, kick: float = 0.0
+    planned: PlannedRun,
+    values: Mapping[str, Array],
+    metrics: Sequence[str],
+    n: int,
+    perturbation: float = 0.0,
 ) -> Measured:
-    """What every case gives; less exact with a kick.
+    """What every case gives; less exact with a perturbation.
 
     The exact integrator's steps are then wrong on purpose, the adaptive one's tolerance is ten times wider, the fixed
     one's step twice as long (`stickslip.simulation.accuracy`).
@@ -196,11 +202,12 @@ def measured(
     many = _as_batch(planned, values)
     if many is None:
         rows = [
-            _alone(planned, {k: v[i].tolist() for k, v in values.items()}, metrics, kick) for i in range(n)
+            _alone(planned, {k: v[i].tolist() for k, v in values.items()}, metrics, perturbation)
+            for i in range(n)
         ]
         found = np.array([row for row, *_ in rows]).reshape(n, len(metrics))
         return Measured(found, [why for _, why, _ in rows], [name for *_, name in rows])
-    many.parameters[:, _case.KICK] = kick
+    many.parameters[:, _case.PERTURBATION] = perturbation
     return _read(many.run(metrics), metrics, "exact")
 
 
@@ -219,7 +226,7 @@ def integrator_of(sweep: Sweep, run: int) -> tuple[str, str]:
     if sweep.step > 0.0:
         try:
             values = sweep.values(planned, sweep.drawn.block(0, 1))
-            lanes.prepare(_laid_out(planned), as_columns(planned, values), sweep.step)
+            simd_batch.prepare(_laid_out(planned), as_columns(planned, values), sweep.step)
         except InputError as error:
             reasons.append(str(error))
         else:
@@ -228,12 +235,12 @@ def integrator_of(sweep: Sweep, run: int) -> tuple[str, str]:
     return choice.name, "; ".join([*reasons, *choice.refused.values()])
 
 
-def as_lanes(planned: PlannedRun, values: Mapping[str, Array], step: float) -> lanes.Lanes | None:
+def as_lanes(planned: PlannedRun, values: Mapping[str, Array], step: float) -> simd_batch.Lanes | None:
     """The block in lanes, or None where they cannot run it."""
     if isinstance(planned.axis, Machine):
         return None
     try:
-        return lanes.prepare(_laid_out(planned), as_columns(planned, values), step)
+        return simd_batch.prepare(_laid_out(planned), as_columns(planned, values), step)
     except InputError:
         return None
 
@@ -266,23 +273,23 @@ def _as_batch(planned: PlannedRun, values: Mapping[str, Array]) -> batch.Batch |
 
 
 def _alone(
-    planned: PlannedRun, values: Mapping[str, Any], metrics: Sequence[str], kick: float = 0.0
+    planned: PlannedRun, values: Mapping[str, Any], metrics: Sequence[str], perturbation: float = 0.0
 ) -> tuple[list[float], str, str]:
     """Metrics of one case, why it has none, and what ran it."""
     none = [np.nan] * len(metrics)
     try:
         run = varied(planned, values)
         if isinstance(run.axis, Machine):
-            return _on_machine(run, run.axis, metrics, FINER if kick else 0)
+            return _on_machine(run, run.axis, metrics, FINER if perturbation else 0)
         case = _laid_out(run)
         name, integrate, _ = integrator_for(case, run.numerics.integrator)
     except ParameterError as error:
         return none, str(error), ""
     step = run.numerics.time_step
-    # Only the exact integrator reads the kick: without more the others would agree with themselves.
+    # Only the exact integrator reads the perturbation: without more the others would agree with themselves.
     if name == "exact":
-        case.numbers[_case.KICK] = kick
-    elif kick != 0.0:
+        case.numbers[_case.PERTURBATION] = perturbation
+    elif perturbation != 0.0:
         case.numbers[_case.TOLERANCE] *= LOOSER.get(name, 1.0)
         step *= LONGER
     outcome = integrate(case, step) if name == "fixed" else integrate(case)

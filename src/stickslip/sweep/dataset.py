@@ -18,7 +18,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.study.files import unwritable
-from stickslip.study.plan import PlannedRun
+from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.block import Block
 from stickslip.sweep.plan import BLOCK, Sweep
 

@@ -24,7 +24,7 @@ from typing import Any
 from stickslip.approval import allow_code
 from stickslip.capacity import insist_on_jobs, insist_on_memory
 from stickslip.errors import InputError
-from stickslip.simulation import lanes
+from stickslip.simulation.many import simd_batch
 from stickslip.study.files import claim_folder, copy_inputs, unwritable
 from stickslip.study.provenance import engine_hash, versions
 from stickslip.study.study import interrupts_between_runs
@@ -132,7 +132,7 @@ def ready(sweep: Sweep, scheduler: str = "") -> None:
             f"--scheduler {scheduler!r} is no address of a Dask scheduler; give one such as tcp://host:8786"
         )
     if sweep.device == "gpu" and not scheduler:
-        lanes.check_gpu()
+        simd_batch.check_gpu()
     loops = len(sweep.runs) * sweep.drawn.cases
     insist_on_memory(loops / BLOCK * BOOKED, f"{loops:.3g} closed loops in blocks of {BLOCK}", "run fewer")
     for planned in sweep.runs:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.study.plan import PlannedRun
+from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.dataset import read
 from stickslip.sweep.numbers import value_of
 from stickslip.sweep.plan import Sweep

@@ -24,7 +24,7 @@ from stickslip.errors import UnknownName
 from stickslip.machines.machine import Machine
 from stickslip.machines.numbers import machine_numbers, with_friction, with_numbers
 from stickslip.model import Model, Reference
-from stickslip.study.plan import PlannedRun
+from stickslip.study.planned_run import PlannedRun
 
 __all__ = ["as_columns", "belongs", "poles", "value_of", "varied"]
 
@@ -86,11 +86,11 @@ def _of_loop(control: SampledController, inertia: float) -> dict[str, Any]:
 
 def _of_gains(control: Controller, inertia: float) -> dict[str, Any]:
     """The numbers of a controller with gains and a compensator."""
-    helper, gains, found = control.compensator, control.gains, dict[str, Any]()
-    if helper:
-        found |= {f"law.{k}": v for k, v in helper.model.parameters._asdict().items()}
-        found["controller.gain"] = helper.gain
-        found["controller.filter_hz"] = helper.filter_hz or math.inf
+    compensator, gains, found = control.compensator, control.gains, dict[str, Any]()
+    if compensator:
+        found |= {f"law.{k}": v for k, v in compensator.model.parameters._asdict().items()}
+        found["controller.gain"] = compensator.gain
+        found["controller.filter_hz"] = compensator.filter_hz or math.inf
     if isinstance(gains, Gains) and gains.kp > 0.0:
         _, found["controller.bandwidth_hz"], found["controller.damping"] = poles(gains, inertia)
     return found | {f"controller.{k}": v for k, v in gains._asdict().items()}
@@ -165,16 +165,16 @@ def _control(run: PlannedRun, settings: Mapping[str, Any], law: Mapping[str, Any
         return replace(
             control.with_values({**_placed(control, run.axis.inertia, settings), **settings}), **both
         )
-    helper = control.compensator
+    compensator = control.compensator
     own = {k: float(v) for k, v in settings.items()}
-    if helper:
-        hz = own.get("filter_hz", helper.filter_hz or math.inf)
-        helper = replace(
-            helper, model=with_values(helper.model, law), gain=own.get("gain", helper.gain),
+    if compensator:
+        hz = own.get("filter_hz", compensator.filter_hz or math.inf)
+        compensator = replace(
+            compensator, model=with_values(compensator.model, law), gain=own.get("gain", compensator.gain),
             filter_hz=hz if math.isfinite(hz) else None,
         )  # fmt: skip
     return replace(
-        control, gains=_gains(control, run.axis.inertia, own), compensator=helper,
+        control, gains=_gains(control, run.axis.inertia, own), compensator=compensator,
         torque_limit=own.get("torque_limit", control.torque_limit),
         sample_time=own.get("sample_time", control.sample_time),
     )  # fmt: skip
@@ -204,7 +204,7 @@ def _gains(control: Controller, inertia: float, settings: Mapping[str, float]) -
 
 
 def as_columns(run: PlannedRun, values: Mapping[str, Array]) -> dict[str, Array]:
-    """The values as `stickslip.simulation.batch` names them; it says itself which it cannot vary.
+    """The values as `stickslip.simulation.many.batch` names them; it says itself which it cannot vary.
 
     Parameters
     ----------
@@ -213,6 +213,8 @@ def as_columns(run: PlannedRun, values: Mapping[str, Array]) -> dict[str, Array]
     """
     out: dict[str, Array] = {}
     settings: dict[str, Array] = {}
+    if isinstance(run.control, SampledController) and run.control.sample_time == 0.0:
+        out, values = _of_blocks(run, values)
     for name, column in values.items():
         family, rest, element = parts(name)
         if family in ("friction", "law"):
@@ -234,3 +236,21 @@ def as_columns(run: PlannedRun, values: Mapping[str, Array]) -> dict[str, Array]
         gains = [_gains(run.control, inertia, dict(zip(settings, map(float, row)))) for row in rows]
         out |= {field: np.array([getattr(g, field) for g in gains]) for field in Gains._fields}
     return out
+
+
+def _of_blocks(run: PlannedRun, values: Mapping[str, Array]) -> tuple[dict[str, Array], dict[str, Array]]:
+    """The columns of a controller made of control laws, in continuous time, and the values that are not its own."""
+    family = "controller."
+    own = {k: v for k, v in values.items() if k.startswith(family) and parts(k)[2] is None}
+    rest = {k: v for k, v in values.items() if k not in own}
+    rows = zip(*(column.tolist() for column in own.values()))
+    names = [name.removeprefix(family) for name in own]
+    made = [_control(run, dict(zip(names, row)), {}).continuous for row in rows]
+    if not made:
+        return {}, rest
+    out = {field: np.array([getattr(c.gains, field) for c in made]) for field in Gains._fields}
+    if made[0].compensation:
+        out["gain"] = np.array([c.compensation.gain for c in made])
+    for held in (name.split("_friction_", 1)[1] for name in names if "_friction_" in name):
+        out[f"law.{held}"] = np.array([getattr(c.friction.parameters, held) for c in made])
+    return out, rest

@@ -15,10 +15,11 @@ from stickslip.config import Table, read_toml
 from stickslip.errors import ConfigError, InputError, suggestion
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import read_identified
-from stickslip.simulation import lanes
 from stickslip.simulation._meter import METRICS
+from stickslip.simulation.many import simd_batch
 from stickslip.study import plan as studies
-from stickslip.study.plan import PlannedRun, Study
+from stickslip.study.plan import Study
+from stickslip.study.planned_run import PlannedRun
 from stickslip.study.provenance import file_hash
 from stickslip.sweep.numbers import belongs, value_of, varied
 from stickslip.sweep.sample import LEVEL, METHODS, Drawn, Spread, count_of
@@ -58,7 +59,7 @@ class Sweep:
     tuned, percentile
         What `stickslip.sweep.tune` may choose, and the percentile over the cases that it judges by.
     step : float
-        Of lanes, s (`stickslip.simulation.lanes`); 0 runs every case exactly.
+        Of lanes, s (`stickslip.simulation.many.simd_batch`); 0 runs every case exactly.
     device : {"cpu", "gpu"}
         Where lanes run.
     left_out : tuple of str
@@ -180,13 +181,13 @@ def _lanes(table: Table, metrics: Sequence[str]) -> tuple[float, str]:
     """Step and device of ``integrator = "lanes"``; no step where every case is run exactly."""
     if table.choice("integrator", ("exact", "lanes"), "exact") == "exact":
         return 0.0, "cpu"
-    unknown = [name for name in metrics if name not in lanes.METRICS]
+    unknown = [name for name in metrics if name not in simd_batch.METRICS]
     if unknown:
         raise table.error(
             "metrics", f"has {unknown[0]!r}, which lanes do not measure; choose integrator exact"
         )
-    device = table.choice("device", lanes.DEVICES, "cpu")
-    return table.positive("time_step", "s", lanes.STEP), device
+    device = table.choice("device", simd_batch.DEVICES, "cpu")
+    return table.positive("time_step", "s", simd_batch.STEP), device
 
 
 def _study(table: Table, moved: Mapping[str, Path]) -> Study:

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.draws import spread_values
 from stickslip.identify.estimate import Estimate
+from stickslip.identify.monte_carlo import spread_values
 
 __all__ = ["LEVEL", "METHODS", "Drawn", "Spread", "widest"]
 

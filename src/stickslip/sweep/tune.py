@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.study.plan import PlannedRun
+from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.block import measured
 from stickslip.sweep.numbers import belongs, value_of
 from stickslip.sweep.plan import Sweep

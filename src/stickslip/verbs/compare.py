@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from stickslip.identify.drift import Comparison, compare_models
+from stickslip.identify.compare.change import Comparison, compare_models
 from stickslip.identify.identified_file import Identified, read_identified
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import require

@@ -8,26 +8,29 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 from stickslip.config import Document, Table, read_toml
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
+from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.linear import Gains
 from stickslip.control.recommended import recommended_in
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
-from stickslip.export import CONTROLLER_TARGETS, controller_target, target_named
+from stickslip.export import CONTROLLER_TARGETS, TARGETS, controller_target, target_named
 from stickslip.export.job import Check, Export, Job
+from stickslip.export.maps import MAP_TARGETS, MapTarget, map_target, written
 from stickslip.export.target import Target, settings_of
+from stickslip.machines.position_map import PositionMap
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 from stickslip.study.files import prepared_folder, unwritable
 from stickslip.study.study import load_run
-from stickslip.verbs.export_notes import around_of, axis_of, constant_torque, notes_on
+from stickslip.verbs.export_maps import map_in, only_map
+from stickslip.verbs.export_notes import around_of, axis_of, constant_torque, notes_on, notes_on_controller
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import require
 from stickslip.verbs.recommend import RecommendationResult
@@ -35,7 +38,8 @@ from stickslip.verbs.recommend import RecommendationResult
 __all__ = ["CompensatorOptions", "ExportResult", "export"]
 
 Source = (
-    IdentificationResult | RecommendationResult | Model | Controller | SampledController | str | os.PathLike[str]
+    IdentificationResult | RecommendationResult | Model | Controller | SampledController | PositionMap | str
+    | os.PathLike[str]
 )  # fmt: skip
 """What can be exported; a path is that of a model.toml, a recommended.toml or a `stickslip simulate` file."""
 
@@ -62,7 +66,7 @@ class ExportResult:
         Where the files were written; empty where they were not.
     """
 
-    target: Target
+    target: Target | MapTarget
     name: str
     files: Mapping[str, str | bytes]
     notes: tuple[str, ...] = ()
@@ -142,15 +146,17 @@ def export(
     top_speed: float | None = None,
     settings: Mapping[str, str | float] | None = None,
     check: bool = False,
+    position_map: bool = False,
 ) -> ExportResult:
     """Write a model, a compensator or a controller as C, structured text, MATLAB, Python, ...
 
     Parameters
     ----------
-    source : IdentificationResult, RecommendationResult, Model, Controller, SampledController or path
+    source : IdentificationResult, RecommendationResult, Model, Controller, SampledController, PositionMap or path
         A path is that of model.toml, recommended.toml or, with `controller`, a `stickslip simulate` file.
     to : str
-        The target, one of `stickslip.export.TARGETS`: "c99", "arduino", "st", "fmu", ...
+        The target, one of `stickslip.export.TARGETS`: "c99", "arduino", "st", "fmu", ...; of a map over the angle one
+        of `stickslip.export.maps.MAP_TARGETS`: "c99", "moteus", "odrive", "vesc", "st", ...
     folder : path, optional
         Where the files are written; without it they are in ``files`` of the result alone.
     name : str, optional
@@ -177,6 +183,9 @@ def export(
         What only the target asks for, by name.
     check : bool
         Try the export in its own tool, where that is installed.
+    position_map : bool
+        The torque over the angle that method cogging found, not its law; a source or a target that knows nothing else
+        is exported so anyway.
 
     Returns
     -------
@@ -187,16 +196,25 @@ def export(
     InputError
         One line that names what the target cannot carry, or what is missing, and the remedy.
     """
+    if position_map or only_map(source) or (to in MAP_TARGETS and to not in TARGETS):
+        for option, asked in (
+            ("single", single), ("controller", controller), ("compensator", compensator), ("nearest", nearest),
+        ):  # fmt: skip
+            if asked:
+                raise InputError(f"--{option}: a torque over the angle has none; leave it out")
+        target, own = map_target(to), name or "cogging"
+        made = written(map_in(source, to), target, own, settings)
+        return saved(ExportResult(target, own, made.files, (*made.notes, f"tried: {target.tried}")), folder)
     chosen = target_named(to)
     if single and not chosen.precision:
-        raise InputError(f"--single: {chosen.name} has one precision; leave it out")
+        raise InputError(f"--single: {chosen.name} supports only one precision; leave it out")
     options = CompensatorOptions(
         sample_time, substeps, gain, lead, deadband, offset, inertia_feedforward, filter_hz
     )
     if (
         isinstance(source, RecommendationResult)
         and compensator is None
-        and chosen.controller
+        and chosen.name in CONTROLLER_TARGETS
         and not options.given
     ):
         compensator = "recommended"
@@ -204,16 +222,23 @@ def export(
     refuse_controllers(chosen, controller, compensator)
     content = content_of(source)
     own = name or re.sub(r"[^A-Za-z0-9_]+", "_", Path(content.document.name).stem)
-    if controller:
-        made = controller_in(source)
-        if isinstance(made, SampledController):
-            return saved(composed(made, chosen, own, single, check), folder)
-        if not chosen.controller:
-            raise InputError(
-                f"--controller: {chosen.name} carries controllers made of control laws (a loop, "
-                f'`loop = {{law = "pd"}}`), and that of {content.document.name} is none; take --to c99'
-            )
-    job = job_of(source, content, own, chosen, options, controller, compensator)
+    if compensator is None and options.given:
+        option = options.given[0].replace("_", "-")
+        raise InputError(f"--{option} belongs to --compensator; give both or neither")
+    if nearest and not chosen.forms:
+        raise InputError(f"--nearest: {chosen.name} carries {chosen.carries}; leave it out")
+    if controller or compensator:
+        settings_of(chosen, settings or {})
+        if compensator:
+            made = compensator_of(content, model_of(source, content), options, compensator)
+            offset = made.compensator.offset if made.compensator else 0.0
+        else:
+            made, offset = controller_in(source), 0.0
+        whole = composed_of(made)
+        result = carried(source, whole, chosen, own, single, check)
+        notes = (*result.notes, *notes_on_controller(content, whole, compensator, offset))
+        return saved(replace(result, notes=notes), folder)
+    job = job_of(source, content, own, chosen)
     job = replace(
         job,
         single=single,
@@ -221,11 +246,9 @@ def export(
         top_speed=top_speed,
         settings={**job.settings, **(settings or {})},
     )
-    if job.nearest and not chosen.forms:
-        raise InputError(f"--nearest: {chosen.name} carries {chosen.carries}; leave it out")
     settings_of(chosen, job.settings)
     files = chosen.write(job)
-    notes = (*files.notes, *around_of(chosen, job), *notes_on(content, job, controller, compensator))
+    notes = (*files.notes, *around_of(chosen, job), *notes_on(content, job))
     tried = chosen.check(job, files) if check and chosen.check else None
     return saved(ExportResult(chosen, own, files.files, notes, tried), folder)
 
@@ -247,14 +270,10 @@ def refuse_controllers(chosen: Target, controller: bool, compensator: str | None
     ------
     InputError
     """
-    carried = {
-        "controller": (controller, chosen.controller or chosen.name in CONTROLLER_TARGETS),
-        "compensator": (compensator, chosen.controller),
-    }
-    for option, (asked, possible) in carried.items():
-        if asked and not possible:
+    for option, asked in (("controller", controller), ("compensator", compensator)):
+        if asked and chosen.name not in CONTROLLER_TARGETS:
             raise InputError(
-                f"--{option}: {chosen.name} carries the law alone; leave it out, or take --to c99"
+                f"--{option}: {chosen.name} supports the law alone; leave it out, or use --to c99"
             )
     if controller and compensator:
         raise InputError("--controller takes the compensator of its file; leave --compensator out")
@@ -268,6 +287,7 @@ def content_of(source: Source) -> Table:
         return Table({}, Document("friction", Path()))
     if isinstance(source, (Controller, SampledController)):
         return Table({}, Document("controller", Path()))
+    assert not isinstance(source, PositionMap)
     require(Path(source), "model", "simulation")
     return read_toml(Path(source))
 
@@ -283,7 +303,7 @@ def controller_in(source: Source) -> Controller | SampledController:
     """The controller given, or that of a file for `stickslip simulate`."""
     if isinstance(source, (Controller, SampledController)):
         return source
-    if isinstance(source, (Model, IdentificationResult, RecommendationResult)):
+    if isinstance(source, (Model, IdentificationResult, RecommendationResult, PositionMap)):
         raise InputError(
             f"a {type(source).__name__} has no controller; give a Controller, or leave controller out"
         )
@@ -293,45 +313,30 @@ def controller_in(source: Source) -> Controller | SampledController:
     return load_run(Path(source)).control
 
 
-def composed(made: SampledController, chosen: Target, name: str, single: bool, check: bool) -> ExportResult:
-    """A controller made of control laws."""
+def carried(
+    source: Source, made: SampledController, chosen: Target, name: str, single: bool, check: bool
+) -> ExportResult:
+    """A controller as the target has it."""
+    around = Surroundings()
+    if isinstance(source, (str, os.PathLike)) and read_toml(Path(source)).has("reference"):
+        axis = load_run(Path(source)).axis
+        if isinstance(axis, RigidAxis):
+            around = Surroundings(load=axis.load, temperature=axis.temperature)
     target = controller_target(chosen.name)
-    files: Export = target.write(made, name, single)
+    files: Export = target.write(made, name, single, around)
     tried = target.check(files, name) if check and target.check else None
     return ExportResult(chosen, name, files.files, tuple(files.notes), tried)
 
 
-def job_of(
-    source: Source, content: Table, name: str, chosen: Target, options: CompensatorOptions, controller: bool,
-    compensator: str | None,
-) -> Job:  # fmt: skip
-    """The model, or the model and the controller that holds it, with what the file knows of its axis."""
-    if compensator is None and options.given:
-        option = options.given[0].replace("_", "-")
-        raise InputError(f"--{option} belongs to --compensator; give both or neither")
+def job_of(source: Source, content: Table, name: str, chosen: Target) -> Job:
+    """The model, with what the file knows of its axis."""
     known = axis_of(content)
     settings: dict[str, str | float] = {s.name: known[s.name] for s in chosen.settings if s.name in known}
-    if not controller:
-        model = model_of(source, content)
-        return Job(model, name, compensator_of(content, model, options, compensator), settings=settings)
-    around, made = Surroundings(), cast("Controller", controller_in(source))
-    if made.compensator is None:
-        raise InputError(
-            f"{content.document.name}: [controller] has no compensator; add one, or export the law alone"
-        )
-    if isinstance(source, (str, os.PathLike)):
-        axis = load_run(Path(source)).axis
-        if isinstance(axis, RigidAxis):
-            around = Surroundings(load=axis.load, temperature=axis.temperature)
-    return Job(made.compensator.model, name, made, surroundings=around, settings=settings)
+    return Job(model_of(source, content), name, settings=settings)
 
 
-def compensator_of(
-    content: Table, model: Model, options: CompensatorOptions, compensator: str | None
-) -> Controller | None:
-    """A sampled controller that has nothing but the compensator asked for, with what the file knows of its axis."""
-    if compensator is None:
-        return None
+def compensator_of(content: Table, model: Model, options: CompensatorOptions, compensator: str) -> Controller:
+    """A controller that has nothing but the compensator asked for, with what the file knows of its axis."""
     if compensator == "recommended":
         return recommended_on(content, model, options)
     kinds = {"ff": Feedforward, "fb": Feedback}
@@ -364,7 +369,7 @@ def recommended_on(content: Table, model: Model, options: CompensatorOptions) ->
     if tried and asked is not None and not math.isclose(tried, asked):
         raise InputError(
             f"--sample-time {asked:g}: {content.document.name} is recommended for {tried:g} s; leave it out, or "
-            "ask `stickslip recommend` with that sample time"
+            "run `stickslip recommend` with that sample time"
         )
     if not found.offset:
         found = replace(found, offset=constant_torque(content))

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
 from stickslip.config import Table
 from stickslip.control.recommended import Recommended, recommended_in
-from stickslip.export._c_control import given_by
+from stickslip.control.sampled_controller import SampledController
+from stickslip.export._controllers import depends_on, given_by
 from stickslip.export._nearest import read_by
 from stickslip.export.job import Job
 from stickslip.export.target import Target
 from stickslip.machines.angle import AngleMap
 
-__all__ = ["around_of", "axis_of", "constant_torque", "notes_on"]
+__all__ = ["around_of", "axis_of", "constant_torque", "notes_on", "notes_on_controller"]
 
 SLOW = 0.02
 """s: sample times above it are told; a tenth of a period of 5 Hz."""
@@ -35,35 +36,41 @@ def constant_torque(content: Table) -> float:
     return axis_of(content).get("offset", 0.0)
 
 
-def notes_on(content: Table, job: Job, controller: bool, compensator: str | None) -> Iterator[str]:
-    """What the user must know of a compensator besides what the target says, and of what is not in the export."""
-    name = content.document.name
-    if not controller and compensator != "recommended" and content.has("recommended"):
-        yield (
-            f"{name} recommends {in_words(recommended_in(content))}: that is not in this export; "
-            "`--to c99 --compensator recommended` (or `--to arduino`) writes it"
-        )
-    if not controller:
-        yield from other_torques(content, job)
-    if job.controller is None or compensator is None:
+def notes_on(content: Table, job: Job) -> Iterator[str]:
+    """What the user must know of the export of a law: what the file holds besides it, and is left out."""
+    yield from other_recommendation(content)
+    yield from other_torques(content, 0.0, job.settings)
+
+
+def notes_on_controller(
+    content: Table, made: SampledController, compensator: str | None, offset: float = 0.0
+) -> Iterator[str]:
+    """What the user must know of a controller besides what the target says; ``offset``: the constant torque in it."""
+    if read := depends_on(made):
+        yield f"friction depends on {read}: set load and temperature in every sample, position and time it keeps itself"
+    if compensator is None:
         return
-    time = job.controller.sample_time
-    yield f"it gives {given_by(job.controller)}"
+    yield from other_torques(content, offset, {})
+    yield f"it gives {given_by(made)}"
+    time = made.sample_time
     if time > SLOW:
         yield (
-            f"a sample time of {time:g} s compensates a reversal up to {time:g} s late, and a loop bears it up to some "
+            f"a sample time of {time:g} s compensates a reversal up to {time:g} s late, and a loop tolerates it "
+            "up to some "
             f"{0.1 / time:.2g} Hz only; give --sample-time in seconds"
         )
     if compensator == "recommended":
         found = recommended_in(content)
         what = "the loop of" if found.gains else f"a PD of {found.bandwidth:.4g} Hz:"
         gains = ", ".join(f"{k} {v:.5g}" for k, v in found.linear._asdict().items() if v or k == "feed")
-        yield f"it was tried beside {what} {gains}; the linear controller is not in the export"
+        yield f"it was tried with {what} {gains}; the linear controller is not in the export"
         if content.has("angle"):
             yield (
                 "what the file knows of the angle ([angle]) is not in the export but for the mean of the torque beside "
                 "friction: `stickslip rig run track` runs it"
             )
+    else:
+        yield from other_recommendation(content)
 
 
 def around_of(chosen: Target, job: Job) -> Iterator[str]:
@@ -87,15 +94,22 @@ def in_words(found: Recommended) -> str:
     return f"{found.compensator} with gain {found.gain:.4g}{''.join(more)}"
 
 
-def other_torques(content: Table, job: Job) -> Iterator[str]:
-    """Torques besides friction that the file holds and that are not in the export."""
+def other_recommendation(content: Table) -> Iterator[str]:
+    """That the file recommends what is not in the export."""
+    if content.has("recommended"):
+        yield (
+            f"{content.document.name} recommends {in_words(recommended_in(content))}: that is not in this export; "
+            "`--to c99 --compensator recommended` (or another target that carries controllers) writes it"
+        )
+
+
+def other_torques(content: Table, given: float, settings: Mapping[str, object]) -> Iterator[str]:
+    """Torques besides friction that the file holds and that are not in the export, which gives a constant torque."""
     known = axis_of(content)
     offset, gravity = constant_torque(content), known.get("gravity", 0.0)
-    made = job.controller.compensator if job.controller else None
-    missing = made.offset != offset if made else "offset" not in job.settings
-    if offset and missing:
+    if offset and offset != given and "offset" not in settings:
         yield f"the constant torque of {offset:.4g} N·m that acts in addition to friction is not in the export"
-    if gravity and "gravity" not in job.settings:
+    if gravity and "gravity" not in settings:
         yield (
             f"gravity, up to {gravity:.4g} N·m over the angle, acts in addition to friction and is not in the "
             "export: add gravity sin(q - gravity_angle) of the file's [axis] to the drive's torque"

@@ -16,10 +16,11 @@ from stickslip.approval import allow_code
 from stickslip.config import Table
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.identify.identified_file import Identified, identified_in
 from stickslip.identify.model_file import in_memory, model_content, versions, write_model
 from stickslip.identify.motion import motion_of, speeds_of
+from stickslip.machines.position_map import PositionMap
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 from stickslip.report.answers import Answers, answers_of
@@ -75,7 +76,7 @@ class IdentificationResult:
         """
         if self.identification.model is None:
             raise InputError(
-                f"{self.method} yields no whole law, so there is no model; take method sliding or axis"
+                f"{self.method} gives no complete law and so no model; use method sliding or axis"
             )
         return self.identification.model
 
@@ -90,10 +91,15 @@ class IdentificationResult:
         """
         mechanics: Any = self.identification.details.get("mechanics")
         if mechanics is None:
-            raise InputError(
-                f"{self.method} yields no inertia; take method axis, or RigidAxis(inertia, model)"
-            )
+            raise InputError(f"{self.method} gives no inertia; use method axis, or RigidAxis(inertia, model)")
         return RigidAxis(inertia=float(mechanics.inertia), friction=self.model)
+
+    @property
+    def position_map(self) -> PositionMap | None:
+        """The torque over the angle, for `export` and `position_feedforward`: from method cogging, or from method axis
+        with ``position_map=True``."""
+        found: Any = self.identification.details.get("map")
+        return found if isinstance(found, PositionMap) else None
 
     @property
     def verdict(self) -> str:
@@ -125,6 +131,14 @@ class IdentificationResult:
         """What the friction is, whether it can be trusted, what to do now."""
         return self.answers_with("model.toml")
 
+    @cached_property
+    def pictures(self) -> tuple[Picture, ...]:
+        """The report's pictures as plain numbers: the sliding curve with its band, the torque, the residuals."""
+        from stickslip.report.answers import speeds_in
+        from stickslip.report.axis_pictures import pictures_of
+
+        return pictures_of(self.identification, speeds_in([s.record for s in self.sources if not s.held_out]))
+
     def answers_with(self, model_file: str | os.PathLike[str]) -> Answers:
         """The same, its commands for a model that lies in `model_file`."""
         fitted = [s for s in self.sources if not s.held_out]
@@ -146,12 +160,13 @@ class IdentificationResult:
         Raises
         ------
         InputError
-            If there is no whole law, or the file cannot be written.
+            If there is neither a whole law nor a map over the angle, or the file cannot be written.
         """
         target = Path(path)
         target = target if target.suffix == ".toml" else target / "model.toml"
         prepared_folder(target.parent)
-        self.model.warn(str(target))
+        if self.position_map is None or self.identification.model is not None:
+            self.model.warn(str(target))
         return write_model(
             target, self.identification, data=self._data, law=self.law_file, more=self._recorded()
         )

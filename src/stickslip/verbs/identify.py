@@ -12,13 +12,13 @@ import numpy as np
 
 from stickslip import plugins
 from stickslip.errors import InputError
-from stickslip.identify.axis_trial import DRIVES
 from stickslip.identify.doctor import Diagnosis, examine
 from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.methods import method_named
 from stickslip.identify.methods.method import Options
 from stickslip.identify.on_a_line import along_a_line
-from stickslip.identify.regressions import Regress, Regressions
+from stickslip.identify.regression.regressions import Regress, Regressions
+from stickslip.identify.trial import DRIVES
 from stickslip.model import Model
 from stickslip.readers.cut import file_rows, pieces
 from stickslip.record import Record
@@ -57,6 +57,7 @@ def identify(
     torque_is: Literal["commanded", "actual", "mean"] | None = None,
     delay: float | None = None,
     harmonics: int = 0,
+    position_map: bool = False,
     load: bool = False,
     intervals: Literal["prediction", "covariance"] = "prediction",
     robust: bool = False,
@@ -74,7 +75,8 @@ def identify(
     method : str
         One of `stickslip.identify.methods.METHODS`: "axis" (inertia, offset or gravity and friction jointly, from any
         motion), "sliding" (constant velocities), "breakaway" (torque ramps), "presliding" and "attraction" (GMS),
-        "hysteresis" (a measured friction along its motion), "lugre" (sigma0, sigma1), "inertia" (frequency response).
+        "hysteresis" (a measured friction along its motion), "lugre" (sigma0, sigma1), "inertia" (frequency response),
+        "cogging" (torque or current over the angle).
     law : str, Law or sequence of these, optional
         A law's name or file, or "all". Of several the error on data left out chooses; None: the method's candidates.
     hold_out : log or sequence of logs
@@ -100,8 +102,8 @@ def identify(
         count, span): with it and a reference in the log the closed loop is simulated. One for all logs, or one each.
     loop_output : {"torque", "current", "voltage"}, optional
         What its output is where no drive signal is recorded.
-    inverse, per_direction, pendulum, drive_gain, resistance, extra_torque, torque_is, delay, harmonics, load, \
-intervals, robust
+    inverse, per_direction, pendulum, drive_gain, resistance, extra_torque, torque_is, delay, harmonics, \
+position_map, load, intervals, robust
         As in `stickslip.identify.methods.method.Options`.
     accept : sequence of str
         Codes of errors of the doctor that count as warnings, since you know better.
@@ -120,7 +122,7 @@ intervals, robust
         One line that names the thing, its value and the remedy; an error of the doctor, too.
     """
     kind = method_named(method)
-    refused_for(method, kind.holds_out, threshold, bool(_listed(hold_out)))
+    refused_for(method, kind.holds_out, threshold, bool(_listed(hold_out)), position_map)
     regress = Regressions()
     laws, left_out = laws_of(law)
     known = dict(values or {}) | ({} if inertia is None else {"inertia": inertia})
@@ -129,8 +131,9 @@ intervals, robust
         model if model is None or isinstance(model, Model) else Model.from_file(model), noise, torque_channel, elements,
         threshold, 0, inverse, per_direction, pendulum, drive_gain, reading.get("torque_constant"), resistance,
         loop_output, extra_torque, torque_is, delay, harmonics, load, intervals, robust, regress, progress,
+        position_map,
     )  # fmt: skip
-    examiner = Examiner(accept, regress, tell)
+    examiner = Examiner((*accept, *(["missing-column"] if kind.takes_current else [])), regress, tell)
     sources = sources_of(logs, _listed(hold_out), loop, reading, examiner)
     records = [s.record for s in sources]
     options = replace(options, held_out=sum(s.held_out for s in sources))
@@ -152,10 +155,12 @@ intervals, robust
     return IdentificationResult(found, tuple(sources), law_file(found, () if inverse else laws))
 
 
-def refused_for(method: str, holds_out: bool, threshold: float | None, hold_out: bool) -> None:
+def refused_for(method: str, holds_out: bool, threshold: float | None, hold_out: bool, over: bool) -> None:
     """Refuse what the method would not look at."""
     if threshold is not None and method != "breakaway":
         raise InputError(f"--threshold is for --method breakaway; --method {method} has none")
+    if over and method != "axis":
+        raise InputError(f"--position is for --method axis; --method {method} has none")
     if hold_out and not holds_out:
         raise InputError(f"--hold-out is for --method axis; --method {method} has none")
 
@@ -261,7 +266,13 @@ def about(record: Record) -> dict[str, Any]:
 def friction_alone(records: Sequence[Record], options: Options) -> bool:
     """Whether a record holds what an axis has no equation of motion for: friction as a sensor measures it."""
     channels = set[str]().union(*(r.channels for r in records))
-    asked = options.inverse or options.held_out or len(records) != 1 or records[0].meta.get("loop")
+    asked = (
+        options.inverse
+        or options.position_map
+        or options.held_out
+        or len(records) != 1
+        or records[0].meta.get("loop")
+    )
     return not asked and "friction_torque" in channels and not channels & set(DRIVES)
 
 

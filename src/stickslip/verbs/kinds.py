@@ -12,6 +12,10 @@ __all__ = ["kind_of", "require"]
 WORDS = {
     "record": ("a record", "a record (CSV, MAT, HDF5, Parquet, ...)"),
     "model": ("a model", "a model (what `stickslip identify` wrote)"),
+    "map": (
+        "a torque over the angle",
+        "a torque over the angle (what `stickslip identify --method cogging` wrote)",
+    ),
     "study": ("a study", "a study (tables [friction.NAME], [references.NAME], ...)"),
     "sweep": ("a sweep", "a sweep (`study` and tables [vary.NAME])"),
     "tuning": ("a sweep with a table [tune]", "a sweep with a table [tune]"),
@@ -23,6 +27,7 @@ WORDS = {
 TAKEN_BY = {
     "record": "`stickslip identify {0}` makes a model of it, `stickslip doctor {0}` checks it",
     "model": "`stickslip recommend {0}`, `stickslip export {0} --to ...` and `stickslip compare A.toml B.toml` take it",
+    "map": "`stickslip export {0} --to moteus` and other targets of a map take it",
     "study": "`stickslip study {0}` runs it",
     "sweep": "`stickslip sweep {0}` runs it",
     "tuning": "`stickslip tune {0}` runs it",
@@ -54,6 +59,8 @@ def kind_of_toml(table: Mapping[str, Any]) -> str:
     """One of `WORDS`; "" where the tables do not tell."""
     if "law" in table and ("parameters" in table or "format" in table):
         return "model"
+    if "position_map" in table:
+        return "map"
     if "study" in table:
         return "tuning" if "tune" in table else "sweep"
     if "rig" in table:

@@ -15,13 +15,14 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding
 from stickslip.readers import profiles
 from stickslip.readers._convert import Drive
+from stickslip.readers._table import Table
 from stickslip.readers.cut import Cut, cut, parse_rows, unwrapped
 from stickslip.readers.in_memory import digest_of, table_in_memory, table_of_signals
 from stickslip.readers.reading import joined, open_table, record_of, with_source
 from stickslip.record import Record
 from stickslip.verbs.kinds import require
 
-__all__ = ["ARRAYS", "Log", "Opened", "Reading", "beside_of", "named", "open_log", "read"]
+__all__ = ["ARRAYS", "Log", "Opened", "Reading", "beside_of", "columns_of", "named", "open_log", "read"]
 
 Log = str | os.PathLike[str] | Record | Any
 """A path, a `Record`, a data frame, a mapping of arrays, or a structured array."""
@@ -96,12 +97,14 @@ class Reading(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Opened:
-    """A record, the profile that was used, the one that was written, and what is to be said of them."""
+    """A record, the profile that was used, the one that was written, and what is to be said of them; of a file also
+    the name and unit of every column that it has, used or not."""
 
     record: Record
     used: Path | None = None
     written: Path | None = None
     notes: tuple[Finding, ...] = ()
+    columns: tuple[tuple[str, str], ...] = ()
 
     @property
     def tells_numbers(self) -> bool:
@@ -172,16 +175,18 @@ def open_log(
     signals = {SHORT.get(n, n): said[n] for n in SIGNALS if said.get(n) is not None}
     if signals:
         if log is not None:
-            raise InputError(f"{', '.join(signals)} and a log are two records; give one of them")
+            raise InputError(f"{', '.join(signals)} and a log exclude each other; give one of them")
         return Opened(_part(_of_signals(signals, reading), reading, "the arrays"))
     if reading.get("units"):
-        raise InputError("units belongs to arrays by name; say a column's unit in map, such as q:deg")
+        raise InputError("units is for arrays; give the unit of a column in map, such as q:deg")
     if log is None:
         raise InputError("no log; give a path, a data frame, or arrays: t=..., position=..., torque=...")
     if isinstance(log, Record):
         for name in COLUMNS:
             if reading.get(name):
-                raise InputError(f"{name} is for reading columns, and a Record is read already; leave it out")
+                raise InputError(
+                    f"{name} applies to columns of files and frames, not to a Record; leave it out"
+                )
         return Opened(_part(log, reading, "the record"))
     if isinstance(log, (str, os.PathLike)):
         return _of_file(Path(cast("str", log)), reading, accept)
@@ -191,9 +196,7 @@ def open_log(
 def _of_signals(signals: Mapping[str, ArrayLike], reading: Reading) -> Record:
     for name in ("map", "profile", "beside"):
         if reading.get(name):
-            raise InputError(
-                f"{name} is for columns of files and frames; arrays say by their names what they are"
-            )
+            raise InputError(f"{name} applies to columns of files and frames, not to arrays; leave it out")
     units = {SHORT.get(n, n): unit for n, unit in reading.get("units", {}).items()}
     table, mapping = table_of_signals(signals, units)
     record = record_of(table, mapping, drive=_drive(reading), sample_time=reading.get("sample_time"))
@@ -250,7 +253,23 @@ def _of_file(path: Path, reading: Reading, accept: Callable[[Record], object]) -
             notes += tuple(profiles.misfits(kept, record, said.drive.known()))
         record.meta["reading"]["findings"] += [note.as_data() for note in notes]
         record.meta["reading"]["profile"] = str(used) if used and notes and not written else ""
-    return Opened(with_source(record, path), used, written, notes)
+    return Opened(with_source(record, path), used, written, notes, named_columns(table))
+
+
+def columns_of(path: str | os.PathLike[str]) -> tuple[tuple[str, str], ...]:
+    """Name and unit of every column of a file, as they stand there: what `map` may name.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or its format is not known.
+    """
+    return named_columns(open_table(path))
+
+
+def named_columns(table: Table) -> tuple[tuple[str, str], ...]:
+    """Name and unit of every column."""
+    return tuple((c.name, c.unit) for c in table.columns)
 
 
 def _part(record: Record, reading: Reading, name: str) -> Record:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
@@ -12,18 +12,20 @@ from typing import Any, Literal, cast
 
 from stickslip.approval import allow_code
 from stickslip.config import Table, named_numbers
+from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.recommended import recommended_in
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, UnknownName
-from stickslip.identify import recommend as setting
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.motion import Motion, motion_of
-from stickslip.identify.recommend import Candidate, Recommendation
-from stickslip.identify.setting_file import setting_table, write_setting
-from stickslip.identify.setting_trial import Drive
+from stickslip.identify.setting import recommend as setting
+from stickslip.identify.setting.candidate_run import Drive
+from stickslip.identify.setting.file import setting_table, write_setting
+from stickslip.identify.setting.recommend import Candidate, Recommendation
+from stickslip.machines.machine import Machine, load_machine
 from stickslip.model import Model
 from stickslip.readers.reading import read
 from stickslip.report.recommendation_text import recommendation_lines, reduction, safety
@@ -40,7 +42,7 @@ class RecommendationResult:
 
     Attributes
     ----------
-    recommendation : stickslip.identify.recommend.Recommendation
+    recommendation : stickslip.identify.setting.recommend.Recommendation
     identified : stickslip.identify.identified_file.Identified
         What it was made for.
     """
@@ -75,6 +77,9 @@ class RecommendationResult:
         InputError
             Where no compensator is recommended.
         """
+        if self.recommendation.instead is not None:
+            assert self.recommendation.instead.controller is not None
+            return self.recommendation.instead.controller
         loop, model = self.loop, self.model
         assert self.chosen is not None
         if isinstance(loop, SampledController):
@@ -134,6 +139,8 @@ class RecommendationResult:
         return "\n".join(recommendation_lines(self.recommendation, self.identified.unit))
 
     def __repr__(self) -> str:
+        if self.recommendation.instead is not None:
+            return f"<RecommendationResult: {self.recommendation.instead.label}>"
         if self.chosen is None:
             return "<RecommendationResult: no compensator>"
         x = self.chosen.setting
@@ -170,14 +177,16 @@ def recommend(
     linear: Literal["PD", "PID", "PR"] = "PD",
     loop: str | Mapping[str, float] | None = None,
     controller: SampledController | str | os.PathLike[str] | None = None,
-    sample_time: float = 1e-3,
-    counts_per_rev: float = 0.0,
+    machine: Machine | str | os.PathLike[str] | None = None,
+    sample_time: float | None = None,
+    counts_per_rev: float | None = None,
     torque_limit: float = math.inf,
     motion: Log | None = None,
     amplitude: float | None = None,
     frequency: float | None = None,
     inertia: float | None = None,
     feed_inertia: bool = True,
+    compensators: Sequence[str] = (),
     axes: int = 6,
     confirm: int = 39,
     progress: Callable[[int, int], None] = lambda done, of: None,
@@ -186,7 +195,7 @@ def recommend(
 
     Candidates are simulated on the best estimate and on axes drawn from the model's intervals, along the motion of the
     log and at rest behind it, sampled as in the drive. Recommended is what limit-cycles on none of them and leaves the
-    least error on the worst; then it is simulated on other axes drawn from the intervals.
+    least error on the worst; then it is simulated on other axes sampled from the intervals.
 
     Parameters
     ----------
@@ -203,10 +212,14 @@ def recommend(
     controller : SampledController or path, optional
         The drive's own loop made of control laws instead, observers and all, but without friction laws; a path is that
         of a file with a table [controller].
-    sample_time : float
-        Of the drive, s.
-    counts_per_rev : float
-        Of the encoder; 0: exact.
+    machine : Machine or path, optional
+        The machine at hand (a name of the library, or the path of its TOML file): candidates then run on it, with its
+        resonances, delay, amplifier, encoder and noise, and the identified friction and inertia. Without it on rigid
+        axes.
+    sample_time : float, optional
+        Of the drive, s; the machine's, or 1e-3.
+    counts_per_rev : float, optional
+        Of the encoder; 0: exact. The machine's, or 0.
     torque_limit : float
         N·m
     motion : log, optional
@@ -217,6 +230,9 @@ def recommend(
         kg·m², where the model has none, or another one.
     feed_inertia : bool
         Whether the inertia times the reference's acceleration is fed forward, too.
+    compensators : sequence of str
+        Of the catalogue of `stickslip study compensators` (observers, adaptation, sliding modes, resets), which are
+        tried besides and switched on where one leaves less; ("all",) for all of them.
     axes : int
         Drawn from the intervals for all candidates.
     confirm : int
@@ -233,33 +249,28 @@ def recommend(
     InputError
         One line that names the thing, its value and the remedy.
     """
-    if axes < 1:
-        raise InputError(
-            f"--axes {axes} must be at least 1: what is safe on the best estimate alone need not be on the machine"
-        )
-    if confirm < 0:
-        raise InputError(
-            f"--confirm {confirm} must be at least 0, which confirms nothing; leave it out for 39"
-        )
-    if motion is not None and amplitude is not None:
-        raise InputError("--motion and --amplitude are two motions; give one of them")
-    if frequency is not None and amplitude is None:
-        raise InputError(f"--frequency {frequency:g} belongs to a sinusoid; give its --amplitude too")
-    if loop and linear != "PD":
-        raise InputError(f"--linear {linear} beside --loop, which gives the gains themselves; leave it out")
+    refuse_numbers(axes, confirm)
+    refuse_together(motion, amplitude, frequency, loop, linear)
+    tried = compensators_of(compensators)
     found = identified_of(model)
+    at_hand = load_machine(machine) if isinstance(machine, (str, os.PathLike)) else machine
+    if at_hand is not None:
+        sample_time = at_hand.sample_time if sample_time is None and controller is None else sample_time
+        counts_per_rev = at_hand.encoder.counts if counts_per_rev is None else counts_per_rev
     path = None if motion is None else motion_in(motion)
     if controller is not None:
-        for option, value, usual in (
-            ("loop", loop, None), ("linear", linear, "PD"), ("bandwidth", bandwidth, 10.0), ("damping", damping, 1.0),
-            ("sample-time", sample_time, 1e-3),
-        ):  # fmt: skip
-            if value != usual:
-                raise InputError(f"--{option} beside --controller {controller}, which says it; leave it out")
+        refuse_beside(
+            controller,
+            loop=loop,
+            linear=linear,
+            bandwidth=bandwidth,
+            damping=damping,
+            sample_time=sample_time,
+        )
         drive = drive_with(
             controller,
             inertia or found.axis.get("inertia"),
-            counts_per_rev,
+            counts_per_rev or 0.0,
             torque_limit,
             amplitude,
             frequency,
@@ -268,16 +279,91 @@ def recommend(
     else:
         gains, own = loop_of(loop) if loop else (None, dict[str, float]())
         if "limit" in own and math.isfinite(torque_limit):
-            raise InputError(f"--torque-limit {torque_limit:g} beside --loop's limit; give one of them")
+            raise InputError(
+                f"--torque-limit {torque_limit:g} and the limit of --loop exclude each other; give one of them"
+            )
         drive = Drive(
-            bandwidth, damping, sample_time, counts_per_rev, own.get("limit", torque_limit), amplitude,
+            bandwidth, damping, 1e-3 if sample_time is None else sample_time, counts_per_rev or 0.0,
+            own.get("limit", torque_limit), amplitude,
             frequency or 0.5, linear, gains, own.get("filter", 0.0), path,
         )  # fmt: skip
+    if at_hand is not None:
+        most = at_hand.limits.get("torque", math.inf)
+        drive = replace(drive, machine=at_hand, torque_limit=min(drive.torque_limit, most))
     with allow_code(bool(found.law_file)):  # its model has been read: whoever must approve it has
         result = setting.recommend(
-            found, drive, inertia=inertia, axes=axes, confirm=confirm, progress=progress, feed_inertia=feed_inertia
+            found, drive, inertia=inertia, axes=axes, confirm=confirm, progress=progress, feed_inertia=feed_inertia,
+            compensators=tried,
         )  # fmt: skip
     return RecommendationResult(result, found)
+
+
+def refuse_numbers(axes: int, confirm: int) -> None:
+    """Refuse numbers of axes that show nothing.
+
+    Raises
+    ------
+    InputError
+    """
+    if axes < 1:
+        raise InputError(
+            f"--axes {axes} must be at least 1: what is safe on the best estimate alone need not be on the machine"
+        )
+    if confirm < 0:
+        raise InputError(
+            f"--confirm {confirm} must be at least 0, which confirms nothing; leave it out for 39"
+        )
+
+
+def refuse_together(
+    motion: object | None, amplitude: float | None, frequency: float | None, loop: object, linear: str
+) -> None:
+    """Refuse what excludes each other.
+
+    Raises
+    ------
+    InputError
+    """
+    if motion is not None and amplitude is not None:
+        raise InputError("--motion and --amplitude exclude each other; give one of them")
+    if frequency is not None and amplitude is None:
+        raise InputError(f"--frequency {frequency:g} needs a sinusoid; give --amplitude too")
+    if loop and linear != "PD":
+        raise InputError(
+            f"--linear {linear} cannot be combined with --loop, which sets the gains; leave it out"
+        )
+
+
+def refuse_beside(controller: object, **given: object) -> None:
+    """Refuse what a controller's own file sets, where it was given too.
+
+    Raises
+    ------
+    InputError
+    """
+    usual = {"loop": None, "linear": "PD", "bandwidth": 10.0, "damping": 1.0, "sample_time": None}
+    for name, value in given.items():
+        if value != usual[name]:
+            option = name.replace("_", "-")
+            raise InputError(
+                f"--{option} cannot be combined with --controller {controller}, which sets it; leave it out"
+            )
+
+
+def compensators_of(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of the catalogue; all of it for ("all",).
+
+    Raises
+    ------
+    UnknownName
+        If there is none of a name.
+    """
+    if tuple(names) == ("all",):
+        return tuple(CATALOGUE)
+    for name in names:
+        if name not in CATALOGUE:
+            raise UnknownName("compensator", name, (*CATALOGUE, "all"))
+    return tuple(names)
 
 
 def drive_with(

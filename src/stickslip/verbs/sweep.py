@@ -139,7 +139,7 @@ def sweep(
     """
     planned = sweep_of(file, cases)
     if jobs < 0:
-        raise InputError(f"--jobs {jobs} must be at least 1; leave it out for one block a core")
+        raise InputError(f"--jobs {jobs} must be at least 1; leave it out for one block per core")
     insist_on_jobs(jobs or 1)
     out = Path(folder) if folder is not None else Path(f"sweep-{planned.name}")
     execute.ready(planned, scheduler)

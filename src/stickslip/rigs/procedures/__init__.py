@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 __all__ = ["PROCEDURES", "procedure"]
 
 PROCEDURES = (
-    "inertia", "resonance", "breakaway", "sliding", "presliding", "stickslip", "attraction", "track", "repeat",
+    "inertia", "resonance", "breakaway", "sliding", "presliding", "stickslip", "attraction", "cogging",
+    "standstill", "track", "repeat",
 )  # fmt: skip
 
 

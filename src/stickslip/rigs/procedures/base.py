@@ -24,7 +24,7 @@ from stickslip.errors import InputError, RigError, suggestion
 from stickslip.record import Record
 from stickslip.rigs._control import COLUMNS, UNITS
 from stickslip.rigs.loop import Loop
-from stickslip.rigs.pace import Account
+from stickslip.rigs.realtime import Account
 from stickslip.rigs.rig import Rig
 
 __all__ = ["Check", "CheckFailed", "Performed", "Plan", "Procedure", "Step", "Steps", "perform", "planned"]

@@ -30,7 +30,7 @@ class Repeat(Track):
     def plan(self, rig: Rig) -> Plan:
         """Every repetition."""
         one = Track.plan(self, rig)
-        text = (*one.text, f"{self.times} times, {self.interval:g} s from one beginning to the next")
+        text = (*one.text, f"{self.times} times, {self.interval:g} s from one start to the next")
         return replace(
             one, duration=self.times * one.duration, text=text,
             pauses=self.wait + (self.times - 1) * max(self.interval - one.duration, 0.0),

@@ -1,7 +1,7 @@
 """Sliding: the velocities of thesis (4.1) and (4.3), from the greatest, 380 degrees each, both directions.
 
 A PID holds each velocity as a ramp of position (the thesis used an H-infinity controller). The torque of a revolution
-is averaged by `stickslip.identify.segments`; the first 20 degrees are its transient.
+is averaged by `stickslip.identify.sliding.segments`; the first 20 degrees are its transient.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ class Sliding(Procedure):
     name: ClassVar[str] = "sliding"
     title: ClassVar[str] = "friction at constant velocities, both directions (4.3.1.1.2)"
     signed: ClassVar[tuple[str, ...]] = ("velocities",)
+    longest: ClassVar[float] = LONGEST
 
     velocities: tuple[float, ...] = DRY
     degrees: float = 380.0
@@ -70,7 +71,7 @@ class Sliding(Procedure):
             ),
             (self.rest + SHORT) * len(self.speeds),
             # One velocity at a time, and of all the averaged rows.
-            travel / min(self.speeds) + max(rise) + total * min(1.0, rig.sample_time / LONGEST),
+            travel / min(self.speeds) + max(rise) + total * min(1.0, rig.sample_time / self.longest),
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:
@@ -84,7 +85,7 @@ class Sliding(Procedure):
                 begin, v = float(rows[-1, POSITION]), direction * speed
                 ramp, level, _ = uniform(rig, begin, v, travel, self.inertia)
                 yield Step(ramp, loop)
-                most = max(1, round(LONGEST / rig.sample_time))
+                most = max(1, round(self.longest / rig.sample_time))
                 rows = yield Step(
                     level,
                     loop,

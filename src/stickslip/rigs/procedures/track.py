@@ -12,10 +12,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from stickslip.config import read_toml
+from stickslip.control import catalogue
+from stickslip.control.belief import believed
+from stickslip.control.compensator import COMPENSATORS
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.linear import LINEAR, Gains, place
-from stickslip.control.recommended import KINDS, read_recommended
+from stickslip.control.recommended import read_recommended
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, UnknownName
 from stickslip.machines.angle import AngleMap
@@ -38,6 +41,8 @@ RECOMMENDED = ("linear", "bandwidth", "damping", "inertia", "gain", "filter", "l
 """Options that a recommendation sets: it was simulated and measured with these, and with no others."""
 BESIDE_FILE = ("linear", "bandwidth", "damping", "compensator", "model", *RECOMMENDED[4:], "substeps")
 """Options of what the file of a controller says itself."""
+MADE = tuple(name for name in catalogue.CATALOGUE if name != "none")
+"""Compensators of the catalogue."""
 HIGHEST = 0.1
 """Of the sample rate, that a bandwidth may be"""
 
@@ -51,7 +56,9 @@ class Track(Procedure):
     one of the machine's, its ``gain``, ``filter`` (Hz, 0: the machine's), ``lead`` (s, of feedforward), ``deadband``
     (rad/s), ``offset`` (N·m) and ``inertia_feedforward`` (kg·m²); or recommended: all of that from the ``model``, a
     recommended.toml of `stickslip rig commission` (of this machine) or `stickslip recommend`, and none of it given
-    beside it. ``substeps`` divide the law's step over a sample, whichever compensator it is. What a file knows of the
+    beside it; or one of the catalogue (`stickslip.control.catalogue`: dob, ff-dob, ...), whose numbers follow from
+    ``inertia``, ``bandwidth`` and the ``model`` (the machine's LuGre law, where none is given). ``substeps`` divide the
+    law's step over a sample, whichever compensator it is. What a file knows of the
     angle (``[angle]``) is compensated as well. Instead of all of it ``controller`` may be a TOML file with a table
     ``[controller]`` that is made of control laws (`stickslip.control.files`; ``friction`` in it may name a model of the
     machine); ``inertia`` is that of the axis where the file has no ``[axis]``. ``duration`` in s (0: the reference's
@@ -89,8 +96,8 @@ class Track(Procedure):
         beside = [name for name in BESIDE_FILE if name in given]
         if beside and given.get("controller"):
             raise InputError(
-                f"{beside[0]} = {given[beside[0]]} beside controller = {given['controller']}, which says all of it; "
-                "leave it out, or write it into the file"
+                f"{beside[0]} = {given[beside[0]]} cannot be combined with controller = {given['controller']}, which "
+                "defines it; leave it out, or write it into the file"
             )
         return super().with_options(given)
 
@@ -111,12 +118,28 @@ class Track(Procedure):
             If a name is unknown, the model is missing, or the file has no controller made of control laws.
         """
         if not self.controller:
-            return self.compensated(rig)
-        machine: Any = getattr(rig, "machine", None)
-        known: dict[str, Model] = dict(machine.models) if machine is not None else {}
-        found = read_controller(self.controller, self.inertia, known)
+            return self.catalogued(rig) if self.compensator in MADE else self.compensated(rig)
+        found = read_controller(self.controller, self.inertia, models_of(rig))
         limit = ROOM * rig.limits.torque
         return dataclasses.replace(found, torque_limit=min(found.torque_limit, limit))
+
+    def catalogued(self, rig: Rig) -> SampledController:
+        """The controller with a compensator of the catalogue, made for the law that is believed of the machine.
+
+        Raises
+        ------
+        InputError
+            If no law is known, the compensator needs another one, or it has no place in the loop.
+        """
+        known = models_of(rig)
+        law = self.law(rig) if self.model or "lugre" not in known else known["lugre"]
+        belief = believed(
+            law, self.inertia, sample_time=rig.sample_time, torque_limit=ROOM * rig.limits.torque,
+            bandwidth=self.bandwidth,
+        )  # fmt: skip
+        if belief.elements is None and "gms" in known and not self.model:
+            belief = dataclasses.replace(belief, elements=known["gms"])
+        return dataclasses.replace(catalogue.compensated(self.compensator, self.linear, belief), alone=False)
 
     def compensated(self, rig: Rig) -> Controller:
         """The controller with a compensator that the options describe."""
@@ -137,13 +160,14 @@ class Track(Procedure):
         limit = ROOM * rig.limits.torque - self.angle().largest
         if self.compensator == "none":
             return Controller(gains, None, limit, rig.sample_time)
-        if self.compensator not in KINDS:
-            raise UnknownName("compensator", self.compensator, ("none", *KINDS, "recommended"))
+        if self.compensator not in COMPENSATORS:
+            names = ("none", *COMPENSATORS, "recommended", *MADE)
+            raise UnknownName("compensator", self.compensator, names)
         machine: Any = getattr(rig, "machine", None)
         corner = self.filter or (machine.filter if machine is not None else 0.0)
         corner = corner if math.isfinite(corner) else 0.0
         law = self.angle().on(self.law(rig))
-        helper = KINDS[self.compensator](
+        compensator = COMPENSATORS[self.compensator](
             law,
             self.gain,
             corner or None,
@@ -153,7 +177,7 @@ class Track(Procedure):
             self.inertia_feedforward,
             self.substeps,
         )
-        return Controller(gains, helper, limit, rig.sample_time)
+        return Controller(gains, compensator, limit, rig.sample_time)
 
     def recommended(self, machine: str) -> Track:
         """This with what the file of the model recommends; without a filter where the file names none.
@@ -174,7 +198,7 @@ class Track(Procedure):
         found = read_recommended(self.model)
         if found.machine and machine_in(found.machine) != machine_in(machine):
             raise InputError(
-                f"{self.model} is recommended for {found.machine!r}, and this is {machine!r}: it may shake here; "
+                f"{self.model} is recommended for {found.machine!r}, and this is {machine!r}: it may oscillate here; "
                 f"commission this machine, or give the settings themselves (compensator={found.compensator}, "
                 f"gain={found.gain:g}, ...)"
             )
@@ -194,8 +218,7 @@ class Track(Procedure):
 
     def law(self, rig: Rig) -> Model:
         """The compensator's model."""
-        machine: Any = getattr(rig, "machine", None)
-        known: dict[str, Model] = dict(machine.models) if machine is not None else {}
+        known = models_of(rig)
         if self.model in known:
             return known[self.model]
         if self.model.endswith(".toml"):
@@ -257,6 +280,12 @@ class Track(Procedure):
         )  # fmt: skip
 
 
+def models_of(rig: Rig) -> dict[str, Model]:
+    """The laws that are believed of a virtual rig's machine, by name."""
+    machine: Any = getattr(rig, "machine", None)
+    return dict(machine.models) if machine is not None else {}
+
+
 def machine_in(rig: str) -> str:
     """The machine of a rig's name, whatever imperfections were switched off."""
     return rig.partition(" without ")[0]
@@ -265,7 +294,8 @@ def machine_in(rig: str) -> str:
 def beside_recommended(name: str, value: object) -> str:
     """What is wrong with an option that the recommendation sets."""
     return (
-        f"{name} = {value} beside compensator = recommended, which sets it; leave it out, or give compensator = "
+        f"{name} = {value} cannot be combined with compensator = recommended, which sets it; leave it out, or "
+        "give compensator = "
         f"feedforward or feedback with its own {', '.join(RECOMMENDED)}"
     )
 

@@ -15,11 +15,11 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
-from stickslip.identify.hysteresis import Loop, correlation_lags
+from stickslip.identify.presliding.hysteresis import Loop, correlation_lags
 from stickslip.machines.angle import AngleMap, harmonic_sum
 from stickslip.model import Model
 from stickslip.record import Record
-from stickslip.simulation.along import Along
+from stickslip.simulation.prescribed.motion import Along
 
 __all__ = ["LAGS", "lag_of"]
 

@@ -9,10 +9,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.identify.attraction import largest_without_overshoot
-from stickslip.identify.breakaway import student
-from stickslip.identify.draws import WIDEST
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.monte_carlo import WIDEST
+from stickslip.identify.presliding.attraction import largest_without_overshoot
+from stickslip.identify.presliding.breakaway import student
 from stickslip.model import Model
 from stickslip.record import Record
 
@@ -102,7 +102,7 @@ def with_lag(
     model : Model
         With the C of the rule.
     lag : Identification or None
-        Of `stickslip.commission.lag`.
+        Of `stickslip.commission.friction_lag`.
     said : tuple of str
         What is to be said of the rule.
     """

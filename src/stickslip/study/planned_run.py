@@ -1,0 +1,142 @@
+"""One closed loop of a study: what it is made of, its name, and the fingerprint of all that its numbers depend on."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from stickslip.control.controller import Controller
+from stickslip.control.sampled_controller import SampledController
+from stickslip.control_spec import ControlLaw
+from stickslip.errors import ConfigError, InputError
+from stickslip.machines.machine import Machine
+from stickslip.machines.numbers import machine_numbers
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model, Reference
+from stickslip.simulation.closed_loop import check_machine_run, integrator_for, prepare
+from stickslip.study.build import Numerics
+from stickslip.study.provenance import engine_hash, source_hash
+
+__all__ = ["OWN", "PlannedRun", "control_laws_of", "described", "frictions_of"]
+
+OWN = "own"
+"""What stands for the slip rule in the name of a run whose laws keep rules of their own."""
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One closed loop to be run, with the names by which the study calls its parts."""
+
+    slip_rule: str
+    reference: str
+    friction: str
+    controller: str
+    axis: RigidAxis | Machine
+    control: Controller | SampledController
+    motion: Reference
+    duration: float
+    numerics: Numerics
+
+    @property
+    def key(self) -> str:
+        """`slip_rule/reference/friction/controller`."""
+        return f"{self.slip_rule}/{self.reference}/{self.friction}/{self.controller}"
+
+    @property
+    def rule(self) -> str | None:
+        """The slip rule that the file gives for the whole run; None where each law keeps its own."""
+        return None if self.slip_rule == OWN else self.slip_rule
+
+    @functools.cached_property
+    def fingerprint(self) -> str:
+        """A hash of everything that determines the run's numbers."""
+        return hashlib.sha256(json.dumps(self._content(), sort_keys=True).encode()).hexdigest()
+
+    def _content(self) -> dict[str, Any]:
+        """What the fingerprint is made of."""
+        laws = [self.axis.friction.law, *(m.law for m in frictions_of(self.control))]
+        return {
+            "slip_rule": self.slip_rule,
+            "inertia": self.axis.inertia,
+            "friction": self.axis.friction.as_dict(),
+            **({"machine": described(self.axis)} if isinstance(self.axis, Machine) else {}),
+            **(
+                {"controller": self.control.as_dict()}
+                if isinstance(self.control, SampledController)
+                else _control_content(self.control)
+            ),
+            "reference": self.motion.as_dict(),
+            "duration": self.duration,
+            "numerics": asdict(self.numerics),
+            "laws": [source_hash(law.Params.__module__) for law in (*laws, *control_laws_of(self.control))],
+            "engine": engine_hash(),
+        }
+
+    def check(self) -> None:
+        """Find what is wrong with the run without running it; compiles its laws.
+
+        Raises
+        ------
+        InputError
+        """
+        n = self.numerics
+        try:
+            if isinstance(self.axis, Machine):
+                check_machine_run(
+                    self.axis, self.control, self.duration, n.output, n.integrator, slip_rule=self.rule
+                )
+                return
+            case = prepare(
+                self.axis, self.control, self.motion, self.duration,
+                tolerance=n.tolerance, slip_rule=self.rule, output=n.output,
+            )  # fmt: skip
+            integrator_for(case, n.integrator)
+        except InputError as error:
+            raise ConfigError(f"run {self.key}: {error}") from None
+
+
+def described(machine: Machine) -> dict[str, Any]:
+    """Everything of a machine that a run's numbers depend on."""
+    laws = {name: model.as_dict() for name, model in machine.models.items()}
+    return {**machine_numbers(machine), **machine.as_dict(), "sample_time": machine.sample_time,
+            "converters": repr((machine.amplifier, machine.sensor, machine.cogging, machine.contact.ripple)),
+            "models": laws}  # fmt: skip
+
+
+def frictions_of(control: Controller | SampledController) -> list[Model]:
+    """The friction laws that a controller holds."""
+    if isinstance(control, SampledController):
+        return [block.friction for block in control.blocks.values() if block.friction]
+    return [control.compensator.model] if control.compensator else []
+
+
+def control_laws_of(control: Controller | SampledController) -> list[ControlLaw]:
+    """The control laws that a controller is made of."""
+    blocks = control.blocks.values() if isinstance(control, SampledController) else ()
+    return [block.law for block in blocks]
+
+
+def _control_content(control: Controller) -> dict[str, Any]:
+    """What determines the numbers of a controller with gains and a compensator."""
+    compensator = control.compensator
+    sampled = [compensator.lead, compensator.deadband] if compensator and compensator.sampled else []
+    if compensator and (compensator.offset or compensator.inertia_feedforward):
+        sampled += [compensator.offset, compensator.inertia_feedforward]
+    if compensator and compensator.substeps != 1:
+        sampled += ["substeps", compensator.substeps]
+    filtered = [control.velocity_filter] if control.velocity_filter else []
+    return {
+        "gains": control.gains._asdict(),
+        "compensator": compensator
+        and [
+            compensator.name,
+            compensator.gain,
+            compensator.filter_hz,
+            compensator.model.as_dict(),
+            *sampled,
+        ],
+        "control": [control.torque_limit, control.sample_time, control.encoder_counts, *filtered],
+    }

@@ -1,0 +1,1 @@
+"""What only the thesis needs: its statements, judged on runs."""
