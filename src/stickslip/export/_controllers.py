@@ -1,15 +1,18 @@
-"""Controllers made of control laws, as their exports need them: functions as trees, counts, words, golden samples."""
+"""Controllers, as their exports need them: functions as trees, counts, words, golden samples."""
 
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+from stickslip.control.block import ControlBlock
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.export._analysis import merged
+from stickslip.export._nearest import read_by
 from stickslip.export._text import ascii_only
 from stickslip.export.golden import Samples, changing, random_motion, sampled_torques
 from stickslip.export.job import IDENTIFIER, Check, Export
@@ -17,10 +20,15 @@ from stickslip.spec import Surroundings
 from stickslip.subset import named
 
 __all__ = [
+    "STILL",
     "ControllerTarget",
     "checked_name",
+    "compensates_alone",
     "counts_of",
+    "depends_on",
+    "given_by",
     "golden_samples",
+    "head_of",
     "laws_of",
     "settings_of",
     "table_of",
@@ -28,11 +36,16 @@ __all__ = [
 ]
 
 
-class ControllerTarget(NamedTuple):
-    """What a target does with a controller made of control laws."""
+STILL = Surroundings()
+"""Where nothing is said."""
 
-    write: Callable[[SampledController, str, bool], Export]
-    """``write(controller, name, single)``; `InputError` where the name is none in the target's language"""
+
+class ControllerTarget(NamedTuple):
+    """What a target does with a controller."""
+
+    write: Callable[..., Export]
+    """``write(controller, name, single, around)``, where ``around`` holds until somebody sets it; `InputError` where
+    the name is none in the target's language"""
     check: Callable[[Export, str], Check] | None = None
     """``check(export, name)``: run the export in its tool against the golden samples"""
 
@@ -65,8 +78,54 @@ def counts_of(controller: SampledController) -> dict[str, int]:
 
 
 def settings_of(controller: SampledController) -> dict[str, float]:
-    """Numbers of the composition; the samples make the time."""
+    """Numbers of the composition; the samples make the time.
+
+    Raises
+    ------
+    InputError
+        If the controller acts in continuous time.
+    """
+    if controller.sample_time == 0.0:
+        raise InputError(
+            "a controller in continuous time cannot be exported; give it a sample_time greater than 0"
+        )
     return controller.settings._replace(clock=1.0)._asdict()
+
+
+def compensates_alone(controller: SampledController) -> bool:
+    """Whether it has no loop: its torque belongs to that of another controller."""
+    return not any(block.law.place == "loop" for block in controller.blocks.values())
+
+
+def depends_on(controller: SampledController) -> str:
+    """What the friction laws in it depend on besides velocities, for people."""
+    found = [read_by(block.friction) for block in controller.blocks.values() if block.friction]
+    return ", ".join(dict.fromkeys(words for words in found if words))
+
+
+def given_by(controller: SampledController) -> str:
+    """What its torque is made of, for people."""
+    blocks = {part: block for part, block in controller.blocks.items() if block.law.place != "estimator"}
+    parts = [_gives(part, block) for part, block in blocks.items()]
+    fed = [block.own for block in blocks.values() if block.law.name == "inertia_feedforward"]
+    if compensates_alone(controller):
+        parts += [] if any(own["offset"] for own in fed) else ["no constant torque"]
+        parts += [] if any(own["inertia"] for own in fed) else ["nothing for the inertia"]
+    limit = controller.torque_limit
+    return ", ".join([*parts, *([f"within ±{limit:.6g} N·m"] if math.isfinite(limit) else [])])
+
+
+def _gives(part: str, block: ControlBlock) -> str:
+    """What a law of the controller gives; parameters by their whole names."""
+    own = block.own
+    if block.law.name in ("friction_feedforward", "friction_feedback"):
+        velocity = "reference's" if block.law.place == "feedforward" else "measured"
+        return f"{own['gain']:.6g} times the friction law's torque at the {velocity} velocity"
+    if block.law.name == "inertia_feedforward":
+        offset = f"the constant torque `{part}_offset` = {own['offset']:.6g} N·m"
+        inertia = f"`{part}_inertia` = {own['inertia']:.6g} kg·m² times the reference's acceleration"
+        return ", ".join(words for words, x in ((offset, own["offset"]), (inertia, own["inertia"])) if x)
+    return f"the torque of `{part}` ({block.law.title})"
 
 
 def laws_of(controller: SampledController) -> list[str]:
@@ -84,13 +143,30 @@ def table_of(controller: SampledController) -> Iterable[Mapping[str, Any]]:
         yield {"name": f.name, "value": values[f.name], "unit": f.par.unit, "meaning": f.par.meaning}
 
 
-def golden_samples(controller: SampledController, count: int = 400, seed: int = 1) -> Samples:
-    """Random samples and the torque of plain Python, from the first sample on, while load and temperature change."""
+def head_of(controller: SampledController, name: str) -> dict[str, Any]:
+    """What every template begins with: the prefix of its names, the laws, the sample time, the table of parameters.
+
+    Raises
+    ------
+    InputError
+        If `name` is none in most languages.
+    """
+    return {
+        "x": checked_name(name), "laws": laws_of(controller), "sample_time": controller.sample_time,
+        "table": [*table_of(controller)], "given": given_by(controller), "alone": compensates_alone(controller),
+        "depends": depends_on(controller),
+    }  # fmt: skip
+
+
+def golden_samples(
+    controller: SampledController, around: Surroundings = STILL, count: int = 400, seed: int = 1
+) -> Samples:
+    """Random samples and the torque of plain Python, from the first one on, about this load and temperature."""
+    n, m = SimpleNamespace(**settings_of(controller)), controller.memory()
     stiffness = controller.values().get("loop_kp", 0.0)
     reach = controller.torque_limit / stiffness if stiffness else 1.0
     inputs = random_motion(controller.sample_time, reach, count, seed)
-    n, m = SimpleNamespace(**settings_of(controller)), controller.memory()
-    z, p, u = controller.state(), controller.parameters, SimpleNamespace(**Surroundings()._asdict())
-    sample, change = controller.functions["sample"], changing(Surroundings(), count, seed)
+    z, p, u = controller.state(), controller.parameters, SimpleNamespace(**around._asdict())
+    sample, change = controller.functions["sample"], changing(around, count, seed)
     torque = sampled_torques(lambda *row: sample(*row, n, m, z, p, u), u, inputs, change)
     return Samples(*inputs, torque, *change)

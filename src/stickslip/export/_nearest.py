@@ -18,7 +18,7 @@ import numpy as np
 
 from stickslip import plugins
 from stickslip.binding import NEGATIVE
-from stickslip.errors import InputError, ParameterError
+from stickslip.errors import ParameterError
 from stickslip.export._sliding import Curve
 from stickslip.export.job import CannotCarry, Job
 from stickslip.model import Model
@@ -207,8 +207,6 @@ def carried(job: Job, target: str, forms: Sequence[Form], also_lost: Sequence[st
     CannotCarry
         If all lose something and the job does not ask for the nearest.
     """
-    if job.controller is not None:
-        raise InputError(f"{target} carries a law alone, no controller")
     curve = Curve.of(job.model, job.top_speed, max(form.density for form in forms))
     near = [found for form in forms if (found := nearest(curve, form)) is not None]
     tried = [replace(found, lost=(*found.lost, *also_lost)) for found in near]

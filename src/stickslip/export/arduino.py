@@ -1,4 +1,4 @@
-"""Arduino: the C of a law, or of a whole controller, as a library with an example, in single precision."""
+"""Arduino: the C of a law as a library with an example, in single precision."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from stickslip.export import _c_control, c99
+from stickslip.export import c99
 from stickslip.export._text import ascii_only, render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target
+from stickslip.spec import Surroundings
 
 __all__ = ["TARGET", "tried"]
 
@@ -31,11 +32,8 @@ def write(job: Job) -> Export:
     c = c99.write(single).files
     x = job.name
     values: dict[str, Any] = {
-        "x": x, "title": ascii_only(job.model.law.title), "controller": job.controller is not None,
-        "surroundings": ", ".join(f"{u!r}f" for u in job.surroundings),
-        "sample_time": job.controller.sample_time if job.controller else 1e-3,
-        "given": _c_control.given_by(job.controller) if job.controller else "",
-        "alone": job.controller is not None and _c_control.compensates_alone(job.controller),
+        "x": x, "title": ascii_only(job.model.law.title),
+        "surroundings": ", ".join(f"{u!r}f" for u in Surroundings()), "sample_time": 1e-3,
     }  # fmt: skip
     return Export(
         {
@@ -101,7 +99,6 @@ TARGET = Target(
     "Arduino library, single precision",
     write,
     check,
-    controller=True,
-    around="position, load, temperature and time are yours to set in `u` (`_sample_turns` writes position and time)",
+    around="position, load, temperature and time are yours to set in `u`",
     tried="g++, avr-g++ (ATmega328P) and arm-none-eabi-g++; not on a board",
 )

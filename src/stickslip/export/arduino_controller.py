@@ -1,4 +1,4 @@
-"""Arduino: the C of a controller made of control laws as a library with an example, in single precision."""
+"""Arduino: the C of a controller as a library with an example, in single precision."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from stickslip.control.sampled_controller import SampledController
 from stickslip.export import c99_controller
-from stickslip.export._controllers import ControllerTarget, laws_of, table_of
+from stickslip.export._controllers import STILL, ControllerTarget, head_of
 from stickslip.export._text import render
 from stickslip.export.arduino import tried
 from stickslip.export.job import Export
@@ -15,16 +15,15 @@ from stickslip.spec import Surroundings
 __all__ = ["CONTROLLER"]
 
 
-def write(controller: SampledController, name: str, single: bool = True) -> Export:
+def write(
+    controller: SampledController, name: str, single: bool = True, around: Surroundings = STILL
+) -> Export:
     """Sources, an example, the library's properties, and the check of the C export."""
-    c = c99_controller.write(controller, name, single=True).files
+    c = c99_controller.write(controller, name, single=True, around=around).files
     values: dict[str, Any] = {
-        "x": name,
+        **head_of(controller, name),
         "title": "Sampled controller",
-        "laws": laws_of(controller),
-        "table": [*table_of(controller)],
-        "surroundings": ", ".join(f"{u!r}f" for u in Surroundings()),
-        "sample_time": controller.sample_time,
+        "surroundings": ", ".join(f"{u!r}f" for u in around),
         "controller": True,
         "sentence": "Controller of a servo axis.",
     }
@@ -38,7 +37,9 @@ def write(controller: SampledController, name: str, single: bool = True) -> Expo
             "library.properties": render("arduino.properties.j2", **values),
             f"extras/{name}_check.c": c[f"{name}_check.c"],
             "extras/golden_samples.csv": c["golden_samples.csv"],
-            "README.md": render("arduino_controller_readme.md.j2", **values),
+            "README.md": render(
+                "arduino_controller_readme.md.j2", **values, **c99_controller.step_error_of(controller)
+            ),
         }
     )
 

@@ -1,4 +1,4 @@
-"""C99: header and source of a law, optionally with its whole sampled controller.
+"""C99: header and source of a law.
 
 One definition feeds it: the functions of the law's file, printed by `stickslip.export._c`. In double precision
 and without contraction the code gives the bits of plain Python (tested); in single precision it is within
@@ -19,20 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.control.sampled import Memory, Settings, settings
 from stickslip.export._analysis import Facts, analyse, merged
 from stickslip.export._c import Dialect, functions, head, safe
-from stickslip.export._c_control import (
-    LAYOUTS,
-    PUBLIC,
-    compensates_alone,
-    entries_of,
-    given_by,
-    rows_of,
-    wide,
-)
 from stickslip.export._nearest import read_by
-from stickslip.export._step_error import PARTS, about_steps
+from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import (
     PACE,
@@ -41,12 +31,11 @@ from stickslip.export.golden import (
     answered,
     as_csv,
     golden_around,
-    golden_samples,
     room_beside_jumps,
 )
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
-from stickslip.spec import Field, Law, Surroundings, fields_of
+from stickslip.spec import Field, Law, Surroundings
 from stickslip.subset import law_layouts, named
 
 __all__ = ["SINGLE_BOUND", "TARGET", "checked", "dialect_of", "translated", "write"]
@@ -75,12 +64,12 @@ def dialect_of(job: Job) -> Dialect:
 
 
 def translated(job: Job) -> dict[str, Any]:
-    """The functions of the law, and of the controller where there is one, as trees of the subset."""
+    """The functions of the law as trees of the subset."""
     law = job.model.law
     # The public ones first: they have the right to their names.
     entries = {"_steady": law.steady, "_holding": law.holding, "_step": law.step}
     entries = {name: function for name, function in entries.items() if function}
-    return merged(named({**entries, **entries_of(job)}, {**law_layouts(law), **LAYOUTS}))
+    return merged(named(entries, law_layouts(law)))
 
 
 def write(job: Job) -> Export:
@@ -88,26 +77,23 @@ def write(job: Job) -> Export:
     law, p, dialect = job.model.law, job.model.parameters, dialect_of(job)
     trees = translated(job)
     known = analyse(trees)
-    public = [n for n in ("_step", "_steady", "_holding", *PUBLIC) if n in trees]
+    public = [n for n in ("_step", "_steady", "_holding") if n in trees]
     written = functions(trees, dialect, public)
     about = {name: ascii_only(first_line(doc)) for name, doc, _ in written}
     vectors = golden_around(job.model, PACE)
     room = jumps_of(job, vectors)
-    samples = golden_samples(job.controller, job.surroundings) if job.controller else None
     common: dict[str, Any] = {
         "substeps_head": substeps_head(dialect, known["_step"]), "step_arguments": known["_step"].arguments,
         "x": job.name, "X": job.name.upper(), "title": ascii_only(law.title), "real": dialect.real,
         "counts": {dialect.count(n): size for n, size in counts_in(job.model).items()},
         "source": ascii_only("; ".join(law.source)),
         "equation": textwrap.wrap(ascii_only(law.equation), 110, break_long_words=False),
-        "surroundings": ", ".join(dialect.number(x) for x in job.surroundings),
+        "surroundings": ", ".join(dialect.number(x) for x in Surroundings()),
         "moved": isinstance(vectors, Surrounded), "columns": len(vectors),
-        "still": ", ".join(dialect.number(x) for x in Surroundings()),
-        "depends": read_by(job.model), "controller": controller_of(job, dialect),
+        "depends": read_by(job.model),
         "bound": SINGLE_BOUND if job.single else 0.0,
         "scale": scale_of(vectors.torque),
-        "count": len(vectors.v0), "jumps": int((room > 0.0).sum()), "samples": rows_of(samples) if samples else [],
-        "samples_scale": scale_of(samples.torque) if samples else "", "wide": [*wide(known, dialect)],
+        "count": len(vectors.v0), "jumps": int((room > 0.0).sum()),
     }  # fmt: skip
     header = render(
         "c99.h.j2",
@@ -126,7 +112,6 @@ def write(job: Job) -> Export:
         identified=[*initial(law.fields, p._asdict(), dialect)],
         reset=[*cleared(law, dialect)],
     )
-    more = {"golden_samples.csv": as_csv(samples)} if samples else {}
     columns = [*vectors, *([room] if job.single else [])]
     rows = [", ".join(repr(float(x)) for x in row) for row in zip(*columns)]
     table = [
@@ -139,7 +124,6 @@ def write(job: Job) -> Export:
             f"{job.name}.c": source,
             f"{job.name}_check.c": render("c99_check.c.j2", **common, rows=rows),
             "golden.csv": as_csv(vectors),
-            **more,
             "README.md": render("c99_readme.md.j2", **common, **about_substeps(job), table=table),
         }
     )
@@ -163,15 +147,7 @@ def substeps_head(dialect: Dialect, step: Facts) -> str:
 def about_substeps(job: Job) -> dict[str, Any]:
     """What a README says of the error of a step, and how the C divides one."""
     said = f"`{job.name}_substeps(v0, v1, dt, count, ...)` divides a step, the velocity linear in between."
-    helper = job.controller.compensator if job.controller else None
-    if helper is None:
-        return about_steps(job.model, said)
-    sampled = (
-        f"The sampled controller divides its sample in the same way, into `n.substeps` = {helper.substeps}."
-    )
-    return about_steps(
-        job.model, f"{said} {sampled}", parts=helper.substeps if helper.substeps > 1 else PARTS
-    )
+    return about_steps(job.model, said)
 
 
 def scale_of(torque: Any) -> str:
@@ -196,9 +172,6 @@ def structures(job: Job, dialect: Dialect) -> Iterable[Mapping[str, Any]]:
         "about": "What the contact depends on besides its velocity.",
         "fields": around,
     }
-    if job.controller is not None:
-        yield structure("settings", "Settings of the sampled controller.", fields_of(Settings), dialect)
-        yield structure("memory", "What the controller remembers.", fields_of(Memory), dialect)
 
 
 def structure(name: str, about: str, fields: Sequence[Field], dialect: Dialect) -> Mapping[str, Any]:
@@ -258,22 +231,6 @@ def cleared(law: Law, dialect: Dialect) -> Iterable[str]:
         yield "z->none = 0;"
 
 
-def controller_of(job: Job, dialect: Dialect) -> Mapping[str, Any] | None:
-    """Initial values of the controller's structures."""
-    if job.controller is None:
-        return None
-    numbers = settings(job.controller)._replace(clock=1.0)._asdict()
-    zeros = dict.fromkeys(Memory._fields, 0.0)
-    return {
-        "init": [*given(fields_of(Settings), numbers, "n", dialect)],
-        "reset": [*given(fields_of(Memory), zeros, "m", dialect)],
-        "sample_time": numbers["sample_time"],
-        "alone": compensates_alone(job.controller),
-        "unlimited": math.isinf(job.controller.torque_limit),
-        "given": given_by(job.controller),
-    }
-
-
 # ---- the check -------------------------------------------------------------------------------------------------
 
 
@@ -321,7 +278,6 @@ TARGET = Target(
     write,
     check,
     precision=True,
-    controller=True,
-    around="position, load, temperature and time are yours to set in `u` (`_sample` writes position and time)",
+    around="position, load, temperature and time are yours to set in `u`",
     tried="gcc, clang: every bit",
 )

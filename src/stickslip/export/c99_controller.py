@@ -1,4 +1,4 @@
-"""C99: header and source of a sampled controller made of control laws.
+"""C99: header and source of a sampled controller.
 
 One definition feeds it: the text of its laws and of their composition, printed by `stickslip.export._c`. In double
 precision and without contraction the code gives the bits of plain Python (tested).
@@ -10,21 +10,23 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.sampled_controller import SampledController
 from stickslip.export._analysis import Facts, analyse
 from stickslip.export._c import Dialect, functions, head, safe
-from stickslip.export._c_control import rows_of
 from stickslip.export._controllers import (
+    STILL,
     ControllerTarget,
     checked_name,
     counts_of,
     golden_samples,
-    laws_of,
+    head_of,
     settings_of,
-    table_of,
     trees_of,
 )
+from stickslip.export._step_error import PARTS, about_steps
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.c99 import (
     SINGLE_BOUND,
@@ -36,11 +38,11 @@ from stickslip.export.c99 import (
     scale_of,
     structure,
 )
-from stickslip.export.golden import as_csv
+from stickslip.export.golden import Samples, as_csv
 from stickslip.export.job import Check, Export
 from stickslip.spec import Field, Surroundings, fields_of
 
-__all__ = ["CONTROLLER", "check", "write"]
+__all__ = ["CONTROLLER", "check", "step_error_of", "write"]
 
 PUBLIC = ("_sample", "_sample_turns", "_follow", "_follow_turns")
 NARROW = "float turns, float position, float reference_turns, float reference, "
@@ -50,7 +52,9 @@ WIDE = {
 }
 
 
-def write(controller: SampledController, name: str, single: bool = False) -> Export:
+def write(
+    controller: SampledController, name: str, single: bool = False, around: Surroundings = STILL
+) -> Export:
     """Header, source, golden samples, a program that checks them, and how to use it.
 
     Parameters
@@ -60,6 +64,8 @@ def write(controller: SampledController, name: str, single: bool = False) -> Exp
         Prefix of every name in C.
     single : bool
         Single precision.
+    around : Surroundings
+        What ``u`` holds until somebody sets it.
 
     Raises
     ------
@@ -67,8 +73,8 @@ def write(controller: SampledController, name: str, single: bool = False) -> Exp
         If `name` is none in C.
     """
     dialect = Dialect(checked_name(name), single, STRUCTURES)
-    common = {**code_of(controller, dialect), **numbers_of(controller, dialect)}
-    samples = golden_samples(controller)
+    common = {**code_of(controller, dialect), **numbers_of(controller, dialect, around)}
+    samples = golden_samples(controller, around)
     common |= {
         "rows": rows_of(samples),
         "bound": SINGLE_BOUND if single else 0.0,
@@ -80,7 +86,7 @@ def write(controller: SampledController, name: str, single: bool = False) -> Exp
             f"{name}.c": render("c99_controller.c.j2", **common),
             f"{name}_check.c": render("c99_controller_check.c.j2", **common),
             "golden_samples.csv": as_csv(samples),
-            "README.md": render("c99_controller_readme.md.j2", **common),
+            "README.md": render("c99_controller_readme.md.j2", **common, **step_error_of(controller)),
         }
     )
 
@@ -103,11 +109,10 @@ def code_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
     text = "\n".join(line for _, _, lines in written for line in lines)
     x = dialect.prefix
     return {
-        "x": x,
+        **head_of(controller, x),
         "X": x.upper(),
         "real": dialect.real,
         "title": "Sampled controller",
-        "laws": laws_of(controller),
         "structures": list(structures(controller, dialect)),
         "public": [{"about": about[n], "head": head(n, known[n], dialect)} for n in public],
         "wide": list(wide(known, dialect)),
@@ -117,19 +122,32 @@ def code_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
     }
 
 
-def numbers_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
+def numbers_of(controller: SampledController, dialect: Dialect, around: Surroundings) -> dict[str, Any]:
     """Values of the structures."""
     values = controller.values()
     return {
-        "sample_time": controller.sample_time,
         "unlimited": math.isinf(controller.torque_limit),
         "counts": {dialect.count(name): size for name, size in counts_of(controller).items()},
         "designed": [*initial(controller.fields, values, dialect)],
         "settings": [*given(fields_of(Settings), settings_of(controller), "n", dialect)],
         "reset": [*cleared(MEMORY, "m", dialect), *cleared(controller.state_fields, "z", dialect)],
-        "surroundings": ", ".join(dialect.number(x) for x in Surroundings()),
-        "table": [*table_of(controller)],
+        "surroundings": ", ".join(dialect.number(x) for x in around),
     }
+
+
+def rows_of(samples: Samples) -> list[str]:
+    """Golden samples as initializers of C."""
+    return [", ".join("(double)NAN" if np.isnan(x) else repr(float(x)) for x in row) for row in zip(*samples)]
+
+
+def step_error_of(controller: SampledController) -> dict[str, Any]:
+    """What a README says of the error of a friction law's step, and of how the controller divides it."""
+    for part, block in controller.blocks.items():
+        parts = int(block.own.get("substeps", 0))
+        said = f"The controller divides its sample in the same way, into `p.{part}_substeps` = {parts}."
+        if block.friction:
+            return about_steps(block.friction, said if parts else "", parts=parts if parts > 1 else PARTS)
+    return {"step_errors": []}
 
 
 def wide(known: Mapping[str, Facts], dialect: Dialect) -> Iterable[Mapping[str, Any]]:

@@ -42,7 +42,7 @@ class Moved(NamedTuple):
 def variables_of(job: Job) -> list[Variable]:
     """Inputs, output, parameters and state."""
     ports = [
-        Variable("velocity", "velocity", "input", "rad/s", "Velocity at the beginning of a step", 0.0),
+        Variable("velocity", "velocity", "input", "rad/s", "Velocity at the start of a step", 0.0),
         Variable("acceleration", "acceleration", "input", "rad/s2", "Slope of the velocity over a step", 0.0),
         *surroundings_read(job),
         Variable("friction_torque", "friction_torque", "output", "N.m", "Positive against positive velocity"),

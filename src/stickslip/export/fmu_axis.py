@@ -1,8 +1,9 @@
 """FMI 2.0 and 3.0 co-simulation: an axis with friction, J dv/dt = torque - friction torque.
 
 The input is the torque, held over a step; outputs are position, velocity and friction torque. Each step is cut into
-equal parts of at most ``max_step``, and each part is the two-stage L-stable SDIRK of `stickslip.simulation.driven`:
-at equal steps the unit moves as `stickslip.simulation.driven.drive_axis` does (tested).
+equal parts of at most ``max_step``, and each part is the two-stage L-stable SDIRK of
+`stickslip.simulation.recorded_input.simulation`: at equal steps the unit moves as its
+`drive_axis` does (tested).
 """
 
 from __future__ import annotations
@@ -100,7 +101,7 @@ def write(job: Job) -> Export:
 
 def driven(job: Job, count: int = 400, step: float = 1e-3, seed: int = 1) -> Driven:
     """A random torque, new every 20 steps and often below break-away, and the motion of `drive_axis` under it."""
-    from stickslip.simulation.driven import Drive, Mechanics, drive_axis
+    from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, drive_axis
 
     draw = np.random.default_rng(seed)
     law, p = job.model.law, job.model.parameters

@@ -1,4 +1,4 @@
-"""FMI 2.0 and 3.0 co-simulation: a controller made of control laws, sampled by itself.
+"""FMI 2.0 and 3.0 co-simulation: a controller, sampled by itself.
 
 It samples at every multiple of its sample time, at the beginning of the communication step in which that lies, and
 holds its torque in between: the master steps the controller, hands the torque on, and then steps the machine.
@@ -15,10 +15,11 @@ import numpy as np
 from stickslip.control.sampled_controller import SampledController
 from stickslip.export import c99, c99_controller
 from stickslip.export._controllers import (
+    STILL,
     ControllerTarget,
     counts_of,
     golden_samples,
-    laws_of,
+    head_of,
     settings_of,
     trees_of,
 )
@@ -82,9 +83,11 @@ def surroundings_read(controller: SampledController) -> Iterable[Variable]:
             )
 
 
-def write(controller: SampledController, name: str, single: bool = False) -> Export:
+def write(
+    controller: SampledController, name: str, single: bool = False, around: Surroundings = STILL
+) -> Export:
     """A unit of each version, golden samples, and how to use them."""
-    c = c99_controller.write(controller, name).files
+    c = c99_controller.write(controller, name, around=around).files
     variables, values = variables_of(controller), controller.values()
     contents = Contents(
         name, "Sampled controller", {f: str(c[f]) for f in (f"{name}.c", f"{name}.h")},
@@ -95,20 +98,20 @@ def write(controller: SampledController, name: str, single: bool = False) -> Exp
         sample_time=repr(controller.sample_time), unlimited=repr(UNLIMITED),
     )  # fmt: skip
     readme = render(
-        "fmu_controller_readme.md.j2", x=name, laws=laws_of(controller), variables=variables, files=list(files),
-        compiled=not notes, sample_time=controller.sample_time,
+        "fmu_controller_readme.md.j2", **head_of(controller, name), variables=variables, files=list(files),
+        compiled=not notes,
     )  # fmt: skip
-    golden = timed(usable_samples(controller), controller.sample_time)
+    golden = timed(usable_samples(controller, around), controller.sample_time)
     return Export({**files, "golden_samples.csv": golden, "README.md": readme}, notes)
 
 
-def usable_samples(controller: SampledController) -> Samples:
+def usable_samples(controller: SampledController, around: Surroundings) -> Samples:
     """Golden samples without inputs that are no numbers, which an importer may not set; within the unit's limit."""
-    with_faults = golden_samples(controller)
+    with_faults = golden_samples(controller, around)
     good = np.isfinite(np.column_stack(with_faults[:4])).all(axis=1)
     samples = Samples(*(column[good] for column in with_faults))
     n, m = SimpleNamespace(**settings_of(controller)), controller.memory()
-    z, p, u = controller.state(), controller.parameters, SimpleNamespace(**Surroundings()._asdict())
+    z, p, u = controller.state(), controller.parameters, SimpleNamespace(**around._asdict())
     inner = controller.functions["sample"]
     torque = sampled_torques(lambda *row: inner(*row, n, m, z, p, u), u, samples[:4], samples[5:])
     return samples._replace(torque=torque)

@@ -5,13 +5,10 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.control.controller import Controller
-from stickslip.control.sampled import Memory, sampled_by, settings
 from stickslip.export._nearest import surroundings_of
 from stickslip.model import Model
 from stickslip.spec import Surroundings
@@ -25,7 +22,6 @@ __all__ = [
     "changing",
     "golden",
     "golden_around",
-    "golden_samples",
     "random_motion",
     "random_steps",
     "room_beside_jumps",
@@ -205,24 +201,6 @@ def random_motion(
     position[count // 4 : count // 4 + 3] = math.nan
     wanted[count - 20] = math.nan
     return position, wanted, velocity, np.gradient(velocity, sample_time)
-
-
-def golden_samples(
-    controller: Controller, around: Surroundings | None = None, count: int = 400, seed: int = 1
-) -> Samples:
-    """Random samples and the torque of plain Python, from the first sample on, about this load and temperature."""
-    stiffness = controller.linear.kp
-    reach = controller.torque_limit / stiffness if stiffness else 1.0
-    inputs = random_motion(controller.sample_time, reach, count, seed)
-    helper = controller.compensator
-    n, p = settings(controller)._replace(clock=1.0), helper.model.parameters if helper else None
-    m = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0))
-    law = helper.model.law if helper else None
-    z, u = law.state(p) if law else None, SimpleNamespace(**(around or Surroundings())._asdict())
-    sample = sampled_by(law)
-    change = changing(around or STILL, count, seed)
-    torque = sampled_torques(lambda *row: sample(*row, n, m, z, p, u), u, inputs, change)
-    return Samples(*inputs, torque, *change)
 
 
 def sampled_torques(

@@ -7,10 +7,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.model import Model
-from stickslip.spec import Surroundings
 
 __all__ = ["CannotCarry", "Check", "Export", "Job", "counts_in"]
 
@@ -31,8 +29,6 @@ class Job:
         The law and its parameters.
     name : str
         Prefix of every name in the target's language.
-    controller : Controller or None
-        The whole sampled controller, with the model in its compensator; None exports the law alone.
     single : bool
         Single precision, where the target has the choice.
     nearest : bool
@@ -42,18 +38,14 @@ class Job:
         times the velocity over which the law changes.
     settings : mapping
         Values of the target's own settings by name (`Target.settings`); what is not given has the default.
-    surroundings : Surroundings
-        Where the controller starts: what its `u` holds until somebody sets it.
     """
 
     model: Model
     name: str
-    controller: Controller | None = None
     single: bool = False
     nearest: bool = False
     top_speed: float | None = None
     settings: Mapping[str, str | float] = field(default_factory=dict[str, str | float])
-    surroundings: Surroundings = field(default_factory=Surroundings)
 
     def __post_init__(self) -> None:
         if not IDENTIFIER.fullmatch(self.name):
@@ -62,10 +54,6 @@ class Job:
             )
         if self.top_speed is not None and not 0.0 < self.top_speed < math.inf:
             raise InputError(f"the top speed is {self.top_speed:g} rad/s; give one greater than 0")
-        if self.controller is not None and self.controller.sample_time <= 0.0:
-            raise InputError(
-                "a controller in continuous time cannot be exported; give it a sample_time greater than 0"
-            )
 
 
 def counts_in(model: Model) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""MATLAB and Octave: functions of a controller made of control laws, tried in Octave."""
+"""MATLAB and Octave: functions of a controller, tried in Octave."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from typing import Any
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.sampled_controller import SampledController
 from stickslip.export._controllers import (
+    STILL,
     ControllerTarget,
-    checked_name,
     counts_of,
     golden_samples,
-    laws_of,
+    head_of,
     settings_of,
-    table_of,
     trees_of,
 )
 from stickslip.export._matlab import functions, local, safe, with_helpers
@@ -30,11 +29,13 @@ __all__ = ["CONTROLLER"]
 PUBLIC = ("sample", "follow")
 
 
-def write(controller: SampledController, name: str, single: bool = False) -> Export:
+def write(
+    controller: SampledController, name: str, single: bool = False, around: Surroundings = STILL
+) -> Export:
     """One file a function, golden samples and a script that checks them."""
-    x, values, counts = checked_name(name), controller.values(), counts_of(controller)
+    values, counts = controller.values(), counts_of(controller)
     sizes = [f"    p.{count.strip('_')} = {size};" for count, size in counts.items()]
-    settings, surroundings = settings_of(controller), Surroundings()._asdict()
+    settings, surroundings = settings_of(controller), around._asdict()
     files = {
         "parameters": given("p", "Parameters of the laws.", controller.fields, values, sizes),
         "settings": given("n", "What the controller keeps to.", fields_of(Settings), settings),
@@ -43,20 +44,17 @@ def write(controller: SampledController, name: str, single: bool = False) -> Exp
             "function u = @()", "    % What friction depends on; set load and temperature where you measure them.",
             *(f"    u.{n} = {value!r};" for n, value in surroundings.items()), "end",
         ],
-        "golden": golden(golden_samples(controller)),
+        "golden": golden(golden_samples(controller, around)),
         **{entry: entry_of(controller, entry) for entry in PUBLIC},
     }  # fmt: skip
-    common: dict[str, Any] = {
-        "x": x, "laws": laws_of(controller), "sample_time": controller.sample_time, "bound": repr(BOUND),
-        "table": [*table_of(controller)],
-    }  # fmt: skip
+    common = {**head_of(controller, name), "bound": repr(BOUND)}
     return Export(
         {
             **{
-                f"{x}_{part}.m": "\n".join([*lines, ""]).replace("@", f"{x}_{part}", 1)
+                f"{name}_{part}.m": "\n".join([*lines, ""]).replace("@", f"{name}_{part}", 1)
                 for part, lines in files.items()
             },
-            f"{x}_check.m": render("matlab_controller_check.m.j2", **common),
+            f"{name}_check.m": render("matlab_controller_check.m.j2", **common),
             "README.md": render("matlab_controller_readme.md.j2", **common),
         }
     )

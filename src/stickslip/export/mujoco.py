@@ -124,7 +124,7 @@ def for_timestep(found: Nearest, step: float, inertia: float, contact: str) -> t
     damped = max(p.sigma1, 2.0 * step * soft - p.sigma2)
     if contact == "identified":
         warning = (
-            f"at a timestep of {step:g} s MuJoCo does not hold this contact at rest: it rings, and drifts under a "
+            f"at a timestep of {step:g} s MuJoCo does not hold this contact at rest: it oscillates, and drifts under a "
             f"load. It takes a timestep below {bound:.3g} s, or --set contact=held, which bends "
             f"{p.fs / soft:.3g} rad before it breaks away instead of {p.fs / p.sigma0:.3g} rad"
         )

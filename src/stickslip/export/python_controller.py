@@ -1,4 +1,4 @@
-"""Python: a controller made of control laws as one file without dependencies; its functions are the laws' own."""
+"""Python: a controller as one file without dependencies; its functions are the laws' own."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from typing import Any
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.sampled_controller import SampledController
 from stickslip.export._controllers import (
+    STILL,
     ControllerTarget,
-    checked_name,
     counts_of,
     golden_samples,
-    laws_of,
+    head_of,
     settings_of,
-    table_of,
     trees_of,
 )
 from stickslip.export._text import render
@@ -30,18 +29,15 @@ __all__ = ["CONTROLLER"]
 PUBLIC = ("sample", "sample_turns", "follow", "follow_turns")
 
 
-def write(controller: SampledController, name: str, single: bool = False) -> Export:
+def write(
+    controller: SampledController, name: str, single: bool = False, around: Surroundings = STILL
+) -> Export:
     """One module, golden samples, and how to use it."""
     counts, trees = counts_of(controller), trees_of(controller, PUBLIC)
     for tree in trees.values():
         count_by_constant(tree, counts)
         indent_docstring(tree)
-    common: dict[str, Any] = {
-        "x": checked_name(name),
-        "laws": laws_of(controller),
-        "sample_time": controller.sample_time,
-        "table": [*table_of(controller)],
-    }
+    common = head_of(controller, name)
     text = render(
         "python_controller.py.j2",
         counts={constant(n): size for n, size in counts.items()},
@@ -49,14 +45,14 @@ def write(controller: SampledController, name: str, single: bool = False) -> Exp
         settings=[*assigned(fields_of(Settings), settings_of(controller))],
         states=[*cleared(controller.state_fields)],
         memory=[*cleared(MEMORY)],
-        around=[f"{n}={value!r}" for n, value in Surroundings()._asdict().items()],
+        around=[f"{n}={value!r}" for n, value in around._asdict().items()],
         functions=[ast.unparse(tree) for tree in trees.values()],
         **common,
     )
     return Export(
         {
             f"{name}.py": text,
-            "golden_samples.csv": as_csv(golden_samples(controller)),
+            "golden_samples.csv": as_csv(golden_samples(controller, around)),
             "README.md": render("python_controller_readme.md.j2", **common),
         }
     )

@@ -1,4 +1,4 @@
-"""IEC 61131-3 structured text: a controller made of control laws as a function block for a PLC or a drive."""
+"""IEC 61131-3 structured text: a controller as a function block for a PLC or a drive."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.sampled_controller import SampledController
 from stickslip.export._controllers import (
+    STILL,
     ControllerTarget,
     checked_name,
     counts_of,
     golden_samples,
-    laws_of,
+    head_of,
     settings_of,
-    table_of,
     trees_of,
 )
 from stickslip.export._hoist import hoisted
@@ -46,7 +46,9 @@ BLOCK = (
 STRUCTURES = {**OF_LAWS, "n": "settings", "m": "memory"}
 
 
-def write(controller: SampledController, name: str, single: bool = False) -> Export:
+def write(
+    controller: SampledController, name: str, single: bool = False, around: Surroundings = STILL
+) -> Export:
     """One file with types, functions and the block; golden samples; how to use it."""
     x, counts = named_in_st([checked_name(name)], RESERVED | set(BLOCK))[name], counts_of(controller)
     trees = hoisted(trees_of(controller, ["_sample", "_follow"]))
@@ -60,15 +62,14 @@ def write(controller: SampledController, name: str, single: bool = False) -> Exp
     names = Names.of(trees, x, [*fields, *Surroundings._fields])
     word = names.words
     parts = functions(trees, names, STRUCTURES, counts)
-    around = [f"{word[n]} : LREAL := {number(v)};" for n, v in Surroundings()._asdict().items()]
+    begin = [f"{word[n]} : LREAL := {number(v)};" for n, v in around._asdict().items()]
     values: dict[str, Any] = {
+        **head_of(controller, name),
         "x": x,
         "file": f"{name}.st",
-        "laws": laws_of(controller),
-        "sample_time": controller.sample_time,
         "structures": [
             *((kind, [*declared(own, given, counts, word)]) for kind, (own, given) in structures.items()),
-            ("surroundings", around),
+            ("surroundings", begin),
         ],
         "cleared": [
             *cleared("m", MEMORY, counts, word),
@@ -79,7 +80,6 @@ def write(controller: SampledController, name: str, single: bool = False) -> Exp
             entry: call(names.functions[f"_{entry}"], [a.arg for a in trees[f"_{entry}"].args.args], word)
             for entry in ("sample", "follow")
         },
-        "table": [*table_of(controller)],
         "note": NOTE,
     }
     code = [
@@ -88,7 +88,7 @@ def write(controller: SampledController, name: str, single: bool = False) -> Exp
     ]
     files = {
         f"{name}.st": render("st_controller.st.j2", **values, functions=code),
-        "golden_samples.csv": as_csv(golden_samples(controller)),
+        "golden_samples.csv": as_csv(golden_samples(controller, around)),
         "README.md": render("st_controller_readme.md.j2", **values),
     }
     return Export(files, (NOTE,))

@@ -15,7 +15,7 @@ from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 
 if TYPE_CHECKING:
-    from stickslip.identify.sliding import SlidingPoints
+    from stickslip.identify.sliding.points import SlidingPoints
 
 __all__ = ["TARGET", "model_of", "read", "write"]
 
@@ -72,7 +72,7 @@ def read(text: str) -> SlidingPoints:
     InputError
         If it is no such table.
     """
-    from stickslip.identify.sliding import SlidingPoints
+    from stickslip.identify.sliding.points import SlidingPoints
 
     p = model_of(text).parameters
     velocity, forward, backward = (np.array(column) for column in (p.velocity, p.forward, p.backward))

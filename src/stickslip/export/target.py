@@ -70,8 +70,6 @@ class Target:
         ``check(job, export) -> Check``: run the export in its tool against the golden vectors.
     precision : bool
         Whether it heeds ``Job.single``.
-    controller : bool
-        Whether it carries a whole controller.
     forms : tuple of Form
         The laws that it has room for, the simplest first; empty where it carries any.
     settings : tuple of Setting
@@ -87,7 +85,6 @@ class Target:
     write: Callable[[Job], Export]
     check: Callable[[Job, Export], Check] | None = None
     precision: bool = False
-    controller: bool = False
     forms: tuple[Form, ...] = ()
     settings: tuple[Setting, ...] = ()
     around: str = ""

@@ -14,11 +14,11 @@ from stickslip.control.linear import Gains
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.record import Record
-from stickslip.report._view import StudyView, is_thesis
-from stickslip.report.figures import COMMON, FRICTION_NAMES, Figure, describe, heading, named
+from stickslip.report._view import StudyView
+from stickslip.report.figures import COMMON, Figure, describe, heading, named
 from stickslip.report.plots import Array, Curve, Panel, Style, draw, envelope, scaled, style_of
 from stickslip.simulation.closed_loop import simulate
-from stickslip.simulation.open_loop import respond
+from stickslip.simulation.prescribed.open_loop import respond
 from stickslip.study.plan import Drive, Response, Study, load
 from stickslip.study.result import StudyResult
 
@@ -52,11 +52,12 @@ def response_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
     """
     known: dict[str, tuple[Array, Array]] = {}
     study = planned(view.result) if view.result.config.get("responses") else None
+    plants = {name: view.edition.frictions.get(name, name) for name in view.frictions}
     for response in study.responses if study else ():
         stem = folder / COMMON / named(response.figure, f"response-{response.name}")
         loops = {name: _loop(model, response, known) for name, model in response.models.items()}
-        near = is_thesis(view.result) and any(name not in view.frictions for name in loops)
-        curves = [_loop_curve(n, x, y, near, n in view.frictions, len(loops)) for n, (x, y) in loops.items()]
+        near = view.edition.near_zero and any(name not in view.frictions for name in loops)
+        curves = [_loop_curve(n, x, y, near, plants.get(n, ""), len(loops)) for n, (x, y) in loops.items()]
         limits = (-NEAR_ZERO, NEAR_ZERO) if near else None
         title = heading(response.figure, response.title)
         plant = near and next(iter(loops)) in view.frictions
@@ -78,7 +79,7 @@ def _loop(model: Model, response: Response, known: dict[str, tuple[Array, Array]
     return known[key]
 
 
-def _loop_curve(name: str, x: Array, y: Array, near: bool, plant: bool, count: int) -> Curve:
+def _loop_curve(name: str, x: Array, y: Array, near: bool, plant: str, count: int) -> Curve:
     if near:
         # Only the part that is shown, so that the file keeps its detail; gaps separate the passes.
         outside = np.abs(x) > 1.3 * NEAR_ZERO
@@ -90,7 +91,7 @@ def _loop_curve(name: str, x: Array, y: Array, near: bool, plant: bool, count: i
         keep = np.append(np.diff(np.floor(dots * 800.0)) > 0, True)
         x, y = x[keep], y[keep]
     style = PLANT.get(name, PLANT["nominal"]) if plant else style_of(name)
-    label = f"{name} law" if not plant else "plant" if near else FRICTION_NAMES.get(name, name)
+    label = f"{name} law" if not plant else "plant" if near else plant
     if count == 1 or (near and not plant):
         style = replace(style, width=1.1)
     return Curve(x, y, label if count > 1 else "", style)

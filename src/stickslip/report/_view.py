@@ -7,13 +7,9 @@ from typing import Any
 
 from stickslip.record import Record
 from stickslip.study.result import Run, StudyResult
+from stickslip.thesis.edition import EDITIONS, PLAIN
 
-__all__ = ["StudyView", "is_thesis"]
-
-
-def is_thesis(result: StudyResult) -> bool:
-    """Whether it is the study that ships with the package, whose figures and statements have numbers."""
-    return result.manifest.get("study") == "thesis"
+__all__ = ["StudyView"]
 
 
 class StudyView:
@@ -21,6 +17,7 @@ class StudyView:
 
     def __init__(self, result: StudyResult) -> None:
         self.result = result
+        self.edition = EDITIONS.get(str(result.manifest.get("study", "")), PLAIN)
         self.runs: dict[str, Run] = {run.key: run for run in (*result.runs, *result.extras)}
         self.rules = list(dict.fromkeys(run.slip_rule for run in result.runs))
         self.references = list(dict.fromkeys(run.reference for run in result.runs))

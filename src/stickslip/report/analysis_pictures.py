@@ -11,8 +11,8 @@ import numpy as np
 
 from stickslip.analyse.dependence import Dependence
 from stickslip.analyse.flexibility import Chain, Flexibility, modes
+from stickslip.analyse.motor_vs_sensor import Sides
 from stickslip.analyse.repeatability import Repeated
-from stickslip.analyse.sides import Sides
 from stickslip.analyse.spectrum import Spectrum
 from stickslip.report.plots import SPARE, Curve, Panel, Style, envelope, save, scaled
 
@@ -190,4 +190,4 @@ def picture_of_flexibility(found: Flexibility) -> Drawn:
     panel = Panel(
         curves, "first mode (Hz)", "share of the last inertia in the whole (%)", (0.0, 100.0), (0.6 * found.floor, top)
     )  # fmt: skip
-    return "What first mode the train can have", message, (panel,), 2.6
+    return "Possible first modes of the drivetrain", message, (panel,), 2.6

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.axis_agreed import on_timing
-from stickslip.identify.axis_problem import mechanics_parameters
-from stickslip.identify.draws import sliding_torque
+from stickslip.identify.axis.agreed import on_timing
+from stickslip.identify.axis.problem import mechanics_parameters
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.identify.motion import speeds_of
-from stickslip.identify.regression import Regression
+from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record, encoder_step
 from stickslip.report.plots import quantity

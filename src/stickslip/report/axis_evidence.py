@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.axis_inverse import InverseDynamics
-from stickslip.identify.axis_search import FittedAxis
-from stickslip.identify.axis_trial import Trial
+from stickslip.identify.axis.loop_check import position_noise
+from stickslip.identify.axis.search import FittedAxis
 from stickslip.identify.estimate import Identification
-from stickslip.identify.loop_check import position_noise
-from stickslip.identify.noise import white_std
+from stickslip.identify.fit.noise import white_std
+from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identify.trial import Trial
 from stickslip.record import encoder_step
-from stickslip.simulation.driven import Mechanics
+from stickslip.simulation.recorded_input.simulation import Mechanics
 
 __all__ = ["judgements", "measured_friction", "slow_rows"]
 

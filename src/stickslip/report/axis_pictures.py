@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.axis_inverse import InverseDynamics
-from stickslip.identify.axis_problem import PLACE, measured
-from stickslip.identify.axis_search import FittedAxis
-from stickslip.identify.draws import curve_band, sliding_torque
+from stickslip.identify.axis.problem import PLACE, measured
+from stickslip.identify.axis.search import FittedAxis
 from stickslip.identify.estimate import Identification, Picture, Trace
+from stickslip.identify.monte_carlo import curve_band, sliding_torque
+from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.record import Record
 from stickslip.report.axis_evidence import measured_friction, slow_rows
 from stickslip.report.plots import envelope, quantity
 from stickslip.report.sliding_torque import Sliding, over_all_rows, sliding_of
 from stickslip.report.torque_pictures import friction_points, over_velocity, stretch, whole_record
-from stickslip.simulation.driven import Mechanics
+from stickslip.simulation.recorded_input.simulation import Mechanics
 
 __all__ = ["data_pictures", "pictures_of"]
 

@@ -14,7 +14,8 @@ from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.record import Record
 from stickslip.spec import Law
-from stickslip.study.plan import PlannedRun, Study, frictions_of, load, load_run
+from stickslip.study.plan import Study, load, load_run
+from stickslip.study.planned_run import PlannedRun, frictions_of
 
 __all__ = ["bibliography", "cited_by", "citing"]
 

@@ -12,8 +12,7 @@ import numpy as np
 from stickslip.plugins import reference_kind
 from stickslip.record import Record
 from stickslip.report import plots
-from stickslip.report._numbers import motion_number, result_number
-from stickslip.report._view import StudyView, is_thesis
+from stickslip.report._view import StudyView
 from stickslip.report.captions import case_caption, case_message
 from stickslip.report.plots import REFERENCE, Array, Curve, Panel, draw, envelope, scaled, style_of
 from stickslip.study.result import Run
@@ -62,7 +61,7 @@ def reference_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
         if run is None:
             continue
         record = run.record()
-        number = motion_number(reference) if is_thesis(view.result) else ""
+        number = view.edition.motions.get(reference, "")
         stem = folder / COMMON / named(number, f"reference-{reference}")
         message = f"Reference: {what(view, reference)}"
         window = steady_window(record) or (0.0, float(record.time[-1]))
@@ -73,15 +72,11 @@ def reference_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
             x, y = envelope(record.time[shown], record[channel][shown] * factor)
             panels.append(Panel([Curve(x, y, "", plots.LAWS["gms"])], f"{word} ({unit})", "time (s)", window))
         title = heading(
-            number, f"Reference {reference!r}" if not number else f"The {REFERENCE_NAMES[reference]}"
+            number, f"Reference {reference!r}" if not number else f"The {view.edition.references[reference]}"
         )
         draw(stem, title, message, panels, 1.35)
         caption = f"Reference position and velocity: {what(view, reference)}."
         yield Figure(stem.name.removeprefix("figure-"), number, title, caption, COMMON, stem)
-
-
-REFERENCE_NAMES = {"low": "low-velocity sine", "high": "high-velocity sine", "step": "step"}
-FRICTION_NAMES = {"nominal": "nominal friction", "plus10": "friction +10 %", "minus10": "friction −10 %"}
 
 
 def heading(number: str, text: str) -> str:
@@ -160,15 +155,13 @@ def result_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
     """Position and position error of every case, under every slip rule (thesis figures 3.21 to 3.38)."""
     for rule in view.rules:
         for case in result_cases(view, rule):
-            number = (
-                "" if not is_thesis(view.result) else result_number(case.reference, case.friction, case.kind)
-            )
+            number = view.edition.results.get((case.reference, case.friction, case.kind), "")
             stem = folder / rule / named(number, case.name)
             at_rest = view.reference_kind(case.reference) == "step"
             linear = [r.controller for r in case.runs if not view.compensation(r.controller)]
             message = case_message(case.runs, at_rest, linear)
-            reference = REFERENCE_NAMES.get(case.reference, case.reference) if number else case.reference
-            friction = FRICTION_NAMES.get(case.friction, case.friction) if number else case.friction
+            reference = view.edition.references.get(case.reference, case.reference)
+            friction = view.edition.frictions.get(case.friction, case.friction)
             words = f"{reference}, {friction}" + (f", {case.kind}" if case.kind else "")
             panels = result_panels(case, view.controllers, at_rest)
             if not panels:

@@ -7,15 +7,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from stickslip.analyse.claims import CLAIMS, Claim, Verdict, judge
 from stickslip.report._notes import notes
 from stickslip.report._tables import metrics_tables
-from stickslip.report._view import StudyView, is_thesis
+from stickslip.report._view import StudyView
 from stickslip.report.captions import case_message, figure_of_merit, ranking
 from stickslip.report.conclusions import study_conclusion
 from stickslip.report.figures import COMMON, Figure
 from stickslip.report.page import filled
 from stickslip.report.plots import embedded
+from stickslip.thesis.claims import Claim, Verdict, judge
 
 __all__ = ["image", "render"]
 
@@ -24,9 +24,10 @@ MARKS = {True: ("yes", "holds"), False: ("no", "does not hold"), None: ("open", 
 
 def render(view: StudyView, figures: Sequence[Figure]) -> str:
     """The report's HTML."""
-    verdicts = {rule: judge(view, rule) for rule in view.rules} if is_thesis(view.result) else {}
+    asked = view.edition.claims
+    verdicts = {rule: judge(view, rule, asked) for rule in view.rules} if asked else {}
     manifest = view.result.manifest
-    counted = _tally(verdicts)
+    counted = _tally(asked, verdicts)
     return filled(
         "study.html",
         title=manifest.get("title")
@@ -40,7 +41,7 @@ def render(view: StudyView, figures: Sequence[Figure]) -> str:
         tables=metrics_tables(view),
         rules=view.rules,
         resting=_resting(view),
-        claims=[_claim(c, verdicts, figures) for c in CLAIMS] if verdicts else [],
+        claims=[_claim(c, verdicts, figures) for c in asked],
         parts=_parts(view, figures),
         failed=[run for run in view.runs.values() if run.failure],
         notes=notes(view),
@@ -62,12 +63,12 @@ def _ran(view: StudyView) -> str:
     return f"{count} runs in {seconds:.1f} s of CPU: {'; '.join(words)}. stickslip {version}".strip()
 
 
-def _tally(verdicts: Mapping[str, Mapping[str, Verdict]]) -> list[dict[str, Any]]:
+def _tally(claims: Sequence[Claim], verdicts: Mapping[str, Mapping[str, Verdict]]) -> list[dict[str, Any]]:
     """How many statements hold under which rules."""
     if not verdicts:
         return []
     counts: dict[str, int] = {}
-    for claim in CLAIMS:
+    for claim in claims:
         found = {rule: verdict[claim.id].holds for rule, verdict in verdicts.items()}
         held = [rule for rule, holds in found.items() if holds]
         if any(holds is None for holds in found.values()):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.finding import Finding
-from stickslip.identify.axis_search import FittedAxis
+from stickslip.identify.axis.search import FittedAxis
 from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.record import Record
 from stickslip.report.answers import answers_of, meaning_of, one_number_each, speeds_in

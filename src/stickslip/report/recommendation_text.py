@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from stickslip.identify.recommend import WORTH, Candidate, Recommendation
+from stickslip.identify.setting.recommend import WORTH, Candidate, Recommendation
 from stickslip.model import Model
 
 __all__ = ["parameters", "percent", "recommendation_lines", "reduction", "safety"]
@@ -29,7 +29,7 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
     gains = ", ".join(f"{k} {v:.5g}" for k, v in result.gains.items() if v)
     out.append(f"linear controller: {gains}; RMS error alone {result.linear_error:.3g} {unit('rad')}")
     if result.rings:
-        out.append(f"it rings alone:    {result.rings}")
+        out.append(f"oscillates alone:  {result.rings}")
     c = result.chosen
     if c and result.model:
         out.append(
@@ -43,9 +43,29 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
         out.append(f"inertia:           {said}")
         out.append(f"error reduction:   {reduction(result)}")
         out.append(f"gain margin:       {margin(c, result)}")
+    out += beside_lines(result)
     for note in result.notes:
         out.append(note)
     return out
+
+
+def beside_lines(result: Recommendation) -> list[str]:
+    """Compensators of the catalogue: what each leaves of the error, or why it is not switched on."""
+    if not result.beside:
+        return []
+    out = ["", f"{'compensator':<22}{'error left':>10}  {'worst':>7}  switched on"]
+    for b in result.beside:
+        numbers = (
+            f"{100 * b.errors[0]:>8.1f} %  {100 * b.worst:>5.1f} %" if b.errors else f"{'–':>10}  {'–':>7}"
+        )
+        mark = "<- yes" if b is result.instead else f"no: {b.why_not or 'another one leaves less'}"
+        out.append(f"{b.label:<22}{numbers}  {mark}")
+    taken = result.instead
+    if taken is None:
+        return [*out, "none of these is better than what is said above"]
+    said = f"it leaves at most {100 * taken.worst:.1f} % of the linear controller's error on all sampled axes"
+    why = f"; the setting above {result.hunts}" if result.hunts else ""
+    return [*out, f"switch on instead: {taken.label}; {said}{why}"]
 
 
 def safety(c: Candidate) -> str:

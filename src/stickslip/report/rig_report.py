@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyse.rig_verdicts import Judged, judged_over, main_share
 from stickslip.report.conclusions import rig_conclusion
 from stickslip.report.html import image
 from stickslip.report.page import filled, replaced, unwritable
 from stickslip.report.plots import REFERENCE, Curve, Panel, draw, envelope, style_of
 from stickslip.study.rig_cases import GROUPS, Group
 from stickslip.study.rig_study import NOMINAL, RigResult, RigView
+from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share
 
 __all__ = ["draw_groups", "verdict_table", "write_rig_report"]
 

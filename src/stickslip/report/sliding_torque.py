@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.axis_inverse import InverseDynamics
-from stickslip.identify.draws import sliding_torque
 from stickslip.identify.estimate import Identification
-from stickslip.identify.force_error import model_torque
-from stickslip.identify.regression import Regression
-from stickslip.identify.sliding_rows import SlidingRows
-from stickslip.identify.smooth import seen
-from stickslip.simulation.driven import Mechanics
+from stickslip.identify.fit.smooth import seen
+from stickslip.identify.monte_carlo import sliding_torque
+from stickslip.identify.regression.force_error import model_torque
+from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identify.regression.regression import Regression
+from stickslip.identify.regression.sliding_rows import SlidingRows
+from stickslip.simulation.recorded_input.simulation import Mechanics
 
 __all__ = ["Sliding", "over_all_rows", "sliding_of"]
 

@@ -21,7 +21,7 @@ ONE = Style("#000000", (0, (1, 1.5)), 1.2)
 NOW = Style("#000000", (0, (4, 1.5)), 1.0)
 SAFE = LINE = Style("#000000", "-", 1.0)
 AREAS = {
-    "stable": Style("#56B4E9"), "unstable: rings": Style("#E69F00"), "unstable: creeps away": Style("#CC79A7"),
+    "stable": Style("#56B4E9"), "unstable: oscillates": Style("#E69F00"), "unstable: creeps away": Style("#CC79A7"),
 }  # fmt: skip
 
 
@@ -44,7 +44,7 @@ def picture_of_stability(found: Stability) -> tuple[str, str, Sequence[Panel], f
             f"{name}, {1e3 * drive.sample_time:g} ms", "log",
         ),
     )  # fmt: skip
-    title = f"Which gain feedback of the {name} law bears"
+    title = f"Stable gain of feedback with the {name} law"
     return title, _message(found, name), panels, 2.0
 
 
@@ -107,5 +107,5 @@ def _message(found: Stability, name: str) -> str:
         sieve = f"a filter of {advice.filter_hz:g} Hz" if advice.filter_hz else "no filter"
         return f"{first}safe: gain {advice.gain:g} with {sieve}"
     if not alone.stable:
-        return f"{first}the linear controller alone rings ({alone.growth:+.0f}/s at {alone.frequency:.0f} Hz)"
+        return f"{first}the linear controller alone oscillates ({alone.growth:+.0f}/s at {alone.frequency:.0f} Hz)"
     return f"{first}nothing tried keeps its margins"

@@ -11,7 +11,7 @@ import numpy as np
 from stickslip.control.controller import Controller
 from stickslip.report.plots import Curve, Panel, Style, scaled, style_of
 from stickslip.report.plots import draw as draw_panels
-from stickslip.study.plan import PlannedRun
+from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.dataset import read
 from stickslip.sweep.gains import GAIN, recommended
 from stickslip.sweep.plan import Sweep

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.draws import sliding_torque
 from stickslip.identify.estimate import Identification, Picture, Trace
+from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.report.plots import envelope, quantity
 from stickslip.report.sliding_torque import Sliding
 
@@ -39,7 +39,7 @@ def stretch(sliding: Sliding, motion: str) -> Picture:
     first, last = telling(sliding, time, torque)
     inside, rows = (time >= first) & (time <= last), own & (sliding.time >= first) & (sliding.time <= last)
     return over_time(
-        "torque-stretch", "Torque, measured and of the model: a stretch", sliding, motion,
+        "torque-stretch", "Measured and model torque: a segment", sliding, motion,
         (time[inside], torque[inside]), (sliding.time[rows], sliding.model[rows]),
     )  # fmt: skip
 
