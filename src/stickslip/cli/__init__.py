@@ -25,7 +25,7 @@ __all__ = ["VERBS", "allow_code_argument", "main", "parser_of"]
 
 VERBS = (
     "study", "sweep", "tune", "simulate", "identify", "doctor", "analyse", "compare", "recommend", "demo",
-    "rig", "laws", "law", "cite", "rerun", "export", "warm-up", "version"
+    "rig", "laws", "law", "cite", "rerun", "export", "web", "warm-up", "version"
 )  # fmt: skip
 
 
@@ -95,7 +95,7 @@ def parser_of(names: Sequence[str] = VERBS) -> argparse.ArgumentParser:
     """The parser of these verbs; their modules are imported."""
     parser = Parser(
         prog="stickslip",
-        description="Friction of a servo axis: identified, simulated, compensated, exported.",
+        description="Identify, simulate and compensate friction of servo axes, and export the result.",
     )
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     verbs = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs")
@@ -114,7 +114,7 @@ def allow_code_argument(parser: argparse.ArgumentParser) -> None:
     """What lets code run that came with a file."""
     parser.add_argument(
         "--allow-code", action="store_true",
-        help="run the Python code (laws, rigs) that the given files name, and know it from now on by its SHA-256",
+        help="run Python code named in the given files; its SHA-256 is remembered",
     )  # fmt: skip
 
 

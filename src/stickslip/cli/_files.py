@@ -21,7 +21,7 @@ def force_argument(parser: argparse.ArgumentParser) -> None:
     """The option that lets a verb replace what is not its own."""
     parser.add_argument(
         "--force", action="store_true",
-        help="replace files that are there, also those that stickslip did not write or that were edited since",
+        help="overwrite existing files, even edited ones",
     )  # fmt: skip
 
 
@@ -46,13 +46,11 @@ def refuse_foreign(paths: Iterable[Path], force: bool = False) -> None:
         if not path.exists() or path.is_dir():
             continue
         if not path.is_file():
-            raise InputError(
-                f"{path} is no ordinary file, so that nothing is written there; give another name"
-            )
+            raise InputError(f"{path} is not a regular file; give another name")
         if not force and not ours(path):
             raise InputError(
-                f"{path} is there, and was not written by stickslip or was changed since; --force replaces it, or "
-                "choose another place"
+                f"{path} exists and was not written by stickslip, or was edited since; use --force to overwrite "
+                "it, or give another name"
             )
 
 

@@ -20,7 +20,7 @@ WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "tune": {"tune": ("tuning", "sweep")},
     "simulate": {"file": ("simulation", "model")},
     "study": {"study": ("study",)},
-    "export": {"file": ("model", "simulation")},
+    "export": {"file": ("model", "simulation", "map")},
     "rig": {"rig": ("rig",)},
 }
 """Per verb and argument, the kinds of file that it takes, or knows better what to say of; records are looked at where

@@ -92,13 +92,13 @@ def print_accuracy(meta: Mapping[str, Any]) -> None:
         return
     if found.get("depends_on_start"):
         print(
-            "start: this run depends on its start: 1e-9 rad beside, it takes another branch, "
+            "start: this run depends on its initial position: shifted by 1e-9 rad it takes another branch, "
             f"{found['start_rad']:.2g} rad away; its metrics are those of one branch"
         )
     if "error_rad" not in found:
         return
     if "machine" in meta:
-        print(f"accuracy: half as long sub-steps move its position by up to {found['error_rad']:.1g} rad")
+        print(f"accuracy: halving the sub-steps changes the position by up to {found['error_rad']:.1g} rad")
         return
     tolerance, error = meta["tolerance"], found["error_rad"]
     if error <= 10.0 * tolerance:
@@ -107,7 +107,7 @@ def print_accuracy(meta: Mapping[str, Any]) -> None:
         )
     else:
         print(
-            f"accuracy: this run is sensitive: errors within the tolerance, {tolerance:g} rad, move its position by"
+            f"accuracy: this run is sensitive: errors within the tolerance, {tolerance:g} rad, change its position by"
             f" about {error:.1g} rad; compare its metrics with those at another tolerance before you rely on them"
         )
 
@@ -176,7 +176,7 @@ def print_starts(runs: Sequence[Run]) -> None:
     named = [run.key for run in runs if run.depends_on_start]
     if named:
         print(
-            "these depend on their start (1e-9 rad beside, another branch of the motion and other metrics): "
+            "these depend on their initial position (shifted by 1e-9 rad they take another branch): "
             f"{', '.join(named)}"
         )
 

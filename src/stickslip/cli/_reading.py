@@ -23,30 +23,30 @@ def add_arguments(parser: argparse.ArgumentParser, *, part: bool = False) -> Non
         default=[],
         metavar="CHANNEL=COLUMN[:UNIT]",
         help=(
-            "which column is a channel, and its unit, such as position=q_deg:deg; @load behind it: on the "
-            "load's side of the gear; CHANNEL=none leaves it out; a unit may have a factor or a minus"
+            "column and unit of a channel, such as position=q_deg:deg; append @load for the load side "
+            "of the gear; CHANNEL=none ignores the channel; a unit may have a factor or a minus sign"
         ),
     )
     group.add_argument(
         "--profile",
         type=Path,
         metavar="FILE.toml",
-        help="where the mapping is kept (default: by the file's columns, in your configuration folder)",
+        help="file that stores the mapping (default: chosen by column names, in your configuration folder)",
     )
     group.add_argument(
-        "--sample-time", type=float, metavar="S", help="sample interval, for files without times"
+        "--sample-time", type=float, metavar="S", help="sample interval, for files without a time column"
     )
     for option, unit, what in (
-        ("--counts-per-rev", "N", "encoder counts a revolution"),
-        ("--rated-torque", "NM", "for torques in percent or per mille"),
-        ("--rated-current", "A", "for currents in percent or per mille"),
-        ("--torque-constant", "NM_PER_A", "torque = current x this"),
-        ("--gear-ratio", "N", "revolutions of the motor for one of the load"),
-        ("--lead", "MM", "mm that a linear axis moves for one revolution: of a screw, a pinion, a pulley"),
+        ("--counts-per-rev", "N", "encoder counts per revolution"),
+        ("--rated-torque", "NM", "rated torque, for torques in percent or per mille"),
+        ("--rated-current", "A", "rated current, for currents in percent or per mille"),
+        ("--torque-constant", "NM_PER_A", "torque per current"),
+        ("--gear-ratio", "N", "motor revolutions per load revolution"),
+        ("--lead", "MM", "travel of a linear axis per revolution of screw, pinion or pulley"),
     ):
         group.add_argument(option, type=float, metavar=unit, help=what)
     group.add_argument(
-        "--side", choices=("motor", "load"), help="side of the gear that the record is about (default motor)"
+        "--side", choices=("motor", "load"), help="side of the gear that was recorded (default motor)"
     )
     if part:
         _add_part(parser.add_argument_group("part of the record"))
@@ -56,25 +56,24 @@ def _add_part(group: argparse._ArgumentGroup) -> None:  # type: ignore[reportPri
     """--from, --to, --rows, --leave-out, --unwrap, --accept: what the doctor's remedies ask for."""
     group.add_argument(
         "--accept", action="append", default=[], metavar="CODE",
-        help="this error of the doctor, such as torque-sign, counts as a warning: you know better; repeatable",
+        help="treat this error of the doctor as a warning; repeatable",
     )  # fmt: skip
     for option, name, what in (("--from", "start", "from this time on"), ("--to", "end", "up to this time")):
-        group.add_argument(option, dest=name, type=float, metavar="S", help=f"look at the record {what}, s")
+        group.add_argument(option, dest=name, type=float, metavar="S", help=f"use the record {what}, s")
     group.add_argument(
         "--with", dest="beside", action="append", default=[], type=Path, metavar="FILE",
-        help="a second file of the same motion and clock, such as the torque's; its columns are interpolated at the "
-        "times of LOG; with several LOGs once for each, in their order",
+        help="second file of the same motion and clock; its columns are interpolated at the times of LOG; repeat "
+        "once per LOG, in the same order",
     )  # fmt: skip
-    group.add_argument("--rows", metavar="A:B", help="look at these rows, counted from 1, both included")
+    group.add_argument("--rows", metavar="A:B", help="use rows A to B only, counted from 1")
     group.add_argument(
         "--leave-out", action="append", default=[], metavar="A:B",
-        help="leave these rows out, or `spikes`; where more than 4 in a row go, what stands before and behind them is "
-        "taken as two records; repeatable",
+        help="leave out rows A to B, or `spikes`; gaps of more than 4 rows split the record; repeatable",
     )  # fmt: skip
     group.add_argument(
         "--unwrap",
         action="store_true",
-        help="count the position on where it jumps by a turn or its counter's range",
+        help="undo jumps of the position by a turn or counter range",
     )
 
 
@@ -140,4 +139,4 @@ def print_columns(opened: Opened) -> None:
     if opened.used:
         print(f"profile: {opened.used}")
     if opened.written:
-        print(f"profile written: {opened.written} (the next file with these columns is read alike)")
+        print(f"profile written: {opened.written} (the next file with these columns is read the same way)")

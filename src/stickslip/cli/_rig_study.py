@@ -10,11 +10,11 @@ __all__ = ["run"]
 
 def run(args: argparse.Namespace) -> int:
     """Run chapter 4's experiments, print the verdicts, write the report."""
-    from stickslip.analyse.rig_verdicts import judged_over, main_share
     from stickslip.cli import _output
     from stickslip.errors import InputError
     from stickslip.report.rig_report import verdict_table, write_rig_report
     from stickslip.study.rig_study import RigView, run_rig_study
+    from stickslip.thesis.rig_verdicts import judged_over, main_share
 
     if args.print:
         raise InputError("--print: thesis-rig has no file of its own; see `stickslip study --help`")

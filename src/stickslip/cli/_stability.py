@@ -19,42 +19,47 @@ __all__ = ["arguments", "work"]
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Machine, linear controller, drive."""
     parser.add_argument(
-        "--rig", required=True, metavar="MACHINE", help="a machine of the library, or its TOML file"
+        "--rig", required=True, metavar="MACHINE", help="machine: name from the library, or TOML file"
     )
     parser.add_argument(
-        "--without", default="", metavar="NAMES", help="imperfections switched off, with commas between them"
+        "--without", default="", metavar="NAMES", help="imperfections to switch off, comma-separated"
     )
     parser.add_argument(
         "--controller",
         metavar="FILE.toml",
-        help="a controller made of control laws (table [controller]) instead of a linear one with compensators",
+        help="controller made of control laws, from a table [controller]",
     )
-    parser.add_argument("--linear", choices=("PR", "PD", "PID"), default="PD", help="default PD")
+    parser.add_argument(
+        "--linear", choices=("PR", "PD", "PID"), default="PD", help="linear controller (default PD)"
+    )
     for option, default, unit, what in (
-        ("--bandwidth", 36.0, "HZ", "of its poles"),
-        ("--damping", 1.0, "D", "of its poles"),
+        ("--bandwidth", 36.0, "HZ", "bandwidth of the placed poles"),
+        ("--damping", 1.0, "D", "damping of the placed poles"),
     ):
         parser.add_argument(
             option, type=float, default=default, metavar=unit, help=f"{what} (default {default:g})"
         )
     parser.add_argument(
-        "--inertia", type=float, metavar="KGM2", help="it was placed with (default the machine's)"
+        "--inertia",
+        type=float,
+        metavar="KGM2",
+        help="inertia used for pole placement (default: the machine's)",
     )
-    parser.add_argument("--sample-time", type=float, metavar="S", help="default the machine's")
+    parser.add_argument("--sample-time", type=float, metavar="S", help="sample time (default: the machine's)")
     parser.add_argument(
-        "--delay", type=float, metavar="SAMPLES", help="of the torque, in samples (default the machine's)"
+        "--delay", type=float, metavar="SAMPLES", help="torque delay in samples (default: the machine's)"
     )
     parser.add_argument("--filter", action="append", type=float, default=[], metavar="HZ",
-                        help="of the compensators' input, repeatable; 0 for none (default 0 and 10)")  # fmt: skip
+                        help="low-pass on the compensators' velocity; repeatable; 0: none (default 0, 10)")  # fmt: skip
     parser.add_argument("--amplitude", type=float, default=0.0, metavar="RAD",
-                        help="small motion at the encoder (default one count)")  # fmt: skip
+                        help="amplitude of the motion at the encoder (default one count)")  # fmt: skip
     parser.add_argument(
         "--confirm",
         action="store_true",
-        help="simulate a grid of filters and gains, and the recommended ones, on the virtual rig",
+        help="check the result by simulation on the virtual rig (of a controller: with its loop gains scaled, too)",
     )
     parser.add_argument("--law", action="append", default=[], metavar="NAME",
-                        help="of the machine's models (default all)")  # fmt: skip
+                        help="law among the machine's models (default all)")  # fmt: skip
 
 
 def work(
@@ -81,7 +86,7 @@ def work(
 
 
 BESIDE: dict[str, Any] = {
-    "linear": "PD", "bandwidth": 36.0, "damping": 1.0, "sample_time": None, "filter": [], "law": [], "confirm": False,
+    "linear": "PD", "bandwidth": 36.0, "damping": 1.0, "sample_time": None, "filter": [], "law": [],
 }  # fmt: skip
 """Options of a linear controller and its compensators, and what they are where they are not given."""
 
@@ -98,21 +103,29 @@ def composed(
     for name, usual in BESIDE.items():
         if getattr(args, name) != usual:
             raise InputError(
-                f"--{name.replace('_', '-')} beside --controller {args.controller}, which says all of it; leave it out"
+                f"--{name.replace('_', '-')} cannot be combined with --controller {args.controller}, which defines it; "
+                "leave it out"
             )
     plant = machine_of(args)
     controller = read_controller(
         args.controller, plant.inertia if args.inertia is None else args.inertia, plant.models
     )
     delay = plant.delay if args.delay is None else args.delay
+    if args.confirm and args.delay is not None:
+        raise InputError("--confirm runs the machine with its own delay; leave --delay out")
     found = controller_stability(axis_of(plant, args.amplitude), controller, delay)
+    results: list[Any] = [found]
+    if args.confirm:
+        from stickslip.study.controller_confirmed import confirmed_controller
+
+        results.append(confirmed_controller(plant, controller))
 
     def picture() -> Any:
         from stickslip.report.stability_pictures import picture_of_controller
 
         return picture_of_controller(found)
 
-    show(args, [found], picture)
+    show(args, results, picture)
 
 
 def machine_of(args: argparse.Namespace) -> Machine:
@@ -156,7 +169,7 @@ def computed(args: argparse.Namespace) -> Stability:
     highest = highest_corner(drive.sample_time)
     if any(corner > highest for corner in args.filter):
         raise InputError(
-            f"--filter {max(args.filter):g}: samples of {drive.sample_time:g} s are filtered at {highest:g} Hz at most"
+            f"--filter {max(args.filter):g}: a sample time of {drive.sample_time:g} s allows at most {highest:g} Hz"
         )
     return stability(axis_of(plant, args.amplitude), drive, models, args.filter or (0.0, 10.0))
 

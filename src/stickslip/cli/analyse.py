@@ -1,4 +1,4 @@
-"""Numbers out of records and machines: spectra, repeatability, flexibility, the two sides, dependence, stability.
+"""Analyse records and machines: spectrum, repeatability, flexibility, motor and sensor side, position, stability.
 
 stickslip analyse spectrum run.npz --mode "elastic mode=335" --plot spectrum.png
 stickslip analyse repeatability PID=1.npz PID=2.npz LuGre=3.npz LuGre=4.npz
@@ -20,7 +20,7 @@ from stickslip.cli import _files, _reading, _stability
 if TYPE_CHECKING:
     from stickslip.record import Record
 
-SUMMARY = "spectrum, repeatability, flexibility, both sides, dependence on position, stability"
+SUMMARY = "analyse records and machines: spectrum, repeatability, flexibility, sides, position, stability"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _with_records(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("records", nargs="+", metavar="[NAME=]RECORD", help="records, perhaps named")
+    parser.add_argument("records", nargs="+", metavar="[NAME=]RECORD", help="records, optionally named")
     _reading.add_arguments(parser)
 
 
@@ -76,7 +76,7 @@ def _numbers(option: str, text: str, unit: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
-        raise InputError(f"{option} {text!r} must be numbers in {unit} with commas between them") from None
+        raise InputError(f"{option} {text!r} must be comma-separated numbers in {unit}") from None
 
 
 def _named(option: str, texts: Sequence[str], unit: str) -> dict[str, float]:
@@ -112,13 +112,20 @@ def _show(args: argparse.Namespace, found: Sequence[Any], picture: Callable[[], 
 
 def _spectrum_arguments(parser: argparse.ArgumentParser) -> None:
     _with_records(parser)
-    parser.add_argument("--channel", default="position_error", help="default position_error")
     parser.add_argument(
-        "--mode", action="append", default=[], metavar="NAME=HZ", help="a known mode; peaks near it get its name"
+        "--channel", default="position_error", help="channel to analyse (default position_error)"
+    )
+    parser.add_argument(
+        "--mode", action="append", default=[], metavar="NAME=HZ", help="known mode; nearby peaks get its name"
     )  # fmt: skip
-    parser.add_argument("--resolution", type=float, metavar="HZ", help="default: 8 windows over the record")
-    parser.add_argument("--from", dest="start", type=float, default=0.0, metavar="S", help="leave out before")
-    parser.add_argument("--to", dest="end", type=float, default=float("inf"), metavar="S", help="and after")
+    parser.add_argument(
+        "--resolution",
+        type=float,
+        metavar="HZ",
+        help="frequency resolution (default: 8 windows over the record)",
+    )
+    parser.add_argument("--from", dest="start", type=float, default=0.0, metavar="S", help="start time")
+    parser.add_argument("--to", dest="end", type=float, default=float("inf"), metavar="S", help="end time")
 
 
 def _spectrum(args: argparse.Namespace) -> None:
@@ -145,12 +152,12 @@ def _spectrum(args: argparse.Namespace) -> None:
 
 def _repeatability_arguments(parser: argparse.ArgumentParser) -> None:
     _with_records(parser)
-    parser.add_argument("--channel", default="position", help="default position")
+    parser.add_argument("--channel", default="position", help="channel to analyse (default position)")
 
 
 def _repeatability(args: argparse.Namespace) -> None:
-    from stickslip.analyse.pieces import pieces
     from stickslip.analyse.repeatability import repeatability
+    from stickslip.analyse.split_runs import pieces
 
     groups: dict[str, list[Record]] = {}
     for text, (name, record) in zip(args.records, _opened(args), strict=True):
@@ -171,15 +178,19 @@ def _repeatability(args: argparse.Namespace) -> None:
 
 def _flexibility_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--stiffness", required=True, metavar="K1,K2", help="of the springs, motor first, N·m/rad"
+        "--stiffness", required=True, metavar="K1,K2", help="spring stiffnesses, motor first, N·m/rad"
     )
     parser.add_argument(
-        "--inertia", required=True, metavar="J or J1,J2,J3", help="the whole, or its parts, kg·m²"
+        "--inertia", required=True, metavar="J or J1,J2,J3", help="total inertia or its parts, kg·m²"
     )
     parser.add_argument(
-        "--torque", action="append", default=[], metavar="[NAME=]NM", help="twists the springs; repeatable"
+        "--torque",
+        action="append",
+        default=[],
+        metavar="[NAME=]NM",
+        help="torque for the static twist; repeatable",
     )
-    parser.add_argument("--claimed", metavar="F1,F2", help="first modes to judge, Hz")
+    parser.add_argument("--claimed", metavar="F1,F2", help="claimed first modes to check, Hz")
 
 
 def _flexibility(args: argparse.Namespace) -> None:
@@ -206,12 +217,12 @@ def _flexibility(args: argparse.Namespace) -> None:
 def _sides_arguments(parser: argparse.ArgumentParser) -> None:
     _with_records(parser)
     parser.add_argument(
-        "--inertia", type=float, default=0.0, metavar="KGM2", help="where the speed changes (default 0)"
+        "--inertia", type=float, default=0.0, metavar="KGM2", help="inertia, if the speed changes (default 0)"
     )
 
 
 def _sides(args: argparse.Namespace) -> None:
-    from stickslip.analyse.sides import sides
+    from stickslip.analyse.motor_vs_sensor import sides
 
     found = sides(_distinct(_runs(args)), args.inertia)
 
@@ -225,7 +236,7 @@ def _sides(args: argparse.Namespace) -> None:
 
 def _runs(args: argparse.Namespace) -> list[tuple[str, Record]]:
     """Every run of every record."""
-    from stickslip.analyse.pieces import pieces
+    from stickslip.analyse.split_runs import pieces
 
     return [piece for name, record in _opened(args) for piece in pieces(name, record)]
 
@@ -242,7 +253,7 @@ def _distinct(named: Sequence[tuple[str, Record]]) -> dict[str, Record]:
 def _position_arguments(parser: argparse.ArgumentParser) -> None:
     _with_records(parser)
     parser.add_argument(
-        "--channel", action="append", default=[], help="a torque; repeatable, for both sides (default motor_torque)"
+        "--channel", action="append", default=[], help="torque channel; repeatable (default motor_torque)"
     )  # fmt: skip
     parser.add_argument(
         "--transient", type=float, default=20.0, metavar="DEG", help="travel left out at the start (default 20)"
@@ -268,13 +279,13 @@ def _position(args: argparse.Namespace) -> None:
 Arguments = Callable[[argparse.ArgumentParser], None]
 Work = Callable[[argparse.Namespace], None]
 ANALYSES: dict[str, tuple[str, Arguments, Work]] = {
-    "spectrum": ("power spectral density of a run that oscillates, and the modes excited",
+    "spectrum": ("power spectral density of an oscillating run, and excited modes",
                  _spectrum_arguments, _spectrum),
-    "repeatability": ("how much repeated runs differ, per controller", _repeatability_arguments, _repeatability),
-    "flexibility": ("static twist, modes, and what first mode is possible at all",
+    "repeatability": ("differences between repeated runs, per controller", _repeatability_arguments, _repeatability),
+    "flexibility": ("static twist, modes, and bounds of the first mode",
                     _flexibility_arguments, _flexibility),
-    "sides": ("motor side against sensor side: what the bearings take", _sides_arguments, _sides),
-    "stability": ("why feedback compensation oscillates: margins against gain, sample time and filter",
+    "sides": ("motor torque against sensor torque: bearing friction", _sides_arguments, _sides),
+    "stability": ("stability of feedback compensation: margins over gain, sample time, filter",
                   _stability.arguments, lambda args: _stability.work(args, _show)),
     "position": ("torque against position and time while the axis slides", _position_arguments, _position),
 }  # fmt: skip

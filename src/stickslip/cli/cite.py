@@ -1,4 +1,4 @@
-"""Print the references of what was used, in BibTeX: the package, the sources of the laws, the methods.
+"""Print references in BibTeX: the package, the sources of the laws, the methods.
 
 stickslip cite                                 the package itself
 stickslip cite lugre gms                       laws
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 
-SUMMARY = "print the references of what was used, in BibTeX"
+SUMMARY = "print references in BibTeX"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,10 +1,10 @@
-"""Has the friction changed? Tests the difference of two identified models, parameters and sliding curve.
+"""Test whether friction differs between two identified models, in parameters and sliding curve.
 
 stickslip compare january.toml june.toml
 stickslip compare january.toml june.toml --plot drift.png
 
-Differences of parameters are judged with the correlation of the estimates (joint chi-square; single ones after Holm),
-the curves by a band that holds for the whole curve. The level of both together is 5 %.
+Parameters are tested with the correlation of their estimates (joint chi-square; single parameters after Holm), curves
+by a simultaneous confidence band. The overall significance level is 5 %.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from stickslip.identify.drift_levels import Change
+    from stickslip.identify.compare.levels import Change
 
 from stickslip.cli import _files
 
 LEAST = 1e-6
 """A chance below it depends on how normal the estimates are, far out."""
-SUMMARY = "has the friction changed between two identified models?"
+SUMMARY = "test whether friction changed between two models"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,9 +1,9 @@
-"""The whole way on a record that ships with the package: doctor, identify, recommend.
+"""Run doctor, identify and recommend on a simulated record that ships with the package.
 
 stickslip demo --out demo
 
 The record is simulated (a servo axis with Stribeck friction in a 1 kHz position loop, with noise on the torque and a
-16-bit encoder; `tools/make_demo.py` in the sources makes it), so that what is found can be compared with what is true.
+16-bit encoder; `tools/make_demo.py` in the sources makes it), so the result can be compared with the true values.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 
 from stickslip.cli import _files
 
-SUMMARY = "the whole way, from a log to a recommendation, on a simulated record that ships with the package"
+SUMMARY = "run all steps, from log to recommendation, on a demo record"
 LOOP = "kp=8,kd=0.08,kr=0.08,limit=3"
 TRUTH = (
     "inertia 4e-4 kg·m², offset 0.03 N·m, fc 0.285 N·m, fs 0.335 N·m, vs 0.1 rad/s, sigma2 0.018 N·m·s/rad"
@@ -26,7 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--out", type=Path, default=Path("stickslip-demo"), metavar="DIR", help="default stickslip-demo"
     )
     parser.add_argument(
-        "--log", type=Path, metavar="FILE.csv", help="write the log alone, to try verbs on it"
+        "--log", type=Path, metavar="FILE.csv", help="only write the log, to try the verbs on"
     )
     _files.force_argument(parser)
 

@@ -1,9 +1,9 @@
-"""Check a record for everything that would spoil an identification, one line a finding.
+"""Check a record for everything that would impair an identification; one line per finding.
 
 stickslip doctor log.csv
 stickslip doctor log.csv --map position=q_deg:deg --map torque=I_act:mA --torque-constant 0.05
 
-Errors make the record unusable (exit code 2), warnings make results doubtful, notes are good to know.
+Errors make the record unusable (exit code 2), warnings make results uncertain, notes are for information.
 """
 
 from __future__ import annotations
@@ -13,14 +13,17 @@ from pathlib import Path
 
 from stickslip.cli import _reading
 
-SUMMARY = "check a record before anything is identified from it"
+SUMMARY = "check a record before identification"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """File, and how to read it."""
     parser.add_argument("file", type=Path, metavar="LOG", help="CSV, MAT, HDF5, Parquet, NumPy, JSON, ...")
     parser.add_argument(
-        "--stribeck-velocity", type=float, metavar="RAD_PER_S", help="whether the record has speeds near it"
+        "--stribeck-velocity",
+        type=float,
+        metavar="RAD_PER_S",
+        help="check that the record has speeds near this one",
     )
     parser.add_argument("--json", action="store_true", help="print columns and findings as JSON")
     _reading.add_arguments(parser, part=True)

@@ -1,14 +1,15 @@
-"""Export a friction model to what another machine or simulator reads.
+"""Export a friction model or controller for a drive, PLC or simulator.
 
 stickslip export model.toml --to c99
 stickslip export model.toml --to c99 --single --out firmware --name axis1
 stickslip export run.toml --to c99 --controller      # the whole sampled controller of a `stickslip simulate` file
 stickslip export model.toml --to c99 --compensator fb --filter-hz 10      # the law as a sampled compensator
-stickslip export recommended.toml --to c99 --compensator recommended      # of `stickslip recommend --out`
-stickslip export model.toml --to urdf --nearest      # what a poorer target can hold, with its error
+stickslip export recommended.toml --to c99 --compensator recommended      # from `stickslip recommend --out`
+stickslip export model.toml --to moteus      # the torque over the angle of `stickslip identify --method cogging`
+stickslip export model.toml --to urdf --nearest      # nearest law that the target supports, with its error
 
-model.toml is what identification writes; by hand it is `law = "lugre"` and a table [parameters]. `stickslip export
---list` names the targets. With --check the export is tried in its own tool, where that is installed.
+model.toml is written by `stickslip identify`; by hand it is `law = "lugre"` and a table [parameters]. `stickslip export
+--list` lists the targets. --check tests the export in the target's own tool, if that is installed.
 """
 
 from __future__ import annotations
@@ -23,34 +24,60 @@ if TYPE_CHECKING:
     from stickslip.export.target import Target
 
 NUMBERS = ("gain", "lead", "deadband", "offset", "inertia_feedforward", "filter_hz")
-SUMMARY = "write a model as C, structured text, MATLAB, Python, ..."
+SUMMARY = "export a model as C, structured text, MATLAB, Python, ..."
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """File, target and what to write."""
     parser.add_argument(
-        "file", type=Path, nargs="?", metavar="MODEL.toml", help="what `stickslip identify` wrote"
+        "file", type=Path, nargs="?", metavar="MODEL.toml", help="model written by `stickslip identify`"
     )
-    parser.add_argument("--to", metavar="TARGET", help="the target; --list names them")
-    parser.add_argument("--list", action="store_true", help="name the targets and exit")
+    parser.add_argument("--to", metavar="TARGET", help="target, as listed by --list")
+    parser.add_argument("--list", action="store_true", help="list the targets and exit")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: NAME-TARGET)")
+    parser.add_argument("--name", help="prefix of all exported names (default: that of the file)")
+    parser.add_argument("--single", action="store_true", help="single precision, if the target supports it")
+    compensator_arguments(parser)
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder of the export (default: NAME-TARGET here)"
+        "--nearest", action="store_true", help="export the nearest law that the target supports"
     )
-    parser.add_argument("--name", help="prefix of every name in the target's language (default: the file's)")
-    parser.add_argument("--single", action="store_true", help="single precision, where the target has it")
     parser.add_argument(
-        "--controller", action="store_true", help="the whole sampled controller of the file's [controller]"
+        "--top-speed", type=float, metavar="SPEED",
+        help="highest velocity of the application, for tables and sliding curves, rad/s "
+        "(default: 100 times the velocity over which the law changes)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="setting of the target, as listed by --list",
+    )
+    parser.add_argument(
+        "--position-map",
+        action="store_true",
+        help="export the torque over the angle (identify --method cogging), not the law",
+    )
+    parser.add_argument("--check", action="store_true", help="test the export in the target's own tool")
+    _files.force_argument(parser)
+    parser.add_argument("--json", action="store_true", help="print files, notes and check as JSON")
+
+
+def compensator_arguments(parser: argparse.ArgumentParser) -> None:
+    """A controller or a compensator in place of the law."""
+    parser.add_argument(
+        "--controller", action="store_true", help="export the whole sampled controller in [controller]"
     )
     parser.add_argument(
         "--compensator", choices=("ff", "fb", "recommended"),
-        help="the law as a compensator that is called every sample: feedforward of the reference velocity, "
-        "feedback of the measured one, or what the file recommends",
+        help="export a sampled compensator: feedforward of the reference velocity (ff), feedback of the measured "
+        "velocity (fb), or as recommended in the file",
     )  # fmt: skip
     parser.add_argument(
         "--sample-time",
         type=float,
         metavar="TIME",
-        help="of the compensator, s (default: 0.001, or the recommended one)",
+        help="sample time of the compensator, s (default: recommended, or 0.001)",
     )
     parser.add_argument(
         "--filter-hz",
@@ -60,13 +87,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     for option, metavar, what in (
         ("--gain", "G", "factor on the compensating torque (default: 1)"),
-        ("--lead", "TIME", "by which feedforward looks ahead of the reference, s (default: 0)"),
-        ("--deadband", "SPEED", "velocity below which the compensator's law sees rest, rad/s (default: 0)"),
-        ("--offset", "TORQUE", "constant torque that it gives beside friction's, N·m (default: the file's)"),
+        ("--lead", "TIME", "prediction horizon of the feedforward, s (default: 0)"),
+        ("--deadband", "SPEED", "velocity that the law treats as zero below, rad/s (default: 0)"),
+        ("--offset", "TORQUE", "torque offset, N·m (default: the file's)"),
         (
             "--inertia-feedforward",
             "INERTIA",
-            "times the reference's acceleration, kg·m² (default: the file's inertia)",
+            "inertia of the acceleration feedforward, kg·m² (default: the file's)",
         ),
     ):
         parser.add_argument(option, type=float, metavar=metavar, help=what)
@@ -74,26 +101,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--substeps",
         type=int,
         metavar="N",
-        help="steps of the compensator's law into which a sample is divided (default: 1); the README states the errors",
+        help="integration steps of the law per sample (default: 1)",
     )
-    parser.add_argument(
-        "--nearest", action="store_true", help="where the target cannot hold the law, the nearest that it can"
-    )
-    parser.add_argument(
-        "--top-speed", type=float, metavar="SPEED",
-        help="greatest velocity of the application, rad/s: up to it tables are made and sliding curves compared "
-        "(default: 100 times the velocity over which the law changes)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="a setting of the target; --list names them",
-    )
-    parser.add_argument("--check", action="store_true", help="try the export in its own tool")
-    _files.force_argument(parser)
-    parser.add_argument("--json", action="store_true", help="print files, notes and check as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -101,11 +110,17 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.cli import _output
     from stickslip.errors import InputError
     from stickslip.export import TARGETS, target_named
+    from stickslip.export.maps import MAP_TARGETS
     from stickslip.verbs.export import export
 
     if args.list:
         for name in TARGETS:
             print("\n".join(described(target_named(name))))
+        print(
+            "Of a torque over the angle (identify --method cogging; --position-map where it has a law too):"
+        )
+        for target in MAP_TARGETS.values():
+            print(f"{target.name:<10}{target.title}{f', in {target.unit}' if target.unit else ''}")
         return 0
     if args.file is None or args.to is None:
         raise InputError(
@@ -115,14 +130,14 @@ def run(args: argparse.Namespace) -> int:
     made = export(
         args.file, args.to, name=args.name, single=args.single, controller=args.controller,
         compensator=args.compensator, nearest=args.nearest, top_speed=args.top_speed,
-        settings=settings_given(args.set), check=args.check, **numbers,
+        settings=settings_given(args.set), check=args.check, position_map=args.position_map, **numbers,
     )  # fmt: skip
     folder: Path = args.out or Path(f"{made.name}-{made.target.name}")
     _files.refuse_foreign([folder / name for name in made.files], args.force)
     made = made.save(folder)
     _files.written(made.paths)
     if args.check and made.check is None:
-        print(f"check: {made.target.name} has no tool to run; its format is checked by our tests")
+        print(f"check: {made.target.name} has no tool to run; its format is tested with the package")
     if args.json:
         tried = made.check
         check = {"passed": tried.passed, "text": tried.text, **tried.numbers} if tried else None

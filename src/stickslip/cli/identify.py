@@ -1,17 +1,18 @@
-"""Identify an axis or its friction from records: numbers with intervals, a verdict on each, a model and a report.
+"""Identify an axis or its friction from records; gives intervals, verdicts, a model and a report.
 
 stickslip identify log.csv
 stickslip identify log.mat --drive-gain 35.15 --loop kp=38996,kd=243.45,limit=10,span=2 --law coulomb --law lugre
 stickslip identify a.csv b.csv --hold-out c.csv --law my_law.py --out friction
 stickslip identify steps.csv --method sliding --law stribeck --noise 1e-4
 
-The records are checked first (`stickslip doctor`); an error stops. Methods: `axis` (inertia, offset or gravity and
-friction jointly, from any motion), `sliding` (constant velocities), `breakaway` (torque ramps), `presliding` and
-`attraction` (GMS), `hysteresis` (a measured friction along its motion), `lugre` (sigma0, sigma1), `inertia`
-(frequency response). Of several laws the error on data left out chooses; `sliding` without --law chooses among the
-curves of the thesis. With --loop and a reference in the record the closed loop is simulated, otherwise the recorded
-drive. --out names a folder for model.toml and report.html, or the model's file with the report beside it; `law =
-{model = "model.toml"}` names the model in a study or simulation. What is printed ends with the next command.
+The records are checked first (`stickslip doctor`); an error stops the identification. Methods: `axis` (inertia, offset
+or gravity and friction jointly, from any motion), `sliding` (constant velocities), `breakaway` (torque ramps),
+`presliding` and `attraction` (GMS), `hysteresis` (friction measured along a motion), `lugre` (sigma0, sigma1),
+`inertia` (frequency response), `cogging` (torque over the angle). Several laws are compared by their error on held-out
+data; `sliding` without --law compares the curves of the thesis. With --loop and a reference in the record the closed
+loop is simulated, otherwise the recorded drive signal is the input. --out names a folder for model.toml and
+report.html, or the model file, with the report next to it; a study or simulation uses the model by `law = {model =
+"model.toml"}`. The last line printed is the next command.
 """
 
 from __future__ import annotations
@@ -32,37 +33,60 @@ if TYPE_CHECKING:
     from stickslip.report.answers import Answers
     from stickslip.verbs.identification import IdentificationResult
 
-SUMMARY = "identify inertia and a friction law from records; writes model.toml and report.html"
+SUMMARY = "identify inertia and friction; writes model.toml and report.html"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Files, method, axis, laws, and how to read."""
-    parser.add_argument("files", nargs="+", type=Path, metavar="LOG", help="records, fitted together")
-    parser.add_argument("--method", choices=METHODS, default="axis", help="default axis")
+    parser.add_argument(
+        "files", nargs="+", type=Path, metavar="LOG", help="logs to identify from, fitted together"
+    )
+    parser.add_argument(
+        "--method", choices=METHODS, default="axis", help="method of identification (default axis)"
+    )
     parser.add_argument(
         "--hold-out", "--validation", dest="validation", action="append", default=[], type=Path, metavar="LOG",
-        help="not fitted, judges the result (axis)",
+        help="log for validation only, not fitted (axis)",
     )  # fmt: skip
     parser.add_argument(
-        "--law", action="append", default=[], metavar="LAW", help="a law's name or file, or all; repeatable"
+        "--law",
+        action="append",
+        default=[],
+        metavar="LAW",
+        help="friction law: name, file or all; repeatable",
     )
     parser.add_argument(
-        "--noise", type=float, metavar="X", help="standard deviation of what is fitted: N·m, or rad (lugre)"
-    )
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="a starting value")
-    parser.add_argument(
-        "--freeze", action="append", default=[], metavar="NAME[=VALUE]", help="keep at its value"
+        "--noise", type=float, metavar="X", help="standard deviation of the fitted signal, N·m (lugre: rad)"
     )
     parser.add_argument(
-        "--free", action="append", default=[], metavar="NAME[=VALUE]", help="fit what usually stays"
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="initial value of a parameter"
     )
     parser.add_argument(
-        "--model", type=Path, metavar="MODEL.toml", help="what an earlier identification found"
+        "--freeze", action="append", default=[], metavar="NAME[=VALUE]", help="keep a parameter fixed"
     )
-    parser.add_argument("--torque", metavar="CHANNEL", help="motor_torque, sensor_torque, ... (not axis)")
-    parser.add_argument("--elements", type=int, default=0, metavar="N", help="of GMS (presliding; 0: chosen)")
     parser.add_argument(
-        "--threshold", type=float, metavar="V", help="velocity that is motion, rad/s or m/s (breakaway; 0.01)"
+        "--free",
+        action="append",
+        default=[],
+        metavar="NAME[=VALUE]",
+        help="fit a parameter that is normally fixed",
+    )
+    parser.add_argument("--model", type=Path, metavar="MODEL.toml", help="model of an earlier identification")
+    parser.add_argument(
+        "--torque", metavar="CHANNEL", help="torque channel: motor_torque, sensor_torque, ... (not axis)"
+    )
+    parser.add_argument(
+        "--elements",
+        type=int,
+        default=0,
+        metavar="N",
+        help="number of GMS elements (presliding; 0: automatic)",
+    )
+    parser.add_argument(
+        "--threshold",
+        type=float,
+        metavar="V",
+        help="velocity that counts as motion (breakaway), rad/s or m/s (default 0.01)",
     )
     _axis_arguments(parser.add_argument_group("axis"))
     parser.add_argument(
@@ -70,7 +94,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("model.toml"),
         metavar="DIR",
-        help="folder, or FILE.toml (model.toml)",
+        help="folder or model file (default model.toml)",
     )
     parser.add_argument("--no-report", action="store_true", help="write no report.html")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
@@ -82,51 +106,59 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
     """What only the method `axis` (and `inertia`) looks at."""
     parser.add_argument("--inverse", action="store_true", help="linear least squares only, no simulation")
     parser.add_argument(
-        "--per-direction", action="store_true", help="friction with parameters of its own for each direction"
+        "--per-direction", action="store_true", help="separate friction parameters for each direction"
     )
-    parser.add_argument("--pendulum", action="store_true", help="gravity m g l sin(q - q0)")
+    parser.add_argument("--pendulum", action="store_true", help="include gravity, m g l sin(q - q0)")
     parser.add_argument("--drive-gain", type=float, metavar="G", help="torque per unit of the drive's signal")
     parser.add_argument(
-        "--resistance", type=float, metavar="OHM", help="of the motor, where a voltage drives it"
+        "--resistance", type=float, metavar="OHM", help="motor resistance, for logs of a voltage"
     )
     parser.add_argument(
         "--loop", action="append", default=[], metavar="kp=..,kd=..",
-        help="sampled controller kp e + ki (integral of e) + kr v_ref - kd v, its output the recorded drive's signal "
-        "(a torque: kp in N·m/rad, kd and kr in N·m·s/rad), what is left out 0; limit: of that output; period: s from "
-        "sample to sample (0: the rows); count: rad of its encoder; span: samples that its velocity spans, 1 or 2. "
-        "Once for each LOG, in their order, where they ran with different gains",
+        help="sampled controller kp e + ki (integral of e) + kr v_ref - kd v whose output is the recorded drive signal "
+        "(of a torque: kp in N·m/rad, kd and kr in N·m·s/rad); omitted gains are 0. limit: of the output; period: "
+        "sample time, s (0: that of the rows); count: encoder resolution, rad; span: samples per velocity difference, "
+        "1 or 2. Repeat once per LOG, in the same order, if the gains differ",
     )  # fmt: skip
     parser.add_argument(
         "--loop-output", choices=("torque", "current", "voltage"),
-        help="what the loop's output is where no drive signal is recorded (torque; voltage with --resistance); of a "
-        "voltage the duty cycle, where the record has the supply",
+        help="quantity that the loop outputs if no drive signal is recorded (default torque, or voltage with "
+        "--resistance); a voltage is a duty cycle if the record has the supply voltage",
     )  # fmt: skip
     parser.add_argument(
         "--extra-torque",
         metavar="CHANNEL",
-        help="a known torque that acts beside the recorded one, such as compensation_torque; is added to it",
+        help="known torque added to the recorded one, such as compensation_torque",
     )
     parser.add_argument(
         "--torque-is", choices=("commanded", "actual", "mean"),
-        help="what the column of the torque holds: the command from this row to the next, the value at the row, or "
-        "the mean over the row before; found from the record unless given",
+        help="meaning of the torque column: commanded from this row to the next, actual at the row, or "
+        "mean since the previous row (default: found from the record)",
     )  # fmt: skip
     parser.add_argument(
         "--delay", type=float, metavar="S",
-        help="s from then until it acts (current loop, dead time); 0 where --torque-is is given alone",
+        help="delay until the torque acts (current loop, dead time), s; 0 if only --torque-is is given",
     )  # fmt: skip
-    parser.add_argument("--harmonics", type=int, default=0, metavar="N", help="of a torque over the position")
     parser.add_argument(
-        "--load", action="store_true", help="friction that grows with the load of the gearing"
+        "--harmonics",
+        type=int,
+        default=0,
+        metavar="N",
+        help="number of harmonics of a position-dependent torque",
     )
     parser.add_argument(
+        "--position", dest="position_map", action="store_true",
+        help="find the torque over the angle (cogging, friction by angle), take it out and write its map",
+    )  # fmt: skip
+    parser.add_argument("--load", action="store_true", help="include friction that grows with the gear load")
+    parser.add_argument(
         "--intervals", choices=("prediction", "covariance"), default="prediction",
-        help="covariance: that of the output error, too narrow under coloured noise",
+        help="source of the intervals; covariance is too narrow under coloured noise",
     )  # fmt: skip
     parser.add_argument(
         "--robust",
         action="store_true",
-        help="outliers count linearly in the output error; the prediction error weighs them anyway",
+        help="weight outliers linearly in the output error",
     )
 
 
@@ -151,7 +183,7 @@ def run(args: argparse.Namespace) -> int:
     options["progress"] = begins
     result = identify(*args.files, **options, **_reading.reading_of(args))
     made: dict[str, Path] = {}
-    if result.identification.model is not None:
+    if result.identification.model is not None or result.position_map is not None:
         made["model_file"] = result.save(model_file)
     if not args.no_report:
         _output.say("report")
@@ -185,8 +217,9 @@ def options_of(args: argparse.Namespace) -> dict[str, Any]:
         "loop": args.loop, "loop_output": args.loop_output, "inverse": args.inverse,
         "per_direction": args.per_direction, "pendulum": args.pendulum, "drive_gain": args.drive_gain,
         "resistance": args.resistance, "extra_torque": args.extra_torque or "", "torque_is": args.torque_is,
-        "delay": args.delay, "harmonics": args.harmonics, "load": args.load, "intervals": args.intervals,
-        "robust": args.robust, "accept": args.accept, "progress": _output.say, "tell": tell,
+        "delay": args.delay, "harmonics": args.harmonics, "position_map": args.position_map, "load": args.load,
+        "intervals": args.intervals, "robust": args.robust, "accept": args.accept,
+        "progress": _output.say, "tell": tell,
     }  # fmt: skip
 
 

@@ -4,7 +4,7 @@
     stickslip law lugre --plot                        draws law-lugre.png
     stickslip law gms --plot gms.svg --set slip_rule=literal --set k=[1e4,5e3] --set alpha=[0.5,0.5]
     stickslip law my_law.py --plot
-    stickslip law my_law.py --check                   holds a law of your own to the contract of laws
+    stickslip law my_law.py --check                   tests a law of your own
 
 The picture shows the torque along a slow sine, in pre-sliding, and after steps in velocity.
 """
@@ -24,20 +24,20 @@ if TYPE_CHECKING:
     from stickslip.model import Model
     from stickslip.spec import Field, Law
 
-SUMMARY = "explain a friction law: equation, parameters with units and bounds, source, picture"
+SUMMARY = "explain a friction law: equation, parameters, source, plot"
 DEFAULT = Path()
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """The name, the picture, parameters."""
-    parser.add_argument("name", help="a law that `stickslip laws` lists, or the path of a law's file")
+    parser.add_argument("name", help="law listed by `stickslip laws`, or path of a law file")
     parser.add_argument(
         "--plot", type=Path, nargs="?", const=DEFAULT, metavar="FILE",
-        help="draw the law into FILE.png, .svg or .pdf (default: law-NAME.png here)",
+        help="draw the law into FILE.png, .svg or .pdf (default: law-NAME.png)",
     )  # fmt: skip
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE",
-        help="another value of a parameter, or another option of a choice; may be repeated",
+        help="value of a parameter or option of a choice; repeatable",
     )  # fmt: skip
     _files.force_argument(parser)
     parser.add_argument(
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     if args.check:
         if args.plot is not None or args.set:
             raise InputError(
-                "--check tries the law as its file has it; give --plot and --set in a call of their own"
+                "--check tests the law as written in its file; use --plot and --set in a separate call"
             )
         return check(law)
     model = with_values(law, args.set).warn()
@@ -131,7 +131,7 @@ def setting(text: str) -> tuple[str, Any]:
 
     name, equals, value = text.partition("=")
     if not equals or not name.strip() or not value.strip():
-        raise InputError(f"--set {text!r} is no NAME=VALUE; write it like fs=0.3 or k=[1e4,5e3]")
+        raise InputError(f"--set {text!r} must be NAME=VALUE, such as fs=0.3 or k=[1e4,5e3]")
     try:
         return name.strip(), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:

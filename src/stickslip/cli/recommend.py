@@ -1,17 +1,18 @@
-"""From an identified model to a setting that is safe to switch on.
+"""Recommend a compensator that is safe to switch on, from an identified model.
 
 stickslip recommend model.toml --bandwidth 15 --sample-time 0.001 --counts-per-rev 65536 --torque-limit 2
 stickslip recommend model.toml --bandwidth 15 --out recommended.toml
 stickslip export recommended.toml --to c99 --compensator recommended
 
 stickslip recommend model.toml --loop kv=40,kvp=0.8,kvi=25,feed=1,filter=300,limit=3 --counts-per-rev 262144
+stickslip recommend model.toml --bandwidth 15 --compensators all
 stickslip recommend model.toml --loop kp=8,ki=60,kd=0.08,kr=0.08,limit=3 --motion cycle.csv
 
-Simulates the linear controller alone (the loop given, or PD, PID by pole placement) and every candidate (law,
-feedforward or feedback, gain, deadband) on the best estimate and on axes drawn from the model's intervals, along the
-motion of the log (or one given) and at rest behind it, sampled as in the drive. Recommended is what limit-cycles on
-none of them and leaves the least error on the worst. It is then simulated on other axes drawn from the intervals; the
-error reduction that is printed is what it did there.
+Simulates the linear controller alone (the given loop, or PD or PID by pole placement) and every candidate (law,
+feedforward or feedback, gain, dead band) on the best estimate and on axes sampled from the model's intervals. The
+motion is that of the log, or a given one, followed by a standstill; sampling is that of the drive. The recommended
+candidate has a limit cycle on none of these axes and the smallest error on the worst one. It is then simulated on
+further sampled axes; the error reduction printed is the one found there.
 """
 
 from __future__ import annotations
@@ -27,77 +28,115 @@ from stickslip.cli import _files
 if TYPE_CHECKING:
     from stickslip.verbs.recommend import RecommendationResult
 
-SUMMARY = "which compensator to switch on: law, structure, gain, lead, deadband, and what to expect"
+SUMMARY = "recommend a compensator for an identified model"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Model, drive, motion."""
-    parser.add_argument("model", type=Path, metavar="MODEL.toml", help="what `stickslip identify` wrote")
+    """Model, drive, motion, search."""
+    parser.add_argument(
+        "model", type=Path, metavar="MODEL.toml", help="model written by `stickslip identify`"
+    )
+    drive_arguments(parser)
+    motion_arguments(parser)
+    search_arguments(parser)
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE.toml",
+        help="write the recommended setting, for `stickslip export`",
+    )
+    _files.force_argument(parser)
+    parser.add_argument("--json", action="store_true", help="print the result and all candidates as JSON")
+
+
+def drive_arguments(parser: argparse.ArgumentParser) -> None:
+    """The drive and its loop."""
     for option, default, unit, what in (
-        ("--bandwidth", 10.0, "HZ", "of the position loop"),
-        ("--damping", 1.0, "D", "of its poles"),
-        ("--sample-time", 1e-3, "S", "of the drive"),
-        ("--counts-per-rev", 0.0, "N", "of the encoder; 0: exact"),
-        ("--torque-limit", math.inf, "NM", "of the drive"),
+        ("--bandwidth", 10.0, "HZ", "bandwidth of the position loop"),
+        ("--damping", 1.0, "D", "damping of its poles"),
+        ("--torque-limit", math.inf, "NM", "torque limit of the drive"),
     ):
         parser.add_argument(
             option, type=float, default=default, metavar=unit, help=f"{what} (default {default:g})"
         )
     parser.add_argument(
+        "--machine", metavar="MACHINE",
+        help="the machine at hand (of the library, or its TOML file): simulated with "
+        "its resonances, delay, amplifier, encoder and noise",
+    )  # fmt: skip
+    parser.add_argument(
+        "--sample-time",
+        type=float,
+        metavar="S",
+        help="sample time of the drive (default the machine's, or 0.001)",
+    )
+    parser.add_argument(
+        "--counts-per-rev",
+        type=float,
+        metavar="N",
+        help="encoder counts per revolution; 0: no quantisation (default the machine's, or 0)",
+    )
+    parser.add_argument(
         "--linear",
         choices=("PD", "PID", "PR"),
         default="PD",
-        help="what bandwidth and damping place (default PD)",
+        help="controller designed by pole placement (default PD)",
     )
     parser.add_argument(
         "--loop", metavar="kp=..,kd=..",
-        help="the drive's own loop instead: kp (N·m/rad), ki, kd, kr of a PID, or kv (1/s), kvp (N·m·s/rad), kvi "
-        "(N·m/rad), feed (part of the reference velocity fed forward, default 1) of position P around velocity PI; "
-        "with filter (Hz, low-pass on its velocity) and limit (N·m)",
+        help="gains of the existing loop: kp (N·m/rad), ki, kd, kr of a PID; or kv (1/s), kvp (N·m·s/rad), kvi "
+        "(N·m/rad), feed (share of the velocity feedforward, default 1) of a position P loop around a velocity PI "
+        "loop; optionally filter (Hz, velocity low-pass) and limit (N·m)",
     )  # fmt: skip
     parser.add_argument(
         "--controller", type=Path, metavar="FILE.toml",
-        help="the drive's own loop made of control laws instead (table [controller]), observers and all, but without "
-        "friction laws",
+        help="existing loop as control laws (table [controller]), including observers, without friction "
+        "compensation",
     )  # fmt: skip
+
+
+def motion_arguments(parser: argparse.ArgumentParser) -> None:
+    """The motion of the application."""
     parser.add_argument(
         "--motion", type=Path, metavar="FILE",
-        help="log or CSV (time, position) of the motion that matters (default: that of the log, kept in MODEL.toml)",
+        help="log or CSV (time, position) of the application's motion (default: that of the identified log)",
     )  # fmt: skip
     parser.add_argument(
         "--amplitude",
         type=float,
         metavar="RAD",
-        help="of a slow sinusoid as the motion instead (m of a linear axis)",
+        help="amplitude of a slow sinusoid as the motion (linear axis: m)",
     )
-    parser.add_argument("--frequency", type=float, metavar="HZ", help="of that sinusoid (default 0.5)")
     parser.add_argument(
-        "--inertia", type=float, metavar="KGM2", help="where the model has none, or another one"
+        "--frequency", type=float, metavar="HZ", help="frequency of that sinusoid (default 0.5)"
+    )
+
+
+def search_arguments(parser: argparse.ArgumentParser) -> None:
+    """What is tried, and on how many axes."""
+    parser.add_argument(
+        "--inertia", type=float, metavar="KGM2", help="inertia, if missing in the model or different"
     )
     parser.add_argument(
         "--no-inertia-feedforward", dest="feed_inertia", action="store_false",
-        help="leave out the inertia times the reference's acceleration, where the drive gives it itself or knows none",
+        help="omit the inertia feedforward",
+    )  # fmt: skip
+    parser.add_argument(
+        "--compensators", metavar="NAMES",
+        help="observers, adaptive compensators and others to try too: names separated by commas, or all (a minute)",
     )  # fmt: skip
     parser.add_argument(
         "--axes",
         type=int,
         default=6,
         metavar="N",
-        help="drawn from the intervals for all candidates (default 6)",
+        help="sampled axes for all candidates (default 6)",
     )
     parser.add_argument(
         "--confirm", type=int, default=39, metavar="N",
-        help="drawn for the recommended one: what it does on them is the interval of the error reduction, which holds "
-        "with (N - 1)/(N + 1) (default 39: 95 %%)",
+        help="further sampled axes for the recommended candidate; they give the interval of the error reduction with a "
+        "probability of (N - 1)/(N + 1) (default 39: 95 %%)",
     )  # fmt: skip
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE.toml",
-        help="write what is recommended, as `stickslip export` takes it",
-    )
-    _files.force_argument(parser)
-    parser.add_argument("--json", action="store_true", help="print the result as JSON, all candidates too")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -111,10 +150,12 @@ def run(args: argparse.Namespace) -> int:
     with _output.progress_bar("simulating") as progress:
         result = recommend(
             args.model, bandwidth=args.bandwidth, damping=args.damping, linear=args.linear, loop=args.loop,
-            controller=args.controller,
+            controller=args.controller, machine=args.machine,
             sample_time=args.sample_time, counts_per_rev=args.counts_per_rev, torque_limit=args.torque_limit,
             motion=args.motion, amplitude=args.amplitude, frequency=args.frequency, inertia=args.inertia,
-            feed_inertia=args.feed_inertia, axes=args.axes, confirm=args.confirm, progress=progress,
+            feed_inertia=args.feed_inertia,
+            compensators=[n.strip() for n in args.compensators.split(",")] if args.compensators else (),
+            axes=args.axes, confirm=args.confirm, progress=progress,
         )  # fmt: skip
     written = args.out and store(args.out, result)
     if written:
@@ -125,7 +166,8 @@ def run(args: argparse.Namespace) -> int:
     print(result)
     if written:
         print(f"recommended: {written}")
-        what = "--controller" if args.controller else "--compensator recommended"
+        whole = args.controller or result.recommendation.instead
+        what = "--controller" if whole else "--compensator recommended"
         print(f"next: stickslip export {shlex.quote(str(written))} --to c99 {what}")
     return 0
 
@@ -134,7 +176,7 @@ def store(out: Path, result: RecommendationResult) -> Path | None:
     """Write the recommendation; where there is none, an earlier one must not be taken for it."""
     from stickslip.config import read_toml
 
-    if result.chosen is not None:
+    if result.chosen is not None or result.recommendation.instead is not None:
         return result.save(out)
     if out.is_file() and out.suffix == ".toml" and read_toml(out).has("recommended"):
         out.unlink()

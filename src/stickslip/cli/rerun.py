@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-SUMMARY = "run a finished study or sweep again from its manifest and compare the metrics"
+SUMMARY = "repeat a study or sweep from its manifest and compare"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,9 +14,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "folder",
         type=Path,
         metavar="DIR",
-        help="a folder that `stickslip study` or `stickslip sweep` wrote, or its manifest.json",
+        help="folder written by `stickslip study` or `stickslip sweep`, or its manifest.json",
     )
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at a time (default 1)")
+    parser.add_argument(
+        "--jobs", type=int, default=1, metavar="N", help="number of parallel runs (default 1)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -31,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.sweep.rerun import rerun as rerun_sweep
 
     if args.jobs < 1:
-        raise InputError(f"--jobs {args.jobs} must be at least 1; give how many may run at a time")
+        raise InputError(f"--jobs {args.jobs} must be at least 1; give the number of parallel runs")
     insist_on_jobs(args.jobs)
     sweep = is_sweep(args.folder)
     rerun = rerun_sweep if sweep else rerun_study

@@ -7,11 +7,11 @@ stickslip rig run track --rig thesis-dry --set compensator=feedforward --set mod
 stickslip rig run track --rig thesis-dry --set controller=my_controller.toml      # made of control laws
 stickslip rig run inertia --rig my_machine.toml --dry-run
 stickslip rig run breakaway --rig drive.toml --limit torque=0.5 --stream breakaway.stream
-stickslip rig commission --rig thesis-dry --out commissioned      # the same again goes on where it was interrupted
+stickslip rig commission --rig thesis-dry --out commissioned      # run again to resume after an interruption
 
-A rig is the name of a machine of the library, the TOML file of a machine, or a TOML file with a table [rig] (`kind`,
-and what that kind of rig needs). --dry-run says how far, how fast, how strong and how long, and moves nothing. The
-record is a .npz file that `stickslip identify` and `stickslip doctor` read.
+A rig is the name of a machine in the library, the TOML file of a machine, or a TOML file with a table [rig] (`kind` and
+the settings of that kind). --dry-run prints travel, speed, torque and duration without moving. The record is a .npz
+file for `stickslip identify` and `stickslip doctor`.
 """
 
 from __future__ import annotations
@@ -41,36 +41,48 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     run_one = actions.add_parser("run", help="perform one procedure")
-    run_one.add_argument("procedure", metavar="NAME", help="`stickslip rig list` names them")
-    run_one.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="an option")
-    run_one.add_argument("--out", type=Path, metavar="FILE.npz", help="the record (default: NAME.npz)")
+    run_one.add_argument("procedure", metavar="NAME", help="procedure, as listed by `stickslip rig list`")
     run_one.add_argument(
-        "--realtime", action="store_true", help="keep pace with the clock on a virtual rig too"
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="option of the procedure"
     )
-    run_one.add_argument("--stream", type=Path, metavar="FILE", help="also write every sample as it comes")
+    run_one.add_argument("--out", type=Path, metavar="FILE.npz", help="record to write (default: NAME.npz)")
+    run_one.add_argument("--realtime", action="store_true", help="run a virtual rig in real time")
+    run_one.add_argument("--stream", type=Path, metavar="FILE", help="also stream every sample to this file")
     _files.force_argument(run_one)
-    whole = actions.add_parser("commission", help="every procedure in turn, to a model.toml and a report")
+    whole = actions.add_parser("commission", help="run all procedures; writes model.toml and a report")
     whole.add_argument(
-        "--out", type=Path, default=Path("commission"), metavar="DIR", help="folder (commission)"
+        "--out",
+        type=Path,
+        default=Path("commission"),
+        metavar="DIR",
+        help="output folder (default commission)",
+    )
+    whole.add_argument(
+        "--cogging",
+        choices=("rotation", "standstill"),
+        default="",
+        help="also map the torque over the angle, in slow rotations or held at places",
     )
     whole.add_argument(
         "--force",
         action="store_true",
-        help="measure all of it again, over the results that lie in the folder",
+        help="measure everything again and overwrite existing results",
     )
     actions.add_parser("list", help="list machines, procedures and imperfections")
     for action in (run_one, whole):
-        action.add_argument("--rig", required=True, metavar="RIG", help="a machine's name or a TOML file")
+        action.add_argument("--rig", required=True, metavar="RIG", help="name of a machine, or TOML file")
         action.add_argument(
-            "--without", action="append", default=[], metavar="NAME", help="an imperfection to switch off"
+            "--without", action="append", default=[], metavar="NAME", help="imperfection to switch off"
         )
         action.add_argument(
             "--limit", action="append", default=[], metavar="NAME=VALUE",
-            help="a narrower limit than the rig's: torque, speed, lowest_position, highest_position, temperature, "
+            help="tighter limit than the rig's: torque, speed, lowest_position, highest_position, temperature, "
             "following_error, stop_time (SI units)",
         )  # fmt: skip
-        action.add_argument("--dry-run", action="store_true", help="say what would be done")
-        action.add_argument("--no-watchdog", action="store_true", help="arm a rig that declares no watchdog")
+        action.add_argument("--dry-run", action="store_true", help="print the plan without moving")
+        action.add_argument(
+            "--no-watchdog", action="store_true", help="allow a rig that declares no watchdog"
+        )
         action.add_argument("--json", action="store_true", help="print the result as JSON")
         allow_code_argument(action)
 
@@ -85,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
 def listed() -> int:
     """Machines, procedures, imperfections."""
     from stickslip.machines.machine import IMPERFECTIONS, library, machine
-    from stickslip.plugins import rig_kind_names
+    from stickslip.rigs.kinds import rig_kind_names
     from stickslip.rigs.procedures import PROCEDURES, procedure
 
     print("machines (--rig):")
@@ -111,7 +123,7 @@ def rig_of(args: argparse.Namespace) -> Rig:
     from stickslip.config import read_toml
     from stickslip.errors import InputError
     from stickslip.rigs.files import read_rig
-    from stickslip.rigs.limited import limited
+    from stickslip.rigs.narrower_limits import limited
     from stickslip.rigs.virtual import virtual_rig
 
     name = str(args.rig)
@@ -141,7 +153,7 @@ def performed(args: argparse.Namespace) -> int:
     if out.is_dir():
         raise InputError(f"--out {out} is a folder; give the name of a file")
     if args.stream is not None and args.stream.resolve() == out.resolve():
-        raise InputError(f"--out and --stream are both {out}; give another name to one of them")
+        raise InputError(f"--out and --stream are both {out}; give different names")
     prepared_folder(out.parent)
     _files.refuse_foreign([out], args.force)
     result = perform(
@@ -195,8 +207,8 @@ def commissioned(args: argparse.Namespace) -> int:
     from stickslip.cli import _output
     from stickslip.commission.commission import commission, planned
     from stickslip.commission.headline import headline
-    from stickslip.commission.kept import claimed
     from stickslip.commission.recommended import write_recommended
+    from stickslip.commission.resume import claimed
     from stickslip.errors import InputError
     from stickslip.identify.model_file import versions, write_model
     from stickslip.report.identified import Source, write_identification
@@ -205,7 +217,7 @@ def commissioned(args: argparse.Namespace) -> int:
     rig = rig_of(args)
     if args.dry_run:
         total = 0.0
-        for plan in planned(rig):
+        for plan in planned(rig, cogging=args.cogging):
             total += plan.duration + plan.pauses
             print("\n".join(plan.text))
         print(f"time    up to {clock(total)}")
@@ -221,10 +233,11 @@ def commissioned(args: argparse.Namespace) -> int:
             progress=_output.tell,
             without_watchdog=args.no_watchdog,
             resume=not args.force,
+            cogging=args.cogging,
         )
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
-            f"the records are kept in {folder}; run the same command again, without --force, to go on"
+            f"the records are kept in {folder}; run the same command again, without --force, to resume"
         ) from None
     stages = [s for s in found.stages if s.name != "angle"]  # another look at the sliding record
     records = {s.name: s.performed.record for s in stages}
@@ -297,7 +310,7 @@ def shown(result: Performed, out: Path, args: argparse.Namespace) -> int:
         for check in result.checks:
             print(f"{'ok    ' if check.passed else 'FAILED'} {check.name}: {check.text}")
         if "loop" in result.record.meta:
-            from stickslip.rigs.pace import Account
+            from stickslip.rigs.realtime import Account
 
             print(*Account(**result.record.meta["loop"]).lines(), sep="\n")
         print(f"record: {out} ({len(result.record)} rows)")

@@ -1,6 +1,6 @@
 """Simulate one closed loop from a TOML file with [axis], [friction], [reference] and [controller].
 
-A compensator computes its torque with a law from a table [laws.NAME], which the controller names.
+A compensator computes its torque with the law of a table [laws.NAME] that the controller names.
 
 [axis]
 inertia = 3.8623e-4            # kg·m²
@@ -20,9 +20,9 @@ duration = 5.0                 # s
 [controller]
 linear = "PD"
 placement = {bandwidth_hz = 36.0, damping = 1.0}
-compensator = "feedforward"    # or "feedback"; leave it and `law` out for the linear controller alone
+compensator = "feedforward"    # or "feedback"; omit it and `law` for the linear controller alone
 law = "lugre"                  # the NAME of a table [laws.NAME]
-[laws.lugre]                   # what the compensator believes friction to be
+[laws.lugre]                   # the friction model of the compensator
 law = "lugre"
 sigma0 = 3.5e4
 sigma1 = 0.1
@@ -45,7 +45,12 @@ SUMMARY = "simulate one closed loop from a TOML file"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """File and output."""
     parser.add_argument("file", type=Path, metavar="FILE.toml")
-    parser.add_argument("--out", type=Path, metavar="FILE.npz", help="the record (default: FILE.npz here)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE.npz",
+        help="record to write (default: FILE.npz in the current folder)",
+    )
     _files.force_argument(parser)
     parser.add_argument(
         "--json", action="store_true", help="print the record's meta (metrics, energy, ...) as JSON"

@@ -1,11 +1,12 @@
-"""Run a study: controllers compared over references and frictions.
+"""Run a study: controllers compared over references and friction models.
 
     stickslip study thesis           the thesis's simulation study, which ships with the package
-    stickslip study thesis-rig       its experiments (chapter 4) on virtual machines, its statements checked
-    stickslip study my.toml          your own; begin with a copy of thesis.toml (`stickslip study thesis --print`)
+    stickslip study thesis-rig       the thesis's experiments (chapter 4) on virtual machines, statements checked
+    stickslip study compensators     every compensator on one bench of machines, references and changes of friction
+    stickslip study my.toml          your own; start from a copy of thesis.toml (`stickslip study thesis --print`)
 
 Writes DIR/metrics.csv, metrics.parquet, records/, manifest.json and report.html. Finished runs are kept: after an
-interruption the same command goes on, and what --only leaves out stays in the tables and the report.
+interruption the same command resumes, and runs that --only leaves out stay in the tables and the report.
 """
 
 from __future__ import annotations
@@ -14,30 +15,36 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-SUMMARY = "run a study: controllers compared over references and frictions"
+SUMMARY = "compare controllers over references and friction models"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Study, output, selection."""
-    parser.add_argument("study", metavar="STUDY", help="thesis, thesis-rig, or the path of a TOML file")
+    parser.add_argument(
+        "study",
+        metavar="STUDY",
+        help="thesis, thesis-rig, imperfections, compensators, or the path of a TOML file",
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: study-STUDY)")
     parser.add_argument(
-        "--only", metavar="PARTS", help="run only what has these in its name: low,step or FF-lugre,signed"
+        "--only", metavar="PARTS", help="run only what matches these names: low,step or FF-lugre,signed"
     )
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at a time (default 1)")
+    parser.add_argument(
+        "--jobs", type=int, default=1, metavar="N", help="number of parallel runs (default 1)"
+    )
     parser.add_argument("--json", action="store_true", help="print the results as JSON instead of a table")
-    parser.add_argument("--no-report", action="store_true", help="leave figures and report.html out")
+    parser.add_argument("--no-report", action="store_true", help="write no figures and no report.html")
     parser.add_argument(
         "--seeds",
         type=int,
         default=20,
         metavar="N",
-        help="thesis-rig: further starts of every run (default 20)",
+        help="thesis-rig: additional start angles per run (default 20)",
     )
     parser.add_argument(
         "--no-ablation",
         action="store_true",
-        help="thesis-rig: leave out the runs without one imperfection each",
+        help="thesis-rig: skip the runs with one imperfection removed",
     )
     parser.add_argument("--print", action="store_true", help="print the study's TOML and run nothing")
 
@@ -48,6 +55,12 @@ def run(args: argparse.Namespace) -> int:
         from stickslip.cli import _rig_study
 
         return _rig_study.run(args)
+    from stickslip.study.bench import is_bench
+
+    if is_bench(args.study):
+        from stickslip.cli import _bench
+
+        return _bench.run(args)
     from stickslip.cli import _output
     from stickslip.errors import InputError
     from stickslip.report import write
@@ -70,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         report = None if args.no_report else write(result)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
-            f"finished runs are kept in {out}; run the same command again to go on"
+            f"finished runs are kept in {out}; run the same command again to resume"
         ) from None
     # The folder may hold more of the study than was asked for; only that is shown.
     names = [*study.runs, *study.extras]

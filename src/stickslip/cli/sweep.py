@@ -1,10 +1,10 @@
-"""Run a study over many cases: numbers varied on a grid, by Sobol or Latin points, or as an identification doubts them.
+"""Run a study over many cases: vary numbers on a grid, by Sobol or Latin points, or within identified intervals.
 
-    stickslip sweep thesis-robustness      ships: friction and inertia up to 30 % off, for every compensator
-    stickslip sweep my.toml                your own; begin with a copy (`stickslip sweep thesis-robustness --print`)
+    stickslip sweep thesis-robustness      included: friction and inertia up to 30 % off, for every compensator
+    stickslip sweep my.toml                your own; start from a copy (`stickslip sweep thesis-robustness --print`)
 
-Writes DIR/data/ (a Parquet data set), manifest.json, summary.csv and figures. Finished blocks are kept: after an
-interruption, whatever it was, the same command goes on.
+Writes DIR/data/ (a Parquet data set), manifest.json, summary.csv and figures. Finished blocks are kept: after any
+interruption the same command resumes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MANY = 1000
 """Closed loops from which it is told beforehand how long they take."""
-SUMMARY = "run a study over many cases: which compensator for how much uncertainty"
+SUMMARY = "run a study over many cases, such as uncertain parameters"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,14 +28,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "sweep", metavar="SWEEP", help="thesis-robustness, thesis-gain, or the path of a TOML file"
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: sweep-SWEEP)")
-    parser.add_argument("--cases", type=int, metavar="N", help="another number of cases than the file's")
-    parser.add_argument("--jobs", type=int, metavar="N", help="blocks at a time (default: one a core)")
+    parser.add_argument("--cases", type=int, metavar="N", help="number of cases, instead of the file's")
+    parser.add_argument(
+        "--jobs", type=int, metavar="N", help="number of parallel blocks (default: one per core)"
+    )
     parser.add_argument("--processes", action="store_true", help="use processes instead of threads")
     parser.add_argument(
-        "--scheduler", default="", metavar="URL", help="of Dask, tcp://host:8786: its workers run it"
+        "--scheduler", default="", metavar="URL", help="run on a Dask cluster, such as tcp://host:8786"
     )
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
-    parser.add_argument("--no-report", action="store_true", help="leave the figures out")
+    parser.add_argument("--no-report", action="store_true", help="write no figures")
     parser.add_argument("--print", action="store_true", help="print the sweep's TOML and run nothing")
 
 
@@ -51,7 +53,7 @@ def announce(sweep: Sweep, jobs: int) -> None:
         _output.say("timing some cases ...")
         told = f", about {_output.duration(seconds_of(sweep) / jobs)} on {jobs} core{'s' if jobs > 1 else ''}"
     _output.tell(
-        f"stickslip: {sweep.cases} closed loops{told}; fewer with --cases, and what is finished is kept"
+        f"stickslip: {sweep.cases} closed loops{told}; --cases reduces the number; finished blocks are kept"
     )
 
 
@@ -67,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         print(load(args.sweep).source.read_text(encoding="utf-8"), end="")
         return 0
     if args.jobs is not None and args.jobs < 1:
-        raise InputError(f"--jobs {args.jobs} must be at least 1; leave it out for one block a core")
+        raise InputError(f"--jobs {args.jobs} must be at least 1; leave it out for one block per core")
     planned = sweep_of(args.sweep, args.cases)
     if planned.left_out:
         _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(planned.left_out)}")
@@ -82,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
             )  # fmt: skip
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
-            f"finished blocks are kept in {out}; run the same command again to go on"
+            f"finished blocks are kept in {out}; run the same command again to resume"
         ) from None
     if args.json:
         _output.print_json({"folder": str(out), "timings": found.manifest["timings"], "runs": found.rows,

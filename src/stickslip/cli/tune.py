@@ -1,8 +1,8 @@
-"""Choose bandwidth, gain, filter of a controller for a machine that is not quite what was believed.
+"""Choose bandwidth, gain and filter of a controller for a machine whose parameters are uncertain.
 
     stickslip tune my.toml
 
-The file is a sweep's (`stickslip sweep thesis-robustness --print`) with a table of what may be chosen besides:
+The file is that of a sweep (`stickslip sweep thesis-robustness --print`) plus a table of the settings to tune:
 
     percentile = 95
     [tune."controller.bandwidth_hz"]
@@ -10,8 +10,8 @@ The file is a sweep's (`stickslip sweep thesis-robustness --print`) with a table
     [tune."controller.gain"]
     range = [0.5, 1.1]
 
-Found is the setting with the least 95th percentile of the first metric over all cases; the second metric shows its
-price. Writes DIR/...-tuned.json, ...-tried.csv and figures.
+The result is the setting with the lowest 95th percentile of the first metric over all cases; the second metric shows
+what that setting costs. Writes DIR/...-tuned.json, ...-tried.csv and figures.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-SUMMARY = "choose a controller's settings for an uncertain machine"
-STOPPING = "stopping after the setting in hand; Ctrl-C again drops it"
+SUMMARY = "tune a controller for an uncertain machine"
+STOPPING = "finishing the current setting; press Ctrl-C again to abort"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,7 +31,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("tune", metavar="TUNE.toml", help="a sweep with a table [tune]")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: tune-NAME)")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    parser.add_argument("--no-report", action="store_true", help="leave the figures out")
+    parser.add_argument("--no-report", action="store_true", help="write no figures")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,10 +1,10 @@
-"""Print the versions of stickslip and of what its numbers come from."""
+"""Print the versions of stickslip, Python and the numerical libraries."""
 
 from __future__ import annotations
 
 import argparse
 
-SUMMARY = "print the versions of stickslip and of what its numbers come from"
+SUMMARY = "print the versions of stickslip and its libraries"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -12,7 +12,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print one line a package."""
+    """Print one line per package."""
     from stickslip.study.provenance import versions
 
     for name, version in versions().items():

@@ -1,9 +1,9 @@
-"""Compile everything beforehand, so that the first calls after an installation do not wait for it.
+"""Compile everything in advance, so that the first calls after an installation start without delay.
 
 stickslip warm-up
 
-Runs small pieces of the other verbs in a temporary folder; what they compile is kept in the user's cache folder (or
-STICKSLIP_CACHE). It takes a minute or two after an installation, and some seconds where nothing is left to compile.
+Runs small examples of the other verbs in a temporary folder; the compiled code is kept in the user's cache folder (or
+STICKSLIP_CACHE). Takes a minute or two after an installation, and some seconds if nothing is left to compile.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import tempfile
 import time
 from collections.abc import Generator, Sequence
 
-SUMMARY = "compile everything beforehand, once after an installation"
+SUMMARY = "compile everything once after installation"
 STEPS: dict[str, Sequence[str]] = {
     "simulation": ("study", "thesis", "--only", "low,signed,nominal", "--no-report"),
     "pictures": ("law", "lugre", "--plot"),

@@ -15,7 +15,7 @@ from stickslip.errors import StickslipError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.simulation.open_loop import respond
+from stickslip.simulation.prescribed.open_loop import respond
 from stickslip.spec import Law
 
 __all__ = ["modes_against_rate", "steady_is_reached", "step_against_rate", "step_errors"]

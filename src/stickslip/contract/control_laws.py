@@ -6,6 +6,7 @@ friction law is put where it needs one, and a PD where it is no loop itself.
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
@@ -17,6 +18,7 @@ from stickslip.contract.description import bounds
 from stickslip.contract.units import parsed
 from stickslip.contract.verdict import Verdict, failed, held, not_tried
 from stickslip.control.block import ControlBlock
+from stickslip.control.linear import Gains
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import LawError
@@ -32,9 +34,13 @@ __all__ = ["CHECKS", "examine", "specimen", "variants"]
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TIME, LIMIT = 1e-3, 1.0
 """Sample time, s, and torque limit, N·m, of the specimens."""
+INERTIA = 3.8623e-4
+"""Of the axis on which a law is tried, kg·m²."""
 COUNT = 400
 HOUR, MINUTE = 60, 60_000
 """Minutes, and samples of one."""
+BEGUN = 100
+"""Samples after which a friction law has forgotten the jump to the first velocity."""
 JUMP = 1e-12
 """Of the limit: what the torque may jump by when a controller takes over."""
 FRICTION = Model("lugre", sigma0=3.5e4, sigma1=0.0, sigma2=0.018, fs=0.335, fc=0.285, vs=0.01)
@@ -64,7 +70,7 @@ def specimen(law: ControlLaw, limit: float = LIMIT, time: float = TIME) -> Sampl
 def around(block: ControlBlock, loop: ControlBlock, limit: float, time: float) -> SampledController:
     """A controller with the block in its place, and the loop where the block is none."""
     places: dict[str, Any] = {"loop": loop, block.law.place: block}
-    return SampledController(sample_time=time, torque_limit=limit, **places)
+    return SampledController(sample_time=time, torque_limit=limit, alone=True, **places)
 
 
 def motion(time: float = TIME) -> Array:
@@ -303,21 +309,69 @@ def superposition(law: ControlLaw) -> Verdict:
 
 def continuous(law: ControlLaw) -> Verdict:
     """The continuous form is what fine samples come to."""
-    if law.continuous is None:
-        return not_tried("continuous", "sampled only")
-    time, gains = 1e-5, law.continuous(block_of(law).parameters)
+    form = law.continuous(block_of(law).parameters) if law.continuous else "sampled only"
+    if isinstance(form, str):
+        return not_tried("continuous", form)
+    if law.place == "estimator":
+        return corner(law, form)
+    time = 1e-5
     t = time * np.arange(20_000)
     reference, position = 0.02 * np.sin(20.0 * t), 0.015 * np.sin(20.0 * t - 0.2) + 0.015 * math.sin(0.2)
     velocities = 0.4 * np.cos(20.0 * t), 0.3 * np.cos(20.0 * t - 0.2)
     inputs = np.column_stack([position, reference, velocities[0], np.zeros(len(t))])
-    error = reference - position
-    wanted = gains.kp * error + gains.kr * velocities[0] - gains.kd * velocities[1]
-    wanted += gains.ki * time * (np.cumsum(error) - 0.5 * error)
-    apart = float(
-        np.abs(torques(specimen(law, math.inf, time), inputs) - wanted)[10:].max() / np.abs(wanted).max()
-    )
+    wanted = answer(law, form, reference - position, velocities, time)
+    quiet = ControlBlock("pd", kp=0.0, kd=0.0)
+    off = torques(around(block_of(law), quiet, math.inf, time), inputs)[BEGUN:] - wanted[BEGUN:]
+    # Where a contact reverses within a sample, its torque is off by that sample's displacement.
+    size = np.abs(off).max() if isinstance(form, Gains) else np.sqrt(np.mean(off**2))
+    apart = float(size / np.abs(wanted).max())
     said = f"samples of {time:g} s are {apart:.2g} of the largest torque off it"
     return held("continuous", said) if apart <= 1e-3 else failed("continuous", said)
+
+
+def integrating(law: ControlLaw) -> Verdict:
+    """A law that is declared to integrate leaves no error where a torque pushes a moving axis: at rest it may not."""
+    if not law.integrates:
+        return not_tried("integrates", "the law is not declared to integrate")
+    plain, push, speed = Plain(specimen(law)), 0.1, 0.1
+    error = position = largest = 0.0
+    velocity = speed
+    for i in range(5000):
+        error = speed * i * TIME - position
+        torque = plain((position, speed * i * TIME, speed, 0.0)) - push
+        position += TIME * (velocity + 0.5 * TIME * torque / INERTIA)
+        velocity += TIME * torque / INERTIA
+        largest = max(largest, abs(error))
+    said = f"{abs(error):.2g} rad are left of {largest:.2g} rad after 5 s"
+    return held("integrates", said) if abs(error) <= 1e-6 * largest else failed("integrates", said)
+
+
+def answer(law: ControlLaw, form: Any, error: Array, velocities: tuple[Array, Array], time: float) -> Array:
+    """The torque of a continuous form, N·m, along velocities of the reference and as measured, rad/s."""
+    if isinstance(form, Gains):
+        torque = form.kp * error + form.kr * velocities[0] - form.kd * velocities[1]
+        return torque + form.ki * time * (np.cumsum(error) - 0.5 * error)
+    friction = block_of(law).friction
+    assert friction is not None
+    z, p, u = friction.law.state(friction.parameters), friction.parameters, Surroundings()
+    v = velocities[0 if form.velocity == "reference" else 1]
+    if form.corner > 0.0:
+        signal: Any = importlib.import_module("scipy.signal")
+        v = signal.lfilter(*signal.butter(2, form.corner, fs=2.0 * math.pi / time), v)
+    steps = zip([v[0], *v[:-1]], v)
+    return form.gain * np.array([friction.law.step(float(a), float(b), time, z, p, u) for a, b in steps])
+
+
+def corner(law: ControlLaw, form: float) -> Verdict:
+    """An estimator in continuous time lags by the time constant of its low-pass."""
+    fine = 1e-9
+    stated = law.delay(block_of(law).parameters, fine) if law.delay else math.nan
+    said = f"a corner of {form:.6g} 1/s; samples of {fine:g} s lag by {stated:.6g} s"
+    return (
+        held("continuous", said)
+        if abs(stated - 1.0 / form) <= 1e-3 / form + fine
+        else failed("continuous", said)
+    )
 
 
 def delayed(law: ControlLaw) -> Verdict:
@@ -336,7 +390,7 @@ def delayed(law: ControlLaw) -> Verdict:
 
 CHECKS: tuple[Callable[[ControlLaw], Verdict], ...] = (
     description, subset, bounds, units, same_bits, in_c, in_single_precision, limit_kept, faults, taken_over, at_rest,
-    superposition, continuous, delayed,
+    superposition, continuous, integrating, delayed,
 )  # fmt: skip
 """In the order in which `examine` runs them."""
 

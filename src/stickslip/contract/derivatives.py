@@ -35,7 +35,7 @@ def derivatives(law: Law) -> Verdict:
             size = float(np.sqrt(max(np.mean(narrow**2), np.mean(wide**2))))
             apart = np.sort(np.abs(wide - narrow))[: int(TYPICAL * narrow.size)]
             if not np.all(np.isfinite(narrow)):
-                return failed(name, f"the torque is not finite beside {label} = {x:g}")
+                return failed(name, f"the torque is not finite near {label} = {x:g}")
             if size == 0.0:
                 without.append(label)
             elif float(np.sqrt(np.mean(apart**2))) > APART * size:

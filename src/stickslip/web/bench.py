@@ -1,0 +1,107 @@
+"""The workbench's simulations: one warm process, and the addresses that ask it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from contextlib import suppress
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from stickslip.web.asking import Refused, Table, body
+from stickslip.web.jobs import LONGEST_LINE, ended, last_of, worker_command
+
+__all__ = ["Bench", "table"]
+
+PATIENCE = 400.0
+"""s that a simulation may take, a first one that compiles too"""
+
+
+class Bench:
+    """A process that simulates one case after the other."""
+
+    def __init__(self) -> None:
+        self._process: asyncio.subprocess.Process | None = None
+        self._turn = asyncio.Lock()
+        self._complaints: asyncio.Task[str] | None = None
+
+    async def simulate(self, case: dict[str, Any]) -> dict[str, Any]:
+        """Channels and metrics of a case.
+
+        Raises
+        ------
+        Refused
+            With what is wrong about it.
+        """
+        async with self._turn:
+            process = await self._running()
+            assert process.stdin is not None
+            assert process.stdout is not None
+            try:
+                process.stdin.write(json.dumps({"case": case}).encode() + b"\n")
+                async with asyncio.timeout(PATIENCE):
+                    await process.stdin.drain()
+                    line = await process.stdout.readline()
+            except (TimeoutError, ConnectionError):
+                line = b""
+            except asyncio.CancelledError:
+                await self.close()  # its answer would be taken for the next one's
+                raise
+            if not line:
+                await self.close()
+                raise Refused(422, "this simulation found no end or took its process along; change a number")
+        answer: dict[str, Any] = json.loads(line)
+        if "error" in answer:
+            raise Refused(422, answer["error"])
+        return answer
+
+    async def close(self) -> None:
+        """End the process."""
+        process, self._process = self._process, None
+        if process is not None:
+            await ended(process)
+
+    async def _running(self) -> asyncio.subprocess.Process:
+        if self._process is None or self._process.returncode is not None:
+            command, environment = worker_command("stickslip.web.bench_worker")
+            self._process = await asyncio.create_subprocess_exec(
+                *command, env=environment, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.PIPE, limit=LONGEST_LINE, start_new_session=True,
+            )  # fmt: skip
+            if self._process.stderr is not None:
+                self._complaints = asyncio.create_task(last_of(self._process.stderr))
+        return self._process
+
+
+def table(bench: Bench) -> Table:
+    """Handlers by method and path."""
+    from stickslip.web import cases
+
+    async def forms(_request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(cases.descriptions))
+
+    async def simulate(request: Request) -> Response:
+        return JSONResponse(await bench.simulate(await body(request)))
+
+    async def text(request: Request) -> Response:
+        kind = request.path_params["kind"]
+        write = {"toml": cases.toml_of, "python": cases.python_of}.get(kind)
+        if write is None:
+            raise Refused(404, "there is nothing at this address")
+        case: Any = None
+        with suppress(ValueError, RecursionError):
+            case = json.loads(request.query_params.get("case", ""))
+        if not isinstance(case, dict):
+            raise Refused(400, "case must be a JSON object")
+        name = {"toml": "case.toml", "python": "case.py"}[kind]
+        headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+        content = await asyncio.to_thread(write, case)  # type: ignore[reportUnknownArgumentType]
+        return Response(content, media_type="text/plain; charset=utf-8", headers=headers)
+
+    return {
+        ("GET", "/forms"): forms,
+        ("POST", "/simulations"): simulate,
+        ("GET", "/simulations/{kind}"): text,
+    }

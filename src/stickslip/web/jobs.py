@@ -1,0 +1,316 @@
+"""Long work in processes of its own: started, watched, cancelled. What a job said is kept, so that a reload sees it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import secrets
+import signal
+import sys
+import time
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from stickslip.errors import InputError
+from stickslip.web.projects import NotThere
+
+__all__ = ["Job", "Jobs", "worker_command"]
+
+LONGEST_LINE = 64 * 2**20
+KEPT = 200
+"""Finished jobs that are remembered."""
+WAITING = 40
+"""Jobs that may wait for their turn."""
+GRACE = 3.0
+"""s after which a job that was asked to end is ended; a rig that moves has more (`Job.grace`)."""
+
+
+@dataclass
+class Job:
+    """One job.
+
+    Attributes
+    ----------
+    id, project, kind, title : str
+    state : str
+        "waiting", "running", "done", "failed" or "cancelled".
+    said : list of dict
+        Every line so far, each with its number and time.
+    result : dict
+        What came of it.
+    """
+
+    id: str
+    project: str
+    kind: str
+    title: str
+    request: Mapping[str, Any]
+    limit: float = float("inf")
+    finish: Callable[[Job], None] | None = None
+    item: str = ""
+    grace: float = GRACE
+    meanwhile: Callable[[dict[str, Any]], None] | None = None
+    clock: asyncio.Timeout | None = None
+    state: str = "waiting"
+    said: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    result: dict[str, Any] = field(default_factory=dict[str, Any])
+    error: str = ""
+    process: asyncio.subprocess.Process | None = None
+    changed: asyncio.Event = field(default_factory=asyncio.Event)
+    began: float = field(default_factory=time.time)
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing more is to come."""
+        return self.state in ("done", "failed", "cancelled")
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended and its process, which may take its time about it, is gone."""
+        return self.ended and (self.process is None or self.process.returncode is not None)
+
+    def say(self, **line: Any) -> None:
+        """Add a line and wake those who listen."""
+        self.said.append({"n": len(self.said) + 1, "s": round(time.time() - self.began, 2), **line})
+        self.changed.set()
+        self.changed = asyncio.Event()
+
+    def about(self) -> dict[str, Any]:
+        """What the page shows of it."""
+        last = next((line["tell"] for line in reversed(self.said) if "tell" in line), "")
+        return {
+            "id": self.id, "kind": self.kind, "title": self.title, "state": self.state, "item": self.item,
+            "last": last, "error": self.error, "result": self.result, "s": round(time.time() - self.began, 1),
+        }  # fmt: skip
+
+    async def lines(self, after: int = 0) -> AsyncIterator[dict[str, Any] | None]:
+        """What it says from line `after` on, to its end; None every 15 s, so that a dead listener is noticed."""
+        while True:
+            changed = self.changed
+            while after < len(self.said):
+                after += 1
+                yield self.said[after - 1]
+            if self.ended:
+                return
+            try:
+                await asyncio.wait_for(changed.wait(), 15.0)
+            except TimeoutError:
+                yield None
+
+
+def worker_command(module: str = "stickslip.web.worker") -> tuple[list[str], dict[str, str]]:
+    """Command and environment of a process of our own that finds what this one finds."""
+    paths = os.pathsep.join(p or os.getcwd() for p in sys.path)
+    threads = {name: os.environ.get(name, "1") for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+    return [sys.executable, "-P", "-m", module], {**os.environ, **threads, "PYTHONPATH": paths}
+
+
+class Jobs:
+    """All jobs of a server.
+
+    Parameters
+    ----------
+    most : int
+        How many run at a time; others wait. Reading and small things have a place of their own.
+    """
+
+    def __init__(self, most: int = 2) -> None:
+        self._jobs: dict[str, Job] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._spare: asyncio.Task[asyncio.subprocess.Process] | None = None
+        self._closed = False
+        self._places = {"long": asyncio.Semaphore(most), "short": asyncio.Semaphore(2)}
+
+    def start(
+        self, project: str, kind: str, title: str, request: Mapping[str, Any], *, item: str = "", short: bool = False,
+        limit: float = float("inf"), finish: Callable[[Job], None] | None = None, grace: float = GRACE,
+        meanwhile: Callable[[dict[str, Any]], None] | None = None,
+    ) -> Job:  # fmt: skip
+        """Begin a job, or let it wait for its turn.
+
+        Parameters
+        ----------
+        project, kind, title : str
+        request : mapping
+            What the worker reads; ``task`` names what it does.
+        item : str
+            Identifier of what it makes.
+        short : bool
+            Whether it goes past those that take long.
+        limit : float
+            s, after which it is ended unless it has shown something.
+        finish : callable, optional
+            Is called when it has ended.
+        grace : float
+            s that its process has to end in order once it was asked to.
+        meanwhile : callable, optional
+            Is called with what can be shown before the end.
+
+        Raises
+        ------
+        InputError
+            If too many wait.
+        """
+        waiting = sum(not job.ended for job in self._jobs.values())
+        if waiting >= WAITING:
+            raise InputError(f"{waiting} jobs run or wait; let some of them end, or cancel them")
+        name = f"job-{secrets.token_hex(6)}"
+        job = Job(name, project, kind, title, request, limit, finish, item, grace, meanwhile)
+        self._jobs[job.id] = job
+        self._forget()
+        task = asyncio.create_task(self._run(job, self._places["short" if short else "long"]))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return job
+
+    def find(self, project: str, identifier: str) -> Job:
+        """The job of that identifier in a project.
+
+        Raises
+        ------
+        NotThere
+        """
+        job = self._jobs.get(identifier)
+        if job is None or job.project != project:
+            raise NotThere("no such job; the server may have been started anew since")
+        return job
+
+    def of(self, project: str) -> list[Job]:
+        """The jobs of a project, the oldest first."""
+        return [job for job in self._jobs.values() if job.project == project]
+
+    def all(self) -> list[Job]:
+        """The jobs of every project, the oldest first."""
+        return list(self._jobs.values())
+
+    async def cancel(self, job: Job) -> None:
+        """End a job; what it wrote so far stays."""
+        if job.ended:
+            return
+        job.state = "cancelled"
+        if job.process is not None:
+            await ended(job.process, job.grace)
+        job.say(end="cancelled")
+
+    async def close(self) -> None:
+        """End all of them."""
+        self._closed = True
+        if self._spare is not None:
+            await ended(await self._spare)
+        for job in list(self._jobs.values()):
+            await self.cancel(job)
+        for task in list(self._tasks):
+            task.cancel()
+
+    def _forget(self) -> None:
+        old = [job.id for job in self._jobs.values() if job.ended]
+        for identifier in old[: max(0, len(self._jobs) - KEPT)]:
+            del self._jobs[identifier]
+
+    async def _run(self, job: Job, place: asyncio.Semaphore) -> None:
+        async with place:
+            if job.ended:
+                return
+            job.state, job.began = "running", time.time()
+            try:
+                async with asyncio.timeout(None if job.limit == float("inf") else job.limit) as job.clock:
+                    await self._listen(job)
+            except TimeoutError:
+                job.error = f"this found no end in {job.limit:.0f} s and was ended"
+            except Exception as error:
+                job.error = f"its process could not be run ({error})"
+            finally:
+                if job.process is not None:
+                    await ended(job.process, job.grace)
+        was_cancelled = job.ended
+        if not was_cancelled:
+            job.state = "failed" if job.error else "done"
+        if job.finish is not None:
+            job.finish(job)
+        if not was_cancelled:
+            job.say(end=job.state, error=job.error, result=job.result)
+
+    def prepare(self) -> None:
+        """Start a process that waits for the next job, so that its imports are not waited for."""
+        if self._spare is None and not self._closed:
+            self._spare = asyncio.create_task(started())
+
+    async def _process(self) -> asyncio.subprocess.Process:
+        spare, self._spare = self._spare, None
+        process = await (spare or started())
+        self.prepare()
+        return process if process.returncode is None else await started()
+
+    async def _listen(self, job: Job) -> None:
+        """Give the job to a process and hear it to its end."""
+        process = job.process = await self._process()
+        if job.ended:
+            return
+        assert process.stdin is not None
+        assert process.stdout is not None
+        assert process.stderr is not None
+        complaints = asyncio.create_task(last_of(process.stderr))
+        process.stdin.write(json.dumps(dict(job.request)).encode() + b"\n")
+        with suppress(ConnectionError):
+            await process.stdin.drain()
+        heard = False
+        async for text in process.stdout:
+            line: dict[str, Any] = json.loads(text)
+            heard = "done" in line or "error" in line
+            if "done" in line:
+                job.result = line["done"]
+            elif "error" in line:
+                job.error = str(line["error"])
+                job.result = {"kind": line.get("kind", "")}
+            elif "shown" in line:
+                if job.meanwhile is not None:
+                    job.meanwhile(line["shown"])
+                if job.clock is not None:  # the file has been read: what follows is our own work
+                    job.clock.reschedule(None)
+                job.say(shown=True)
+            else:
+                job.say(**line)
+        await process.wait()
+        if not heard and job.state == "running":
+            said = await complaints
+            job.error = f"its process ended with exit code {process.returncode}" + (
+                f": {said}" if said else ""
+            )
+
+
+async def started() -> asyncio.subprocess.Process:
+    """A process that waits for a job."""
+    command, environment = worker_command()
+    return await asyncio.create_subprocess_exec(
+        *command, env=environment, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE, limit=LONGEST_LINE, start_new_session=True,
+    )  # fmt: skip
+
+
+async def last_of(stream: asyncio.StreamReader) -> str:
+    """The last line of a stream, which is read to its end so that nobody waits for it."""
+    tail = b""
+    while chunk := await stream.read(65536):
+        tail = (tail + chunk)[-2000:]
+    lines = tail.decode("utf-8", "replace").strip().splitlines()
+    return lines[-1][:300] if lines else ""
+
+
+async def ended(process: asyncio.subprocess.Process, grace: float = GRACE) -> None:
+    """End a process: asked first, then without asking, its own processes too."""
+    if process.returncode is not None:
+        return
+    with suppress(ProcessLookupError):
+        process.terminate()
+    try:
+        await asyncio.wait_for(process.wait(), grace)
+    except TimeoutError:
+        with suppress(ProcessLookupError, PermissionError):
+            if hasattr(os, "killpg"):
+                os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
+        await process.wait()

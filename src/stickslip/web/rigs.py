@@ -1,0 +1,277 @@
+"""Addresses of the rig view: a plan before anything moves, a run that lives only as long as its page looks at it.
+
+The page says every half second that it is there. Where it does not, or where the connection of its live signals ends,
+the run is asked to end: the loop ramps the torque to zero in the rig's own time, as it does for any signal.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import AsyncIterator
+from typing import Any, cast
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response, StreamingResponse
+
+from stickslip.web.asking import Refused, Table, body, text
+from stickslip.web.jobs import Job
+from stickslip.web.logs import read_again
+from stickslip.web.projects import Item, Project
+from stickslip.web.sent import MAIN
+from stickslip.web.site import Site
+
+__all__ = ["table"]
+
+PATIENCE = 4.0
+"""s without a sign of life from the page, after which the rig is stopped"""
+FRAME = 0.04
+"""s from one frame of live signals to the next, beside the time that a frame takes: more than 20 in a second"""
+SHOWN = ("position", "position_reference", "velocity", "torque_command", "motor_torque")
+KILLED = 9
+"""The signal that ends a process which did not end when it was asked to"""
+GRACE = 10.0
+"""s beside the rig's own time for its ramp, after which a run that was asked to end is ended"""
+MOST = 25
+"""Rows of a frame, of each stretch one"""
+
+
+class Watch:
+    """Stops every run whose page is gone.
+
+    Parameters
+    ----------
+    site : Site
+    """
+
+    def __init__(self, site: Site) -> None:
+        self.site = site
+        self._seen: dict[str, float] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def begin(self, job: Job) -> None:
+        """Watch over a run."""
+        self._seen[job.id] = time.monotonic()
+        task = asyncio.create_task(self._watch(job))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def alive(self, job: Job) -> None:
+        """Its page is there."""
+        if job.id in self._seen:
+            self._seen[job.id] = time.monotonic()
+
+    def gone(self, job: Job) -> None:
+        """Its page is not there any more."""
+        if not job.ended:
+            self._seen[job.id] = float("-inf")
+
+    async def _watch(self, job: Job) -> None:
+        while not job.ended:
+            if time.monotonic() - self._seen[job.id] > PATIENCE:
+                await self.site.jobs.cancel(job)
+            await asyncio.sleep(0.1)
+        self._seen.pop(job.id, None)
+
+
+def table(site: Site) -> Table:
+    """Handlers by method and path."""
+    watch = Watch(site)
+    return {**beginning(site, watch), **running(site, watch)}
+
+
+def beginning(site: Site, watch: Watch) -> Table:
+    """What there is, a plan, and the start of a run."""
+
+    async def rigs(_request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(described))
+
+    async def plan(request: Request) -> Response:
+        project = site.project(request)
+        asked = asked_of(project, await body(request))[0]
+        job = site.jobs.start(
+            project.id, "plan", "Planning", {"task": "rig_plan", **asked}, short=True, limit=120.0
+        )
+        return JSONResponse({"job": job.id}, 201)
+
+    async def start(request: Request) -> Response:
+        project, data = site.project(request), await body(request)
+        if data.get("armed") is not True:
+            raise Refused(409, "the rig is not armed: read its plan, then arm it")
+        asked, rig = asked_of(project, data)
+        said = rig.about if rig else {}
+        if said.get("sentence") and data.get("understood") != said["sentence"]:
+            raise Refused(409, f"{said['sentence']}: this has to be confirmed before the rig is armed")
+        refuse_second(site, project, real=bool(said.get("real")))
+        on = said["name"] if rig else asked["machine"]
+        name = project.free_name("logs", f"{asked['procedure']} on {on}")
+        item = project.add("logs", name=name, file="live.stream", state="coming", reading={}, size=0)
+        work = {"task": "rig_run", "folder": str(item.folder), "real": bool(said.get("real")), **asked}
+        job = site.jobs.start(
+            project.id, "rig", name, work, item=item.id, short=True,
+            grace=GRACE + said.get("limits", {}).get("stop_time", 0.0),
+            finish=lambda job: kept(site, project, item, job),
+        )  # fmt: skip
+        watch.begin(job)
+        return JSONResponse({"job": job.id, "log": item.id}, 201)
+
+    return {
+        ("GET", "/rigs"): rigs,
+        ("POST", "/projects/{project}/rig/plan"): plan,
+        ("POST", "/projects/{project}/rig/run"): start,
+    }
+
+
+def running(site: Site, watch: Watch) -> Table:
+    """Signs of life of the page, and the live signals."""
+
+    def found(request: Request) -> Job:
+        job = site.jobs.find(site.project(request).id, request.path_params["job"])
+        if job.kind != "rig":
+            raise Refused(404, "this job is no run of a rig")
+        return job
+
+    async def alive(request: Request) -> Response:
+        job = found(request)
+        watch.alive(job)
+        return JSONResponse({"state": job.state})
+
+    async def live(request: Request) -> Response:
+        job = found(request)
+        item = site.project(request).item("logs", job.item)
+
+        async def stream() -> AsyncIterator[bytes]:
+            try:
+                async for frame in frames(job, item):
+                    yield f"data: {json.dumps(frame)}\n\n".encode()
+            finally:
+                watch.gone(job)
+
+        return StreamingResponse(stream(), media_type="text/event-stream")
+
+    return {
+        ("POST", "/projects/{project}/rig/{job}/alive"): alive,
+        ("GET", "/projects/{project}/rig/{job}/live"): live,
+    }
+
+
+def described() -> dict[str, Any]:
+    """Machines of the library, and the procedures with their options."""
+    from dataclasses import fields
+
+    from stickslip.machines.machine import library, machine
+    from stickslip.rigs.procedures import PROCEDURES, procedure
+
+    machines = [{"name": name, "title": machine(name).title} for name in library()]
+    procedures: list[dict[str, Any]] = []
+    for kind in (procedure(name) for name in PROCEDURES):
+        options = [{"name": f.name, "default": written(f.default)} for f in fields(kind)]
+        procedures.append({"name": kind.name, "title": kind.title, "options": options})
+    return {"machines": machines, "procedures": procedures}
+
+
+def refuse_second(site: Site, project: Project, real: bool) -> None:
+    """One rig at a time in a project, and one real one in all of them: two might be the same machine.
+
+    Raises
+    ------
+    Refused
+    """
+    moving = [job for job in site.jobs.all() if job.kind == "rig" and not job.over]
+    if any(job.project == project.id for job in moving):
+        raise Refused(409, "the rig runs already; stop it first")
+    if real and any(job.request["real"] for job in moving):
+        raise Refused(409, "a real rig runs already in another project; stop it first")
+
+
+def written(value: Any) -> str:
+    """An option's value as people write it."""
+    return (
+        ",".join(f"{x:g}" for x in cast("tuple[float, ...]", value))
+        if isinstance(value, tuple)
+        else str(value)
+    )
+
+
+def asked_of(project: Project, data: dict[str, Any]) -> tuple[dict[str, Any], Item | None]:
+    """Rig, procedure and options as the worker takes them, and the project's item if the rig is one.
+
+    A machine and a procedure are of those that there are, a rig is an item of the project; no option is a path.
+
+    Raises
+    ------
+    Refused, NotThere
+    """
+    from stickslip.machines.machine import library
+    from stickslip.rigs.procedures import PROCEDURES
+
+    procedure, rig = text(data, "procedure"), rig_of(project, data)
+    machine = "" if rig else text(data, "machine")
+    if (machine not in library() and rig is None) or procedure not in PROCEDURES:
+        raise Refused(400, "choose one of the rigs and one of the procedures")
+    options: Any = data.get("options", {})
+    if not isinstance(options, dict):
+        raise Refused(400, "options must be names and texts")
+    given = cast("dict[str, Any]", options)
+    out = {name: text(given, name)[:200] for name in given if given[name] not in ("", None)}
+    if odd := [name for name in ("controller", "model") if out.get(name)]:
+        raise Refused(400, f"{odd[0]} names a file, which the page does not take; use the command line")
+    file = str(rig.folder / MAIN["rigs"]) if rig else ""
+    approved: list[str] = rig.about["approved"] if rig else []
+    asked = {"machine": machine, "rig": file, "approved": approved, "procedure": procedure, "options": out}
+    return asked, rig
+
+
+def rig_of(project: Project, data: dict[str, Any]) -> Item | None:
+    """The rig of the project that is asked for; None where a machine of the library is.
+
+    Raises
+    ------
+    Refused, NotThere
+    """
+    if not text(data, "rig", ""):
+        return None
+    rig = project.item("rigs", data["rig"])
+    if rig.about.get("state") != "ready":
+        raise Refused(409, "this rig cannot be run as it is; open it in the project, which says why")
+    return rig
+
+
+async def frames(job: Job, item: Item) -> AsyncIterator[dict[str, Any]]:
+    """What the rig measured since the frame before, until the run has ended."""
+    from stickslip.stream import rows_since
+
+    path, after = item.folder / "live.stream", 0
+    while True:
+        over = job.over
+        if path.is_file():
+            units, rows = rows_since(path, after)
+            after += len(rows)
+            if len(rows):
+                names = list(units)
+                kept_rows = rows[:: max(1, len(rows) // MOST)]
+                channels = {n: kept_rows[:, names.index(n)].tolist() for n in SHOWN if n in names}
+                finite = {n: [v if v == v else None for v in values] for n, values in channels.items()}
+                yield {"time": kept_rows[:, 0].tolist(), "channels": finite, "units": units, "rows": after}
+        if over:
+            killed = job.process is not None and job.process.returncode == -KILLED
+            yield {"end": job.state, "error": job.error, "result": job.result, "killed": killed}
+            return
+        last = next((line["tell"] for line in reversed(job.said) if "tell" in line), "")
+        yield {"tell": last, "state": job.state}
+        await asyncio.sleep(FRAME)
+
+
+def kept(site: Site, project: Project, item: Item, job: Job) -> None:
+    """The run's record becomes a log: what the procedure hands on, or of a run that was stopped what there is."""
+    name = next((f for f in ("upload.npz", "live.stream") if (item.folder / f).is_file()), "")
+    if not name:
+        item.update(
+            state="unread", readable=False, problem=job.error or "it was stopped before it moved", columns=[]
+        )
+        return
+    said = "" if job.state == "done" else " (stopped)"
+    size = (item.folder / name).stat().st_size
+    item.update(file=name, size=size, state="reading", name=str(item.about["name"]) + said)
+    read_again(site, project, item)

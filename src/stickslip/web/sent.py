@@ -1,0 +1,232 @@
+"""Addresses of models, studies and rigs from elsewhere: kept, looked at, run once their code has been seen and allowed.
+
+A TOML file may name Python code, and whoever runs it gives it all that he can do himself. So it is loaded with only
+those codes allowed whose SHA-256 somebody has confirmed for this very item, after its text was shown; what other
+projects, other items or the command line have approved counts for nothing here.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import PurePosixPath, PureWindowsPath
+from typing import Any, cast
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from stickslip.verbs.kinds import WORDS, kind_of_toml
+from stickslip.web.asking import Refused, Table, body, text
+from stickslip.web.jobs import Job
+from stickslip.web.projects import Item, Project, words
+from stickslip.web.site import Site
+
+__all__ = ["MAIN", "table"]
+
+NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_. -]{0,79}\.(toml|py|csv)", re.IGNORECASE)
+"""Names that are taken as they are, since the TOML file says them; none of them leaves a folder."""
+MAIN = {"models": "model.toml", "studies": "study.toml", "rigs": "rig.toml"}
+KEPT_AS = {"model": "models", "study": "studies", "simulation": "studies", "rig": "rigs"}
+"""What each kind of file becomes in a project."""
+DEVICE = re.compile(r"/dev/[A-Za-z0-9_-]+(/[A-Za-z0-9_.-]+)*")
+"""A serial port and the like, that a rig is reached by."""
+RIG_FILES = ("kind", "machine", "file")
+"""Keys of a rig's table that may name a file, which is read as soon as it is looked at."""
+LOOK, RUN = "look", "run_sent"
+
+
+def table(site: Site) -> Table:
+    """Handlers by method and path."""
+
+    def begin(project: Project, item: Item, task: str, title: str) -> Response:
+        about = item.update(state="looking" if task == LOOK else "running", problem="")
+        kind = item.folder.parent.name
+        request = {
+            "task": task,
+            "folder": str(item.folder),
+            "file": MAIN[kind],
+            "approved": about["approved"],
+        }
+        job = site.jobs.start(
+            project.id, task, title, request, item=item.id, finish=lambda job: told(item, job)
+        )
+        return JSONResponse({"id": item.id, "kind": kind, "job": job.id}, 201)
+
+    async def add(request: Request) -> Response:
+        project = site.project(request)
+        files = files_of(await body(request))
+        main, kind = main_of(files)
+        machine, kind = kind == "machine", "rigs" if kind == "machine" else kind
+        stored = {
+            MAIN[kind] if name == main and not machine else name: content for name, content in files.items()
+        }
+        if len(stored) < len(files):
+            raise Refused(400, f"two of these files would be called {MAIN[kind]}; give one another name")
+        if machine:
+            stored = with_rig(main, stored)
+        name = words(main.removesuffix(".toml"), "study")
+        item = project.add(kind, name=name, sent=sorted(files), approved=[], state="looking")
+        for name, content in stored.items():
+            (item.folder / name).write_text(content, encoding="utf-8", newline="")
+        return begin(project, item, LOOK, f"Looking at {main}")
+
+    async def approve(request: Request) -> Response:
+        project, item = site.project(request), site.item(request, request.path_params["kind"])
+        about = item.about
+        shown: dict[str, Any] = about.get("asks") or {}
+        if about.get("state") != "asks" or text(await body(request), "sha256") != shown["sha256"]:
+            raise Refused(409, "this is not the code that was shown; open the page again and read it")
+        item.update(approved=[*about["approved"], shown["sha256"]], asks=None)
+        return begin(project, item, LOOK, f"Running {shown['name']}")
+
+    async def run(request: Request) -> Response:
+        project, item = site.project(request), site.item(request, "studies")
+        if item.about.get("state") == "asks":
+            raise Refused(409, "it names code that nobody has allowed; read it first")
+        if any(job.item == item.id and not job.ended for job in site.jobs.of(project.id)):
+            raise Refused(409, "it runs already")
+        return begin(project, item, RUN, f"Running {item.about['name']}")
+
+    return {
+        ("POST", "/projects/{project}/sent"): add,
+        ("POST", "/projects/{project}/{kind}/{item}/approval"): approve,
+        ("POST", "/projects/{project}/studies/{item}/run"): run,
+    }
+
+
+def told(item: Item, job: Job) -> None:
+    """Keep what a job found out about an item."""
+    if not item.folder.is_dir():
+        return
+    if job.state == "done":
+        item.update(**job.result)
+    else:
+        item.update(state=job.state, problem=job.error)
+
+
+def files_of(data: dict[str, Any]) -> dict[str, str]:
+    """The texts that were sent, by name.
+
+    Raises
+    ------
+    Refused
+    """
+    given: Any = data.get("files")
+    if not isinstance(given, list) or not 1 <= len(cast("list[Any]", given)) <= 20:
+        raise Refused(400, "files must be a list of at most 20 names with texts")
+    out: dict[str, str] = {}
+    for one in cast("list[Any]", given):
+        if not isinstance(one, dict):
+            raise Refused(400, "each file must have a name and a text")
+        file = cast("dict[str, Any]", one)
+        name = text(file, "name")
+        if not NAME.fullmatch(name):
+            only = ".toml, .py and .csv of plain names alone"
+            raise Refused(400, f"{name[:80]!r}: a model, study or rig comes with {only}")
+        out[name] = text(file, "text")
+    return out
+
+
+def main_of(files: Mapping[str, str]) -> tuple[str, str]:
+    """The file that names the others, and the kind of item that it makes.
+
+    Raises
+    ------
+    Refused
+    """
+    tables: dict[str, dict[str, Any]] = {}
+    for name in (n for n in files if n.lower().endswith(".toml")):
+        try:
+            tables[name] = tomllib.loads(files[name])
+        except (ValueError, RecursionError) as error:
+            raise Refused(400, f"{name} is no TOML ({' '.join(str(error).split())[:200]})") from None
+    named = {PurePosixPath(value).name for one in tables.values() for value in texts_in(one)}
+    first = [name for name in tables if name not in named]
+    if len(first) != 1:
+        raise Refused(400, "give one model or study at a time, or one rig, with the files that it names")
+    main, kind = first[0], kind_of_toml(tables[first[0]])
+    devices = set(devices_in(tables[main])) if kind == "rig" else set[str]()
+    for name, one in tables.items():
+        for value in texts_in(one):
+            if leaves(value) and value not in devices:
+                raise Refused(
+                    400, f"{name} names {value[:80]!r}, outside what was sent; put that file beside it"
+                )
+    machine = is_machine(tables[main])
+    if kind not in KEPT_AS and not machine:
+        what = WORDS[kind][0] if kind else "of a kind that is not known"
+        raise Refused(400, f"{main} is {what}; the page takes models, studies, simulations and rigs")
+    if kind == "rig" or machine:
+        complete(tables, files)
+    return main, "machine" if machine else KEPT_AS[kind]
+
+
+def is_machine(table: Mapping[str, Any]) -> bool:
+    """Whether a file describes a machine, which makes a virtual rig."""
+    friction = table.get("friction")
+    return not kind_of_toml(table) and "inertia" in table and isinstance(friction, dict) and "law" in friction
+
+
+def with_rig(machine: str, files: dict[str, str]) -> dict[str, str]:
+    """The files of a machine that was sent alone, with the virtual rig that it makes.
+
+    Raises
+    ------
+    Refused
+    """
+    if MAIN["rigs"] in files:
+        raise Refused(400, f"a machine cannot be called {MAIN['rigs']}; give it another name")
+    return {MAIN["rigs"]: f'[rig]\nkind = "virtual"\nmachine = "{machine}"\n', **files}
+
+
+def devices_in(table: Mapping[str, Any]) -> Iterator[str]:
+    """Ports that a rig is reached by; a file of that name is read nowhere."""
+    rig = table.get("rig")
+    if isinstance(rig, dict):
+        said = cast("dict[str, Any]", rig)
+        for value in texts_in({k: v for k, v in said.items() if k not in RIG_FILES}):
+            if DEVICE.fullmatch(value) and ".." not in PurePosixPath(value).parts:
+                yield value
+
+
+def complete(tables: Mapping[str, Mapping[str, Any]], files: Mapping[str, str]) -> None:
+    """Refuse a rig that names what did not come with it.
+
+    Raises
+    ------
+    Refused
+    """
+    for name, one in tables.items():
+        for key, value in files_in(one):
+            if value not in files and (key == "file" or value.lower().endswith((".toml", ".py"))):
+                raise Refused(
+                    400, f"{name} names {value[:80]!r}, which did not come with it; drop both together, and name "
+                    "it without a folder"
+                )  # fmt: skip
+
+
+def files_in(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Keys of a rig or machine that may name a file, and what they say."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from files_in(cast("dict[str, Any]", value))
+        elif isinstance(value, str) and key in (*RIG_FILES, "law"):
+            yield key, value
+
+
+def texts_in(value: Any) -> Iterator[str]:
+    """Every text in a table."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        yield from texts_in(list(cast("dict[str, Any]", value).values()))
+    elif isinstance(value, list):
+        for one in cast("list[Any]", value):
+            yield from texts_in(one)
+
+
+def leaves(value: str) -> bool:
+    """Whether a text, taken for a path, leads out of its folder."""
+    ways = PurePosixPath(value), PureWindowsPath(value)
+    return value.startswith("~") or any(way.anchor or ".." in way.parts for way in ways)

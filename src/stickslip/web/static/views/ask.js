@@ -1,0 +1,42 @@
+// Code that came with a model, study or rig: it is shown, and runs only after an explicit step, for this item alone.
+
+import { post, remove } from "../api.js";
+import { complaint, fill, h } from "../dom.js";
+import { run } from "../jobs.js";
+import { here, link, refresh } from "../store.js";
+
+// Characters that print nothing or turn the direction of a line could hide what runs.
+const HIDDEN = /[\u0000-\u0008\u000b-\u001f\u007f-\u009f\u00ad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff]/gu;
+const visible = (text) => text.replace(/\r\n/g, "\n").replace(HIDDEN, (c) => `⟨U+${c.codePointAt(0).toString(16).toUpperCase().padStart(4, "0")}⟩`);
+
+export function ask(kind, item) {
+  const { name, text, sha256 } = item.asks;
+  const state = h("div");
+  const allow = h("button", { type: "button", disabled: true, onclick: async () => {
+    allow.disabled = true;
+    try {
+      const { job } = await post(here(`/${kind}/${item.id}/approval`), { sha256 });
+      await run(job, `Running ${name}`);
+      dispatchEvent(new Event("stickslip-show"));
+    } catch (error) {
+      fill(state, complaint(error));
+    }
+  } }, "Run this code");
+  const read = h("input", { type: "checkbox", id: "code-read", onchange: () => { allow.disabled = !read.checked; } });
+  const refuse = h("button", { type: "button", onclick: async () => {
+    try {
+      await remove(here(`/${kind}/${item.id}`));
+      await refresh();
+      location.hash = link();
+    } catch (error) {
+      fill(state, complaint(error));
+    }
+  } }, "Delete it, run nothing");
+  return h("section", { class: "ask" }, h("h2", {}, "It asks to run Python code"),
+    h("p", {}, h("strong", {}, name), ` (${text.split("\n").length} lines) came with it. Nothing of it has run yet. Code that runs can do all that you can on this machine: read and change your files, and reach the network. `
+      + "Read it, or ask whoever sent it, before you let it."),
+    h("pre", { tabindex: 0, "aria-label": `Code of ${name}` }, visible(text)),
+    h("p", { class: "hint" }, "SHA-256 ", h("code", {}, sha256), `. What you allow is this code, for this item of this project, and nothing else.`),
+    h("p", { class: "row tick" }, read, h("label", { for: "code-read", htmlFor: "code-read" }, "I have read it and trust whoever sent it")),
+    h("div", { class: "row" }, refuse, allow), state);
+}

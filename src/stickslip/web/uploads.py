@@ -1,0 +1,72 @@
+"""Files that come from the page: written as they come, up to a limit, under names of our own."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from pathlib import Path
+
+from starlette.requests import Request
+
+from stickslip.verbs.kinds import RECORDS
+from stickslip.web.asking import Refused
+
+__all__ = ["memory_for", "received", "suffix_of", "time_for"]
+
+KNOWN = RECORDS | {".json", ".jsonl", ".ndjson", ".toml"}
+SPARE = 256 * 2**20
+"""Of the disk, that an upload leaves."""
+
+
+def suffix_of(name: str) -> str:
+    """The ending that tells a reader the format: one of those known, whatever else stands in the name."""
+    ending = "." + name.rpartition(".")[2].lower() if "." in name else ""
+    return ending if ending in KNOWN else ".dat"
+
+
+async def received(request: Request, path: Path, most: int) -> tuple[int, str]:
+    """Write the request's body to a file. Returns its size and SHA-256.
+
+    Raises
+    ------
+    Refused
+        If it is larger than `most` bytes, empty, or the disk is full; the file is then removed.
+    """
+    said = request.headers.get("content-length", "0")
+    size, digest = 0, hashlib.sha256()
+    too_large = Refused(
+        413, f"the file is larger than the {most / 2**20:.0f} MB that are taken; --max-upload says it"
+    )
+    if not said.isdecimal() or len(said) > 15 or int(said) > most:
+        raise too_large
+    if shutil.disk_usage(path.parent).free < int(said) + SPARE:
+        raise Refused(507, "there is no room for this file on the disk")
+    try:
+        with path.open("xb") as file:
+            async for chunk in request.stream():
+                size += len(chunk)
+                if size > most:
+                    raise too_large
+                digest.update(chunk)
+                file.write(chunk)
+        if not size:
+            raise Refused(400, "the file is empty; give one with samples")
+    except BaseException as error:
+        path.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise Refused(507, f"the file cannot be kept ({error.strerror})") from None
+        raise
+    return size, digest.hexdigest()
+
+
+def memory_for(size: int) -> int:
+    """Bytes that reading a file may take: an archive that grows beyond all measure is refused by this.
+
+    A text of numbers takes about four times its size while it is read and examined; a short one next to nothing.
+    """
+    return 900 * 2**20 + 12 * size
+
+
+def time_for(size: int) -> float:
+    """s that reading a file may take."""
+    return 240.0 + 240.0 * size / 100e6

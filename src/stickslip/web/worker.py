@@ -1,0 +1,111 @@
+"""A process that does one job for the page: it reads what to do from stdin and writes lines of JSON to stdout.
+
+It ends when stdin closes, so that no job outlives the server. ``{"tell": ...}`` says how far it is, ``{"done": ...}``
+what came of it, ``{"error": ...}`` why nothing did: one of the last two is the last line.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Callable
+from typing import Any, TextIO
+
+from stickslip.errors import StickslipError
+
+__all__ = ["Said", "main", "plain"]
+
+Said = Callable[[dict[str, Any]], None]
+"""Sends one line to the server."""
+
+
+def limit_memory(most: int) -> None:
+    """Let this process hold that many bytes; where the system cannot, nothing is limited.
+
+    What counts is memory that can be written: libraries reserve addresses far beyond what they ever use.
+    """
+    try:
+        import resource
+    except ModuleNotFoundError:  # Windows
+        return
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+    resource.setrlimit(
+        resource.RLIMIT_DATA, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard)
+    )
+
+
+def plain(value: Any) -> Any:
+    """Data as JSON holds it: no arrays, and null where a number is not finite."""
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}  # type: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]  # type: ignore[reportUnknownVariableType]
+    if isinstance(value, float) and not (-1e308 <= value <= 1e308):
+        return None
+    return value if isinstance(value, (str, int, float, bool)) or value is None else str(value)
+
+
+def main() -> int:
+    """Do the job that the first line of stdin names."""
+    channel = os.fdopen(os.dup(1), "w", encoding="utf-8", errors="replace")
+    os.dup2(2, 1)  # what a library prints is no part of the answer
+    get_ready()
+    request: dict[str, Any] = json.loads(sys.stdin.readline())
+    if "memory" in request:
+        limit_memory(int(request["memory"]))
+    threading.Thread(target=end_with, args=(sys.stdin,), daemon=True).start()
+    warnings.simplefilter("ignore")
+    lock = threading.Lock()
+
+    def say(line: dict[str, Any]) -> None:
+        with lock:
+            channel.write(json.dumps(plain(line), ensure_ascii=False, allow_nan=False) + "\n")
+            channel.flush()
+
+    say(outcome(request, say))
+    return 0
+
+
+def get_ready() -> None:
+    """Load what most jobs need while there is none yet: the server keeps one process waiting."""
+    for name in ("identify", "doctor", "reading", "recommend", "export", "compare"):
+        importlib.import_module(f"stickslip.verbs.{name}")
+    importlib.import_module("stickslip.web.tasks")
+
+
+def outcome(request: dict[str, Any], say: Said) -> dict[str, Any]:
+    """The last line."""
+    try:
+        tasks = importlib.import_module("stickslip.web.tasks")
+        return {"done": tasks.TASKS[request["task"]](request, say)}
+    except StickslipError as error:
+        words = importlib.import_module("stickslip.web.wording").in_the_page(str(error))
+        return {"error": " ".join(words.split()), "kind": type(error).__name__}
+    except MemoryError:
+        return {
+            "error": "this needs more memory than a file of its size may take; give a part of it, or another format"
+        }
+    except Exception as error:  # a reader's library may raise anything on a damaged file
+        return {
+            "error": f"this failed ({type(error).__name__}: {' '.join(str(error).split())[:300]}); it is a "
+            "fault of stickslip or of a library of its"
+        }
+
+
+def end_with(stream: TextIO) -> None:
+    """End this process when the server is gone, as an interruption that a rig's loop hears."""
+    for line in stream:
+        if line.strip() == "stop":
+            break
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
