@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from stickslip.approval import allow_code
     from stickslip.control.block import ControlBlock
-    from stickslip.control.compensators.feedback import Feedback
-    from stickslip.control.compensators.feedforward import Feedforward
+    from stickslip.control.compensator import Feedback, Feedforward
     from stickslip.control.controller import Controller
     from stickslip.control.linear import Cascade, Gains, pd, pid, place, pr
+    from stickslip.control.registry import control_law, control_law_names
     from stickslip.control.sampled_controller import SampledController
     from stickslip.control_spec import ControlLaw
     from stickslip.errors import InputError, SimulationError, StickslipError
     from stickslip.machines.machine import Machine, load_machine
     from stickslip.machines.rigid import RigidAxis
     from stickslip.model import Model, Reference
-    from stickslip.plugins import control_law, control_law_names, law, law_names
+    from stickslip.plugins import law, law_names
     from stickslip.record import Record
     from stickslip.simulation.closed_loop import simulate
-    from stickslip.simulation.open_loop import respond
+    from stickslip.simulation.prescribed.open_loop import respond
     from stickslip.spec import Law, Mode, Par
     from stickslip.verbs.compare import compare
     from stickslip.verbs.doctor import doctor
@@ -46,8 +46,8 @@ _HOME = {
     "ControlLaw": "control_spec",
     "Controller": "control.controller",
     "ExportResult": "verbs.export",
-    "Feedback": "control.compensators.feedback",
-    "Feedforward": "control.compensators.feedforward",
+    "Feedback": "control.compensator",
+    "Feedforward": "control.compensator",
     "Gains": "control.linear",
     "IdentificationResult": "verbs.identification",
     "InputError": "errors",
@@ -66,8 +66,8 @@ _HOME = {
     "SweepResult": "verbs.sweep",
     "allow_code": "approval",
     "compare": "verbs.compare",
-    "control_law": "plugins",
-    "control_law_names": "plugins",
+    "control_law": "control.registry",
+    "control_law_names": "control.registry",
     "doctor": "verbs.doctor",
     "law": "plugins",
     "law_names": "plugins",
@@ -78,7 +78,7 @@ _HOME = {
     "pr": "control.linear",
     "read": "verbs.reading",
     "recommend": "verbs.recommend",
-    "respond": "simulation.open_loop",
+    "respond": "simulation.prescribed.open_loop",
     "simulate": "simulation.closed_loop",
     "tune": "verbs.tune",
 }

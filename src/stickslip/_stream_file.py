@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import struct
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +13,11 @@ import numpy as np
 
 from stickslip.errors import InputError, RecordFault
 
-__all__ = ["HEAD", "MAGIC", "StreamFile"]
+__all__ = ["HEAD", "MAGIC", "Contents", "StreamFile", "contents", "load", "rows_since"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Contents = tuple[Array, Mapping[str, Array], Mapping[str, str], Mapping[str, Any]]
+"""Times, channels, their units, meta"""
 
 MAGIC = b"STKSLIP1"
 HEAD = struct.Struct("<8sQQQQ")
@@ -160,3 +164,76 @@ def allocate(file: int, offset: int, size: int) -> None:
     zeros = bytes(min(size, 1 << 20))
     for begin in range(offset, offset + size, len(zeros)):
         whole_write(file, zeros[: offset + size - begin], begin)
+
+
+# ---- reading ----------------------------------------------------------------------------------------------
+
+
+def load(path: str | os.PathLike[str]) -> Contents:
+    """What a record is made of, from a stream's file, also in one that is being written or whose writer was killed.
+
+    ``meta["complete"]`` is true where it was closed.
+
+    Raises
+    ------
+    InputError
+        If it is not such a file.
+    """
+    try:
+        with open(path, "rb") as file:
+            magic, start, count, length, trailer = HEAD.unpack(file.read(HEAD.size))
+            if magic != MAGIC:
+                raise ValueError("no header")
+            header = json.loads(file.read(min(length, start)))
+            units, absent, meta = (
+                dict(header["units"]),
+                header["absent"],
+                {**header["meta"], "complete": False},
+            )
+            file.seek(start)
+            data = file.read(min(count * len(units) * 8, os.fstat(file.fileno()).st_size))
+            if trailer and len(data) == count * len(units) * 8:
+                meta |= json.loads(file.read(trailer))
+    except FileNotFoundError:
+        raise InputError(f"no record at {path}; check the path") from None
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, struct.error) as error:
+        raise InputError(f"{path} is not a record of this package ({error})") from None
+    values = np.frombuffer(data, dtype="<f8", count=len(data) // 8)
+    rows = values[: len(values) // len(units) * len(units)].reshape(-1, len(units))
+    # After a crash of the whole machine the number may have reached the disk before the rows: these hold zeros.
+    late = np.flatnonzero(~(np.diff(rows[:, 0]) > 0.0))
+    whole = rows[: late[0] + 1] if late.size else rows
+    return contents(units, absent, whole, meta)
+
+
+def contents(
+    units: Mapping[str, str], absent: Sequence[str], rows: Array, meta: Mapping[str, Any]
+) -> Contents:
+    """Times, channels, their units and meta of rows whose first column is the time; columns `absent` are left out."""
+    names = list(units)
+    channels = {
+        name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(names) if i > 0 and name not in absent
+    }
+    return rows[:, 0].copy(), channels, {name: units[name] for name in channels}, meta
+
+
+def rows_since(path: Path, after: int) -> tuple[dict[str, str], Array]:
+    """Columns with their units, and the rows behind row `after`, of a stream that may still be written.
+
+    Raises
+    ------
+    InputError
+        If it is no stream.
+    """
+    try:
+        with path.open("rb") as file:
+            magic, start, count, length, _ = HEAD.unpack(file.read(HEAD.size))
+            if magic != MAGIC:
+                raise ValueError("no header")
+            units = {str(k): str(v) for k, v in json.loads(file.read(min(length, start)))["units"].items()}
+            file.seek(start + 8 * len(units) * after)
+            content = file.read(8 * len(units) * max(0, count - after))
+    except (OSError, ValueError, KeyError, struct.error) as error:
+        raise InputError(f"{path} is no stream of a rig ({error})") from None
+    whole = len(content) // (8 * len(units)) * len(units)
+    return units, np.frombuffer(content, dtype="<f8", count=whole).reshape(-1, len(units))

@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Generator
+from collections.abc import Collection, Generator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
@@ -22,24 +22,26 @@ from stickslip.errors import CodeRefused
 __all__ = ["allow_code", "approved_file", "asked_for", "demand"]
 
 
-_allowed: ContextVar[bool] = ContextVar("stickslip_code_allowed", default=False)
+_allowed: ContextVar[bool | frozenset[str]] = ContextVar("stickslip_code_allowed", default=False)
 _remember: ContextVar[bool] = ContextVar("stickslip_code_remember", default=False)
 _ran: set[str] = set()
 """SHA-256 of what ran in this process."""
 
 
 @contextmanager
-def allow_code(allowed: bool = True, *, remember: bool = False) -> Generator[None]:
+def allow_code(allowed: bool | Collection[str] = True, *, remember: bool = False) -> Generator[None]:
     """Let code that TOML files name run: the laws and rigs of a model, study or rig that somebody sent.
 
     Parameters
     ----------
-    allowed : bool
-        False refuses what nobody approved; so it is outside, too.
+    allowed : bool or collection of str
+        False refuses what nobody approved; so it is outside, too. A collection holds the SHA-256 of the codes that may
+        run, and no other runs, whatever was approved before.
     remember : bool
         Whether what runs is known from now on, in other processes too.
     """
-    before = _allowed.set(allowed), _remember.set(remember)
+    chosen = allowed if isinstance(allowed, bool) else frozenset(allowed)
+    before = _allowed.set(chosen), _remember.set(remember)
     try:
         yield
     finally:
@@ -76,13 +78,16 @@ def demand(path: str, code: bytes, named_by: str) -> None:
     CodeRefused
     """
     digest = hashlib.sha256(code).hexdigest()
-    if digest in _ran or digest in _approved():
+    allowed = _allowed.get()
+    known = digest in allowed if isinstance(allowed, frozenset) else digest in _ran or digest in _approved()
+    if known:
         return
-    if not _allowed.get():
+    if allowed is not True:
         raise CodeRefused(
             f"{named_by} would run the Python code of {path}, which nobody has approved here; read it, then give "
-            "--allow-code (in Python: `with stickslip.allow_code():`)"
-        )
+            "--allow-code (in Python: `with stickslip.allow_code():`)",
+            path, code,
+        )  # fmt: skip
     _note(path, digest)
     if _remember.get():
         print(f"stickslip: runs {path}; approved until it changes (SHA-256 {digest[:12]})", file=sys.stderr)

@@ -48,7 +48,7 @@ class Document:
     def locate(self, written: str) -> Path:
         """Where the file written as `written` lies; it is remembered as an input."""
         if not written.isprintable() or not written.strip():
-            raise ConfigError(f"{self.name}: {written!r} is no path of a file; correct it")
+            raise ConfigError(f"{self.name}: {written!r} is not a valid file path; correct it")
         self.files[written] = self.moved.get(written, self.folder / written)
         return self.files[written]
 
@@ -85,7 +85,7 @@ def read_toml(path: Path, name: str = "", moved: Mapping[str, Path] | None = Non
     except RecursionError:
         raise ConfigError(f"{shown}: arrays or tables are nested too deeply; flatten them") from None
     except ValueError as error:
-        raise ConfigError(f"{shown}: not TOML: {error}; correct the file there") from None
+        raise ConfigError(f"{shown}: invalid TOML: {error}; correct the file") from None
     return Table(values, Document(shown, path.parent, moved or {}))
 
 

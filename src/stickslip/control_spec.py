@@ -11,13 +11,16 @@ Argument order, everywhere: signals of the loop ``y``, state ``z``, parameters `
                                          what it could not take over, N·m
 ``check(p)``                             a sentence that says what is wrong with the parameters, or ""
 ``delay(p, sample_time)``                of an estimator: its delay at low frequency, s
-``continuous(p)``                        the law in continuous time, as `stickslip.control.linear.Gains`
+``continuous(p)``                        the law in continuous time: of a loop `stickslip.control.linear.Gains`, of one
+                                         that holds a friction law `stickslip.control.linear.Compensation`, of an
+                                         estimator the corner of its low-pass, rad/s; a sentence where these
+                                         parameters have none
 ``placed(inertia, bandwidth, damping)``  parameters that place the poles of the loop without friction, by name
 =======================================  ===========================================================
 
 ``sample`` and ``take_over`` are written in the scalar subset (`stickslip.subset`). ``y`` has the fields of
 `Signals`, ``u`` those of `stickslip.spec.Surroundings`. A law that holds a friction law calls ``friction(v0,
-v1, dt, z.friction, p.friction, u)``.
+v1, dt, z.friction, p.friction, u)``, and ``friction_steady(v, p.friction)`` for its torque at constant velocity.
 """
 
 from __future__ import annotations
@@ -30,9 +33,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 from stickslip.binding import bound, first_complaint
 from stickslip.errors import LawError
-from stickslip.spec import Choice, Configurable, Field, Par, fields_of
+from stickslip.spec import Choice, Configurable, Field, Law, Par, fields_of
 
-__all__ = ["PLACES", "REST", "ControlLaw", "Signals", "friction"]
+__all__ = ["PLACES", "REST", "ControlLaw", "Signals", "friction", "friction_steady"]
 
 PLACES = ("estimator", "feedforward", "observer", "loop")
 """Where a law stands in a controller, in the order in which a sample runs them."""
@@ -67,10 +70,19 @@ class Signals(NamedTuple):
     ]
     started: Annotated[float, Par("-", "", "1 after the first sample")]
     rest: Annotated[float, Par("-", "", "samples for which the reference velocity has been 0")]
+    turns: Annotated[
+        float,
+        Par("-", "", "measured position: turns split off; 0 where they are not counted, may have parts"),
+    ]
 
 
 def friction(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
     """The friction law that a control law holds; a controller puts its ``step`` here. N·m."""
+    return 0.0
+
+
+def friction_steady(v: float, p: Any) -> float:
+    """The friction law's torque at constant velocity; a controller puts its ``steady`` here. N·m."""
     return 0.0
 
 
@@ -98,6 +110,10 @@ class ControlLaw(Configurable):
         Superposition holds while the torque is within its limit. A declaration: the contract tests try it.
     holds_friction : bool
         Whether it needs a friction law.
+    integrates : bool
+        It holds a constant torque against a constant error: no standing error is left.
+    adapts : bool
+        It learns while the axis moves, and stands over a law that integrates.
     choices : tuple of Choice
     chosen : mapping
         The options in force, by the names of the choices.
@@ -122,6 +138,8 @@ class ControlLaw(Configurable):
     placed: Callable[[float, float, float], Mapping[str, float]] | None = None
     linear: bool = False
     holds_friction: bool = False
+    integrates: bool = False
+    adapts: bool = False
     choices: tuple[Choice, ...] = ()
     chosen: Mapping[str, str] = field(default_factory=dict[str, str])
     variants: dict[tuple[tuple[str, str], ...], Any] = field(default_factory=dict[Any, Any], repr=False)
@@ -153,11 +171,16 @@ class ControlLaw(Configurable):
             object.__setattr__(self, name, part)
         self.parameters(dict(self.example))
 
-    def holding(self, name: str, step: Callable[..., float]) -> Callable[..., float]:
-        """The function of that name with a friction law's ``step`` in its place, in the chosen options too."""
-        held = {"friction": step}
+    def holding(self, name: str, law: Law) -> Callable[..., float]:
+        """The function of that name with a friction law's functions in their places, in the chosen options too."""
+        held = {"friction": law.step, "friction_steady": law.steady}
         options = {replaces: bound(function, held) for replaces, function in self.option_scope().items()}
         return bound(self.written[name], {**options, **held})
+
+    @property
+    def reads_steady(self) -> bool:
+        """Whether it calls `friction_steady`."""
+        return "friction_steady" in getattr(self.written["sample"], "__globals__", {})
 
     @property
     def is_linear(self) -> bool:

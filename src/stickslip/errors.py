@@ -87,7 +87,19 @@ class ConfigError(InputError):
 
 
 class CodeRefused(ConfigError):
-    """A TOML file names Python code that nobody has approved (`stickslip.allow_code`)."""
+    """A TOML file names Python code that nobody has approved (`stickslip.allow_code`).
+
+    Attributes
+    ----------
+    path : str
+        Of the code.
+    code : bytes
+        Its content.
+    """
+
+    def __init__(self, message: str, path: str = "", code: bytes = b"") -> None:
+        super().__init__(message)
+        self.path, self.code = path, code
 
 
 class LawError(InputError):

@@ -1,8 +1,8 @@
 """Programs of lanes on a graphics processor, one thread a case. Imported only where a GPU is asked for.
 
-The text is that of the processor (`stickslip.simulation._lanes_source`) with one lane, and an entry of its own; what
-its functions are decorated with here makes device code of them. With ``NUMBA_ENABLE_CUDASIM=1`` numba's simulator runs
-them in Python, which is how they are tested without a GPU.
+The text is that of the processor (`stickslip.simulation.many.simd_source`) with one lane, and an entry of its own;
+what its functions are decorated with here makes device code of them. With ``NUMBA_ENABLE_CUDASIM=1`` numba's simulator
+runs them in Python, which is how they are tested without a GPU.
 """
 
 # numba carries no types.

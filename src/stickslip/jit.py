@@ -80,7 +80,7 @@ SIGNATURES = {
 def _kernel_files() -> tuple[Path, ...]:
     """The files that kernels are made of: the engines, and what begins with _ among machines and rigs."""
     package = Path(__file__).parent
-    found = (package.glob(f"{part}.py") for part in ("simulation/*", "machines/_*", "rigs/_*"))
+    found = (package.glob(f"{part}.py") for part in ("simulation/**/*", "machines/_*", "rigs/_*"))
     return (Path(__file__), *sorted(file for files in found for file in files))
 
 
@@ -260,7 +260,7 @@ def compiled_profile(name: str, function: Callable[..., Any], layout: Layout) ->
 
 
 def compiled_sample(name: str, function: Callable[..., Any], layouts: Mapping[str, Layout]) -> int:
-    """Compile one sample of a controller, `stickslip.control.sampled.sample`; returns its address."""
+    """Compile one sample of a controller, `stickslip.control.composition.sample`; returns its address."""
     return _compile(name, {"sample": function}, layouts)["sample"]
 
 
@@ -315,7 +315,7 @@ LANES_ALLOW = {"contract", "arcp", "nsz"}
 
 @functools.lru_cache(maxsize=64)
 def compiled_lanes(text: str) -> Any:
-    """The module of a specialised program of lanes (`stickslip.simulation._lanes_source`)."""
+    """The module of a specialised program of lanes (`stickslip.simulation.many.simd_source`)."""
     return loaded(f"lanes_{hashlib.sha256(text.encode()).hexdigest()[:16]}", text)
 
 

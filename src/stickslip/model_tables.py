@@ -1,4 +1,4 @@
-"""From tables of a TOML file to friction models, and the laws in the files that it names as plugins."""
+"""From tables of a TOML file to friction models."""
 
 from __future__ import annotations
 
@@ -12,26 +12,7 @@ from stickslip.errors import ConfigError, suggestion
 from stickslip.model import Model
 from stickslip.spec import Described, Law
 
-__all__ = ["friction_laws", "law_files", "model", "models", "refuse_unknown"]
-
-
-def law_files(table: Table) -> dict[str, Law | ControlLaw]:
-    """The laws and control laws in the files that ``plugins`` lists, by name."""
-    found: dict[str, Law | ControlLaw] = {}
-    for path in table.files("plugins"):
-        with table.blamed():
-            named_by = table.label("plugins")
-            law = plugins.law_or_control_law(str(path), named_by) if path.suffix == ".py" else None
-            if law is None:
-                raise ConfigError(
-                    f"{table.label('plugins')}: {path.name} is no law's file; its name ends in .py"
-                )
-            if law.name in found or law.name in (*plugins.law_names(), *plugins.control_law_names()):
-                raise ConfigError(
-                    f"{table.label('plugins')}: {path.name} defines {law.name!r}, a name taken already"
-                )
-        found[law.name] = law
-    return found
+__all__ = ["friction_laws", "model", "models", "refuse_unknown"]
 
 
 def models(tables: Mapping[str, Table], laws: Mapping[str, Law | ControlLaw]) -> dict[str, Model]:

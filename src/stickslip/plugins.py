@@ -1,9 +1,9 @@
-"""Names to things: laws, control laws, kinds of reference, kinds of rig.
+"""Names to things: friction laws and kinds of reference; and the files of one's own in which any such thing may stand.
 
 Built-in ones are named in their family's tuple (``stickslip.laws.LAWS`` and so on) and imported when asked for.
-Others come from installed packages (entry points ``stickslip.laws``, ``stickslip.references``, ``stickslip.rigs``)
-or from files: a name that ends in ``.py`` is a law's file, and the environment variable STICKSLIP_LAWS lists such
-files.
+Others come from installed packages (entry points ``stickslip.laws``, ``stickslip.references``, ...) or from files: a
+name that ends in ``.py`` is a law's file, and the environment variable STICKSLIP_LAWS lists such files. Control laws
+are looked up in `stickslip.control.registry`, kinds of rig in `stickslip.rigs.kinds`.
 """
 
 from __future__ import annotations
@@ -17,34 +17,30 @@ from collections.abc import Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from stickslip import approval, trial
-from stickslip.control_spec import ControlLaw
 from stickslip.errors import InputError, LawError, UnknownName
 from stickslip.spec import Law, ReferenceKind
 from stickslip.subset import law_layouts, lower
 
-if TYPE_CHECKING:
-    from stickslip.rigs.rig import RigKind
-
 __all__ = [
-    "control_law",
-    "control_law_names",
+    "code_at",
+    "defined_in",
+    "installed",
     "law",
+    "law_in",
     "law_names",
-    "law_or_control_law",
+    "module_of",
     "reference_kind",
     "reference_names",
-    "rig_kind",
-    "rig_kind_names",
 ]
 
 
 def law_names() -> tuple[str, ...]:
     """Every law's name: built in, installed, and from files named in STICKSLIP_LAWS."""
     builtin: tuple[str, ...] = importlib.import_module("stickslip.laws").LAWS
-    return (*builtin, *_installed("stickslip.laws"), *_from_files())
+    return (*builtin, *installed("stickslip.laws"), *_from_files())
 
 
 def law(name: str, named_by: str = "") -> Law:
@@ -62,13 +58,13 @@ def law(name: str, named_by: str = "") -> Law:
     UnknownName, LawError, CodeRefused
     """
     if name.endswith(".py"):
-        return _law_in(*_code_at(str(Path(name).resolve()), named_by))
+        return law_in(*code_at(str(Path(name).resolve()), named_by))
     if name in importlib.import_module("stickslip.laws").LAWS:
         return completed(importlib.import_module(f"stickslip.laws.{name}").LAW)
     if name in (files := _from_files()):
         return files[name]
-    if name in (installed := _installed("stickslip.laws")):
-        return _tried(installed[name].load(), f"installed law {name!r}")
+    if name in (others := installed("stickslip.laws")):
+        return _tried(others[name].load(), f"installed law {name!r}")
     raise UnknownName("law", name, law_names())
 
 
@@ -80,64 +76,16 @@ def completed(law: Law) -> Law:
     return law.offering(common)
 
 
-def control_law_names() -> tuple[str, ...]:
-    """The name of every control law and velocity estimator."""
-    builtin = (name for names in _control_folders().values() for name in names)
-    return (*builtin, *_installed("stickslip.control_laws"))
-
-
-def control_law(name: str, named_by: str = "") -> ControlLaw:
-    """The control law or velocity estimator of that name, or of the file of that path; `named_by` as in `law`.
-
-    Raises
-    ------
-    UnknownName, LawError, CodeRefused
-    """
-    if name.endswith(".py"):
-        return _control_law_in(*_code_at(str(Path(name).resolve()), named_by))
-    for folder, names in _control_folders().items():
-        if name in names:
-            found: ControlLaw = importlib.import_module(f"{folder}.{name}").CONTROL_LAW
-            return found
-    if name in (installed := _installed("stickslip.control_laws")):
-        return installed[name].load()
-    raise UnknownName("control law", name, control_law_names())
-
-
-def _control_folders() -> dict[str, tuple[str, ...]]:
-    """Where control laws are, and their names."""
-    laws, estimators = "stickslip.control.laws", "stickslip.control.estimators"
-    return {
-        laws: importlib.import_module(laws).CONTROL_LAWS,
-        estimators: importlib.import_module(estimators).ESTIMATORS,
-    }
-
-
-def law_or_control_law(path: str, named_by: str = "") -> Law | ControlLaw:
-    """What a file defines: a friction law or a control law; `named_by` and errors as in `law`."""
-    file, code = _code_at(str(Path(path).resolve()), named_by)
-    made = vars(_defined_in(file, code))
-    return _control_law_in(file, code) if "CONTROL_LAW" in made else _law_in(file, code)
-
-
 @functools.cache
-def _defined_in(path: str, code: bytes) -> ModuleType:
+def defined_in(path: str, code: bytes) -> ModuleType:
     """The module of a file, run once: its law is one object, however often it is asked for."""
-    return _module_of(path, code)
-
-
-@functools.cache
-def _control_law_in(path: str, code: bytes) -> ControlLaw:
-    found = getattr(_defined_in(path, code), "CONTROL_LAW", None)
-    if not isinstance(found, ControlLaw):
-        raise LawError(f"{path} defines no control law; end it with `CONTROL_LAW = ControlLaw(...)`")
-    return found
+    return module_of(path, code)
 
 
 def reference_names() -> tuple[str, ...]:
     """The name of every kind of reference."""
     builtin: tuple[str, ...] = importlib.import_module("stickslip.references").REFERENCES
-    return (*builtin, *_installed("stickslip.references"))
+    return (*builtin, *installed("stickslip.references"))
 
 
 def reference_kind(name: str) -> ReferenceKind:
@@ -150,52 +98,27 @@ def reference_kind(name: str) -> ReferenceKind:
     if name in importlib.import_module("stickslip.references").REFERENCES:
         found: ReferenceKind = importlib.import_module(f"stickslip.references.{name}").REFERENCE
         return found
-    if name in (installed := _installed("stickslip.references")):
-        return installed[name].load()
+    if name in (others := installed("stickslip.references")):
+        return others[name].load()
     raise UnknownName("reference", name, reference_names())
 
 
-def rig_kind_names() -> tuple[str, ...]:
-    """The name of every kind of rig."""
-    builtin: tuple[str, ...] = importlib.import_module("stickslip.rigs").RIGS
-    return (*builtin, *_installed("stickslip.rigs"))
-
-
-def rig_kind(name: str, named_by: str = "") -> RigKind:
-    """The kind of rig of that name, or of the file of that path; `named_by` as in `law`.
-
-    Raises
-    ------
-    UnknownName, InputError, CodeRefused
-    """
-    if name.endswith(".py"):
-        if not Path(name).is_file():
-            raise InputError(f"no file {name}; give the path of the rig's file")
-        found = getattr(_module_of(*_code_at(str(Path(name).resolve()), named_by)), "RIG", None)
-        if found is None:
-            raise InputError(f"{name} defines no rig; end it with `RIG = RigKind(...)`")
-        return found
-    if name in importlib.import_module("stickslip.rigs").RIGS:
-        return importlib.import_module(f"stickslip.rigs.{name}").RIG
-    if name in (installed := _installed("stickslip.rigs")):
-        return installed[name].load()
-    raise UnknownName("rig", name, rig_kind_names())
-
-
 @functools.cache
-def _installed(group: str) -> Mapping[str, Any]:
+def installed(group: str) -> Mapping[str, Any]:
+    """The entry points of installed packages in that group, by name."""
     return {entry.name: entry for entry in entry_points(group=group)}
 
 
 def _from_files() -> dict[str, Law]:
     paths = [p for p in os.environ.get("STICKSLIP_LAWS", "").split(os.pathsep) if p]
-    laws = [_law_in(*_code_at(str(Path(p).resolve()))) for p in paths]
+    laws = [law_in(*code_at(str(Path(p).resolve()))) for p in paths]
     return {found.name: found for found in laws}
 
 
 @functools.cache
-def _law_in(path: str, code: bytes) -> Law:
-    found = getattr(_defined_in(path, code), "LAW", None)
+def law_in(path: str, code: bytes) -> Law:
+    """The friction law in a file; `LawError` if there is none, or it is wrong."""
+    found = getattr(defined_in(path, code), "LAW", None)
     if not isinstance(found, Law):
         raise LawError(f"{path} defines no law; end it with `LAW = Law(...)`")
     return _tried(found, path)
@@ -211,7 +134,7 @@ def _tried(law: Law, origin: str) -> Law:
     return completed(law)
 
 
-def _code_at(path: str, named_by: str = "") -> tuple[str, bytes]:
+def code_at(path: str, named_by: str = "") -> tuple[str, bytes]:
     """Path and content of a file that may run."""
     if not os.path.isfile(path):
         raise LawError(f"no file {path}; give the path of the law's file")
@@ -226,7 +149,7 @@ def _code_at(path: str, named_by: str = "") -> tuple[str, bytes]:
     return path, code
 
 
-def _module_of(path: str, code: bytes) -> ModuleType:
+def module_of(path: str, code: bytes) -> ModuleType:
     """Run these bytes: no other content of the file, and no compiled one that lies beside it."""
     name = f"stickslip_file_{Path(path).stem}_{abs(hash(path)):x}"
     spec = importlib.util.spec_from_file_location(name, path)

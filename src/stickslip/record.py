@@ -80,15 +80,15 @@ class Record:
         InputError
             If there is no such file, or it is not a record.
         """
+        from stickslip import _stream_file as stream
         from stickslip.config import refuse_endless
-        from stickslip.stream import MAGIC, load_stream
 
         refuse_endless(Path(path))
 
         try:
             with open(path, "rb") as file:
-                if file.read(len(MAGIC)) == MAGIC:
-                    return load_stream(path)
+                if file.read(len(stream.MAGIC)) == stream.MAGIC:
+                    return cls(*stream.load(path))
             with np.load(path, allow_pickle=False) as data:
                 units, meta = _header(str(data["__header__"]))
                 values = {k: _real(k, data[k]) for k in data.files if k != "__header__"}

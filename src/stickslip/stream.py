@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 import os
-import struct
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -21,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip._stream_file import HEAD, MAGIC, StreamFile
+from stickslip._stream_file import MAGIC, StreamFile, contents, rows_since
 from stickslip.errors import InputError, RecordFault
 from stickslip.record import Record
 
-__all__ = ["EXTENT", "MAGIC", "PERIOD", "Stream", "load_stream"]
+__all__ = ["EXTENT", "MAGIC", "PERIOD", "Stream", "rows_since"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -187,7 +186,7 @@ class Stream:
             rows = self.rows(0, self._written)
         except RecordFault:
             rows = self.rows(self._first_kept(), self._written)
-        return _record(self.units, self.absent, rows, self.meta)
+        return Record(*contents(self.units, self.absent, rows, self.meta))
 
     def close(self, meta: Mapping[str, Any] | None = None) -> None:
         """End the record: give back the room that was not needed, and add to its meta.
@@ -337,51 +336,3 @@ class Stream:
             beside.write(self.rows(begin, min(begin + EXTENT, self._written)), begin - first)
         self._flushed = self._written - first
         return beside
-
-
-# ---- reading ----------------------------------------------------------------------------------------------
-
-
-def load_stream(path: str | os.PathLike[str]) -> Record:
-    """The record in a stream's file, also in one that is being written or whose writer was killed.
-
-    ``meta["complete"]`` is true where it was closed.
-
-    Raises
-    ------
-    InputError
-        If it is not such a file.
-    """
-    try:
-        with open(path, "rb") as file:
-            magic, start, count, length, trailer = HEAD.unpack(file.read(HEAD.size))
-            if magic != MAGIC:
-                raise ValueError("no header")
-            header = json.loads(file.read(min(length, start)))
-            units, absent, meta = (
-                dict(header["units"]),
-                header["absent"],
-                {**header["meta"], "complete": False},
-            )
-            file.seek(start)
-            data = file.read(min(count * len(units) * 8, os.fstat(file.fileno()).st_size))
-            if trailer and len(data) == count * len(units) * 8:
-                meta |= json.loads(file.read(trailer))
-    except FileNotFoundError:
-        raise InputError(f"no record at {path}; check the path") from None
-    except (OSError, ValueError, KeyError, TypeError, OverflowError, struct.error) as error:
-        raise InputError(f"{path} is not a record of this package ({error})") from None
-    values = np.frombuffer(data, dtype="<f8", count=len(data) // 8)
-    rows = values[: len(values) // len(units) * len(units)].reshape(-1, len(units))
-    # After a crash of the whole machine the number may have reached the disk before the rows: these hold zeros.
-    late = np.flatnonzero(~(np.diff(rows[:, 0]) > 0.0))
-    whole = rows[: late[0] + 1] if late.size else rows
-    return _record(units, absent, whole, meta)
-
-
-def _record(units: Mapping[str, str], absent: Sequence[str], rows: Array, meta: Mapping[str, Any]) -> Record:
-    names = list(units)
-    channels = {
-        name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(names) if i > 0 and name not in absent
-    }
-    return Record(rows[:, 0].copy(), channels, {name: units[name] for name in channels}, meta)

@@ -6,9 +6,9 @@ import zipfile
 from pathlib import Path
 from typing import cast
 
+from stickslip._stream_file import MAGIC
 from stickslip.readers._table import Column, Format, Table
 from stickslip.record import Record
-from stickslip.stream import MAGIC
 
 __all__ = ["FORMAT"]
 
