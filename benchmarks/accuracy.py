@@ -23,10 +23,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.simulation import accuracy, adaptive, exact
+from stickslip.simulation import accuracy
+from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.exact import engine as exact
 from stickslip.study import study as studies
-from stickslip.study.plan import PlannedRun
+from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.numbers import value_of, varied
 
 VARIED = ("friction.fs", "friction.fc", "friction.sigma2", "friction.vs", "friction.c", "axis.inertia")

@@ -15,10 +15,10 @@ import numpy as np
 
 from stickslip.jit import kernel
 from stickslip.model import Model
-from stickslip.simulation import exact
 from stickslip.simulation._case import FROM_MEASUREMENT, FROM_REFERENCE, KI, SOURCE, Case
-from stickslip.simulation._exact_kernel import LONGEST_STEP, SAFETY, solve
 from stickslip.simulation._forcing import CELL_SIZE
+from stickslip.simulation.exact import engine as exact
+from stickslip.simulation.exact.kernel import LONGEST_STEP, SAFETY, solve
 
 Positions = np.ndarray[Any, np.dtype[np.float64]]
 Run = Callable[..., Positions]

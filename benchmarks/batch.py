@@ -1,8 +1,9 @@
 """Ten thousand closed loops with perturbed Fs and Fc on one core, against C.
 
 The loop of Table 6 (PD on the low reference, 2.5 s), Fs and Fc each up to `--spread` off. Ours is
-`stickslip.simulation.batch` at the loosest tolerance at which 99 % of 200 of the loops end within `--error` of a tight
-run; with no metrics, with four that need no short windows, and with all; and `stickslip.simulation.lanes` at 2e-4 s.
+`stickslip.simulation.many.batch` at the loosest tolerance at which 99 % of 200 of the loops end within `--error` of a
+tight run; with no metrics, with four that need no short windows, and with all; and
+`stickslip.simulation.many.simd_batch` at 2e-4 s.
 C is `baseline.c` (the same method, compiled here by gcc -O3 -march=native), and, where `--prototypes DIR` names a
 folder with them, the first prototypes: etd.c (event-driven, position on a 1 ms grid) and trim.c (trapezoid at 2e-4 s
 in SIMD lanes, by clang). With `--jax`, trim.c's step in JAX (`jax_step.py`), compiled beforehand. Times are CPU times
@@ -30,9 +31,10 @@ import closed_loop
 import jax_step
 from baseline import FC, FS, Baseline, compiled_baseline
 from stickslip.control.controller import Controller
-from stickslip.simulation import batch, exact, lanes
 from stickslip.simulation._case import Case
 from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.exact import engine as exact
+from stickslip.simulation.many import batch, simd_batch
 
 DURATION = 2.5
 CURVE = closed_loop.CURVE
@@ -64,9 +66,9 @@ def ours(name: str, fs: Column, fc: Column, tolerance: float) -> batch.Batch:
     return batch.prepare(the_case(name, tolerance), {"friction.fs": fs, "friction.fc": fc})
 
 
-def side_by_side(name: str, fs: Column, fc: Column) -> lanes.Lanes:
+def side_by_side(name: str, fs: Column, fc: Column) -> simd_batch.Lanes:
     """The loops at a fixed step, laid out."""
-    return lanes.prepare(the_case(name, 1e-7), {"friction.fs": fs, "friction.fc": fc}, STEP)
+    return simd_batch.prepare(the_case(name, 1e-7), {"friction.fs": fs, "friction.fc": fc}, STEP)
 
 
 def built(compiler: str, source: Path, folder: str) -> Any | None:
@@ -174,13 +176,13 @@ def compare(name: str, options: argparse.Namespace, c: dict[str, Any]) -> None:
     }
     fixed = side_by_side(name, fs, fc)
     fixed[:1].run(())
-    fixed[:1].run(lanes.METRICS)
+    fixed[:1].run(simd_batch.METRICS)
     runs: dict[str, Callable[[], Column]] = {
         "ours, no metrics": lambda: many.run(()).position,
         "ours, 4 metrics": lambda: many.run(COARSE).position,
         "ours, all metrics": lambda: many.run().position,
         f"ours, lanes ({STEP:g} s)": lambda: fixed.run(()).position,
-        "ours, lanes, 16 metrics": lambda: fixed.run(lanes.METRICS).position,
+        "ours, lanes, 16 metrics": lambda: fixed.run(simd_batch.METRICS).position,
     }
     if "baseline" in c:
         level = loosest(lambda tol: same_method(c["baseline"], name, *some, tol), truth, options.error)
@@ -233,7 +235,7 @@ def least(run: Callable[[], Any]) -> float:
     return min(times)
 
 
-def two_cores(fixed: lanes.Lanes) -> float:
+def two_cores(fixed: simd_batch.Lanes) -> float:
     """How much faster two threads are by the clock, the best of five."""
     times: dict[int, float] = {1: np.inf, 2: np.inf}
     for _ in range(5):

@@ -18,11 +18,11 @@ from tempfile import TemporaryDirectory
 
 from coverage_records import make
 from stickslip.errors import StickslipError
-from stickslip.identify.axis import identify_axis
-from stickslip.identify.axis_trial import trial_of
-from stickslip.identify.drift import compare_models
+from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.compare.change import compare_models
 from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
+from stickslip.identify.trial import trial_of
 from stickslip.machines.servo import ServoAxis
 
 RAISED = 1.1

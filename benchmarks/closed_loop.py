@@ -32,16 +32,16 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from baseline import TOLERANCES, Baseline, Run, compiled_baseline, fastest, ours
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.jit import kernel
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulation import _forcing, exact
+from stickslip.simulation import _forcing
 from stickslip.simulation._case import lay_out
 from stickslip.simulation.closed_loop import simulate
+from stickslip.simulation.exact import engine as exact
 
 INERTIA = 3.8623e-4
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}

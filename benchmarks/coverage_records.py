@@ -20,7 +20,7 @@ from stickslip.control.linear import place
 from stickslip.model import Model
 from stickslip.plugins import law
 from stickslip.record import Record
-from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
+from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 __all__ = ["FAMILIES", "Case", "make"]
 

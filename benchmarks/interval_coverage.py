@@ -31,8 +31,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 from coverage_records import make  # noqa: E402
 from stickslip.errors import StickslipError  # noqa: E402
-from stickslip.identify.axis_prediction import axis_prediction  # noqa: E402
-from stickslip.identify.axis_trial import trial_of  # noqa: E402
+from stickslip.identify.axis.prediction import axis_prediction  # noqa: E402
+from stickslip.identify.trial import trial_of  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402
 
 ALWAYS = ("inertia", "fc", "sigma2")

@@ -14,12 +14,11 @@ import argparse
 import numpy as np
 
 import closed_loop
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.model import Model
-from stickslip.simulation import batch, lanes
 from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.many import batch, simd_batch
 from stickslip.sweep.block import SURE_OF_STEPS, differ
 
 METRICS = ("position_rms_rad", "position_peak_rad", "velocity_rms_rad_s", "torque_rms_Nm")
@@ -56,7 +55,7 @@ def main() -> None:
         controller = Controller(closed_loop.GAINS, compensator)
         case = prepare(closed_loop.AXIS, controller, closed_loop.REFERENCE, 2.5, tolerance=1e-8, output=2.5)
         exact = batch.prepare(case, columns).run(METRICS)
-        found = {h: lanes.prepare(case, columns, h).run(METRICS) for h in (2.0 * STEPS[0], *STEPS)}
+        found = {h: simd_batch.prepare(case, columns, h).run(METRICS) for h in (2.0 * STEPS[0], *STEPS)}
         truth = np.column_stack([exact.metrics[m] for m in METRICS])
         rows = {h: np.column_stack([r.metrics[m] for m in METRICS]) for h, r in found.items()}
         for h in STEPS:

@@ -19,9 +19,9 @@ import numpy as np
 
 import coverage_records as records
 from stickslip.control.linear import place
-from stickslip.identify.axis_trial import Trial
-from stickslip.identify.loop_check import shown_gains
-from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
+from stickslip.identify.axis.loop_check import shown_gains
+from stickslip.identify.trial import Trial
+from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 KINDS = ("as seen", "rounded", "late", "reference late", "every fifth row")
 COUNTS = (2000, 16384, 1_000_000)

@@ -4,8 +4,9 @@
     python benchmarks/promise.py --out promise.jsonl --only-sum
 
 Every axis is one of `ordinary_logs.py`, of which the package knows nothing but a log: any torque column and rate,
-moves, sine, staircase or tuning steps, and by chance cogging, backlash, a flexible train or friction that differs by
-direction. `identify` reads the log as it is; `recommend` is asked for a loop that a person would set on this axis
+moves, sine, staircase or tuning steps, and by chance cogging, backlash, a flexible drivetrain or friction that
+differs by direction.
+`identify` reads the log as it is; `recommend` is asked for a loop that a person would set on this axis
 (P-PI cascade, PID or PD) and for a motion (production moves, slow sine, staircase); the setting is exported as C,
 compiled, and added to the loop's torque on the generator's own machine. Printed is whether the part of the RMS error
 that it takes away lies in the promised interval, and whether any setting is worse than none.
@@ -183,15 +184,14 @@ class Exported:
     """The exported C, compiled."""
 
     def __init__(self, folder: Path) -> None:
-        accelerates = "wanted_acceleration" in (folder / "axis.h").read_text()
         (folder / "glue.c").write_text(
             '#include <string.h>\n#include "axis.h"\n'
             "static axis_settings n; static axis_memory m; static axis_state z; static axis_parameters p;\n"
             "static axis_surroundings u;\n"
-            "void begin(void) { memset(&u, 0, sizeof u); u.load = 1.0; u.temperature = 20.0; axis_init(&p);\n"
-            "axis_controller_init(&n); axis_controller_reset(&m, &z); }\n"
-            "double torque(double y, double r, double v, double a) { (void)a; return axis_sample(y, r, v, "
-            f"{'a, ' if accelerates else ''}&n, &m, &z, &p, &u); }}\n"
+            "void begin(void) { memset(&u, 0, sizeof u); u.load = 1.0; u.temperature = 20.0; axis_init(&n, &p);\n"
+            "axis_reset(&m, &z); }\n"
+            "double torque(double y, double r, double v, double a)\n"
+            "{ return axis_sample(y, r, v, a, &n, &m, &z, &p, &u); }\n"
         )  # fmt: skip
         library = folder / "axis.so"
         command = [

@@ -36,12 +36,12 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 from stickslip.errors import StickslipError  # noqa: E402
-from stickslip.identify.axis import identify_axis  # noqa: E402
-from stickslip.identify.axis_agreed import sliding_values  # noqa: E402
-from stickslip.identify.axis_inverse import inverse_dynamics  # noqa: E402
-from stickslip.identify.axis_trial import Trial  # noqa: E402
-from stickslip.identify.force_error import force_error_on, plain_error_on  # noqa: E402
-from stickslip.identify.regression import regress_axis  # noqa: E402
+from stickslip.identify.axis.agreed import sliding_values  # noqa: E402
+from stickslip.identify.axis.identify import identify_axis  # noqa: E402
+from stickslip.identify.regression.force_error import force_error_on, plain_error_on  # noqa: E402
+from stickslip.identify.regression.inverse import inverse_dynamics  # noqa: E402
+from stickslip.identify.regression.regression import regress_axis  # noqa: E402
+from stickslip.identify.trial import Trial  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402
 
 DATA = Path(os.environ.get("STICKSLIP_DATA", "../shared/data"))

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.machine import machine

@@ -23,11 +23,11 @@ from stickslip.control.linear import place
 from stickslip.jit import call_guards, call_rate, call_switch, compiled_law, flat, kernel, pointer
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulation._adaptive_step import stages
-from stickslip.simulation._dormand_prince import NODES, TABLEAU
-from stickslip.simulation._loop import EXTRA, LAWS, arrays_of, begin_side, events, rates, switch
+from stickslip.simulation.adaptive.dormand_prince import NODES, TABLEAU
+from stickslip.simulation.adaptive.hybrid import EXTRA, LAWS, arrays_of, begin_side, events, rates, switch
+from stickslip.simulation.adaptive.step import stages
 from stickslip.simulation.closed_loop import prepare, simulate
-from stickslip.simulation.open_loop import respond
+from stickslip.simulation.prescribed.open_loop import respond
 
 PLANT = Model(
     "gms",

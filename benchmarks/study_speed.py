@@ -40,11 +40,12 @@ from baseline import (
     ours,
     time_of,
 )
-from stickslip.simulation import adaptive, exact
-from stickslip.simulation._loop import EXTRA, LAWS, arrays_of, begin_side, events, rates, switch
+from stickslip.simulation.adaptive import engine as adaptive
+from stickslip.simulation.adaptive.hybrid import EXTRA, LAWS, arrays_of, begin_side, events, rates, switch
 from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.exact import engine as exact
 from stickslip.study import study as studies
-from stickslip.study.plan import PlannedRun
+from stickslip.study.planned_run import PlannedRun
 
 TIMES_BDF, TIMES_C = 200, 1.5
 LONGEST = 1e-3  # s, lest SciPy step over an event

@@ -23,7 +23,7 @@ from stickslip.control.linear import place
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.report.plots import Curve, Panel, Style, draw
-from stickslip.simulation._loop import LAWS, arrays_of
+from stickslip.simulation.adaptive.hybrid import LAWS, arrays_of
 from stickslip.simulation.closed_loop import prepare, simulate
 
 AXIS = RigidAxis(INERTIA, PLANT)

@@ -12,7 +12,7 @@ import pytest
 
 import stickslip
 from stickslip import errors
-from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, pd, place
 from stickslip.errors import InputError, ParameterError, UnknownName

@@ -7,10 +7,10 @@ import sys
 
 import pytest
 
-from contract.faulty import END, RATE, dahl
 from stickslip import plugins, trial
 from stickslip.cli import main
 from stickslip.errors import LawError
+from support.faulty import END, RATE, dahl
 
 NO_RETURN = dahl((END, END.replace("    return z.force", "        return z.force")))
 FAULTS = {

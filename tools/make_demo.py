@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from stickslip import Model
-from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
+from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 FRICTION = Model("stribeck", k=50.0, sigma2=0.018, fs=0.335, fc=0.285, vs=0.1)
 MECHANICS = Mechanics(4e-4, offset=0.03)

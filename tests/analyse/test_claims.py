@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from stickslip.analyse.claims import CLAIMS, judge
 from stickslip.record import Record
+from stickslip.thesis.claims import CLAIMS, judge
 
 REFERENCE = Path(os.environ.get("STICKSLIP_REFERENCE", Path(__file__).parents[3] / "shared" / "reference"))
 needs_reference = pytest.mark.skipif(

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip import plugins
 from stickslip.analyse.controller_loop import linearised
 from stickslip.analyse.controller_margins import controller_stability
 from stickslip.analyse.machine_axis import axis_of
@@ -18,17 +17,19 @@ from stickslip.cli import main
 from stickslip.contract.control_laws import Plain, block_of, specimen
 from stickslip.control.block import ControlBlock
 from stickslip.control.linear import place
+from stickslip.control.registry import control_law, control_law_names
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.machines.machine import machine
+from stickslip.study.controller_confirmed import confirmed_controller, scaled
 from stickslip.study.stability_map import moved
 
 T = 1e-3
 DRY = machine("thesis-dry")
 AXIS = axis_of(DRY)
 RIGID = axis_of(DRY.without("flexibility", "encoder-mode", "bearings", "direction", "bandwidth"))
-OWN = Path(__file__).parents[1] / "study" / "sliding_mode.py"
-LINEAR = [n for n in plugins.control_law_names() if plugins.control_law(n).is_linear]
+OWN = Path(__file__).parents[1] / "support" / "sliding_mode.py"
+LINEAR = [n for n in control_law_names() if control_law(n).is_linear]
 
 
 def placed(kind, bandwidth, **more):
@@ -40,7 +41,7 @@ def placed(kind, bandwidth, **more):
 @pytest.mark.parametrize("name", LINEAR)
 def test_the_matrices_give_the_torque_of_the_samples(name):
     """Of every linear law, along random angles about rest."""
-    controller = specimen(plugins.control_law(name), math.inf, T)
+    controller = specimen(control_law(name), math.inf, T)
     a, b, c, d = linearised(controller, 1e-6, 100.0).state_space()
     plain = Plain(controller)
     for _ in range(3):
@@ -57,20 +58,20 @@ def test_the_matrices_give_the_torque_of_the_samples(name):
 @pytest.mark.parametrize("kind", ["PD", "PID"])
 def test_the_loop_is_that_of_the_gains(kind):
     controller, gains = placed(kind, 20.0)
-    train = AXIS.at(AXIS.amplitude, AXIS.ringing)
-    found = Loop(train, linearised(controller, 1e-6, 100.0, DRY.delay)).poles()
+    drivetrain = AXIS.at(AXIS.amplitude, AXIS.ringing)
+    found = Loop(drivetrain, linearised(controller, 1e-6, 100.0, DRY.delay)).poles()
     assert found.growth == pytest.approx(
-        Loop(train, Drive(gains, sample_time=T, delay=DRY.delay)).poles().growth, rel=1e-6
+        Loop(drivetrain, Drive(gains, sample_time=T, delay=DRY.delay)).poles().growth, rel=1e-6
     )
 
 
 def test_a_held_friction_law_is_its_spring_and_damper():
     law = DRY.models["gms"]
     controller, gains = placed("PD", 36.0, observer=ControlBlock("friction_feedback", law, gain=0.8))
-    train = AXIS.at(AXIS.amplitude, AXIS.ringing)
+    drivetrain = AXIS.at(AXIS.amplitude, AXIS.ringing)
     drive = Drive(gains, describing(law, 1e-6, 100.0), 0.8, 0.0, T, DRY.delay)
-    found = Loop(train, linearised(controller, 1e-6, 100.0, DRY.delay)).poles()
-    assert found.growth == pytest.approx(Loop(train, drive).poles().growth, rel=1e-6)
+    found = Loop(drivetrain, linearised(controller, 1e-6, 100.0, DRY.delay)).poles()
+    assert found.growth == pytest.approx(Loop(drivetrain, drive).poles().growth, rel=1e-6)
     assert found.growth < 0.0
     # While everything slides its torque is constant.
     alone = linearised(placed("PD", 36.0)[0], math.inf, 100.0)
@@ -105,16 +106,17 @@ def test_margins_are_where_the_loop_goes_unstable():
 
 def test_the_virtual_rig_does_what_the_poles_say():
     calm, _ = placed("PD", 20.0)
-    shaken, _ = placed(
+    perturbed, _ = placed(
         "PD", 20.0, observer=ControlBlock("disturbance_observer", inertia=4.2757e-4, corner=150.0)
     )
-    quiet, restless = (controller_stability(AXIS, c, DRY.delay) for c in (calm, shaken))
+    quiet, restless = (controller_stability(AXIS, c, DRY.delay) for c in (calm, perturbed))
     assert quiet.loops[0].poles.stable
     assert quiet.cycle is None
     assert not restless.loops[0].poles.stable
     limit = 1.0
     moves = [
-        moved(DRY, SampledController(c.loop, T, None, c.observer, torque_limit=limit)) for c in (calm, shaken)
+        moved(DRY, SampledController(c.loop, T, None, c.observer, torque_limit=limit))
+        for c in (calm, perturbed)
     ]
     assert moves[1] > 5.0 * moves[0]
     said = restless.cycle.amplitude / math.sqrt(2.0)  # by the first harmonic of a contact that slips
@@ -122,7 +124,7 @@ def test_the_virtual_rig_does_what_the_poles_say():
 
 
 def test_what_is_not_smooth_about_rest_is_refused():
-    smooth = block_of(plugins.control_law(str(OWN)))
+    smooth = block_of(control_law(str(OWN)))
     assert (
         linearised(SampledController(smooth, T), 1e-6, 100.0).state_space()[3] < 0.0
     )  # inside its boundary layer
@@ -140,6 +142,23 @@ observer = {law = "friction_feedback", friction = "gms", gain = 0.8}
 """
 
 
+def test_the_rig_does_what_the_poles_say_of_softer_and_stiffer_loops():
+    """A PD that rings by itself is held by the friction of its compensator, but not with gains three times as high."""
+    alone, _ = placed("PD", 36.0)
+    helped, _ = placed("PD", 36.0, observer=ControlBlock("friction_feedback", DRY.models["gms"], gain=0.8))
+    factors = (0.5, 1.0, 3.0)
+    calm = [[p.calm for p in confirmed_controller(DRY, c, factors).points] for c in (alone, helped)]
+    assert calm == [[True, False, False], [True, True, False]]
+    assert all(p.agrees for c in (alone, helped) for p in confirmed_controller(DRY, c, factors).points)
+
+
+def test_a_loop_that_is_not_gains_alone_is_tried_as_it_is():
+    sliding = ControlBlock(str(OWN), inertia=DRY.inertia, slope=62.8, torque=0.45, layer=0.5)
+    found = confirmed_controller(DRY, SampledController(sliding, T))
+    assert [p.factor for p in found.points] == [1.0]
+    assert scaled(SampledController(sliding, T), 2.0) is None
+
+
 def test_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("c.toml").write_text(FILE)
@@ -153,9 +172,11 @@ def test_the_command(tmp_path, monkeypatch, capsys):
     data = json.loads(capsys.readouterr().out)
     assert data["loops"][0]["stable"] is True
     assert len(data["gain"]) == len(data["frequency"])
+    assert main([*line, "--confirm"]) == 0
+    assert "8 of 8 loops do what the poles say" in capsys.readouterr().out
     for wrong, words in (
-        (["--bandwidth", "20"], "--bandwidth beside --controller c.toml, which says all of it"),
-        (["--confirm"], "--confirm beside --controller"),
+        (["--bandwidth", "20"], "--bandwidth cannot be combined with --controller c.toml, which defines it"),
+        (["--confirm", "--delay", "0.5"], "--confirm runs the machine with its own delay"),
         (["--delay", "-1"], "delay = -1 samples must be from 0 to 100"),
     ):
         assert main([*line, *wrong]) == 2

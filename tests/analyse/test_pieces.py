@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from stickslip.analyse.dependence import dependence
-from stickslip.analyse.pieces import pieces
+from stickslip.analyse.motor_vs_sensor import sides
 from stickslip.analyse.repeatability import repeatability
-from stickslip.analyse.sides import sides
+from stickslip.analyse.split_runs import pieces
 from stickslip.machines.machine import machine
 from stickslip.report.analysis_pictures import draw_analysis, picture_of_dependence
 from stickslip.rigs.procedures.base import perform

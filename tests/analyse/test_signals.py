@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from stickslip.analyse.dependence import dependence
+from stickslip.analyse.motor_vs_sensor import sides
 from stickslip.analyse.repeatability import repeatability
-from stickslip.analyse.sides import sides
 from stickslip.analyse.spectrum import spectrum
 from stickslip.errors import InputError
 from stickslip.record import Record

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 
 from stickslip.analyse.machine_axis import axis_of
-from stickslip.analyse.presliding_loop import Axis, Contact, Drive, Loop, Train, describing
+from stickslip.analyse.presliding_loop import Axis, Contact, Drive, Drivetrain, Loop, describing
 from stickslip.analyse.stability import gain_margin, stability
-from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
-from stickslip.control.sampled import Memory, sampled_by, settings
 from stickslip.errors import ParameterError
 from stickslip.machines.machine import machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.simulation.machine import linear_part
+from stickslip.simulation.machine.layout import linear_part
 from stickslip.spec import Surroundings
+from support.sampled_text import Memory, sampled_by, settings
 
 J = 4.2757e-4
 DRY = machine("thesis-dry")
@@ -79,7 +79,7 @@ def test_the_train_is_the_virtual_machines(name):
     plant = machine(name)
     a, _ = linear_part(plant)
     axis = axis_of(plant)
-    free = Train(**{**vars(axis.train), "contact": Contact(0.0), "bearings": Contact(0.0, 0.002)})
+    free = Drivetrain(**{**vars(axis.drivetrain), "contact": Contact(0.0), "bearings": Contact(0.0, 0.002)})
     mine = np.linalg.eigvals(free.state_space()[0])
     theirs = np.linalg.eigvals(a)
     # The rigid motion is a double pole at 0, which rounding splits.
@@ -93,26 +93,26 @@ def test_the_train_is_the_virtual_machines(name):
 def test_poles_of_a_free_inertia_are_where_they_were_placed():
     """With fast samples the loop without friction has the poles of the design (thesis eq. 3.10)."""
     drive = Drive(place("PD", J, 10.0, 0.5), sample_time=1e-6)
-    found = Loop(Train((J,)), drive).poles()
+    found = Loop(Drivetrain((J,)), drive).poles()
     w = 2.0 * math.pi * 10.0
     assert found.growth == pytest.approx(-0.5 * w, rel=1e-3)
     assert found.frequency == pytest.approx(10.0 * math.sqrt(0.75), rel=1e-3)
 
 
 def test_static_margin_is_the_stiffness_that_is_left():
-    train = Train((J,), contact=Contact(388.157, 0.05))
+    drivetrain = Drivetrain((J,), contact=Contact(388.157, 0.05))
     law = Contact(388.157)
-    found = gain_margin(train, Drive(PD36), law)
+    found = gain_margin(drivetrain, Drive(PD36), law)
     assert found == pytest.approx((388.157 + PD36.kp) / 388.157, rel=1e-4)
     # Half of the contact lost: nothing holds the axis with gain 1.
-    broken = Loop(train.softer(0.5), Drive(PD36, law)).poles()
+    broken = Loop(drivetrain.softer(0.5), Drive(PD36, law)).poles()
     assert not broken.stable
     assert broken.frequency < 1.0
 
 
 def test_a_delay_of_a_whole_sample_is_the_limit_of_a_part():
-    train = Train((J,), contact=Contact(388.0, 0.03))
-    loops = [Loop(train, Drive(PD36, delay=d)).poles().radius for d in (0.0, 1e-9, 1.0 - 1e-9, 1.0)]
+    drivetrain = Drivetrain((J,), contact=Contact(388.0, 0.03))
+    loops = [Loop(drivetrain, Drive(PD36, delay=d)).poles().radius for d in (0.0, 1e-9, 1.0 - 1e-9, 1.0)]
     assert loops[1] == pytest.approx(loops[0], abs=1e-6)
     assert loops[2] == pytest.approx(loops[3], abs=1e-6)
     assert loops[3] > loops[0]
@@ -124,7 +124,7 @@ def test_thesis_answers():
     found = stability(
         axis_of(grease), Drive(place("PD", 3.8623e-4, 25.0, 1.0)), {"gms": grease.models["gms"]}, (0.0,)
     )
-    assert found.train.visible < found.margins[1].law.stiffness
+    assert found.drivetrain.visible < found.margins[1].law.stiffness
     assert found.margins[1].static < 0.9
     assert not found.margins[1].at_one.stable
     dry = stability(axis_of(DRY), Drive(place("PD", 3.8623e-4, 10.0, 0.85)), DRY.models, (0.0,))
@@ -146,7 +146,7 @@ def swing(gain, sample_time, filter_hz, gains=PD36, model=GMS, start=1e-7, durat
     controller = Controller(gains, Feedback(model, gain, filter_hz or None), sample_time=sample_time)
     record = simulate(
         RigidAxis(J, RIGID.clutch), controller, Reference.table([0.0, duration], [0.0, 0.0]), duration,
-        integrator="fixed", time_step=5e-5, output=sample_time, initial=(start, 0.0), metered=False,
+        output=sample_time, initial=(start, 0.0), metered=False,
     )  # fmt: skip
     return record["position"][record["event"] == 0.0]
 
@@ -154,11 +154,11 @@ def swing(gain, sample_time, filter_hz, gains=PD36, model=GMS, start=1e-7, durat
 @pytest.mark.parametrize("sample_time", [5e-4, 1e-3, 3e-3])
 def test_simulations_grow_where_poles_say_so(sample_time):
     law = describing(GMS, 1e-7, 150.0)
-    train = Axis(Train((J,)), RIGID.clutch).at(1e-7, 150.0)
+    drivetrain = Axis(Drivetrain((J,)), RIGID.clutch).at(1e-7, 150.0)
     judged = 0
     for gain in (0.0, 0.5, 0.9, 1.2, 1.5):
         for filter_hz in (0.0, 10.0, 60.0, 150.0):
-            poles = Loop(train, Drive(PD36, law, gain, filter_hz, sample_time)).poles()
+            poles = Loop(drivetrain, Drive(PD36, law, gain, filter_hz, sample_time)).poles()
             if abs(poles.growth) < 30.0:
                 continue  # too slow to tell in 0.3 s
             path = np.abs(swing(gain, sample_time, filter_hz))
@@ -169,7 +169,7 @@ def test_simulations_grow_where_poles_say_so(sample_time):
 
 
 def test_the_cycle_of_coulomb_feedback_is_the_simulated_one():
-    axis = Axis(Train((J,)), RIGID.clutch)
+    axis = Axis(Drivetrain((J,)), RIGID.clutch)
     found = stability(axis, Drive(PD36), {"coulomb": DRY.models["coulomb"]}, (0.0,)).margins[1].cycle
     assert found
     path = swing(1.0, 1e-3, 0.0, model=DRY.models["coulomb"], start=1e-5, duration=1.0)[500:]

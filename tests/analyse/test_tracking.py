@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from stickslip.analyse.rig_claims import CLAIMS, MAIN, judge
 from stickslip.analyse.tracking import METRICS, tracking_metrics
 from stickslip.record import Record
+from stickslip.thesis.rig_claims import CLAIMS, MAIN, judge
 
 TIME = np.arange(5000) / 1000.0
 WANTED = 0.01 * (1.0 - np.cos(2.0 * math.pi * 0.4 * TIME))

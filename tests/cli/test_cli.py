@@ -211,7 +211,7 @@ def test_ctrl_c_of_a_process(folder: Path) -> None:
     _, error = process.communicate(timeout=120)
     assert process.returncode == 130, error
     stopping, interrupted = error.splitlines()
-    assert stopping == "stickslip: stopping: what is in hand is finished and kept; Ctrl-C again drops it"
+    assert stopping == "stickslip: finishing the running cases; press Ctrl-C again to abort"
     assert interrupted.startswith("stickslip: interrupted; finished runs are kept")
 
 

@@ -65,8 +65,8 @@ def test_a_compensator_leaves_without_a_controllers_file(kind, model, tmp_path):
     call = ["export", model, "--to", "c99", "--compensator", kind, "--out", "drive", "--check"]
     assert main(call) == 0
     source = (tmp_path / "drive" / "my_model.c").read_text()
-    assert f"n->source = {'1.0' if kind == 'ff' else '2.0'};" in source
-    assert "n->kp = 0.0;" in source
+    assert f"1.0, /* {'feedforward' if kind == 'ff' else 'observer'}_gain:" in source
+    assert "loop_kp" not in source
 
 
 def test_a_filter_above_half_the_sample_rate_is_refused(model, capsys):
@@ -91,7 +91,7 @@ def test_the_inertia_comes_from_the_models_file(model, tmp_path):
         ([], "--list"),
         (["--to", "python", "--single"], "one precision"),
         (["--to", "urdf", "--controller"], "law alone"),
-        (["--to", "matlab", "--compensator", "ff"], "law alone"),
+        (["--to", "urdf", "--compensator", "ff"], "law alone"),
         (["--to", "c99", "--compensator", "fb", "--filter-hz", "0"], "filter_hz"),
         (["--to", "c99", "--compensator", "fb", "--sample-time", "0"], "sample_time"),
         (["--to", "c99", "--filter-hz", "10"], "--compensator"),

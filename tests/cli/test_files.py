@@ -64,7 +64,7 @@ def test_its_own_is_replaced_until_somebody_edits_it(folder, capsys, words, file
         edited.write(b"\n")
     before = (folder / file).read_bytes()
     assert main(words) == 2
-    assert "changed since" in capsys.readouterr().err
+    assert "edited since" in capsys.readouterr().err
     assert (folder / file).read_bytes() == before
     assert main([*words, "--force"]) == 0
     assert (folder / file).read_bytes() != before
@@ -72,7 +72,7 @@ def test_its_own_is_replaced_until_somebody_edits_it(folder, capsys, words, file
 
 def test_what_is_no_ordinary_file_is_never_replaced(folder):
     os.mkfifo(folder / "pipe.svg")
-    with pytest.raises(InputError, match="no ordinary file"):
+    with pytest.raises(InputError, match="not a regular file"):
         _files.refuse_foreign([folder / "pipe.svg"], force=True)
 
 

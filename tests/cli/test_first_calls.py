@@ -95,9 +95,9 @@ def test_warm_up_runs_small_pieces_of_the_verbs(monkeypatch, capsys, tmp_path):
 def test_a_long_sweep_says_how_long_before_it_starts(monkeypatch, capsys):
     monkeypatch.setattr("stickslip.sweep.forecast.seconds_of", lambda big: 36_000.0)
     sweep.announce(SimpleNamespace(cases=20_000, device="cpu"), 2)
-    assert "20000 closed loops, about 5.0 h on 2 cores; fewer with --cases" in capsys.readouterr().err
+    assert "20000 closed loops, about 5.0 h on 2 cores; --cases reduces the number" in capsys.readouterr().err
     sweep.announce(SimpleNamespace(cases=20_000, device="gpu"), 2)
-    assert "20000 closed loops; fewer with --cases" in capsys.readouterr().err
+    assert "20000 closed loops; --cases reduces the number" in capsys.readouterr().err
     sweep.announce(SimpleNamespace(cases=10, device="cpu"), 2)
     assert capsys.readouterr().err == ""
 

@@ -20,9 +20,7 @@ from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.methods.method import Options
 from stickslip.plugins import law_names
 from stickslip.verbs.identify import assumptions
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "identify"))
-import axis_cases as cases
+from support import axis_cases as cases
 
 LOOP = "kp=8,kd=0.08,kr=0.08,limit=3"
 

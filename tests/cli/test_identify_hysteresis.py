@@ -10,7 +10,7 @@ import pytest
 
 from stickslip import Model
 from stickslip.cli import main
-from stickslip.simulation.along import Along
+from stickslip.simulation.prescribed.motion import Along
 
 FC, STIFFNESS, LOAD = 2.0, 4e4, 5.0
 

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.identify.axis_trial import Trial
-from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "identify"))
-import axis_cases as cases
+from stickslip.identify.trial import Trial
+from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
+from support import axis_cases as cases
 
 TIME = np.arange(0.0, 4.0, 1e-3)
 FAST = ["--no-report", "--force", "--json"]

@@ -19,7 +19,7 @@ from stickslip import Model
 from stickslip.cli import _output, main
 from stickslip.control.linear import Cascade
 from stickslip.control.recommended import read_recommended
-from stickslip.identify.drift import compare_models
+from stickslip.identify.compare.change import compare_models
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
@@ -157,7 +157,7 @@ def test_models_of_different_laws_are_compared_by_their_curves(
 def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (0.8, 1.0))
+    monkeypatch.setattr("stickslip.identify.setting.recommend.GAINS", (0.8, 1.0))
     model = written(tmp_path / "m.toml", 0.03)
     options = [
         "--bandwidth",
@@ -206,9 +206,9 @@ def test_a_torque_limit_below_friction_is_no_safe_axis(
 def test_the_margin_that_is_printed_is_what_the_table_says(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (1.0,))
-    monkeypatch.setattr("stickslip.identify.recommend.LEADS", (0.0,))
-    monkeypatch.setattr("stickslip.identify.recommend.BEYOND", (1.5, 2.5))
+    monkeypatch.setattr("stickslip.identify.setting.recommend.GAINS", (1.0,))
+    monkeypatch.setattr("stickslip.identify.setting.recommend.LEADS", (0.0,))
+    monkeypatch.setattr("stickslip.identify.setting.recommend.BEYOND", (1.5, 2.5))
     model = written(tmp_path / "m.toml", law="coulomb")
     assert main(["recommend", str(model), "--bandwidth", "20", "--axes", "1", "--confirm", "0"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -237,8 +237,8 @@ def test_a_negative_gain_is_not_exported(tmp_path: Path, capsys: pytest.CaptureF
 def test_what_is_recommended_is_exported_and_run_by_the_commands_that_are_printed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (0.9,))
-    monkeypatch.setattr("stickslip.identify.recommend.LEADS", (0.5,))
+    monkeypatch.setattr("stickslip.identify.setting.recommend.GAINS", (0.9,))
+    monkeypatch.setattr("stickslip.identify.setting.recommend.LEADS", (0.5,))
     monkeypatch.chdir(tmp_path)
     model, out = written(tmp_path / "m.toml"), tmp_path / "my axis" / "recommended.toml"
     asked = ["recommend", str(model), "--bandwidth", "20", "--axes", "1", "--confirm", "0", "--out"]
@@ -262,7 +262,7 @@ def test_what_is_recommended_is_exported_and_run_by_the_commands_that_are_printe
     for beside in (["--gain", "1"], ["--sample-time", "0.01"]):
         assert main([*command, *beside]) == 2
     assert main(["export", str(model), *command[2:]]) == 2
-    assert "recommends nothing" in capsys.readouterr().err
+    assert "no table [recommended]" in capsys.readouterr().err
     assert main([*asked, str(model)]) == 2
     assert main(["export", str(model), "--to", "c99", "--compensator", "ff", "--sample-time", "1"]) == 0
     assert "a reversal up to 1 s late" in capsys.readouterr().out
@@ -283,7 +283,7 @@ def test_parameters_and_percentages_are_readable() -> None:
 def test_where_the_model_is_unsure_less_is_promised(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (0.8, 1.0))
+    monkeypatch.setattr("stickslip.identify.setting.recommend.GAINS", (0.8, 1.0))
     kept: list[float] = []
     for relative in (0.01, 0.15):
         model = written(tmp_path / "m.toml", relative)
@@ -347,8 +347,8 @@ def test_the_loop_that_the_user_has_goes_all_the_way(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A cascade given by its gains: simulated, written, named by the export, run by a rig."""
-    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (0.8,))
-    monkeypatch.setattr("stickslip.identify.recommend.LEADS", (0.0,))
+    monkeypatch.setattr("stickslip.identify.setting.recommend.GAINS", (0.8,))
+    monkeypatch.setattr("stickslip.identify.setting.recommend.LEADS", (0.0,))
     model, out = written(tmp_path / "m.toml"), tmp_path / "recommended.toml"
     loop = "kv=30,kvp=0.08,kvi=1.2,feed=0.5,filter=200,limit=3"
     asked = ["recommend", str(model), "--loop", loop, "--axes", "1", "--confirm", "2", "--out", str(out)]
@@ -365,7 +365,7 @@ def test_the_loop_that_the_user_has_goes_all_the_way(
     assert loop_run.velocity_filter == 200.0
     export = ["export", str(out), "--to", "c99", "--compensator", "recommended", "--out", str(tmp_path / "c")]
     assert main(export) == 0
-    assert "it was tried beside the loop of kv 30, kvp 0.08, kvi 1.2, feed 0.5" in capsys.readouterr().out
+    assert "it was tried with the loop of kv 30, kvp 0.08, kvi 1.2, feed 0.5" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -374,10 +374,10 @@ def test_the_loop_that_the_user_has_goes_all_the_way(
         (["--loop", "kv=30,kp=1"], "unknown number of --loop of a cascade 'kp'"),
         (["--loop", "kv=30"], "give kvp, greater than 0"),
         (["--loop", "kp=1,kd=-1"], "kd = -1 must be a number of 0 or more"),
-        (["--loop", "kp=1,limit=2", "--torque-limit", "3"], "--torque-limit 3 beside --loop's limit"),
-        (["--amplitude", "0.1", "--motion", "x.csv"], "two motions"),
-        (["--frequency", "2"], "--frequency 2 belongs to a sinusoid"),
-        (["--loop", "kp=1", "--linear", "PID"], "--linear PID beside --loop"),
+        (["--loop", "kp=1,limit=2", "--torque-limit", "3"], "--torque-limit 3 and the limit of --loop"),
+        (["--amplitude", "0.1", "--motion", "x.csv"], "--motion and --amplitude exclude each other"),
+        (["--frequency", "2"], "--frequency 2 needs a sinusoid"),
+        (["--loop", "kp=1", "--linear", "PID"], "--linear PID cannot be combined with --loop"),
     ],
 )
 def test_a_loop_or_motion_that_cannot_be_is_refused(
@@ -390,7 +390,7 @@ def test_a_loop_or_motion_that_cannot_be_is_refused(
 def test_a_motion_of_another_log_is_taken(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.identify.recommend.GAINS", (0.8,))
+    monkeypatch.setattr("stickslip.identify.setting.recommend.GAINS", (0.8,))
     t = np.linspace(0.0, 2.0, 2001)
     lines = [f"{a:.4f},{b:.6f}" for a, b in zip(t, 0.3 - 0.3 * np.cos(np.pi * t), strict=True)]
     log = tmp_path / "cycle.csv"

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from stickslip.commission.lag import lag_of
-from stickslip.commission.springs import with_lag
+from stickslip.commission.friction_lag import lag_of
+from stickslip.commission.stiffness import with_lag
 from stickslip.errors import InputError
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.machine import machine

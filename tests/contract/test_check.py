@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from faulty import PRODUCT, dahl
 
 from stickslip import plugins
 from stickslip.cli import main
@@ -18,6 +17,7 @@ from stickslip.contract.torques import unbounded
 from stickslip.contract.units import parsed, units
 from stickslip.contract.verdict import failed, held
 from stickslip.spec import Bristle
+from support.faulty import PRODUCT, dahl
 
 NO_RATE = ("rate=rate, ", "")
 

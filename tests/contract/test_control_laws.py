@@ -7,16 +7,17 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pytest
 
-from stickslip import plugins
-from stickslip.contract.control_laws import CHECKS, examine, specimen, variants
+from stickslip.contract.control_laws import CHECKS, continuous, examine, specimen, variants
+from stickslip.control.linear import Compensation
+from stickslip.control.registry import control_law, control_law_names
 from stickslip.control_spec import ControlLaw
 from stickslip.simulation._sampled import compiled, replay
 from stickslip.spec import Par, Surroundings
 
 ALL = {
     "-".join([law.name, *law.chosen.values()]): law
-    for name in plugins.control_law_names()
-    for law in variants(plugins.control_law(name))
+    for name in control_law_names()
+    for law in variants(control_law(name))
 }
 
 
@@ -76,12 +77,35 @@ BROKEN = {
     "units": broken(hidden_unit),
     "linear": broken(squared, linear=True),
     "delay": broken(late, place="estimator", delay=half),
-    "continuous": broken(squared, continuous=lambda p: plugins.control_law("pd").continuous(_Gains())),
+    "continuous": broken(squared, continuous=lambda p: control_law("pd").continuous(_Gains())),
 }
 
 
 class _Gains:
     kp, kd = 5.0, 0.0
+
+
+def twice(p):
+    return Compensation("reference", 2.0 * p.gain)
+
+
+FORMS = {
+    "estimator": broken(late, place="estimator", delay=half, continuous=lambda p: 1e3),
+    "friction": ControlLaw(**{**control_law("friction_feedforward").written, "continuous": twice}),
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_a_continuous_form_that_is_not_the_laws_is_told(name):
+    assert continuous(FORMS[name]).passed is False
+
+
+def test_the_continuous_forms_of_friction_laws_and_estimators_are_tried():
+    for name in ("friction_feedforward", "friction_feedback"):
+        assert continuous(control_law(name)).passed
+    for name in ("backward_difference", "filtered_difference"):
+        assert continuous(control_law(name)).passed
+    assert continuous(control_law("dither")).passed is None
 
 
 @pytest.mark.parametrize("name", BROKEN)

@@ -19,8 +19,7 @@ from stickslip import plugins
 from stickslip.contract.agreement import step_against_rate, step_errors
 from stickslip.contract.description import bounds
 from stickslip.contract.motions import example, level_of
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import ParameterError

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from golden_rows import GMS, INERTIA, LUGRE, pd, pid
 
-from stickslip.control import sampled
 from stickslip.control.block import ControlBlock
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
+from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
-from stickslip.control.linear import Cascade, place
+from stickslip.control.linear import Cascade, Gains, place
+from stickslip.control.registry import control_law, control_law_names
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import LawError, ParameterError, UnknownName
 from stickslip.model import Model
 from stickslip.spec import Surroundings
+from support import sampled_text as sampled
+from support.golden_rows import GMS, INERTIA, LUGRE, pd, pid
 
 TIME = 1e-3
 
@@ -139,6 +141,30 @@ def test_taken_over_as_by_the_sampled_controller_that_it_replaces(name):
         assert np.abs(mine - theirs).max() <= 1e-13
 
 
+PLACED = place("PD", INERTIA, 20.0, 1.0)
+REPLACED = {
+    **{name: old for name, (_, old) in PAIRS.items()},
+    "gains of its own": Controller(Gains(6.0, 300.0, 0.1, 0.05), None, 0.3, TIME),
+    "cascade without integral": Controller(Cascade(60.0, 0.1, 0.0, 0.7), None, 0.3, TIME),
+    "feedforward through a low-pass, in steps": Controller(
+        PLACED, Feedforward(LUGRE, 0.9, 40.0, 2e-3, 0.01, 0.03, INERTIA, 5), 0.6, TIME
+    ),
+    "feedback through a low-pass": Controller(PLACED, Feedback(GMS, 0.7, 60.0), 0.6, TIME),
+    "feedback beside a filtered velocity": Controller(
+        PLACED, Feedback(GMS, 0.7, None, 0.0, 0.01, 0.02, INERTIA, 3), 0.6, TIME, velocity_filter=80.0
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REPLACED)
+def test_gains_and_a_compensator_are_control_laws_bit_for_bit(name):
+    old = REPLACED[name]
+    inputs = motion()[: 200 if "filter" in name or "low-pass" in name else None]
+    mine, theirs = torques_of(composed_of(old), inputs), old_torques_of(old, inputs)
+    assert np.abs(theirs).max() > 0.01
+    assert np.array_equal(mine, theirs)
+
+
 def test_an_integral_takes_over_and_goes_on_from_there():
     controller = PAIRS["PID"][0]
     still = np.tile([0.0, 0.02, 0.0, 0.0], (40, 1))
@@ -159,11 +185,11 @@ def test_two_laws_of_one_file_keep_their_own_choices():
 
 
 def test_a_law_belongs_in_its_place():
-    with pytest.raises(ParameterError, match="observer = 'pd' is no observer; give it as loop"):
+    with pytest.raises(ParameterError, match="observer = 'pd' cannot be used as observer; give it as loop"):
         SampledController(pd(), TIME, observer=pd())
-    with pytest.raises(ParameterError, match="sample_time = 0 s must be greater than 0"):
-        SampledController(pd(), 0.0)
-    with pytest.raises(ParameterError, match="it has no law"):
+    with pytest.raises(ParameterError, match=r"sample_time = -0\.001 s must be at least 0"):
+        SampledController(pd(), -TIME)
+    with pytest.raises(ParameterError, match="no control law"):
         SampledController(None, TIME)
 
 
@@ -180,6 +206,63 @@ def test_a_block_says_what_is_wrong_with_it():
         ControlBlock("pid", None, {"windup": "none"}, **{"kp": 1.0, "ki": 1.0, "kd": 0.1})
     with pytest.raises(UnknownName, match="unknown control law 'pdi'; did you mean"):
         ControlBlock("pdi")
+
+
+ADAPTING = [name for name in control_law_names() if control_law(name).adapts]
+
+
+@pytest.mark.parametrize("name", ADAPTING)
+def test_what_adapts_stands_over_an_integral_or_an_observer(name):
+    law = control_law(name)
+    block = ControlBlock(law, LUGRE if law.holds_friction else None, **law.example)
+    places = {"loop": pd(), law.place: block}
+    with pytest.raises(ParameterError, match=f"{name} cannot adapt while the axis sticks") as refused:
+        SampledController(sample_time=TIME, **places)
+    assert "\n" not in str(refused.value)
+    SampledController(sample_time=TIME, alone=True, **places)
+    helper = ControlBlock("disturbance_observer", inertia=INERTIA, corner=200.0)
+    observers = [block, helper] if law.place == "observer" else helper
+    SampledController(sample_time=TIME, **{**places, "observer": observers})
+    if law.place != "loop":
+        SampledController(sample_time=TIME, **{**places, "loop": pid()})
+
+
+def test_five_laws_adapt():
+    assert len(ADAPTING) == 5
+
+
+def test_a_scale_needs_a_friction_law_with_a_torque_at_constant_velocity():
+    law = LUGRE.law
+    without = replace(law, name="unsteady", steady=None, **{"variants": {}})
+    with pytest.raises(ParameterError, match="friction law 'unsteady' has no torque at constant velocity"):
+        ControlBlock(
+            "scaled_feedforward",
+            Model(without, **law.example),
+            **control_law("scaled_feedforward").example,
+        )
+
+
+def test_a_learnt_scale_stays_inside_its_bounds_and_where_it_is_at_rest():
+    controller = SampledController(
+        pid(),
+        TIME,
+        ControlBlock("scaled_feedforward", LUGRE, **control_law("scaled_feedforward").example),
+    )
+    n, m, z, p = controller.settings, controller.memory(), controller.state(), controller.parameters
+    u, sample = SimpleNamespace(**Surroundings()._asdict()), controller.functions["sample"]
+    position = velocity = 0.0
+    for k in range(3000):  # an axis with half the friction that the law expects
+        torque = sample(position, 0.3 * TIME * k, 0.3, 0.0, n, m, z, p, u)
+        velocity += TIME / INERTIA * (torque - 0.5 * (0.285 + 0.018 * 0.3) * (velocity > 0.0))
+        position += TIME * velocity
+    learnt = z.feedforward.scale
+    assert learnt == pytest.approx((0.5 * (0.285 + 0.018 * 0.3) - 0.018 * 0.3) / 0.285, abs=0.01)
+    for _ in range(2000):
+        sample(position, position, 0.0, 0.0, n, m, z, p, u)
+    assert z.feedforward.scale == learnt
+    for k in range(3000):  # something drives it ahead of its reference
+        sample(position + 0.3 * TIME * k + 2e-3, position + 0.3 * TIME * k, 0.3, 0.0, n, m, z, p, u)
+    assert z.feedforward.scale == p.feedforward.lowest
 
 
 def test_a_control_law_in_a_file_of_ones_own(tmp_path):

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from golden_rows import ROWS
 
 from stickslip.simulation._sampled import compiled, replay
 from stickslip.spec import Surroundings
+from support.golden_rows import ROWS
 
 DATA = np.load(f"{__file__.rpartition('/control/')[0]}/data/control_golden.npz")
 INPUTS = np.column_stack([DATA[name] for name in ("qm", "qd", "vd", "ad")])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from stickslip import plugins
 from stickslip.control.block import ControlBlock
 from stickslip.control.estimators import ESTIMATORS
+from stickslip.control.registry import control_law
 from stickslip.control.sampled_controller import SampledController
 from stickslip.spec import Surroundings
 
@@ -29,7 +29,7 @@ def velocities(block, position):
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_the_stated_delay_is_the_lag_behind_a_constant_acceleration(name, time, monkeypatch):
     monkeypatch.setattr(f"{__name__}.TIME", time)
-    law = plugins.control_law(name)
+    law = control_law(name)
     block = ControlBlock(law, **dict(law.example))
     t = np.arange(2000) * time
     lag = (t - velocities(block, 0.5 * t**2))[-1]
@@ -38,7 +38,7 @@ def test_the_stated_delay_is_the_lag_behind_a_constant_acceleration(name, time, 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_a_constant_velocity_is_found_and_rest_is_rest(name):
-    block = ControlBlock(name, **dict(plugins.control_law(name).example))
+    block = ControlBlock(name, **dict(control_law(name).example))
     found = velocities(block, 0.3 * TIME * np.arange(400) + 7.0)
     assert found[0] == 0.0
     assert found[-1] == pytest.approx(0.3, rel=1e-9)

@@ -6,41 +6,49 @@ import subprocess
 import pytest
 
 from stickslip import plugins
-from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensator import Feedback
+from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.export import arduino, c99
+from stickslip.export import arduino, arduino_controller, c99
 from stickslip.export.job import Job
 from stickslip.model import Model
 
 
-def jobs():
-    model = Model("gms", **plugins.law("gms").example)
-    control = Controller(place("PID", 1e-3, 10.0, 1.0), Feedback(model, filter_hz=10.0), sample_time=2e-3)
-    return Job(model, "joint"), Job(model, "joint", control)
+def controller_with(model):
+    helper = Feedback(model, filter_hz=10.0)
+    return composed_of(Controller(place("PID", 1e-3, 10.0, 1.0), helper, sample_time=2e-3))
 
 
-@pytest.mark.parametrize("job", jobs(), ids=["law", "controller"])
-def test_library_and_example_compile_and_run(job):
-    export = arduino.write(job)
-    result = arduino.check(job, export)
+def exported(model, kind):
+    """The export of the law, or of a controller that holds it."""
+    if kind == "law":
+        return arduino.write(Job(model, "joint"))
+    return arduino_controller.write(controller_with(model), "joint")
+
+
+GMS = Model("gms", **plugins.law("gms").example)
+
+
+@pytest.mark.parametrize("kind", ["law", "controller"])
+def test_library_and_example_compile_and_run(kind):
+    export = exported(GMS, kind)
+    result = arduino.tried(export, "joint")
     if result.passed is None:
         pytest.skip(result.text)
     assert result.passed, result.text
     broken = {**export.files, "examples/Step/Step.ino": "void setup() { joint_missing(); }"}
-    assert arduino.check(job, type(export)(broken)).passed is False
+    assert arduino.tried(type(export)(broken), "joint").passed is False
 
 
 @pytest.mark.skipif(shutil.which("avr-g++") is None, reason="needs avr-g++")
 @pytest.mark.parametrize("law", ["dahl", "gms", "lugre"])
 def test_library_and_example_link_for_an_avr_whose_library_has_less(law):
-    model = Model(law, **plugins.law(law).example)
-    control = Controller(place("PID", 1e-3, 10.0, 1.0), Feedback(model, filter_hz=10.0), sample_time=2e-3)
-    for job in (Job(model, "joint"), Job(model, "joint", control)):
-        export = arduino.write(job)
-        assert "avr-g++" in arduino.check(job, export).text
+    for kind in ("law", "controller"):
+        export = exported(Model(law, **plugins.law(law).example), kind)
+        assert "avr-g++" in arduino.tried(export, "joint").text
         without = {n: str(text).replace("#ifdef __AVR__", "#if 0") for n, text in export.files.items()}
-        found = arduino.check(job, type(export)(without))
+        found = arduino.tried(type(export)(without), "joint")
         assert found.passed is False
         assert found.text.startswith("avr-g++: ")
 
@@ -67,7 +75,7 @@ def test_what_the_avr_lacks_is_as_good_as_the_librarys(law, tmp_path):
 
 @pytest.mark.skipif(shutil.which("arm-none-eabi-g++") is None, reason="needs arm-none-eabi-g++")
 def test_the_library_compiles_for_a_microcontroller_without_double_precision(tmp_path):
-    for name, text in arduino.write(jobs()[1]).files.items():
+    for name, text in exported(GMS, "controller").files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     core = ["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]

@@ -5,26 +5,27 @@ import re
 import shutil
 import subprocess
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from laws import label, registered, variants
 from stickslip import plugins
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
+from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
-from stickslip.control.sampled import Memory, sampled_by, settings
 from stickslip.errors import InputError
-from stickslip.export import c99
+from stickslip.export import c99, c99_controller
 from stickslip.export.golden import Golden, golden, random_steps, room_beside_jumps
 from stickslip.export.job import Job
 from stickslip.jit import call_sample, call_step, compiled_law, flat, kernel, pointer
 from stickslip.laws import LAWS as BUILT_IN
 from stickslip.model import Model
-from stickslip.simulation._sampled import MEMORY, sampler
+from stickslip.simulation._sampled import compiled
 from stickslip.spec import Surroundings
+from support.laws import label, registered, variants
+from support.sampled_text import Memory, sampled_by, settings
 
 COMPILERS = [c for c in ("gcc", "clang") if shutil.which(c)]
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="needs a C compiler")
@@ -56,9 +57,8 @@ void run(long n, const double *position, const double *wanted, const double *wan
     x_settings s;
     x_memory m;
     x_surroundings u = {{ {around} }};
-    x_init(&p);
-    x_controller_init(&s);
-    x_controller_reset(&m, &z);
+    x_init(&s, &p);
+    x_reset(&m, &z);
     for (long i = 0; i < n; i++) {{
         out[i] = x_sample(position[i], wanted[i], wanted_velocity[i], wanted_acceleration[i], &s, &m, &z, &p, &u);
     }}
@@ -68,10 +68,20 @@ void run(long n, const double *position, const double *wanted, const double *wan
 
 def built(job, program, folder, compiler, *more):
     """The exported C with a loop around it, as a function on arrays; one source file where it is baked in."""
-    for name, text in c99.write(job).files.items():
+    return looped(c99.write(job).files, job.single, program, folder, compiler, *more)
+
+
+def built_controller(controller, program, folder, compiler, single=False):
+    """The same of a controller."""
+    files = c99_controller.write(composed_of(controller), "x", single).files
+    return looped(files, single, program, folder, compiler)
+
+
+def looped(files, single, program, folder, compiler, *more):
+    for name, text in files.items():
         (folder / name).write_text(text)
-    around = ", ".join(repr(x) + ("f" if job.single else "") for x in Surroundings())
-    (folder / "run.c").write_text(program.format(around=around, real="float" if job.single else "double"))
+    around = ", ".join(repr(x) + ("f" if single else "") for x in Surroundings())
+    (folder / "run.c").write_text(program.format(around=around, real="float" if single else "double"))
     command = [compiler, *c99.FLAGS, "-shared", "-fPIC", *more, "x.c", "run.c", "-lm", "-o", f"{compiler}.so"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -191,11 +201,11 @@ def test_a_torque_that_jumps_is_held_to_its_bound_beside_the_jumps_alone(tmp_pat
 
 
 @kernel()
-def run_sample(address, position, wanted, wanted_velocity, wanted_acceleration, n, m, p, u, out):
+def run_sample(address, position, wanted, wanted_velocity, wanted_acceleration, n, m, z, p, u, out):
     for i in range(position.size):
         out[i] = call_sample(
             address, position[i], wanted[i], wanted_velocity[i], wanted_acceleration[i], pointer(n, 0),
-            pointer(m, 0), pointer(m, MEMORY), pointer(p, 0), pointer(u, 0),
+            pointer(m, 0), pointer(z, 0), pointer(p, 0), pointer(u, 0),
         )  # fmt: skip
 
 
@@ -226,32 +236,31 @@ def motion(count):
 def test_the_controller_gives_the_bits_of_python(law, kind, tmp_path):
     model, signals = example(law), motion(100_000)
     controller = CONTROLLERS[kind](model)
-    run = built(Job(model, "x", controller), CONTROL, tmp_path, COMPILERS[-1])
-    out, helper = answers(run, *signals), controller.compensator
-    expected = np.empty(out.size)
-    memory = np.concatenate([np.zeros(MEMORY), law.pack_state(law.state(model.parameters))])
-    n, p, u = np.array(settings(controller)), flat(law.pack(model.parameters)), np.array(Surroundings())
-    run_sample(sampler(law if helper else None), *signals, n, memory, p, u, expected)
-    np.testing.assert_array_equal(out, expected)
+    run = built_controller(controller, CONTROL, tmp_path, COMPILERS[-1])
+    np.testing.assert_array_equal(answers(run, *signals), by_compiled_controller(controller, *signals))
 
 
-def test_the_compiled_controller_gives_the_bits_of_plain_python():
-    from types import SimpleNamespace
+def by_compiled_controller(controller, *signals):
+    made, out = compiled(controller), np.empty(signals[0].size)
+    arrays = (made.settings, made.memory, made.state, made.parameters, np.array(Surroundings()))
+    run_sample(made.address, *signals, *arrays, out)
+    return out
 
+
+@pytest.mark.parametrize("kind", CONTROLLERS)
+def test_the_compiled_controller_gives_the_bits_of_a_text_of_its_own(kind):
     model, signals = example(plugins.law("gms")), motion(2000)
-    controller = CONTROLLERS["FB-filtered"](model)
-    law, n, p = model.law, settings(controller), model.parameters
-    m, z = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0)), law.state(p)
+    controller = CONTROLLERS[kind](model)
+    law, n, p = model.law if controller.compensator else None, settings(controller), model.parameters
+    m, z = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0)), model.law.state(p)
     u = SimpleNamespace(**Surroundings()._asdict())
     plain = [sampled_by(law)(*map(float, row), n, m, z, p, u) for row in zip(*signals)]
-    memory, out = np.concatenate([np.zeros(MEMORY), law.pack_state(law.state(p))]), np.empty(2000)
-    run_sample(sampler(law), *signals, np.array(n), memory, flat(law.pack(p)), np.array(Surroundings()), out)
-    np.testing.assert_array_equal(out, plain)
+    np.testing.assert_array_equal(by_compiled_controller(controller, *signals), plain)
 
 
 def test_a_controller_in_continuous_time_is_refused():
     with pytest.raises(InputError, match="sample_time"):
-        Job(example(LAWS[0]), "x", Controller(place("PD", 1e-3, 10.0, 1.0)))
+        c99_controller.write(composed_of(Controller(place("PD", 1e-3, 10.0, 1.0))), "x")
 
 
 def test_a_name_that_is_no_identifier_is_refused():
@@ -277,34 +286,33 @@ MODEL = Model("stribeck", k=50.0, fs=0.33, fc=0.28, vs=0.1, sigma2=0.02)
     [
         (
             Controller(Gains(kp=0.0), Feedforward(MODEL), sample_time=1e-3),
-            "The compensating torque, every 0.001 s",
+            "0.001 s: measured",
         ),
         (
             Controller(Gains(kp=0.0), Feedback(MODEL, filter_hz=10.0), sample_time=2e-3),
-            "The compensating torque, every",
+            "add it to the torque of your own controller",
         ),
         (
             Controller(place("PD", 1e-3, 10.0, 1.0), Feedforward(MODEL), sample_time=1e-3),
-            "The whole controller, every",
+            "the torque of `loop` (Four gains)",
         ),
     ],
     ids=["ff", "fb", "PD and ff"],
 )
 def test_what_the_readme_shows_compiles_and_gives_the_torque(controller, said, single, tmp_path):
-    files = c99.write(Job(MODEL, "axis", controller, single=single)).files
+    files = c99_controller.write(composed_of(controller), "axis", single).files
     readme = files["README.md"]
     assert said in readme
+    assert ("add it to the torque" in readme) is (not any(controller.gains))
     for name, content in files.items():
         (tmp_path / name).write_text(str(content))
-    law, loop = re.findall(r"```c\n(.*?)```", readme, re.DOTALL)
+    (shown,) = re.findall(r"```c\n(.*?)```", readme, re.DOTALL)
     real = "float" if single else "double"
-    given = (
-        "v0 = 0, v1 = 0, dt = 1e-3f, position = 0, wanted = 0, wanted_velocity = 2, wanted_acceleration = 10"
-    )
-    result = "compensation" if "compensation =" in loop else "command"
+    given = "position = 0, reference = 0, velocity = 2, acceleration = 10"
+    head, _, body = shown.partition("\n")
     (tmp_path / "shown.c").write_text(
-        f"#include <stdio.h>\n{law.splitlines()[0]}\nint main(void) {{\n{real} {given};\n"
-        f'{law.partition(chr(10))[2]}{loop}printf("%.9g %.9g", (double)torque, (double){result});\nreturn 0; }}\n'
+        f"#include <stdio.h>\n{head}\nint main(void) {{\n{real} {given};\n"
+        f'{body}printf("%.9g", (double)torque);\nreturn 0; }}\n'
     )
     built = [
         COMPILERS[0],
@@ -320,10 +328,7 @@ def test_what_the_readme_shows_compiles_and_gives_the_torque(controller, said, s
         "shown",
     ]
     subprocess.run(built, cwd=tmp_path, check=True)
-    shown = subprocess.run(
-        ["./shown"], cwd=tmp_path, check=True, capture_output=True, text=True
-    ).stdout.split()
-    assert float(shown[0]) == 0.0
+    ran = subprocess.run(["./shown"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
     friction = MODEL.law.steady(2.0, MODEL.parameters)
     wanted = {"ff": friction, "fb": 0.0}["fb" if controller.compensator.__class__ is Feedback else "ff"]
-    assert float(shown[1]) == pytest.approx(wanted + 2.0 * controller.gains.kr, rel=1e-5)
+    assert float(ran) == pytest.approx(wanted + 2.0 * controller.gains.kr, rel=1e-5)

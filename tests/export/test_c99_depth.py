@@ -6,18 +6,19 @@ import subprocess
 
 import numpy as np
 import pytest
-from cortex_m4f import emulated, missing
 from test_c99 import COMPILERS, answers, example
 
-from laws import farthest, label, registered
 from stickslip import plugins
-from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensator import Feedback
+from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.export import c99
+from stickslip.export import c99, c99_controller
 from stickslip.export.golden import random_steps
 from stickslip.export.job import Job
 from stickslip.spec import Surroundings
+from support.cortex_m4f import emulated, missing
+from support.laws import farthest, label, registered
 
 every_law = pytest.mark.parametrize("law", registered(), ids=label)
 
@@ -37,9 +38,11 @@ def analysed(folder, *files):
 def test_cppcheck_finds_nothing(law, tmp_path):
     model = example(law)
     controller = Controller(place("PID", 1e-3, 10.0, 1.0), Feedback(model, filter_hz=10.0), sample_time=1e-3)
-    for name, text in c99.write(Job(model, "x", controller)).files.items():
+    law, whole = c99.write(Job(model, "x")), c99_controller.write(composed_of(controller), "y")
+    for name, text in {**law.files, **whole.files}.items():
         (tmp_path / name).write_text(text)
     assert analysed(tmp_path, "x.c", "x_check.c") == ""
+    assert analysed(tmp_path, "y.c", "y_check.c") == ""
 
 
 @pytest.mark.skipif(shutil.which("cppcheck") is None, reason="needs cppcheck")

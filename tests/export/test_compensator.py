@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
-from test_c99 import COMPILERS, CONTROL, answers, built
+from test_c99 import COMPILERS, CONTROL, answers, built_controller
 
 from stickslip.cli import main
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.control.recommended import read_recommended
 from stickslip.errors import ParameterError
-from stickslip.export.job import Job
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.rigs.loop import Loop
@@ -67,15 +65,13 @@ def test_the_simulation_runs_the_compensator_that_is_exported(kind, tmp_path):
     helper = kind(COULOMB, 0.9, offset=-0.07, inertia_feedforward=INERTIA)
     controller = Controller(place("PD", INERTIA, 20.0, 1.0), helper, 3.0, 1e-3)
     reference = Reference("scurve", distance=0.5, velocity=2.0, acceleration=40.0, jerk=2000.0)
-    record = simulate(
-        RigidAxis(INERTIA, COULOMB), controller, reference, 0.6, integrator="fixed", output=1e-3
-    )
+    record = simulate(RigidAxis(INERTIA, COULOMB), controller, reference, 0.6, output=1e-3)
     rows = [
         np.flatnonzero(record.time == 1e-3 * k)[-1] for k in range(600)
     ]  # as the controller has just acted
     motion = reference.sample(1e-3 * np.arange(600) + 1e-11)
     told = answers(
-        built(Job(COULOMB, "x", controller), CONTROL, tmp_path, COMPILERS[0]),
+        built_controller(controller, CONTROL, tmp_path, COMPILERS[0]),
         record["position"][rows], *motion.T,
     )  # fmt: skip
     np.testing.assert_allclose(told, record["motor_torque"][rows], atol=2e-9)
@@ -100,9 +96,11 @@ def test_a_recommendation_leaves_with_its_offset_and_inertia(file, tmp_path, cap
     assert (found.offset, found.inertia_feedforward) == (-0.07, INERTIA)
     said = exported(capsys, name, "--to", "c99", "--compensator", "recommended", "--out", "out", "--check")
     source = (tmp_path / "out" / "m.c").read_text()
-    for line in ("n->gain = 0.8;", "n->lead = 0.0005;", "n->offset = -0.07;", "n->inertia = 0.0004;"):
+    for line in ("0.8, /* feedforward_gain:", "0.0005, /* feedforward_lead:", "-0.07, /* feedforward_2_offset:",
+                 "0.0004, /* feedforward_2_inertia:"):  # fmt: skip
         assert line in source
-    for words in ("0.8 times the law's torque", "`offset` = -0.07", "`inertia` = 0.0004 kg·m²"):
+    for words in ("0.8 times the friction law's torque", "`feedforward_2_offset` = -0.07",
+                  "`feedforward_2_inertia` = 0.0004 kg·m²"):  # fmt: skip
         assert words in said
         assert words in (tmp_path / "out" / "README.md").read_text()
     assert "beside friction is not" not in said
@@ -126,8 +124,8 @@ def test_a_models_compensator_has_the_offset_and_inertia_of_its_axis(file, tmp_p
     call = [file("gravity = 0.4"), "--to", "c99", "--compensator", "ff", "--out", "out"]
     said = exported(capsys, *call)
     source = (tmp_path / "out" / "m.c").read_text()
-    assert "n->offset = -0.07;" in source
-    assert "n->inertia = 0.0004;" in source
+    assert "-0.07, /* feedforward_2_offset:" in source
+    assert "0.0004, /* feedforward_2_inertia:" in source
     assert "gravity, up to 0.4 N·m over the angle" in said
     said = exported(capsys, *call, "--offset", "0", "--inertia-feedforward", "0")
     assert "no constant torque" in said
@@ -139,7 +137,7 @@ def test_the_mean_torque_of_a_map_of_the_angle_leaves(file, tmp_path, capsys):
     angle = f"[angle]\n{angle}torque_order = [1]\ntorque = [0.01]\ntorque_phase = [0]\n"
     said = exported(capsys, file(RECOMMENDED.format(more=angle)), "--to", "c99", "--compensator", "recommended",
                     "--out", "out")  # fmt: skip
-    assert "n->offset = 0.03;" in (tmp_path / "out" / "m.c").read_text()
+    assert "0.03, /* feedforward_2_offset:" in (tmp_path / "out" / "m.c").read_text()
     assert "is not in the export but for the mean of the torque" in said
 
 
@@ -161,5 +159,5 @@ def test_a_rig_runs_what_is_recommended_with_offset_and_inertia(file):
 def test_what_cannot_be_fed_forward_is_refused(wrong, said):
     with pytest.raises(ParameterError, match=said):
         Feedforward(COULOMB, **wrong)
-    with pytest.raises(ParameterError, match="offset acts on samples"):
+    with pytest.raises(ParameterError, match="offset needs a sampled controller"):
         Controller(Gains(1.0), Feedback(COULOMB, offset=0.1))

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from structured_text import Program
 
 from stickslip import plugins
 from stickslip.contract.control_laws import Plain, specimen
 from stickslip.control.block import ControlBlock
+from stickslip.control.registry import control_law, control_law_names
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import UnknownName
 from stickslip.export import CONTROLLER_TARGETS, controller_target
@@ -19,8 +19,9 @@ from stickslip.export._controllers import golden_samples
 from stickslip.export._fmu_run import played
 from stickslip.export.st_controller import GIVEN
 from stickslip.model import Model
+from support.structured_text import Program
 
-OWN = Path(__file__).parents[1] / "study" / "sliding_mode.py"
+OWN = Path(__file__).parents[1] / "support" / "sliding_mode.py"
 T = 1e-3
 PD = ControlBlock("pd", kp=6.099, kd=0.097067)
 PID = ControlBlock(
@@ -73,15 +74,15 @@ def test_the_function_block_gives_the_torque_of_plain_python(name, controller):
         assert (v["fault"] > 0.0) == any(math.isnan(x) for x in given)
 
 
-@pytest.mark.parametrize("name", plugins.control_law_names())
+@pytest.mark.parametrize("name", control_law_names())
 def test_every_control_law_goes_to_the_languages_without_a_c_compiler(name):
-    controller = specimen(plugins.control_law(name))
+    controller = specimen(control_law(name))
     for language in ("python", "matlab"):
         target = controller_target(language)
         result = target.check(target.write(controller, "axis", False), "axis")
         assert result.passed is not False, f"{language}: {result.text}"
     program = Program(controller_target("st").write(controller, "axis", False).files["axis.st"])
-    v, samples = program.instance("axis"), golden_samples(controller, 150)
+    v, samples = program.instance("axis"), golden_samples(controller, count=150)
     for row in zip(*(column.tolist() for column in samples)):
         *given, torque, v["load"], v["temperature"] = row
         v.update(zip(GIVEN, given))

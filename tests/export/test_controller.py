@@ -6,19 +6,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_c99 import COMPILERS, answers, built, example
+from test_c99 import COMPILERS, answers, built_controller, example
 
 from stickslip import plugins
 from stickslip.cli import main
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
+from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
-from stickslip.control.sampled import Memory, functions_by, settings
 from stickslip.errors import ParameterError
-from stickslip.export import arduino, c99
+from stickslip.export import controller_target
 from stickslip.export._step_error import step_errors
-from stickslip.export.job import Job
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.rigs._control import control_of
@@ -35,13 +33,10 @@ class Sampled:
     """The controller in plain Python."""
 
     def __init__(self, controller):
-        helper = controller.compensator
-        self.p = helper.model.parameters if helper else None
-        law = helper.model.law if helper else None
-        self.n, self.z = settings(controller), law.state(self.p) if law else None
-        self.m = SimpleNamespace(**dict.fromkeys(Memory._fields, 0.0))
+        made = composed_of(controller)
+        self.p, self.n, self.z, self.m = made.parameters, made.settings, made.state(), made.memory()
         self.u = SimpleNamespace(**Surroundings()._asdict())
-        self.functions = functions_by(law)
+        self.functions = made.functions
 
     def __call__(self, *inputs, name="sample"):
         """Position, reference and its velocity, and the torque to follow; the acceleration is 0."""
@@ -161,26 +156,26 @@ void run(long n, const double *position, const double *wanted, const double *wan
 {{
     x_state z;
     x_settings s;
+    x_parameters p;
     x_memory m;
     x_surroundings u = {{ {around} }};
-    x_controller_init(&s);
-    x_controller_reset(&m, &z);
+    x_init(&s, &p);
+    x_reset(&m, &z);
     for (long i = 0; i < n; i++) {{
         const double x = position[i], w = wanted[i];
         const {real} v = ({real})wanted_velocity[i], a = 0;
-        out[i] = (double)(CALL v, a, &s, &m, &z, &x_identified, &u));
+        out[i] = (double)(CALL v, a, &s, &m, &z, &p, &u));
     }}
 }}
 """
 WHOLE = "x_sample(x, w,"
-FOLLOWING = f"i < 50 ? x_follow(x, w, v, a, 0.3, &s, &m, &z, &x_identified, &u) : {WHOLE}"
+FOLLOWING = f"i < 50 ? x_follow(x, w, v, a, 0.3, &s, &m, &z, &p, &u) : {WHOLE}"
 TURNS = ", ".join(f"({{real}})(long)({a} / TURN), ({{real}})fmod({a}, TURN)" for a in "xw")
 
 
-def answers_of(controller, model, single, signals, folder, call):
+def answers_of(controller, single, signals, folder, call):
     program = RUN.replace("CALL", call)
-    run = built(Job(model, "x", controller, single=single), program, folder, COMPILERS[-1])
-    return answers(run, *signals)
+    return answers(built_controller(controller, program, folder, COMPILERS[-1], single), *signals)
 
 
 def tracking(count, offset):
@@ -195,7 +190,7 @@ def tracking(count, offset):
 @every_controller
 def test_faults_and_taking_over_give_the_bits_of_python(controller, tmp_path):
     signals, drive = tracking(500, 0.0), Sampled(controller)
-    got = answers_of(controller, example(plugins.law("gms")), False, signals, tmp_path, FOLLOWING)
+    got = answers_of(controller, False, signals, tmp_path, FOLLOWING)
     rows = [list(map(float, row)) for row in zip(*signals)]
     expected = [drive(*row, 0.3, name="follow") if k < 50 else drive(*row) for k, row in enumerate(rows)]
     np.testing.assert_array_equal(got, expected)
@@ -205,11 +200,11 @@ def test_faults_and_taking_over_give_the_bits_of_python(controller, tmp_path):
 @every_controller
 @pytest.mark.parametrize("call", [WHOLE, f"x_sample_turns({TURNS},"], ids=["double", "turns"])
 def test_single_precision_loses_nothing_at_a_thousand_radians(controller, call, tmp_path):
-    model, errors = example(plugins.law("gms")), []
+    errors = []
     for offset in (0.0, 1000.0):
         signals, drive = tracking(1000, offset), Sampled(controller)
         expected = [drive(*map(float, row)) for row in zip(*signals)]
-        errors.append(np.abs(answers_of(controller, model, True, signals, tmp_path, call) - expected).max())
+        errors.append(np.abs(answers_of(controller, True, signals, tmp_path, call) - expected).max())
     # The rest of a turn has steps of 2.4e-7 rad, and the contact of this law is as stiff as 6e3 N·m/rad.
     assert max(errors) < (1e-4 if call == WHOLE else 3e-3), errors
 
@@ -243,7 +238,7 @@ def test_the_simulation_divides_the_sample_too():
     drive = Sampled(Controller(Gains(0.0), Feedforward(dahl, substeps=3), sample_time=1e-3))
     reference = Reference("plain_sine", amplitude=0.5, frequency=2.0)
     controller = Controller(PID, Feedforward(dahl, substeps=3), sample_time=1e-3)
-    record = simulate(RigidAxis(3.86e-4, dahl), controller, reference, 0.3, integrator="fixed", output=1e-3)
+    record = simulate(RigidAxis(3.86e-4, dahl), controller, reference, 0.3, output=1e-3)
     rows = [np.flatnonzero(record.time == 1e-3 * k)[-1] for k in range(300)]
     speeds = reference.sample(1e-3 * np.arange(300) + 1e-11)[:, 1]
     told = [drive(0.0, 0.0, float(v)) for v in speeds]
@@ -258,7 +253,7 @@ def test_substeps_are_a_whole_number(wrong):
 
 
 def test_substeps_belong_to_samples():
-    with pytest.raises(ParameterError, match="substeps acts on samples"):
+    with pytest.raises(ParameterError, match="substeps needs a sampled controller"):
         Controller(PID, Feedforward(example(plugins.law("gms")), substeps=2))
 
 
@@ -269,11 +264,11 @@ def test_the_command_line_divides_and_states_the_error(tmp_path, monkeypatch, ca
     (tmp_path / "m.toml").write_text("\n".join(['law = "lugre"', "[parameters]", *lines]))
     call = ["export", "m.toml", "--to", "c99", "--out", "c", "--substeps"]
     assert main([*call, "8", "--compensator", "ff"]) == 0
-    assert "n->substeps = 8.0;" in (tmp_path / "c/m.c").read_text()
+    assert "8.0, /* feedforward_substeps:" in (tmp_path / "c/m.c").read_text()
     readme = (tmp_path / "c/README.md").read_text()
     assert f"| 1 | {step_errors(lugre)[1].whole:.2g} | {step_errors(lugre, parts=8)[1].parts:.2g} |" in readme
     assert "in 8 substeps" in readme
-    assert "`n.substeps` = 8" in readme
+    assert "`p.feedforward_substeps` = 8" in readme
     for more, said in ((["8"], "--substeps belongs to"), (["0", "--compensator", "fb"], "substeps = 0 must")):
         assert main([*call, *more]) == 2
         assert said in capsys.readouterr().err
@@ -283,15 +278,17 @@ def test_the_command_line_divides_and_states_the_error(tmp_path, monkeypatch, ca
 
 
 @pytest.mark.skipif("gcc" not in COMPILERS, reason="needs gcc")
-@pytest.mark.parametrize("target", [c99, arduino], ids=lambda m: m.TARGET.name)
-def test_the_check_runs_the_controller(target):
-    job = Job(example(plugins.law("gms")), "x", ALL["FB"])
-    export = target.write(job)
-    assert target.check(job, export).passed
-    for wrong in ("-7", "m->torque + m->torque / 50"):
-        files = {n: text.replace("return m->torque;", f"return {wrong};") for n, text in export.files.items()}
+@pytest.mark.parametrize("name", ["c99", "arduino"])
+def test_the_check_runs_the_controller(name):
+    target = controller_target(name)
+    export = target.write(composed_of(ALL["FB"]), "x", name == "arduino")
+    assert target.check(export, "x").passed
+    for wrong in ("-7", "m->applied + m->applied / 50"):
+        files = {
+            n: text.replace("return m->applied;", f"return {wrong};") for n, text in export.files.items()
+        }
         assert files != export.files
-        result = target.check(job, type(export)(files))
+        result = target.check(type(export)(files), "x")
         assert result.passed is False
         assert "N·m off the definition" in result.text
 

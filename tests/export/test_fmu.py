@@ -12,9 +12,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from laws import farthest
 from stickslip import plugins
-from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.export import target_named
@@ -25,6 +24,7 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation import _case
 from stickslip.simulation.closed_loop import simulate
+from support.laws import farthest
 
 fmpy = pytest.importorskip("fmpy")
 from fmpy.fmi1 import FMICallException  # noqa: E402

@@ -4,14 +4,14 @@ import shutil
 
 import numpy as np
 import pytest
-from hal_component import Component
 
-from laws import farthest, label, registered
 from stickslip import plugins
 from stickslip.export import linuxcnc
 from stickslip.export.job import Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
+from support.hal_component import Component
+from support.laws import farthest, label, registered
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 LAWS = [*registered(), farthest(registered()[-1])]

@@ -5,17 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from modelica_text import Package
 
-from laws import farthest, label, registered
 from stickslip import plugins
 from stickslip.export import modelica
 from stickslip.export.golden import PACE, golden_around
 from stickslip.export.job import Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
+from support.laws import farthest, label, registered
+from support.modelica_text import Package
 
-HARD = plugins.law(str(Path(__file__).with_name("hard_names.py")))
+HARD = plugins.law(str(Path(__file__).parents[1] / "support" / "hard_names.py"))
 LAWS = [HARD, *registered(), *(farthest(law) for law in registered() if law.choices)]
 BOUND = 1e-11
 """Of the largest torque: Modelica has no expm1."""

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from laws import farthest, label, registered
 from stickslip.errors import InputError
 from stickslip.export import target_named
 from stickslip.export._nearest import COULOMB, STATIC, STRIBECK, Curve, carried, nearest
 from stickslip.export.job import CannotCarry, Job
 from stickslip.model import Model
+from support.laws import farthest, label, registered
 
 FORMS = (COULOMB, STATIC, STRIBECK)
 TABLE_4 = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}

@@ -4,22 +4,22 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
-import matiec
 import numpy as np
 import pytest
 from lark.exceptions import UnexpectedInput
-from structured_text import Program
 
-from laws import farthest, label, registered
 from stickslip import plugins
 from stickslip.export import st
 from stickslip.export.golden import PACE, golden_around
 from stickslip.export.job import Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
+from support import matiec
+from support.laws import farthest, label, registered
+from support.structured_text import Program
 
 HERE = Path(__file__).parent
-HARD = [plugins.law(str(HERE / f"{name}.py")) for name in ("odd_names", "hard_names")]
+HARD = [plugins.law(str(HERE.parent / "support" / f"{name}.py")) for name in ("odd_names", "hard_names")]
 LAWS = [*HARD, *registered(), *(farthest(law) for law in registered() if law.choices)]
 BOUND = 1e-11
 """Of the largest torque: the norm's library has neither expm1 nor a power that rounds as C's does."""

@@ -8,7 +8,6 @@ import subprocess
 
 import numpy as np
 import pytest
-from structured_text import Program
 
 from stickslip import plugins
 from stickslip.export import _fmu, arduino, c99, fmu, fmu_axis, linuxcnc, matlab, modelica, python, st
@@ -16,6 +15,7 @@ from stickslip.export._step_error import PARTS, step_errors
 from stickslip.export.job import Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
+from support.structured_text import Program
 
 LUGRE = Model("lugre", **plugins.law("lugre").example)
 TARGETS = (arduino, c99, fmu, linuxcnc, matlab, modelica, python, st)

@@ -7,21 +7,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from structured_text import Program
-from test_c99 import COMPILERS, CONTROL, answers, built
+from test_c99 import COMPILERS, CONTROL, answers, built_controller
 
-from laws import farthest
 from stickslip import plugins
 from stickslip.cli import main
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control import composition
+from stickslip.control.compensator import Feedforward
+from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.control.sampled import Memory, functions_by, settings
-from stickslip.export import TARGETS, arduino, c99, matlab, modelica, python, st, target_named
+from stickslip.export import TARGETS, arduino, c99, c99_controller, matlab, modelica, python, st, target_named
 from stickslip.export.golden import answered
 from stickslip.export.job import Export, Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
+from support.laws import farthest
+from support.structured_text import Program
 
 T = 1e-3
 TOOLS = {c99: bool(COMPILERS), python: True, matlab: bool(shutil.which("octave-cli"))}
@@ -68,19 +69,18 @@ def test_the_exported_controller_keeps_the_time(single, tmp_path):
         "wanted_velocity[i], wanted_acceleration[i]",
         "({real})wanted_velocity[i], ({real})wanted_acceleration[i]",
     )
-    job = Job(DRIFT, "x", controller, single=single)
-    got = answers(built(job, program, tmp_path, COMPILERS[0]), *signals)
+    got = answers(built_controller(controller, program, tmp_path, COMPILERS[0], single), *signals)
     time = T * np.arange(count)
     np.testing.assert_allclose(got, 1.0 + 0.5 * np.expm1(-time / 0.2), rtol=1e-5 if single else 1e-12)
 
 
 def test_the_time_of_the_samples_loses_nothing_in_single_precision_over_days():
-    sample, n = functions_by(DRIFT.law)["keep_time"], settings(Controller(Gains(0.0), sample_time=T))
-    m, u = SimpleNamespace(**dict.fromkeys(Memory._fields, np.float32(0.0))), around()
+    n = composed_of(Controller(Gains(0.0), sample_time=T)).settings
+    m, u = SimpleNamespace(**{f.name: np.float32(0.0) for f in composition.MEMORY}), around()
     n = SimpleNamespace(**{k: np.float32(v) for k, v in n._replace(clock=1.0)._asdict().items()})
     m.seconds = np.float32(2e5)  # where a float has steps of 16 ms
     for _ in range(5001):
-        sample(n, m, u)
+        composition.keep_time(n, m, u)
     assert float(u.time) == pytest.approx(200_005.0, abs=0.02)
 
 
@@ -197,15 +197,14 @@ def test_golden_steps_tell_an_export_that_lost_a_modulation(target, name):
 @pytest.mark.skipif(not COMPILERS, reason="needs a C compiler")
 def test_golden_samples_tell_a_controller_that_lost_a_modulation(name):
     controller = Controller(Gains(0.0), Feedforward(modulated()), sample_time=T)
-    job = Job(modulated(), "x", controller)
-    export = c99.write(job)
-    assert c99.check(job, export).passed
-    head, name_of, body = export.files["x.c"].partition("double x_law_steps(")
+    export = c99_controller.write(composed_of(controller), "x")
+    assert c99_controller.check(export, "x").passed
+    head, name_of, body = export.files["x.c"].partition("double x_feedforward_over_sample(")
     body, brace, rest = body.partition("\n}\n")
     still = f"{{\n    x_surroundings here = *u;\n    here.{name} = {getattr(Surroundings(), name)};"
     body = body.replace("{", still, 1).replace("p, u);", "p, &here);")
     assert "&here" in body
     source = "".join([head, name_of, body, brace, rest])
-    found = c99.check(job, Export({**export.files, "x.c": source}))
+    found = c99_controller.check(Export({**export.files, "x.c": source}), "x")
     assert found.passed is False
     assert "off the definition" in found.text

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from laws import farthest, label, registered
 from stickslip import plugins
 from stickslip.export import TARGETS, target_named
 from stickslip.export.job import CannotCarry, Job
 from stickslip.model import Model
+from support.laws import farthest, label, registered
 
 ALL = {name: target_named(name) for name in TARGETS}
-ODD = plugins.law(str(Path(__file__).with_name("odd_names.py")))
+ODD = plugins.law(str(Path(__file__).parents[1] / "support" / "odd_names.py"))
 LAWS = [ODD, *registered(), *(farthest(law) for law in registered() if law.choices)]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.identify.angle import identify_angle
+from stickslip.identify.sliding.position_dependence import identify_angle
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.machine import machine
 from stickslip.machines.motor import Harmonics

@@ -7,23 +7,23 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import axis_cases as cases
 import numpy as np
 import pytest
 
 from stickslip import law_names
 from stickslip.errors import InputError, ParameterError, UnknownName
-from stickslip.identify.axis import identify_axis
-from stickslip.identify.axis_choice import Candidate, sentence_on
-from stickslip.identify.axis_inverse import correlation_lags, inverse_dynamics
-from stickslip.identify.axis_output import Extras, output_error
-from stickslip.identify.axis_result import rising
-from stickslip.identify.axis_start import dimensions, starts
-from stickslip.identify.axis_trial import Trial, trial_of
+from stickslip.identify.axis.choice import Candidate, sentence_on
+from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.axis.output import Extras, output_error
+from stickslip.identify.axis.result import rising
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.fit.axis_start import dimensions, starts
+from stickslip.identify.regression.inverse import correlation_lags, inverse_dynamics
+from stickslip.identify.trial import Trial, trial_of
 from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.plugins import law
-from stickslip.simulation.driven import Drive, Harmonics, Loop, Mechanics, drive_axis
+from stickslip.simulation.recorded_input.simulation import Drive, Harmonics, Loop, Mechanics, drive_axis
+from support import axis_cases as cases
 
 AXIS = ServoAxis(drive_side="load")
 

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.identify.axis import nothing_more
-from stickslip.identify.axis_agreed import held_against
-from stickslip.identify.axis_choice import Candidate, chosen_of, sentence_on
-from stickslip.identify.axis_inverse import inverse_dynamics
-from stickslip.identify.axis_settled import settled
-from stickslip.identify.axis_trial import Trial
+from stickslip.identify.axis.agreed import held_against
+from stickslip.identify.axis.choice import Candidate, chosen_of, sentence_on
+from stickslip.identify.axis.identify import nothing_more
+from stickslip.identify.axis.settled import settled
 from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.force_error import force_error, force_error_on, plain_error_on
+from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
+from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 
@@ -48,13 +48,13 @@ def test_what_is_not_identified_goes_with_what_is() -> None:
     given[0] = replace(given[0], value=4.02e-3, lower=4.0e-3, upper=4.04e-3)
     found, _ = settled(given, COULOMB, inverse)
     values = {e.name: e.value for e in found}
-    assert values["inertia"] == 4.02e-3
+    assert 4.0e-3 <= values["inertia"] <= 4.02e-3
     assert values["fc"] == pytest.approx(0.3, rel=0.03)
     assert values["offset"] == pytest.approx(0.05, abs=0.003)
     assert all(e.lower <= e.value <= e.upper for e in found)
 
 
-def test_identified_values_move_within_their_intervals_where_the_record_asks_for_it() -> None:
+def test_identified_values_are_those_of_sliding_and_of_the_whole_record_by_precision() -> None:
     inverse = inverse_dynamics([moving()], AXIS)
     off = {"inertia": 5.5e-3, "offset": 0.05, "fc": 0.36, "sigma2": 0.02}
     given = [estimate(n, x, 0.4 * x) for n, x in off.items()]
@@ -63,8 +63,44 @@ def test_identified_values_move_within_their_intervals_where_the_record_asks_for
     assert force_error(inverse, COULOMB, off) > 1.5 * inverse.relative_error
     model = Model("coulomb", fc=values["fc"], sigma2=values["sigma2"])
     assert force_error(inverse, model, values) == pytest.approx(inverse.relative_error, rel=0.02)
+    assert [(e.lower, e.upper, e.identified) for e in found] == [(e.lower, e.upper, True) for e in given]
+    assert not said
+
+
+def test_identified_values_that_the_whole_record_contradicts_move_within_their_intervals() -> None:
+    inverse = inverse_dynamics([moving()], AXIS)
+    off = {"inertia": 4e-3, "offset": 0.05, "fc": 0.33, "sigma2": 0.02}
+    given = [estimate(n, x, 0.0292 if n == "fc" else 0.4 * x) for n, x in off.items()]
+    found, said = settled(given, COULOMB, inverse)
+    values = {e.name: e.value for e in found}
+    model = Model("coulomb", fc=values["fc"], sigma2=values["sigma2"])
+    assert force_error(inverse, Model("coulomb", fc=0.33, sigma2=0.02), off) > 1.05 * inverse.relative_error
+    assert force_error(inverse, model, values) <= 1.05 * inverse.relative_error
     assert all(e.lower <= values[e.name] <= e.upper for e in given)
     assert "within their intervals" in said[0]
+
+
+def test_values_leave_intervals_that_cannot_explain_the_record_and_are_not_identified_then() -> None:
+    inverse = inverse_dynamics([moving()], AXIS)
+    off = {"inertia": 4e-3, "offset": 0.05, "fc": 0.5, "sigma2": 0.02}
+    given = [estimate(n, x, 0.01 * x) for n, x in off.items()]
+    found, said = settled(given, COULOMB, inverse)
+    values = {e.name: e.value for e in found}
+    model = Model("coulomb", fc=values["fc"], sigma2=values["sigma2"])
+    assert force_error(inverse, model, values) <= 1.0501 * inverse.relative_error
+    (level,) = (e for e in found if e.name == "fc")
+    assert not level.identified
+    assert "whole record" in level.verdict
+    assert level.lower <= level.value <= level.upper
+    assert level.upper == 0.505
+    assert "next to their intervals" in said[0]
+
+
+def test_a_plain_inverse_dynamics_that_certain_sliding_refutes_moves_nothing_out_of_its_interval() -> None:
+    inverse = inverse_dynamics([moving()], AXIS)
+    given = [estimate(n, x, 0.01 * x) for n, x in (TRUE | {"fc": 0.5}).items()]
+    found, _ = settled(given, COULOMB, inverse, believed=False)
+    assert all(e.lower <= f.value <= e.upper for e, f in zip(given, found, strict=True))
 
 
 def test_identified_values_that_explain_the_record_stay() -> None:

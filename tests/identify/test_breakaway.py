@@ -5,8 +5,8 @@ import pytest
 
 from stickslip import Model, Record
 from stickslip.errors import InputError
-from stickslip.identify.breakaway import find_breaks, identify_breakaway, mean_estimate
-from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
+from stickslip.identify.presliding.breakaway import find_breaks, identify_breakaway, mean_estimate
+from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 
 def ramps(rates: list[float], rng: np.random.Generator, per_decade: float = 0.0, held: float = 0.0) -> Record:

@@ -11,12 +11,12 @@ from scipy import optimize, stats
 from stickslip import Model, Par, law, law_names
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.estimate import Identification
-from stickslip.identify.noise import noise_of_repeats
-from stickslip.identify.optimum import central_differences, descend
-from stickslip.identify.secant import descend_by_secants
-from stickslip.identify.selection import criteria, cross_validate
-from stickslip.identify.uncertainty import fit
-from stickslip.identify.vector import Parameter, Vector
+from stickslip.identify.fit.broyden import descend_by_secants
+from stickslip.identify.fit.levenberg_marquardt import central_differences, descend
+from stickslip.identify.fit.noise import noise_of_repeats
+from stickslip.identify.fit.parameter_vector import Parameter, Vector
+from stickslip.identify.fit.selection import criteria, cross_validate
+from stickslip.identify.fit.uncertainty import fit
 
 ANY = Par("-", "x", "a number")
 POSITIVE = Par("-", "x", "a number", positive=True)

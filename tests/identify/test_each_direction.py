@@ -5,20 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import axis_cases as cases
 import numpy as np
 import pytest
 
-from stickslip.identify.axis import identify_axis
-from stickslip.identify.axis_inverse import inverse_dynamics
-from stickslip.identify.axis_plain import inverse_identification
-from stickslip.identify.axis_trial import Trial
-from stickslip.identify.draws import draw_models
+from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.axis.plain import inverse_identification
 from stickslip.identify.estimate import Identification
 from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
+from stickslip.identify.monte_carlo import draw_models
+from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
+from support import axis_cases as cases
 
 FORTH, BACK = 0.3, 0.24
 AXIS = ServoAxis()
@@ -119,6 +119,8 @@ def test_an_axis_per_direction_has_a_law_that_differs_and_no_offset(trial: Trial
     assert by_name["fc"].lower > by_name["fc_negative"].upper
     assert by_name["fc"].identified
     assert "offset" not in by_name
-    assert any("cannot be told from friction that differs by direction" in note for note in found.notes)
+    assert any(
+        "cannot be distinguished from friction that differs by direction" in note for note in found.notes
+    )
     p = read_back(found, tmp_path).parameters
     assert p.fc - p.fc_negative == pytest.approx(FORTH - BACK, abs=0.01)

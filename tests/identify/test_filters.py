@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from stickslip.errors import InputError
-from stickslip.identify.filters import (
+from stickslip.identify.fit.filters import (
     RIPPLE,
     ZeroPhase,
     butterworth_poles,
@@ -18,7 +18,7 @@ from stickslip.identify.filters import (
     low_pass,
     spectrum,
 )
-from stickslip.identify.side_by_side import mapped
+from stickslip.identify.fit.parallel import mapped
 
 
 def wandering(n: int, seed: int):

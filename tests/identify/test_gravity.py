@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from stickslip import Model
-from stickslip.identify.axis import identify_axis
-from stickslip.identify.axis_trial import Trial
+from stickslip.identify.axis.gravity import hanging, nearest, within_a_turn
+from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate
-from stickslip.identify.gravity import hanging, nearest, within_a_turn
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
-from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
+from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 SWING = np.linspace(-1.2, 1.2, 50)
 

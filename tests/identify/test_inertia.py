@@ -10,12 +10,12 @@ import pytest
 from stickslip import Model
 from stickslip.cli._identified import show
 from stickslip.errors import InputError
-from stickslip.identify.axis_trial import Trial
 from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.inertia import frequency_response, inertia, verdict_on
+from stickslip.identify.response.inertia import frequency_response, inertia, verdict_on
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.report.identified import shown
-from stickslip.simulation.driven import Drive, Mechanics, drive_axis
+from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, drive_axis
 
 J = 4.2757e-4  # thesis 4.2
 AXIS = ServoAxis(drive_side="load")
@@ -99,7 +99,7 @@ def test_what_cannot_be_fitted_is_said() -> None:
 
 def test_a_value_below_zero_and_an_interval_of_many_decades_are_called_what_they_are(capsys):
     assert "below 0" in verdict_on(-2.0, -1.0)
-    assert verdict_on(-2.0, 1.0) == "the data do not tell it from 0"
+    assert verdict_on(-2.0, 1.0) == "the data do not distinguish it from 0"
     wide = Estimate("k", "N·m/rad", "k", 1.0, 1.0, 3e-12, 3e16, False, "")
     show(Identification("axis", None, (wide, replace(wide, name="fs", lower=0.5, upper=2.0)), np.eye(2), {}))
     line, other = capsys.readouterr().out.splitlines()[2:4]

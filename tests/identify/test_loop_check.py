@@ -6,15 +6,15 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import axis_cases as cases
 import numpy as np
 import pytest
 
-from stickslip.identify.axis import identify_axis
-from stickslip.identify.axis_trial import Trial
-from stickslip.identify.loop_check import GAINS, doubted_loops, shown_gains
+from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.axis.loop_check import GAINS, doubted_loops, shown_gains
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
-from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
+from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
+from support import axis_cases as cases
 
 WRONG: dict[str, dict[str, Any]] = {
     "kp": {"kp": 1.41 * cases.LOOP.kp},

@@ -13,8 +13,8 @@ from scipy import signal
 
 from stickslip.control.linear import place
 from stickslip.errors import InputError
-from stickslip.identify.nyquist import encirclements, fastest_pd
-from stickslip.identify.train import LoopResponse
+from stickslip.identify.response.drivetrain import LoopResponse
+from stickslip.identify.response.nyquist import encirclements, fastest_pd
 
 DT = 1e-3
 
@@ -66,7 +66,7 @@ def test_the_count_is_half_the_unstable_poles(load, mode, damping, delay, held, 
 
 def locus(points, bandwidth=10.0):
     """A response whose locus under that PD is a polygon through the points, 1 Hz apart from 5 Hz on."""
-    from stickslip.identify.nyquist import pd_response
+    from stickslip.identify.response.nyquist import pd_response
 
     f = 5.0 + np.arange(len(points))
     return LoopResponse(
@@ -127,7 +127,7 @@ def test_the_fastest_pd_says_what_it_does_not_see():
     b, a = plant(1.0, 80.0, 0.02, 1, True)
     f = np.arange(1.0, 450.0, 1.0)
     seen = fastest_pd([response(b, a, f)], 1e-3)
-    assert "rings from" in seen.sentence
+    assert "oscillates from" in seen.sentence
     poles = unstable_poles(b, a, seen.bandwidth)
     ringing = abs(np.angle(poles[np.argmax(np.abs(poles))])) / (2.0 * math.pi * DT)
     assert seen.frequency == pytest.approx(ringing, rel=0.02)

@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.identify.axis_inverse import inverse_dynamics
-from stickslip.identify.axis_prediction import axis_prediction, held_torque, motion_of
-from stickslip.identify.axis_trial import trial_of
-from stickslip.identify.contact import contact_frequency, of_slow_motion, unseen_refused
+from stickslip.identify.axis.prediction import axis_prediction, held_torque, motion_of
 from stickslip.identify.estimate import Estimate
-from stickslip.identify.jackknife import leave_blocks_out
-from stickslip.identify.observer import GRASP, REMEMBERED, Prepared, prepare
+from stickslip.identify.fit.jackknife import leave_blocks_out
+from stickslip.identify.fit.sample_rate_limit import contact_frequency, of_slow_motion, unseen_refused
+from stickslip.identify.observer.observer import GRASP, REMEMBERED, Prepared, prepare
+from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identify.trial import trial_of
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.record import encoder_step
-from stickslip.simulation.driven import Mechanics
+from stickslip.simulation.recorded_input.simulation import Mechanics
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 AXIS = ServoAxis(drive_side="load")
@@ -135,10 +135,10 @@ def test_what_was_asked_a_moment_ago_is_not_simulated_again(
     first = prepared.correction(axis, p)
     assert prepared.correction(axis, p) is first
     assert len(asked) == 1
-    # Whatever it depends on asks anew, and what is shaken has a memory of its own.
+    # Whatever it depends on asks anew, and what is perturbed has a memory of its own.
     assert np.any(prepared.correction(other, p) != first)
     assert np.any(prepared.correction(axis, p._replace(fc=2.0 * p.fc)) != first)
-    assert np.any(prepared.shaken(0.1 * np.sin(motion.time)).correction(axis, p) != first)
+    assert np.any(prepared.perturbed(0.1 * np.sin(motion.time)).correction(axis, p) != first)
     assert len(asked) == 4
     for k in range(REMEMBERED):
         prepared.correction(Mechanics((2.0 + 0.01 * k) * case.truth["inertia"]), p)

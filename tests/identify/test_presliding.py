@@ -8,15 +8,20 @@ import pytest
 
 from stickslip import Model, Reference, respond
 from stickslip.errors import InputError
-from stickslip.identify.attraction import identify_attraction, largest_without_overshoot
-from stickslip.identify.hysteresis import Loop, choose_hysteresis, identify_hysteresis, templates_for
-from stickslip.identify.presliding import cycles, identify_presliding
+from stickslip.identify.presliding.attraction import identify_attraction, largest_without_overshoot
+from stickslip.identify.presliding.hysteresis import (
+    Loop,
+    choose_hysteresis,
+    identify_hysteresis,
+    templates_for,
+)
+from stickslip.identify.presliding.presliding import cycles, identify_presliding
 from stickslip.machines.machine import machine
 from stickslip.report.identification import draw_identification
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.presliding import Presliding
 from stickslip.rigs.virtual import VirtualRig
-from stickslip.simulation.along import Along
+from stickslip.simulation.prescribed.motion import Along
 
 SLIDING = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
 PLANT = Model("gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, **SLIDING)

@@ -10,25 +10,24 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
-from stickslip.control.sampled import Memory, sampled_by, settings
 from stickslip.errors import InputError, ParameterError
-from stickslip.identify import recommend as recommending
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.motion import sinusoid
-from stickslip.identify.recommend import Drive, Setting, recommend
-from stickslip.identify.setting_axes import plants_of
-from stickslip.identify.setting_bench import rings_alone
-from stickslip.identify.setting_refusals import refuse_weak
-from stickslip.identify.setting_trial import Plant, dangers, run
+from stickslip.identify.setting import recommend as recommending
+from stickslip.identify.setting.axes import plants_of
+from stickslip.identify.setting.candidate_run import Plant, dangers, run
+from stickslip.identify.setting.candidates import rings_alone
+from stickslip.identify.setting.recommend import Drive, Setting, recommend
+from stickslip.identify.setting.refusals import refuse_weak
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.spec import Surroundings
+from support.sampled_text import Memory, sampled_by, settings
 
 INERTIA = 4e-4
 TRUE = {"k": 50.0, "fs": 0.335, "fc": 0.285, "vs": 0.1, "sigma2": 0.018}
@@ -92,13 +91,13 @@ def test_a_setting_that_is_unsafe_on_an_axis_drawn_later_gives_way(monkeypatch: 
         ) else out  # fmt: skip
 
     monkeypatch.setattr(recommending.Bench, "judged", failing)
-    monkeypatch.setattr("stickslip.identify.setting_axes._with_springs", lambda model, *_: model)
+    monkeypatch.setattr("stickslip.identify.setting.axes._with_springs", lambda model, *_: model)
     monkeypatch.setattr(recommending, "GAINS", (0.5,))
     advice = recommend(identified(0.02), Drive(20.0, amplitude=0.1), axes=1, confirm=2)
     assert advice.chosen
     assert advice.chosen.setting.kind == "feedback"
     fed = [c for c in advice.candidates if c.setting.kind == "feedforward"]
-    assert all("rough motion on an axis drawn later" in c.unsafe for c in fed)
+    assert all("rough motion on an axis sampled later" in c.unsafe for c in fed)
 
 
 @pytest.mark.parametrize(
@@ -297,7 +296,7 @@ def test_every_rigid_contact_rings_about_a_coarse_count_and_none_with_springs(
     springs: bool, ringing: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not springs:
-        monkeypatch.setattr("stickslip.identify.setting_axes._with_springs", lambda model, *_: model)
+        monkeypatch.setattr("stickslip.identify.setting.axes._with_springs", lambda model, *_: model)
     drive = Drive(20.0, amplitude=0.1, encoder_counts=4096.0, torque_limit=3.0)
     plants = list(plants_of(identified(0.03), INERTIA, 6, 1))
     linear = Controller(place("PD", INERTIA, 20.0, drive.damping), None, 3.0, drive.sample_time, 4096.0)
@@ -334,7 +333,6 @@ def test_a_trial_is_what_the_integrators_of_the_package_make_of_it() -> None:
     path = drive.path
     other = simulate(
         plant, drive.loop(INERTIA), Reference.table(path.time, path.position, path.velocity), path.duration,
-        integrator="fixed", time_step=1e-4,
     )  # fmt: skip
     assert found.moving["position_rms_rad"] == pytest.approx(
         other.meta["metrics"]["position_rms_rad"], rel=0.01

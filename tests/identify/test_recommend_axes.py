@@ -12,13 +12,13 @@ import pytest
 
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import InputError
-from stickslip.identify import recommend as recommending
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.recommend import Drive, recommend
-from stickslip.identify.setting_axes import MOST_STATIC, plants_of
-from stickslip.identify.setting_bench import Bench, lost
-from stickslip.identify.setting_trial import Plant, run
+from stickslip.identify.setting import recommend as recommending
+from stickslip.identify.setting.axes import MOST_STATIC, plants_of
+from stickslip.identify.setting.candidate_run import Plant, run
+from stickslip.identify.setting.candidates import Bench, lost
+from stickslip.identify.setting.recommend import Drive, recommend
 from stickslip.model import Model
 
 INERTIA = 4e-4
@@ -56,7 +56,7 @@ def test_friction_whose_level_no_record_told_is_not_fed_forward() -> None:
     """Of a record that told the inertia alone, a setting was promised 17 to 98 % and made the error larger."""
     unsure = identified(estimate("fc", "N·m", LEVEL["fc"], 1.2, identified=False))
     with pytest.raises(
-        InputError, match=r"does not tell how large friction is \(fc 0.285 \[0.0271, 2.99\] N·m"
+        InputError, match=r"does not determine the friction level \(fc 0.285 \[0.0271, 2.99\] N·m"
     ):
         recommend(unsure, Drive(20.0, amplitude=0.1), axes=1, confirm=1)
 
@@ -79,7 +79,7 @@ def test_axes_that_the_users_own_loop_does_not_hold_are_left_out_and_counted() -
     assert advice.confirmed_on == 9
     assert advice.axes == 4
     (said,) = [n for n in advice.notes if "were left out" in n]
-    assert "drawn from the intervals (not identified: inertia)" in said
+    assert "sampled from the intervals (not identified: inertia)" in said
     drawn = list(plants_of(found, INERTIA, 36, 1))
     kept = Bench.held(iter(drawn), 9, drive.loop(INERTIA), drive, {})
     assert kept.left_out > 0

@@ -17,9 +17,9 @@ from stickslip.control.files import read_controller
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control.written import tables_of
 from stickslip.errors import ParameterError
-from stickslip.identify import recommend as recommending
-from stickslip.identify.recommend import Drive, recommend
-from stickslip.identify.setting_bench import Setting
+from stickslip.identify.setting import recommend as recommending
+from stickslip.identify.setting.candidates import Setting
+from stickslip.identify.setting.recommend import Drive, recommend
 from stickslip.model import Model
 
 T = 1e-3
@@ -78,7 +78,7 @@ def test_settings_stand_beside_the_loops_own_laws():
 
 
 def test_the_tables_of_a_controller_are_that_controller(tmp_path):
-    own = Path(__file__).parents[1] / "study" / "sliding_mode.py"
+    own = Path(__file__).parents[1] / "support" / "sliding_mode.py"
     sliding = ControlBlock(str(own), inertia=INERTIA, slope=60.0, torque=0.4, layer=0.5)
     pid = ControlBlock("pid", None, {"at_rest": "reset"}, kp=1.0, ki=2.0, kd=0.01)
     ahead = ControlBlock("friction_feedforward", LAW, {"velocity": "held"}, gain=0.9)
@@ -153,4 +153,4 @@ def test_the_command_writes_a_controller_that_runs_and_is_exported(tmp_path, mon
     track = ["rig", "run", "track", "--rig", "thesis-dry", "--set", "controller=out.toml", "--dry-run"]
     assert main(track) == 0
     assert main([*line, "--bandwidth", "20"]) == 2
-    assert "--bandwidth beside --controller loop.toml" in capsys.readouterr().err
+    assert "--bandwidth cannot be combined with --controller loop.toml" in capsys.readouterr().err

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.identify import regressions
-from stickslip.identify.axis_trial import Trial
-from stickslip.identify.regression import Regression, regress_axis
-from stickslip.identify.regressions import Regressions
+from stickslip.identify.regression import regressions
+from stickslip.identify.regression.regression import Regression, regress_axis
+from stickslip.identify.regression.regressions import Regressions
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 
 AXIS = ServoAxis(drive_side="load")

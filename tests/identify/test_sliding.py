@@ -8,9 +8,10 @@ import pytest
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
 from stickslip.errors import InputError
-from stickslip.identify.segments import constant_velocity_segments, sliding_points
-from stickslip.identify.sliding import SlidingPoints, identify_sliding
-from stickslip.identify.sliding_choice import candidates, choose_sliding
+from stickslip.identify.sliding.choice import candidates, choose_sliding
+from stickslip.identify.sliding.curve import identify_sliding
+from stickslip.identify.sliding.points import SlidingPoints
+from stickslip.identify.sliding.segments import constant_velocity_segments, sliding_points
 from stickslip.report.identification import draw_identification
 
 TABLE_1 = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
@@ -287,10 +288,10 @@ def test_a_record_without_constant_velocity_is_one_clear_error() -> None:
     still = Record(
         time, {"position": 0.0 * time, "motor_torque": time}, {"position": "rad", "motor_torque": "N·m"}
     )
-    with pytest.raises(InputError, match="no stretch of constant velocity"):
+    with pytest.raises(InputError, match="no segment of constant velocity"):
         sliding_points(still)
     swinging = Record(time, {"position": np.sin(6.0 * time), "motor_torque": time}, still.units)
-    with pytest.raises(InputError, match="no stretch of constant velocity"):
+    with pytest.raises(InputError, match="no segment of constant velocity"):
         sliding_points(swinging)
 
 

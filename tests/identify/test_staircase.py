@@ -7,9 +7,10 @@ import pytest
 
 from stickslip import Model, Record
 from stickslip.identify.estimate import Identification
-from stickslip.identify.segments import segments_of, sliding_points
-from stickslip.identify.sliding import SlidingPoints, identify_sliding
-from stickslip.identify.starts import bounded_solution
+from stickslip.identify.fit.multistart import bounded_solution
+from stickslip.identify.sliding.curve import identify_sliding
+from stickslip.identify.sliding.points import SlidingPoints
+from stickslip.identify.sliding.segments import segments_of, sliding_points
 
 DEGREES = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 TRUTH = {"fs": 1.2, "fc": 1.0, "vs": 0.1, "delta_s": 2.0, "sigma2": 0.35}
@@ -113,7 +114,7 @@ def test_what_depends_on_the_angle_counts_as_the_doubt_of_less_than_a_revolution
     off = np.abs(points.torque - truth) / points.std
     assert float(np.max(np.abs(points.torque - truth))) > 0.05
     assert float(np.sqrt(np.mean(off**2))) < 1.6
-    assert any("counts as their doubt" in note for note in notes)
+    assert any("adds to their uncertainty" in note for note in notes)
 
 
 def test_no_level_of_friction_lies_above_the_largest_torque(fine: Record) -> None:

@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from stickslip import plugins
 from stickslip.errors import ParameterError
 from stickslip.model import Model, Reference
-from stickslip.simulation.open_loop import respond
+from stickslip.simulation.prescribed.open_loop import respond
 from stickslip.spec import Surroundings
 from stickslip.subset import law_layouts, lower
 
@@ -106,7 +106,7 @@ def test_each_direction_slides_on_its_own_level(law):
 def test_bounds_hold_in_both_directions():
     with pytest.raises(ParameterError, match="fc_negative = -1"):
         Model("coulomb", {"symmetry": "asymmetric"}, fc=0.3, fc_negative=-1.0)
-    with pytest.raises(ParameterError, match=r"for v < 0: curve_velocity begins"):
+    with pytest.raises(ParameterError, match=r"for v < 0: curve_velocity starts"):
         Model(
             "lugre", {"symmetry": "asymmetric", "curve": "table"}, sigma0=1e4, curve_velocity=[0, 1],
             curve_torque=[2, 1], curve_velocity_negative=[0.1, 1],

@@ -12,7 +12,7 @@ from stickslip.control.linear import place
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.simulation.open_loop import respond
+from stickslip.simulation.prescribed.open_loop import respond
 from stickslip.spec import Surroundings
 
 U = Surroundings()

@@ -11,7 +11,7 @@ from stickslip.errors import ParameterError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.simulation.open_loop import respond
+from stickslip.simulation.prescribed.open_loop import respond
 
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
 

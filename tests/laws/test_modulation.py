@@ -14,7 +14,7 @@ from stickslip.errors import InputError, ParameterError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.simulation.open_loop import respond
+from stickslip.simulation.prescribed.open_loop import respond
 from stickslip.spec import Surroundings
 
 LAWS = [plugins.law(name) for name in ("coulomb", "stribeck_plain", "lugre", "gms")]
@@ -69,6 +69,24 @@ def test_the_axis_knows_its_load_and_temperature():
     for name in ("adaptive", "fixed"):
         record = simulate(RigidAxis(J, model, load=2.0), loop, move, 1.0, integrator=name)
         assert record["friction_torque"][-1] == pytest.approx(2.0 * 0.285, rel=1e-6)
+
+
+def test_a_sampled_loop_carries_a_ripple():
+    model = with_choice(plugins.law("coulomb"), {"sigma2": 0.0, **RIPPLE}, position_dependence="spectrum")
+    loop = Controller(place("PD", J, 10.0, 0.85), sample_time=1e-3)
+    move = Reference("ramp", velocity=2.0, end=4.0)
+    runs = [
+        simulate(RigidAxis(J, model), loop, move, 1.0, tolerance=tolerance)
+        for tolerance in (1e-7, 1e-9, 1e-11)
+    ]
+    assert "depends on its surroundings" in runs[0].meta["general_step"]
+    q, sliding = runs[2]["position"], (runs[2].time > 0.5) & (runs[2]["event"] == 0.0)
+    assert np.all(runs[2]["velocity"][sliding] > 0.1)
+    expected = 0.285 * (1.0 + 0.2 * np.cos(q + 0.5))
+    np.testing.assert_allclose(runs[2]["friction_torque"][sliding], expected[sliding], rtol=1e-6)
+    coarse, fine = (abs(run["position"][-1] - q[-1]) for run in runs[:2])
+    assert fine < 0.3 * coarse
+    assert fine < 1e-7
 
 
 def test_a_ripple_that_would_turn_friction_round_is_refused():

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from stickslip import plugins
-from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.errors import InputError, ParameterError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.simulation.open_loop import respond
+from stickslip.simulation.prescribed.open_loop import respond
 
 TABLE = json.loads((Path(__file__).parents[1] / "data" / "karnopp.json").read_text())
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.identify.axis_inverse import inverse_dynamics
-from stickslip.identify.axis_output import output_error
-from stickslip.identify.axis_trial import Trial
-from stickslip.identify.loop_check import doubted_loops
+from stickslip.identify.axis.loop_check import doubted_loops
+from stickslip.identify.axis.output import output_error
+from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.plugins import law
-from stickslip.simulation.driven import Loop, control_signal
+from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 
 DATA = Path(os.environ.get("STICKSLIP_DATA", Path(__file__).parents[3].parent / "shared" / "data"))
 FILE = DATA / "emps" / "DATA_EMPS.mat"

@@ -15,9 +15,9 @@ import pytest
 from stickslip import Model
 from stickslip.cli._identified import show
 from stickslip.finding import Finding
-from stickslip.identify.axis import identify_axis
-from stickslip.identify.axis_trial import Trial
+from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 from stickslip.report.answers import answers_of, counts_of, lacking, meaning_of, one_number_each

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from stickslip import Model
-from stickslip.identify.axis import identify_axis
-from stickslip.identify.axis_inverse import inverse_dynamics
-from stickslip.identify.axis_trial import Trial
+from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Identification
+from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.report.axis_evidence import beside, judgements, measured_friction, slow_rows
 from stickslip.report.axis_pictures import pictures_of
 from stickslip.report.identified import rendered
-from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
+from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 AXIS = ServoAxis(drive_side="load")
 TRUTH = {"fs": 0.3, "fc": 0.2, "vs": 0.3, "sigma2": 0.01}

@@ -19,7 +19,7 @@ from stickslip.report.law_pictures import (
     slow_sine,
     velocity_steps,
 )
-from stickslip.simulation.open_loop import respond
+from stickslip.simulation.prescribed.open_loop import respond
 
 every_law = pytest.mark.parametrize("name", plugins.law_names())
 CONTRIBUTING = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text()
@@ -110,7 +110,7 @@ def test_the_command_draws_a_law_of_the_user(tmp_path, capsys) -> None:
 @pytest.mark.parametrize(
     ("argv", "said"),
     [
-        (["law", "lugre", "--set", "fs"], "--set 'fs' is no NAME=VALUE"),
+        (["law", "lugre", "--set", "fs"], "--set 'fs' must be NAME=VALUE"),
         (["law", "lugre", "--set", "f_s=1"], "no parameter 'f_s'"),
         (["law", "lugre", "--set", "fs=-0.1"], "fs = -0.1 N·m must be greater than 0"),
         (["law", "gms", "--set", "slip_rule=other"], "slip rule"),

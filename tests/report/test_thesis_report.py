@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from stickslip import report
-from stickslip.analyse.claims import CLAIMS, judge
 from stickslip.report._view import StudyView
 from stickslip.study.result import StudyResult
 from stickslip.study.study import load, run
+from stickslip.thesis.claims import CLAIMS, judge
 
 pytestmark = pytest.mark.slow
 

@@ -10,12 +10,12 @@ import time
 
 import numpy as np
 import pytest
-from axis_rig import LIMITS, AxisRig
 from test_loop import sine
 
 from stickslip.errors import InputError, Overrun
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Measurement
+from support.axis_rig import LIMITS, AxisRig
 
 SAMPLES = round(LIMITS.stop_time / 1e-3)
 

@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from axis_rig import FRICTION, AxisRig
 
 from stickslip.control.block import ControlBlock
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
 from stickslip.control.sampled_controller import SampledController
@@ -17,6 +16,7 @@ from stickslip.errors import InputError
 from stickslip.rigs._control import COLUMNS
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import setpoints
+from support.axis_rig import FRICTION, AxisRig
 
 T = 1e-3
 AT = {name: COLUMNS.index(name) for name in COLUMNS}

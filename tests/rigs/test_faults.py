@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from axis_rig import LIMITS, AxisRig
 from test_ds402 import (
     DROP_ANSWERS,
     DROP_COMMANDS,
@@ -29,7 +28,7 @@ from test_ds402 import (
 )
 from test_loop import sine
 
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd
 from stickslip.errors import DriveFault, Interrupted, LimitCrossed, MessageLost, RecordFault, RigError
@@ -39,10 +38,11 @@ from stickslip.rigs.ds402 import Ds402
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Measurement, setpoints
 from stickslip.stream import EXTENT
+from support.axis_rig import LIMITS, AxisRig
 
 SAMPLES = round(LIMITS.stop_time / 1e-3)
 PD = Controller(pd(19.7612, 0.1747), torque_limit=0.95)
-BRITTLE = Model(str(Path(__file__).with_name("brittle.py")), fc=0.1, vmax=2.0)
+BRITTLE = Model(str(Path(__file__).parents[1] / "support" / "brittle.py"), fc=0.1, vmax=2.0)
 Change = Callable[[Measurement], Measurement]
 
 

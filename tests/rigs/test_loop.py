@@ -10,19 +10,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from axis_rig import FRICTION, LIMITS, AxisRig
 
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
 from stickslip.errors import InputError, Interrupted, LimitCrossed, RigError
 from stickslip.readers import read
 from stickslip.record import Record
 from stickslip.rigs._control import COLUMNS
-from stickslip.rigs.limited import limited
 from stickslip.rigs.loop import Loop
+from stickslip.rigs.narrower_limits import limited
 from stickslip.rigs.rig import Limits, Measurement, Setpoint, setpoints
+from support.axis_rig import FRICTION, LIMITS, AxisRig
 
 PD = Controller(pd(19.7612, 0.1747), Feedforward(FRICTION), torque_limit=1.0)
 PID = Controller(pid(59.28, 4469.9, 0.2621), torque_limit=1.0)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from axis_rig import LIMITS, AxisRig
 from test_loop import sine
 
 from stickslip import cli
@@ -21,6 +20,7 @@ from stickslip.rigs.procedures.presliding import Presliding
 from stickslip.rigs.procedures.sliding import Sliding
 from stickslip.rigs.replay import Replay
 from stickslip.rigs.rig import setpoints
+from support.axis_rig import LIMITS, AxisRig
 
 PD = Controller(pd(19.7612, 0.1747), torque_limit=0.95)
 

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.control.sampled import Memory, sampled_by, settings
 from stickslip.errors import InputError, UnknownName
-from stickslip.identify.axis_trial import trial_of
-from stickslip.identify.breakaway import find_breaks
-from stickslip.identify.inertia import inertia
-from stickslip.identify.segments import sliding_points
+from stickslip.identify.presliding.breakaway import find_breaks
+from stickslip.identify.response.inertia import inertia
+from stickslip.identify.sliding.segments import sliding_points
+from stickslip.identify.trial import trial_of
 from stickslip.machines.machine import machine
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
@@ -24,8 +23,11 @@ from stickslip.rigs.procedures import PROCEDURES, procedure
 from stickslip.rigs.procedures.base import CheckFailed, perform
 from stickslip.rigs.virtual import VirtualRig, virtual_rig
 from stickslip.spec import Surroundings
+from support.sampled_text import Memory, sampled_by, settings
 
 SHORT = {
+    "cogging": {"velocities": "0.9", "degrees": "380"},
+    "standstill": {"places": "24"},
     "inertia": {"duration": "25"},
     "resonance": {"duration": "8"},
     "breakaway": {"interval": "60"},

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from axis_rig import LIMITS, AxisRig
 from test_loop import sine
 
 from stickslip.control.controller import Controller
@@ -19,6 +18,7 @@ from stickslip.record import Record
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Measurement
 from stickslip.stream import EXTENT, KEPT, PERIOD, Stream
+from support.axis_rig import LIMITS, AxisRig
 
 PD = Controller(pd(19.7612, 0.1747), torque_limit=0.95)
 FOREIGN = b"another program's file\n" * 50_000

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from axis_rig import LIMITS, AxisRig
 from test_loop import PD, sine
 
 from stickslip.errors import ConfigError, InputError, LimitCrossed, RigError
-from stickslip.plugins import rig_kind, rig_kind_names
 from stickslip.record import Record
 from stickslip.rigs.files import read_rig
+from stickslip.rigs.kinds import rig_kind, rig_kind_names
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.replay import Replay
 from stickslip.rigs.rig import Limits, Rig, setpoints
+from support.axis_rig import LIMITS, AxisRig
 
 
 @pytest.fixture(scope="module")

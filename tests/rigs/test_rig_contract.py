@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from axis_rig import AxisRig
 from test_ds402 import drive  # noqa: F401
 
 from stickslip.approval import allow_code
 from stickslip.errors import InputError, RigError
-from stickslip.plugins import rig_kind_names
 from stickslip.rigs.ds402 import Ds402
 from stickslip.rigs.files import read_rig
+from stickslip.rigs.kinds import rig_kind_names
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.replay import Replay
 from stickslip.rigs.rig import BlockRig, Capabilities, Limits, Measurement, Rig, Watchdog, setpoints
 from stickslip.rigs.virtual import virtual_rig
+from support.axis_rig import AxisRig
 
 OWN = """
 from stickslip.rigs.files import limits_in

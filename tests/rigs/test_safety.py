@@ -10,13 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensator import Feedback
+from stickslip.control.composed import composed_of
+from stickslip.control.composition import Settings
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
-from stickslip.control.sampled import Memory, Settings
 from stickslip.model import Model
 from stickslip.rigs import safety
-from stickslip.rigs._control import COLUMNS, control_of, decide, finished
+from stickslip.rigs._control import COLUMNS, NAMES, control_of, decide, finished
 from stickslip.rigs.rig import Limits, Measurement, Setpoint
 from stickslip.rigs.safety import REASONS, RUNNING, STOPPED, guarded_by
 from stickslip.spec import Surroundings
@@ -99,15 +100,15 @@ def test_compiled_and_plain_python_agree_bit_for_bit(data):
     helper = data.draw(st.sampled_from([None, Feedback(friction), Feedback(friction, filter_hz=10.0)]))
     controller = Controller(pd(5.0, 0.05), helper, torque_limit=0.9, sample_time=T)
     control = control_of(controller, LIMITS, T)
-    law = friction.law if helper else None
-    sample = guarded_by(law)
+    composed = composed_of(controller)
+    sample = guarded_by(composed.functions)
 
     def fields(names, values):
         return SimpleNamespace(**dict(zip(names, map(float, values))))
 
     b, s = fields(safety.Bounds._fields, control.bounds), fields(safety.Safety._fields, control.safety)
-    n, m = fields(Settings._fields, control.settings), fields(Memory._fields, control.memory)
-    z = law.state(friction.parameters) if law else None
+    n, m = fields(Settings._fields, control.settings), fields(NAMES, control.memory)
+    z, p = composed.state(), composed.parameters
     u = SimpleNamespace(**Surroundings()._asdict())
     small = st.floats(-0.2, 0.2)
     count = data.draw(st.integers(1, 30))
@@ -126,7 +127,7 @@ def test_compiled_and_plain_python_agree_bit_for_bit(data):
             n,
             m,
             z,
-            friction.parameters,
+            p,
             u,
         )
         torque, row = run(control, y, w)
@@ -138,7 +139,7 @@ def test_compiled_and_plain_python_agree_bit_for_bit(data):
 def takes_over(controller, last: float, own: float, before: Setpoint) -> tuple[list[float], list[float]]:
     """Torques of a controller that closes the loop at a step of 0.02 rad, and those it gives where none was before."""
     taking, alone = control_of(controller, LIMITS, T), control_of(controller, LIMITS, T)
-    alone.memory[Memory._fields.index("open")] = 0.0
+    alone.memory[NAMES.index("open")] = 0.0
     run(taking, GOOD, before._replace(torque=last))
     closed = HOLD._replace(position=0.12, torque=own)
     return [run(taking, GOOD, closed)[0] for _ in range(150)], [

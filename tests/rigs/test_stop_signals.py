@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from axis_rig import LIMITS, AxisRig
 from test_loop import sine
 
 from stickslip.control.controller import Controller
@@ -22,6 +21,7 @@ from stickslip.errors import Interrupted
 from stickslip.record import Record
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Measurement, setpoints
+from support.axis_rig import LIMITS, AxisRig
 
 PD = Controller(pd(19.7612, 0.1747), torque_limit=0.95)
 NAMES = ["SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGUSR1", "SIGALRM", "SIGXCPU"]
@@ -61,8 +61,8 @@ def test_a_signal_in_the_main_thread(name, tmp_path):
 
 CHILD = """
     import signal, sys, threading
-    sys.path.insert(0, {here!r})
-    from axis_rig import AxisRig
+    sys.path[:0] = [{here!r}, {tests!r}]
+    from support.axis_rig import AxisRig
     from test_loop import sine
     from test_stop_signals import PD
     from stickslip.rigs.loop import Loop
@@ -91,7 +91,9 @@ CHILD = """
 
 def child(path: Path, before: str = "", after: str = "") -> subprocess.Popen[str]:
     here = str(Path(__file__).parent)
-    text = textwrap.dedent(CHILD).format(here=here, path=str(path), before=before, after=after)
+    text = textwrap.dedent(CHILD).format(
+        here=here, tests=str(Path(here).parent), path=str(path), before=before, after=after
+    )
     return subprocess.Popen(
         [sys.executable, "-c", text], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )

@@ -29,7 +29,7 @@ class Victim:
     """Orders loops from the process of victim.py."""
 
     def __init__(self, prefix: tuple[str, ...] = ()) -> None:
-        script = Path(__file__).with_name("victim.py")
+        script = Path(__file__).parents[1] / "support" / "victim.py"
         self._process = subprocess.Popen(
             [*prefix, sys.executable, str(script)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
+from stickslip.errors import ParameterError
 from stickslip.record import Record
 from stickslip.rigs.procedures import procedure
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.virtual import virtual_rig
 
-OWN = Path(__file__).parents[1] / "study" / "sliding_mode.py"
+OWN = Path(__file__).parents[1] / "support" / "sliding_mode.py"
 PLACED = "placement = {bandwidth_hz = 25.0, damping = 1.0}"
 FILE = f"""
 [controller]
@@ -116,7 +117,11 @@ loop = {law = "sliding_mode", slope = 62.8, torque = 0.3, layer = 0.5}
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
-        (FILE, {"gain": "0.9"}, "gain = 0.9 beside controller = controller.toml, which says all of it"),
+        (
+            FILE,
+            {"gain": "0.9"},
+            "gain = 0.9 cannot be combined with controller = controller.toml, which defines it",
+        ),
         (FILE.replace("1e-3", "2e-3"), {}, "sample_time = 0.002 s, the rig's is 0.001 s"),
         (FILE.replace('loop = {law = "pd"}', 'linear = "PD"'), {}, "names no control laws; give it a loop"),
         (FILE + AHEAD.replace("lugre", "lugri"), {}, "friction = 'lugri' is not known; did you mean 'lugre'"),
@@ -134,3 +139,10 @@ def test_what_is_wrong_is_said_in_a_line(tmp_path, monkeypatch, capsys, text, op
     said = capsys.readouterr().err
     assert words in said
     assert said.count("\n") == 1
+
+
+def test_a_compensator_of_the_catalogue_runs_by_its_name():
+    given = {"bandwidth": "10", "reference": "high"}
+    assert rms(tracked(compensator="dob", **given)) < 0.5 * rms(tracked(**given))
+    with pytest.raises(ParameterError, match="adaptive_friction cannot adapt while the axis sticks"):
+        tracked(compensator="makkar", **given)

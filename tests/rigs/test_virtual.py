@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from stickslip.control.compensators.feedback import Feedback
+import stickslip.machines
+from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError, UnknownName
@@ -65,6 +67,16 @@ def test_from_a_file(tmp_path, lines, name):
     else:
         with pytest.raises(InputError):
             read_rig(path)
+
+
+def test_a_machine_is_looked_for_beside_the_rigs_file(tmp_path, monkeypatch):
+    """Not in the folder that one happens to be in."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rigs").mkdir()
+    (tmp_path / "rigs" / "rig.toml").write_text('[rig]\nkind = "virtual"\nmachine = "mine.toml"\n')
+    text = (Path(stickslip.machines.__file__).parent / "library" / "ideal.toml").read_text()
+    (tmp_path / "rigs" / "mine.toml").write_text(text)
+    assert read_rig(Path("rigs") / "rig.toml").name == "virtual mine"
 
 
 @pytest.mark.parametrize("name", ["thesis-dry", "thesis-grease", "ideal"])

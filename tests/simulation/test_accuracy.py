@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from conftest import CASES, INERTIA, PARAMETERS, PLANT, thesis_run
-from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
-from stickslip.simulation import accuracy, exact
+from stickslip.simulation import accuracy
 from stickslip.simulation.closed_loop import prepare, simulate
+from stickslip.simulation.exact import engine as exact
+from support.thesis_loops import CASES, INERTIA, PARAMETERS, PLANT, thesis_run
 
 AXIS = RigidAxis(INERTIA, Model("gms", **PLANT))
 PD = Controller(place("PD", INERTIA, 36.0, 1.0))

@@ -7,15 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from conftest import CASES, INERTIA, METRICS, PARAMETERS, PLANT, misses, thesis_run
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, place
 from stickslip.errors import Divergence
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
+from support.thesis_loops import CASES, INERTIA, METRICS, PARAMETERS, PLANT, misses, thesis_run
 
 LINEAR = [f"{r}/{f}/{c}" for r in CASES for f in ("nominal", "plus10", "minus10") for c in ("PD", "PID")]
 # Explicit steps leave ringing of 1e-8 rad/s in a contact that has come to rest; the reference has none.

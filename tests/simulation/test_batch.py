@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.errors import InputError, UnknownName
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulation import batch, exact
 from stickslip.simulation._case import COMPENSATOR_SCALE, PLANT_SCALE, STIFFNESS
-from stickslip.simulation._exact_kernel import AT_SIDES
 from stickslip.simulation._meter import COARSE, metrics
 from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.exact import engine as exact
+from stickslip.simulation.exact.kernel import AT_SIDES
+from stickslip.simulation.many import batch
 
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
 LAWS = {

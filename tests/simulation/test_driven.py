@@ -12,7 +12,14 @@ import pytest
 from stickslip import Controller, Gains, Model, Reference, RigidAxis, simulate
 from stickslip.errors import InputError
 from stickslip.plugins import law
-from stickslip.simulation.driven import Course, Drive, Harmonics, Loop, Mechanics, drive_axis
+from stickslip.simulation.recorded_input.simulation import (
+    Course,
+    Drive,
+    Harmonics,
+    Loop,
+    Mechanics,
+    drive_axis,
+)
 
 INERTIA = 4e-4
 LAWS = ("coulomb", "stribeck", "lugre", "gms")
@@ -29,11 +36,10 @@ def sine(period: float = 1e-3, end: float = 1.0, amplitude: float = 0.5) -> Driv
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_a_sampled_loop_moves_as_the_fixed_integrator_says(name: str) -> None:
+def test_a_sampled_loop_moves_as_the_sampled_integrator_says(name: str) -> None:
     reference = Reference("sine", amplitude=0.3, frequency=1.0)
     gains = Gains(kp=20.0, kd=0.2)
-    record = simulate(RigidAxis(INERTIA, example(name)), Controller(gains, sample_time=1e-3), reference, 1.0,
-                      integrator="fixed", time_step=2e-5)  # fmt: skip
+    record = simulate(RigidAxis(INERTIA, example(name)), Controller(gains, sample_time=1e-3), reference, 1.0)
     time = np.arange(0.0, 1.0, 1e-3)
     wanted = reference.sample(time)[:, 0]
     drive = Drive(time, wanted, "feedback", Loop(kp=20.0, kd=0.2), max_step=2e-5)

@@ -1,4 +1,4 @@
-"""Stretches side by side: the corrections of the whole record, whatever the law; straight lines are the law's step."""
+"""Segments side by side: the corrections of the whole record, whatever the law; straight lines are the law's step."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip.identify.observer import GRASP, Motion, Prepared, prepare
+from stickslip.identify.observer.observer import GRASP, Motion, Prepared, prepare
 from stickslip.jit import compiled_lanes
 from stickslip.laws import LAWS
 from stickslip.model import Model
 from stickslip.plugins import law as law_named
-from stickslip.simulation import _driven_lanes as lanes
-from stickslip.simulation import _lanes_run, driven_lanes
-from stickslip.simulation.driven import Drive, Mechanics, drive_axis
-from stickslip.simulation.straight_line import Name, NotStraight, Trace, traced
+from stickslip.simulation.many import simd_run as _lanes_run
+from stickslip.simulation.recorded_input import segments as driven_lanes
+from stickslip.simulation.recorded_input import simd_batch
+from stickslip.simulation.recorded_input.branchless import Name, NotStraight, Trace, traced
+from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, drive_axis
 from stickslip.spec import Surroundings
 from stickslip.subset import law_layouts, lower
 
@@ -60,21 +61,21 @@ def test_stretches_find_what_the_whole_record_says(name: str, grasp: float):
     # Within a count nothing pulls: it takes longer until a begin is forgotten.
     for count, apart in ((0.0, 1e-5), (COUNT, 1e-2)):
         prepared = prepare(motion(model, count=count), model.law, AXIS.inertia, 0.3, 40.0, grasp=grasp)
-        found = prepared.stretches.corrections(AXIS, model.parameters)
+        found = prepared.segments.corrections(AXIS, model.parameters)
         assert found is not None
-        assert len(prepared.stretches.cuts) >= 4
+        assert len(prepared.segments.cuts) >= 4
         off, whole = compared(prepared, found, model)
         assert off < apart * whole
 
 
 def compared(prepared: Prepared, found: Array, model: Model) -> tuple[float, float]:
-    """RMS of what stretches find wrong, and of what the whole record says, in the band that counts."""
+    """RMS of what segments find wrong, and of what the whole record says, in the band that counts."""
     whole = prepared.course.run(AXIS, model.parameters)[:, 3]
     inside = [prepared.low_pass(x) for x in (found - whole, whole)]
     return float(np.sqrt(np.mean(inside[0] ** 2))), float(np.sqrt(np.mean(inside[1] ** 2)))
 
 
-@pytest.mark.parametrize("module", [lanes, _lanes_run], ids=["observer", "closed loops"])
+@pytest.mark.parametrize("module", [simd_batch, _lanes_run], ids=["observer", "closed loops"])
 def test_a_kernels_own_array_is_used_until_its_end(module: types.ModuleType):
     # Compiled code frees an array after its last use, whatever a pointer into it reads or writes later.
     kernels = [f for f in ast.parse(inspect.getsource(module)).body if isinstance(f, ast.FunctionDef)]
@@ -87,10 +88,10 @@ def test_a_kernels_own_array_is_used_until_its_end(module: types.ModuleType):
 def test_noise_shakes_both_alike():
     model = model_of("lugre")
     prepared = prepare(motion(model, count=0.0), model.law, AXIS.inertia, 0.3, 40.0)
-    shaken = prepared.shaken(0.01 * np.sin(np.arange(prepared.course.drive.time.size)))
-    found = shaken.stretches.corrections(AXIS, model.parameters)
+    perturbed = prepared.perturbed(0.01 * np.sin(np.arange(prepared.course.drive.time.size)))
+    found = perturbed.segments.corrections(AXIS, model.parameters)
     assert found is not None
-    off, whole = compared(shaken, found, model)
+    off, whole = compared(perturbed, found, model)
     assert off < 1e-5 * whole
     assert np.max(np.abs(found - prepared.raw(AXIS, model.parameters))) > 1e-3
 
@@ -99,14 +100,14 @@ def test_what_lanes_leave_to_the_whole_record():
     model = model_of("coulomb")
     prepared = prepare(motion(model), model.law, AXIS.inertia, 0.3, 40.0)
     pendulum = Mechanics(inertia=1e-3, gravity=0.05)
-    assert prepared.stretches.corrections(pendulum, model.parameters) is None
+    assert prepared.segments.corrections(pendulum, model.parameters) is None
     np.testing.assert_array_equal(
         prepared.raw(pendulum, model.parameters), prepared.course.run(pendulum, model.parameters)[:, 3]
     )
     # Without a stroke long enough to forget there is nowhere to cut.
     time = PERIOD * np.arange(2000)
     short = Motion(time, 0.02 * np.sin(60.0 * time), 0.5 * np.sin(60.0 * time))
-    assert prepare(short, model.law, 1e-3, 0.3, 40.0).stretches.corrections(AXIS, model.parameters) is None
+    assert prepare(short, model.law, 1e-3, 0.3, 40.0).segments.corrections(AXIS, model.parameters) is None
 
 
 # ---- straight lines --------------------------------------------------------------------------------------------
@@ -188,8 +189,8 @@ def test_a_stage_is_solved_in_vectors():
     packed = tuple(float(x) for x in law.pack(Model(law, **law.example).parameters))
     text = driven_lanes.source(law, Trace(packed))
     module = compiled_lanes(f"{text}\n# a text of its own, {os.getpid()}, since cached code has no listing")
-    signals, out = np.ones((3, lanes.SIGNALS, 8)), np.zeros((3, 8))
-    module.follow_lanes((1.0,) * lanes.NUMBERS, packed, np.zeros(1), np.zeros(8), signals, 1, 8, out)
+    signals, out = np.ones((3, simd_batch.SIGNALS, 8)), np.zeros((3, 8))
+    module.follow_lanes((1.0,) * simd_batch.NUMBERS, packed, np.zeros(1), np.zeros(8), signals, 1, 8, out)
     (code,) = module.solve.inspect_asm().values()
     wide = [line for line in code.splitlines() if "vdivpd" in line and ("ymm" in line or "zmm" in line)]
     assert wide

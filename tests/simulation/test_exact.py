@@ -8,9 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from conftest import CASES, INERTIA, METRICS, PARAMETERS, PLANT, misses, thesis_run
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, pid, place
 from stickslip.errors import InputError
@@ -18,10 +16,12 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation import _forcing as forcing
 from stickslip.simulation import _meter as meter
-from stickslip.simulation import adaptive, exact
 from stickslip.simulation._case import DIVERGED, DONE, Case, Outcome, lay_out
+from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.closed_loop import simulate
+from stickslip.simulation.exact import engine as exact
 from stickslip.spec import Bristle
+from support.thesis_loops import CASES, INERTIA, METRICS, PARAMETERS, PLANT, misses, thesis_run
 
 NAMES = ["rms_e", "max_e", "ss_e", "rms_ev", "rms_Tm", "rms_hp", "rev_per_s"]
 COULOMB = Model("coulomb", fc=0.285, sigma2=0.018)

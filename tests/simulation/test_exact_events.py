@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from conftest import CASES, PARAMETERS, PLANT
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
-from stickslip.simulation import adaptive, exact
 from stickslip.simulation._case import lay_out
+from stickslip.simulation.adaptive import engine as adaptive
+from stickslip.simulation.exact import engine as exact
+from support.thesis_loops import CASES, PARAMETERS, PLANT
 
 SINE = CASES["low"][0]
 PD = place("PD", 3.8623e-4, 36.0, 1.0)

@@ -5,20 +5,20 @@ import platform
 
 import numpy as np
 import pytest
-from lane_loops import loops
 
 from stickslip import jit
 from stickslip.errors import InputError, UnknownName
 from stickslip.jit import compiled_lanes, exponential
-from stickslip.simulation import batch, lanes
+from stickslip.simulation.many import batch, simd_batch
+from support.lane_loops import loops
 
 
-def in_python(many: lanes.Lanes, i: int) -> np.ndarray:
+def in_python(many: simd_batch.Lanes, i: int) -> np.ndarray:
     """Position and velocity of case i, by the same text in plain Python, one case at a time."""
     same = {"compile_inlined": lambda f: f, "compile_lanes": lambda f: f, "pointer": lambda a, _: a}
     same |= {"exponential": math.exp, "select": lambda c, a, b: a if c else b, "math": math, "np": np}
     text = "\n".join(line for line in many.text.splitlines() if not line.startswith(("import", "from")))
-    exec(f"METERED = False\n{text.replace(f'LANES = {lanes.LANES}', 'LANES = 1')}", same)
+    exec(f"METERED = False\n{text.replace(f'LANES = {simd_batch.LANES}', 'LANES = 1')}", same)
     ends = np.zeros((1, 3))
     steps = np.array([0, len(many.reference)])
     same["solve_lanes"](
@@ -31,9 +31,9 @@ def in_python(many: lanes.Lanes, i: int) -> np.ndarray:
 @pytest.mark.parametrize(("plant", "helper"), [("gms", "FB-gms"), ("lugre", "FB-stribeck")])
 def test_lanes_do_what_one_case_does_in_plain_python(plant, helper):
     """To 1e-12 rad: products and sums are fused in lanes, and events magnify that."""
-    _, _, many = loops(plant, helper, n=lanes.LANES + 3, duration=0.08)
+    _, _, many = loops(plant, helper, n=simd_batch.LANES + 3, duration=0.08)
     found = many.run(())
-    for i in (0, lanes.LANES + 2):
+    for i in (0, simd_batch.LANES + 2):
         position, velocity = in_python(many, i)
         assert found.position[i] == pytest.approx(position, abs=1e-12)
         assert found.velocity[i] == pytest.approx(velocity, abs=1e-9)
@@ -42,7 +42,9 @@ def test_lanes_do_what_one_case_does_in_plain_python(plant, helper):
 def test_the_error_falls_with_the_square_of_the_step():
     case, columns, _ = loops()
     truth = batch.prepare(case, columns).run(()).position
-    errors = [np.max(np.abs(lanes.prepare(case, columns, h).run(()).position - truth)) for h in (2e-4, 5e-5)]
+    errors = [
+        np.max(np.abs(simd_batch.prepare(case, columns, h).run(()).position - truth)) for h in (2e-4, 5e-5)
+    ]
     assert errors[1] < 1e-6
     assert errors[0] > 8.0 * errors[1]
 

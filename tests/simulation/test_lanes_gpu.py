@@ -7,20 +7,20 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from lane_loops import loops
 
 from stickslip.errors import InputError, UnknownName
+from support.lane_loops import loops
 
 PROGRAM = """
 import sys
 import numpy as np
 sys.path.insert(0, {here!r})
-from lane_loops import loops
+from support.lane_loops import loops
 _, _, many = loops({plant!r}, {helper!r}, n=3, duration=0.04, step=2e-4)
 found = many.run(device="gpu")
 np.savez({out!r}, position=found.position, velocity=found.velocity, **found.metrics)
 """
-HERE = os.path.dirname(os.path.abspath(__file__))
+HERE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
 @pytest.mark.skipif(find_spec("numba.cuda") is None, reason="this numba has no CUDA target")

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from conftest import INERTIA, PARAMETERS, PLANT
 from stickslip.errors import Divergence, InputError, ParameterError
 from stickslip.machines.contact import Bearings, Contact
 from stickslip.machines.encoder import Encoder
@@ -19,6 +18,7 @@ from stickslip.machines.motor import Amplifier
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import VirtualRig
+from support.thesis_loops import INERTIA, PARAMETERS, PLANT
 
 SINE = ss.Reference("sine", amplitude=0.05, frequency=1.0)
 GAINS = ss.place("PD", INERTIA, 10.0, 0.85)
@@ -84,7 +84,7 @@ def test_the_error_of_a_run_is_told_by_half_its_steps() -> None:
     run = ss.simulate(smooth, controller, SINE, 1.0, check=True)
     finest = ss.simulate(smooth, controller, SINE, 1.0, check=False)
     assert finest.meta["counts"]["substeps"] == run.meta["counts"]["substeps"]
-    from stickslip.simulation.machine_loop import simulate_machine
+    from stickslip.simulation.machine.loop import simulate_machine
 
     fine = simulate_machine(smooth, controller, SINE, 1.0, substeps=16 * run.meta["counts"]["substeps"])
     error = float(np.max(np.abs(run["position"] - fine["position"])))

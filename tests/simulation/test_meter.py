@@ -20,7 +20,7 @@ from stickslip.simulation._meter import (
 
 
 def measured(duration, x, v, xd=None, vd=None, tm=None, band=0.0, h=1e-3):
-    """Meter a motion given by functions of time, in stretches of h."""
+    """Meter a motion given by functions of time, in segments of h."""
     acc, turns = new_meter(duration, band), np.empty((4096, 2))
     zero = lambda t: np.zeros_like(t)  # noqa: E731
     xd, vd, tm = xd or zero, vd or zero, tm or zero

@@ -12,7 +12,7 @@ import pytest
 
 from stickslip.errors import InputError, StepFailure, UnknownName
 from stickslip.model import Model, Reference
-from stickslip.simulation.open_loop import respond
+from stickslip.simulation.prescribed.open_loop import respond
 from stickslip.spec import Law, Par
 
 TABLE = json.loads((Path(__file__).parents[1] / "data" / "open_loop.json").read_text())

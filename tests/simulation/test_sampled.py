@@ -1,4 +1,4 @@
-"""The sampled engine against independent results, against the fixed integrator refined, and in its corners."""
+"""The sampled engine against independent results, its two ways against each other, and in its corners."""
 
 from __future__ import annotations
 
@@ -6,16 +6,18 @@ import json
 import math
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import stickslip as ss
+from stickslip import plugins
 from stickslip.errors import Divergence, InputError
-from stickslip.simulation import fixed, sampled
 from stickslip.simulation._case import DONE
 from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.sampled import engine as sampled
 
 J, TIME = 3.8623e-4, 1e-3
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
@@ -90,19 +92,20 @@ def apart(one, other):
     return np.abs(on_grid(one)[:, 3] - on_grid(other)[:, 3]).max()
 
 
-# ---- equal to the fixed integrator ---------------------------------------------------------------------------------
+# ---- equal to the general step, which knows a law by its ``step`` alone ----------------------------------------------
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 @pytest.mark.parametrize("controller", CONTROLLERS.values(), ids=CONTROLLERS)
-def test_the_fixed_integrator_tends_to_it(law, controller):
-    case = case_of(law, controller, duration=0.15)
-    outcome = sampled.run(case)
-    assert outcome.code == DONE
-    assert np.ptp(on_grid(outcome)[:, 3]) > 1e-3
-    coarse, fine = (apart(outcome, fixed.run(case, dt)) for dt in (2e-5, 2.5e-6))
+def test_the_general_step_tends_to_the_located_flow(law, controller, monkeypatch):
+    case = {t: case_of(law, controller, duration=0.15, tolerance=t) for t in (1e-7, 1e-10)}
+    located = sampled.run(case[1e-10])
+    assert located.code == DONE
+    assert np.ptp(on_grid(located)[:, 3]) > 1e-3
+    monkeypatch.setattr(sampled, "cannot_locate", lambda case: "asked for")
+    coarse, fine = (apart(located, sampled.run(case[t])) for t in (1e-7, 1e-10))
     # Of an encoder, a position near the edge of a count may fall into the next one.
-    assert fine < 1e-7 or fine < 0.3 * coarse or controller.encoder_counts > 0.0, (coarse, fine)
+    assert fine < 1e-8 or fine < 0.2 * coarse or controller.encoder_counts > 0.0, (coarse, fine)
     assert fine < 2e-5
 
 
@@ -155,18 +158,20 @@ def test_errors_of_the_loop_are_those_of_other_engines(row, speed):
     assert found == pytest.approx(INDEPENDENT[row, speed], rel=1e-5)
 
 
-def lugre_sliding(torques, position, velocity):
-    """LuGre under held torques, by DOP853 stopped at every reversal; position at every sample."""
-    out, z = [position], 0.0
+def moved_by(torques, contact):
+    """Positions at every sample under held torques, by DOP853 stopped at every reversal.
+
+    ``contact(v, z, side)`` is friction, N·m, and the rate of its state z.
+    """
+    out, velocity, z = [0.0], 0.0, 0.0
     for u in torques:
         t, y = 0.0, [out[-1], velocity, z]
         while t < TIME:
-            side = math.copysign(1.0, y[1]) if y[1] != 0.0 else math.copysign(1.0, u - 3.5e4 * y[2])
+            side = math.copysign(1.0, y[1] if y[1] != 0.0 else u - contact(0.0, y[2], 1.0)[0])
 
             def rate(_, y, u=u, side=side):
-                s = 0.285 + 0.05 * math.exp(-((y[1] / 0.01) ** 2))
-                dz = y[1] - 3.5e4 * side * y[1] / s * y[2]
-                return [y[1], (u - 3.5e4 * y[2] - 0.1 * dz - 0.018 * y[1]) / J, dz]
+                friction, dz = contact(y[1], y[2], side)
+                return [y[1], (u - friction) / J, dz]
 
             def turned(_, y, side=side):
                 return side * y[1] if abs(y[1]) > 1e-13 else 1e-13
@@ -183,10 +188,48 @@ def lugre_sliding(torques, position, velocity):
     return np.array(out)
 
 
+def lugre(v, z, side):
+    s = 0.285 + 0.05 * math.exp(-((v / 0.01) ** 2))
+    dz = v - 3.5e4 * side * v / s * z
+    return 3.5e4 * z + 0.1 * dz + 0.018 * v, dz
+
+
+def dahl(v, z, side):
+    return z, 3.5e3 * v * (1.0 - side * z / 0.285)
+
+
+def rests_or_slides(torques, law, p):
+    """Positions of an axis on a contact without memory that holds at rest."""
+    out, velocity = [0.0], 0.0
+    for u in torques:
+        t, y = 0.0, [out[-1], velocity]
+        while t < TIME:
+            side = math.copysign(1.0, y[1] if y[1] != 0.0 else u)
+            if y[1] == 0.0 and abs(u) <= law.holding(side, None, p, None):
+                break
+
+            def rate(_, y, u=u, side=side):
+                return [y[1], (u - law.steady(side * max(side * y[1], 1e-12), p)) / J]
+
+            def turned(_, y, side=side):
+                return side * y[1] if abs(y[1]) > 1e-13 else 1e-13
+
+            turned.terminal, turned.direction = True, -1
+            run = solve_ivp(
+                rate, (t, TIME), y, "DOP853", rtol=1e-12, atol=1e-14, events=turned, max_step=1e-4
+            )
+            t, y = run.t[-1], run.y[:, -1]
+            if run.status == 1:
+                y[1] = 0.0
+        velocity = y[1]
+        out.append(y[0])
+    return np.array(out)
+
+
 def test_lugre_is_that_of_a_general_solver_with_events():
     case = case_of(LUGRE, CONTROLLERS["PD"], duration=0.12, tolerance=1e-11)
     rows = on_grid(sampled.run(case))
-    expected = lugre_sliding(rows[:-1, 5], 0.0, 0.0)
+    expected = moved_by(rows[:-1, 5], lugre)
     assert np.abs(rows[:, 3] - expected).max() < 1e-9
     assert np.ptp(expected) > 1e-3
 
@@ -237,17 +280,19 @@ def test_where_rows_are_wanted_does_not_change_the_motion(name):
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_metrics_are_those_of_the_fixed_integrator(law):
+def test_metrics_are_those_of_the_general_step(law, monkeypatch):
     axis, controller = ss.RigidAxis(J, law), CONTROLLERS["PD"]
     one = ss.simulate(axis, controller, FAST, 0.3)
-    other = ss.simulate(axis, controller, FAST, 0.3, integrator="fixed", time_step=5e-6)
+    monkeypatch.setattr(sampled, "cannot_locate", lambda case: "asked for")
+    other = ss.simulate(axis, controller, FAST, 0.3)
+    assert other.meta["general_step"] == "asked for"
     for name in (
         "position_rms_rad", "velocity_rms_rad_s", "torque_rms_Nm", "motor_work_J", "friction_loss_J",
         "position_peak_rad", "velocity_peak_rad_s", "second_half_position_rms_rad",
     ):  # fmt: skip
         assert one.meta["metrics"][name] == pytest.approx(other.meta["metrics"][name], rel=2e-3), name
-    energy = one.meta["energy"]
-    assert abs(energy["residual"]) < 1e-3 * energy["motor_work"]
+    for record in (one, other):
+        assert abs(record.meta["energy"]["residual"]) < 1e-3 * record.meta["energy"]["motor_work"]
 
 
 def test_a_loop_that_diverges_says_so():
@@ -257,9 +302,91 @@ def test_a_loop_that_diverges_says_so():
 
 
 def test_it_says_what_it_cannot_run():
-    dahl = ss.Model("dahl", sigma0=3.5e4, fc=0.285)
-    record = ss.simulate(ss.RigidAxis(J, dahl), CONTROLLERS["PD"], FAST, 0.05)
-    assert record.meta["integrator"] == "fixed"
-    assert "gives no `modes`" in record.meta["refused"]["sampled"]
     with pytest.raises(InputError, match="acts in continuous time"):
         ss.simulate(ss.RigidAxis(J, GMS), ss.Controller(PD), FAST, 0.05, integrator="sampled")
+
+
+# ---- laws without a located flow: the general step ------------------------------------------------------------------
+
+OTHERS = {
+    name: ss.Model(name, **law.example)
+    for name, law in ((name, plugins.law(name)) for name in plugins.law_names())
+    if law.modes is None
+}
+"""Every registered law that gives no modes."""
+TOLERANCES = (1e-7, 1e-9, 1e-11)
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_every_other_law_takes_the_general_step(name):
+    record = ss.simulate(ss.RigidAxis(J, OTHERS[name]), CONTROLLERS["PD"], FAST, 0.05)
+    assert record.meta["integrator"] == "sampled"
+    assert "gives no `modes`" in record.meta["general_step"]
+    energy = record.meta["energy"]
+    assert abs(energy["residual"]) < 1e-3 * energy["motor_work"]
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_errors_fall_with_the_tolerance(name):
+    runs = {
+        t: sampled.run(case_of(OTHERS[name], CONTROLLERS["PD"], duration=0.15, tolerance=t))
+        for t in TOLERANCES
+    }
+    assert all(run.code == DONE for run in runs.values())
+    assert np.ptp(on_grid(runs[1e-11])[:, 3]) > 1e-3
+    coarse, fine = (apart(runs[1e-11], runs[t]) for t in TOLERANCES[:2])
+    assert fine < 0.3 * coarse
+    assert fine < 5e-6
+
+
+def test_a_viscous_axis_moves_as_its_equation_says():
+    law = ss.Model("viscous", sigma2=0.018)
+    rows = on_grid(sampled.run(case_of(law, CONTROLLERS["PD"], tolerance=1e-10)))
+    rate, position, v = 0.018 / J, [0.0], 0.0
+    faded = -math.expm1(-rate * TIME)
+    for u in rows[:-1, 5]:
+        position.append(position[-1] + u / 0.018 * TIME + (v - u / 0.018) * faded / rate)
+        v += (u / 0.018 - v) * faded
+    assert np.abs(rows[:, 3] - position).max() < 1e-9
+    assert np.ptp(position) > 1e-3
+
+
+def test_dahl_is_that_of_a_general_solver_with_events():
+    law = ss.Model("dahl", sigma0=3.5e3, fc=0.285)
+    rows = on_grid(sampled.run(case_of(law, CONTROLLERS["PD"], duration=0.06, tolerance=1e-11)))
+    expected = moved_by(rows[:-1, 5], dahl)
+    assert np.abs(rows[:, 3] - expected).max() < 1e-7
+    assert np.ptp(expected) > 1e-3
+
+
+def test_elasto_plastic_is_that_of_a_general_solver_with_events():
+    model = OTHERS["elasto_plastic"]
+    law, p, now, slope = model.law, model.parameters, SimpleNamespace(z=0.0), SimpleNamespace(z=0.0)
+
+    def contact(v, z, side):
+        now.z = z
+        return law.rate(v, now, p, None, slope), slope.z
+
+    rows = on_grid(sampled.run(case_of(model, CONTROLLERS["PD"], duration=0.06, tolerance=1e-11)))
+    expected = moved_by(rows[:-1, 5], contact)
+    assert np.abs(rows[:, 3] - expected).max() < 1e-7
+    assert np.ptp(expected) > 1e-3
+
+
+@pytest.mark.parametrize("name", ["static", "stribeck_plain"])
+def test_what_holds_is_that_of_a_general_solver_with_events(name):
+    model = OTHERS[name]
+    rows = on_grid(sampled.run(case_of(model, CONTROLLERS["PD"], duration=0.3, tolerance=1e-11)))
+    expected = rests_or_slides(rows[:-1, 5], model.law, model.parameters)
+    assert np.abs(rows[:, 3] - expected).max() < 1e-7
+    assert np.ptp(expected) > 1e-3
+    assert np.any(rows[20:, 4] == 0.0)
+
+
+@pytest.mark.parametrize("name", ["static", "stribeck_plain", "karnopp"])
+def test_what_holds_does_not_creep(name):
+    step = ss.Reference("step", amplitude=0.01)
+    rows = on_grid(sampled.run(case_of(OTHERS[name], CONTROLLERS["PD"], step, 60.0, output=0.1)))
+    assert np.ptp(rows[300:, 3]) == 0.0
+    assert abs(rows[-1, 5]) > 1e-3
+    assert rows[-1, 6] == rows[-1, 5]

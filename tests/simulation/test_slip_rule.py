@@ -7,9 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from conftest import INERTIA, PARAMETERS, PLANT
 from stickslip.cli import main
-from stickslip.control.compensators.feedback import Feedback
+from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError, UnknownName
@@ -18,8 +17,9 @@ from stickslip.machines.motor import Harmonics
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.simulation.open_loop import respond
+from stickslip.simulation.prescribed.open_loop import respond
 from stickslip.study.plan import load, load_run
+from support.thesis_loops import INERTIA, PARAMETERS, PLANT
 
 SOFT = {**PLANT, "k": [300.0, 200.0, 100.0, 50.0], "fs": 0.5, "fc": 0.1}
 """Springs so soft that elements are still loaded against the motion long after a reversal: where the rules differ."""

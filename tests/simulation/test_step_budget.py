@@ -6,9 +6,10 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError, StepFailure
-from stickslip.simulation import adaptive, exact
 from stickslip.simulation._case import TOO_STIFF, StepBudget
+from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.exact import engine as exact
 
 LUGRE = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}
 PD = ss.Controller(ss.place("PD", 4e-4, 10.0, 1.0))

@@ -14,7 +14,7 @@ from stickslip.machines.machine import Machine, machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.simulation.machine import lay_out_machine, look, run, wait
+from stickslip.simulation.machine.layout import lay_out_machine, look, run, wait
 
 J = 4.2757e-4
 STIFF = Model("lugre", sigma0=2e4, sigma1=0.1, fs=0.335, fc=0.285, vs=0.01, sigma2=0.018)

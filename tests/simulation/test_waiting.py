@@ -10,9 +10,11 @@ import pytest
 
 import stickslip as ss
 from stickslip import waiting
-from stickslip.simulation import adaptive, exact, fixed
 from stickslip.simulation._case import DONE, TOO_STIFF
+from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.exact import engine as exact
+from stickslip.simulation.fixed import engine as fixed
 from stickslip.waiting import Reached, Watch, watched
 
 LUGRE = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}

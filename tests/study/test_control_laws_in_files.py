@@ -6,17 +6,22 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from stickslip import plugins
 from stickslip.approval import allow_code
 from stickslip.cli import main
 from stickslip.contract.control_laws import examine
+from stickslip.control.block import ControlBlock
+from stickslip.control.controller import Controller
+from stickslip.control.linear import place
+from stickslip.control.registry import control_law
+from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ConfigError
 from stickslip.study.study import execute, load, load_run
-from stickslip.sweep.numbers import known, value_of, varied
+from stickslip.sweep.numbers import as_columns, known, value_of, varied
 
-OWN = Path(__file__).with_name("sliding_mode.py")
+OWN = Path(__file__).parents[1] / "support" / "sliding_mode.py"
 STUDY = """
 plugins = ["sliding_mode.py"]
 slip_rules = ["signed"]
@@ -132,6 +137,32 @@ def test_a_sweep_varies_their_numbers_by_name(study):
     assert other.control.laws == run.control.laws
 
 
+def test_in_continuous_time_a_sweep_varies_them_as_gains_and_a_compensator(study):
+    base = study.runs[1]
+    laws = {
+        "loop": base.control.loop,
+        "feedforward": ControlBlock(
+            "friction_feedforward", base.control.blocks["feedforward"].friction, gain=0.9
+        ),
+    }
+    run = replace(base, control=SampledController(sample_time=0.0, **laws))
+    swept = {
+        "controller.bandwidth_hz": np.array([20.0, 30.0]),
+        "controller.feedforward_gain": np.array([0.5, 0.6]),
+        "controller.feedforward_friction_fc": np.array([0.2, 0.25]),
+        "axis.inertia": np.array([3e-4, 4e-4]),
+    }
+    found = as_columns(run, swept)
+    assert found.pop("law.fc") == pytest.approx([0.2, 0.25])
+    assert found.pop("gain") == pytest.approx([0.5, 0.6])
+    assert found.pop("inertia") == pytest.approx([3e-4, 4e-4])
+    plain = replace(run, control=Controller(place("PD", 3.8623e-4, 20.0, 1.0)))
+    gains = as_columns(plain, {"controller.bandwidth_hz": np.array([20.0, 30.0])})
+    assert list(found) == list(gains) == ["kp", "ki", "kd", "kr"]
+    for name, column in gains.items():
+        assert found[name] == pytest.approx(column, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -139,8 +170,8 @@ def test_a_sweep_varies_their_numbers_by_name(study):
         ("corner = 400.0", "corner = -1.0", r"controllers\.observed\.observer: .*corner = -1"),
         ("corner = 400.0", "korner = 400.0", r"no parameter 'korner'; did you mean .*corner"),
         ('friction = "less"', 'friction = "more"', r"friction = .*more.* is not known"),
-        ('law = "inertia_feedforward"', 'law = "pd"', r"feedforward = 'pd' is no feedforward; give it as loop"),
-        ("sample_time = 1e-3\nloop = {law = \"sliding", "loop = {law = \"sliding", "sample_time is missing"),
+        ('law = "inertia_feedforward"', 'law = "pd"', r"feedforward = 'pd' cannot be used as feedforward"),
+        ("sample_time = 1e-3\nloop = {law = \"sliding", "loop = {law = \"sliding", "acts on samples only"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_a_line(tmp_path, old, new, words):
@@ -168,5 +199,5 @@ def test_a_run_of_a_file_is_exported_to_c_as_it_is(tmp_path, capsys, monkeypatch
 
 
 def test_the_law_of_the_documentation_keeps_its_contract():
-    law = plugins.control_law(str(OWN))
+    law = control_law(str(OWN))
     assert [f"{v.name}: {v.text}" for v in examine(law) if v.passed is False] == []

@@ -7,13 +7,13 @@ import json
 import numpy as np
 import pytest
 
-from stickslip.analyse.rig_claims import CLAIMS
-from stickslip.analyse.rig_verdicts import Judged, main_share
 from stickslip.cli import main
 from stickslip.machines.machine import machine
 from stickslip.study import rig_study
 from stickslip.study.rig_cases import GROUPS
 from stickslip.study.rig_study import NOMINAL, all_cases, run_case, run_rig_study, variant
+from stickslip.thesis.rig_claims import CLAIMS
+from stickslip.thesis.rig_verdicts import Judged, main_share
 
 
 def test_every_experiment_of_chapter_4_is_a_case():

@@ -13,7 +13,6 @@ from typing import Any
 
 import pytest
 
-from conftest import INERTIA, thesis_run
 from stickslip.approval import allow_code
 from stickslip.cli import _output
 from stickslip.errors import CodeRefused, InputError
@@ -25,6 +24,7 @@ from stickslip.study import study as studies
 from stickslip.study.files import KEYS
 from stickslip.study.plan import load, load_run, select
 from stickslip.study.rerun import rerun
+from support.thesis_loops import INERTIA, thesis_run
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -283,7 +283,7 @@ def test_ctrl_c_is_acknowledged_at_once_and_held_back_until_what_is_in_hand_is_k
             signal.raise_signal(signal.SIGINT)
     with studies.interrupts_between_runs():
         signal.raise_signal(signal.SIGINT)
-    assert "Ctrl-C again drops it" in capfd.readouterr().err
+    assert "press Ctrl-C again to abort" in capfd.readouterr().err
     assert signal.getsignal(signal.SIGINT) is before
 
 
@@ -399,5 +399,5 @@ def test_a_study_names_the_runs_that_depend_on_their_start(
     assert found.text.endswith(": literal/low/nominal/FB-coulomb.")
     _output.print_study(result, None, 2)
     said = capsys.readouterr().out
-    assert "these depend on their start (1e-9 rad beside" in said
-    assert "metrics): literal/low/nominal/FB-coulomb\n" in said
+    assert "these depend on their initial position (shifted by 1e-9 rad" in said
+    assert "branch): literal/low/nominal/FB-coulomb\n" in said

@@ -21,7 +21,8 @@ from stickslip.errors import ConfigError, InputError, UnknownName
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.model_file import write_model
 from stickslip.model import Model
-from stickslip.simulation import adaptive, lanes
+from stickslip.simulation.adaptive import engine as adaptive
+from stickslip.simulation.many import simd_batch
 from stickslip.sweep import block, dataset, execute, numbers, summary
 from stickslip.sweep.plan import load
 from stickslip.sweep.sample import Drawn, Spread
@@ -176,7 +177,8 @@ def test_every_integrator_is_held_against_a_worse_run(small, integrator):
     run = replace(small.runs[0], duration=0.1)
     run = replace(run, numerics=replace(run.numerics, integrator=integrator, output=0.1, tolerance=1e-6))
     one, worse = (
-        block._alone(run, {"friction.fs": 0.35}, ["position_rms_rad"], kick)[0][0] for kick in (0.0, 2.0)
+        block._alone(run, {"friction.fs": 0.35}, ["position_rms_rad"], perturbation)[0][0]
+        for perturbation in (0.0, 2.0)
     )
     assert one != worse  # else nothing would ever be flagged
     assert one == pytest.approx(worse, rel=1e-2)
@@ -346,7 +348,7 @@ def test_an_interruption_from_the_terminal_reaches_processes_too_and_drops_nothi
     os.killpg(process.pid, signal.SIGINT)  # As Ctrl-C does: to every process of the terminal's foreground.
     _, said = process.communicate(timeout=120)
     assert process.returncode == 130
-    assert "stopping" in said
+    assert "finishing the running cases" in said
     assert "Traceback" not in said
     kept = list(tmp_path.rglob("*.parquet"))
     assert len(kept) > before  # What the processes had in hand.
@@ -453,7 +455,7 @@ def test_a_model_of_another_law_than_the_studys_is_told(tmp_path):
 def test_no_jobs_are_refused(tmp_path, capsys, jobs):
     out = tmp_path / "out"
     assert main(["sweep", str(SMALL), "--jobs", jobs, "--out", str(out)]) == 2
-    assert f"--jobs {jobs} must be at least 1; leave it out for one block a core" in capsys.readouterr().err
+    assert f"--jobs {jobs} must be at least 1; leave it out for one block per core" in capsys.readouterr().err
     assert not out.exists()
     assert main(["rerun", str(tmp_path), "--jobs", jobs]) == 2
     assert f"--jobs {jobs} must be at least 1" in capsys.readouterr().err
@@ -513,7 +515,7 @@ def in_lanes(tmp_path, more=""):
     """The small sweep in lanes, of few cases."""
     text = SMALL.read_text().replace("../data", (SMALL.parents[1] / "data").as_posix())
     text = text.replace("cases = 600", f'cases = 12\nintegrator = "lanes"\n{more}')
-    path = tmp_path / "lanes.toml"
+    path = tmp_path / "simd_batch.toml"
     path.write_text(text)
     return path
 
@@ -537,10 +539,10 @@ def test_a_step_with_more_switches_than_were_followed_is_flagged(tmp_path, monke
     sweep = load(in_lanes(tmp_path, "check = false"))
     assert not block.compute(sweep, 0, 0).flagged.any()
 
-    def run(many, *args, run=lanes.Lanes.run, **more):
+    def run(many, *args, run=simd_batch.Lanes.run, **more):
         return replace(run(many, *args, **more), unresolved=np.arange(12) % 3)
 
-    monkeypatch.setattr(lanes.Lanes, "run", run)
+    monkeypatch.setattr(simd_batch.Lanes, "run", run)
     assert block.compute(sweep, 0, 0).flagged.tolist() == [False, True, True] * 4
 
 

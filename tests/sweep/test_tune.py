@@ -125,6 +125,54 @@ def test_a_controller_made_of_control_laws_is_tuned_by_its_numbers(tmp_path, mon
     assert gains["loop_kd"] == pytest.approx(2.0 * 3.8623e-4 * w)
 
 
+ON_MACHINE = """
+title = "One machine"
+[machines.delayed]
+machine = "thesis-dry"
+only = ["delay"]
+[references.sine]
+kind = "sine"
+amplitude = 0.05
+frequency = 2.0
+duration = 0.3
+placement = {bandwidth_hz = 10.0, damping = 1.0}
+[laws.less]
+law = "lugre"
+sigma0 = 3.5e4
+sigma2 = 0.018
+fs = 0.30
+fc = 0.25
+vs = 0.01
+[controllers.fed]
+sample_time = 1e-3
+loop = {law = "pd"}
+feedforward = {law = "friction_feedforward", friction = "less"}
+"""
+OF_MACHINE = """
+title = "Gain on a machine"
+study = "study.toml"
+cases = 2
+metrics = ["position_rms_rad"]
+percentile = 75
+[vary."machine.delay"]
+range = [0.2, 0.8]
+[tune."controller.feedforward_gain"]
+range = [0.0, 1.2]
+"""
+
+
+def test_a_controller_is_tuned_on_a_machine_whose_delay_is_uncertain(tmp_path):
+    """The law holds less friction than the machine: more than the whole of it is given."""
+    (tmp_path / "study.toml").write_text(ON_MACHINE)
+    (tmp_path / "tune.toml").write_text(OF_MACHINE)
+    sweep = load(tmp_path / "tune.toml")
+    tuned = tuning.tune(sweep, sweep.runs[0])
+    assert 1.05 < tuned.after[0] <= 1.2
+    assert tuned.scores_after[0] < 0.8 * tuned.scores_before[0]
+    delays = sweep.values(sweep.runs[0], sweep.drawn.block(0, 2))["machine.delay"]
+    assert 0.2 <= delays.min() < delays.max() <= 0.8
+
+
 def test_what_cannot_be_tuned(tmp_path, capsys):
     assert main(["sweep", str(SMALL)]) == 2
     assert "stickslip tune" in capsys.readouterr().err

@@ -15,9 +15,7 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.identify.identified_file import read_identified
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "identify"))
-import axis_cases as cases
+from support import axis_cases as cases
 
 LOOP = {"kp": 8.0, "kd": 0.08, "kr": 0.08, "limit": 3.0}
 
@@ -143,7 +141,7 @@ def test_units_of_arrays_are_converted_and_named(signals: dict[str, np.ndarray])
         ({"t": [[0.0]], "position": [0.0]}, "shape"),
         ({"t": [0.0], "position": [0.0], "units": {"torque": "Nm"}}, "units names 'torque'"),
         ({"t": [0.0], "position": [0.0], "units": {"position": "furlong"}}, "is not a unit that is known"),
-        ({"t": [0.0], "position": [0.0], "map": {"position": "q"}}, "map is for columns"),
+        ({"t": [0.0], "position": [0.0], "map": {"position": "q"}}, "map applies to columns"),
         ({"tork": [0.0]}, "did you mean 'torque'"),
     ],
 )
@@ -154,9 +152,9 @@ def test_bad_arrays_are_refused_in_one_line(given: dict[str, object], said: str)
 
 def test_two_logs_in_one_call_and_columns_of_a_record_are_refused(signals: dict[str, np.ndarray]) -> None:
     record = ss.read(**signals)
-    with pytest.raises(ss.InputError, match="are two records"):
+    with pytest.raises(ss.InputError, match="exclude each other"):
         ss.read(record, **signals)
-    with pytest.raises(ss.InputError, match="read already"):
+    with pytest.raises(ss.InputError, match="map applies to columns"):
         ss.read(record, map={"position": "q"})
     with pytest.raises(ss.InputError, match="without columns of numbers"):
         ss.read(object())
@@ -195,13 +193,17 @@ def test_an_unchanged_axis_compares_as_unchanged(result: ss.IdentificationResult
 
 @pytest.mark.parametrize(
     "first",
-    ["import stickslip.identify.axis", "from stickslip.identify import doctor", "import stickslip.verbs.identify"],
-)  # fmt: skip
+    [
+        "import stickslip.identify.axis.identify",
+        "from stickslip.identify import doctor",
+        "import stickslip.verbs.identify",
+    ],
+)
 def test_the_function_is_there_whatever_was_imported_first(first: str) -> None:
     code = (
         f"{first}\nimport stickslip as ss, inspect\n"
         "assert callable(ss.identify) and 'inertia' in inspect.signature(ss.identify).parameters\n"
-        "import stickslip.identify.axis as axis\nassert axis.identify_axis\n"
+        "import stickslip.identify.axis.identify as axis\nassert axis.identify_axis\n"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert out.returncode == 0, out.stderr
@@ -218,7 +220,7 @@ def test_a_recommendation_is_that_of_the_command_line_and_runs_in_a_simulation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     for name, few in (("GAINS", (0.9,)), ("LEADS", (0.5,)), ("BEYOND", (1.5,))):
-        monkeypatch.setattr(f"stickslip.identify.recommend.{name}", few)
+        monkeypatch.setattr(f"stickslip.identify.setting.recommend.{name}", few)
     out, options = (
         tmp_path / "recommended.toml",
         {"bandwidth": 20.0, "counts_per_rev": 65536.0, "axes": 1, "confirm": 2},
@@ -268,11 +270,13 @@ def test_a_controller_is_exported_from_memory_and_what_a_target_lacks_is_refused
     assert any("axis1" in name for name in made.files)
     with pytest.raises(ss.InputError, match="has no controller"):
         ss.export(lugre, to="c99", controller=True)
-    with pytest.raises(ss.InputError, match="no compensator"):
-        ss.export(ss.Controller(pd, sample_time=1e-3), to="c99")
+    alone = ss.export(ss.Controller(pd, sample_time=1e-3), to="st", name="axis1")
+    assert "loop_kp" in str(alone.files["axis1.st"])
+    with pytest.raises(ss.InputError, match="continuous time"):
+        ss.export(ss.Controller(pd), to="c99")
     with pytest.raises(ss.InputError, match="belongs to --compensator"):
         ss.export(lugre, to="c99", gain=0.9)
-    with pytest.raises(ss.InputError, match="carries the law alone"):
+    with pytest.raises(ss.InputError, match="supports the law alone"):
         ss.export(lugre, to="urdf", compensator="ff")
     with pytest.raises(ss.InputError, match="unknown"):
         ss.export(lugre, to="c98")

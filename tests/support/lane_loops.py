@@ -2,14 +2,13 @@
 
 import numpy as np
 
-from stickslip.control.compensators.feedback import Feedback
-from stickslip.control.compensators.feedforward import Feedforward
+from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulation import lanes
 from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.many import simd_batch
 
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
 LAWS = {
@@ -43,4 +42,4 @@ def loops(plant="gms", helper="none", n=20, duration=1.0, step=1e-4, kind="PD", 
         f"friction.{name}": getattr(LAWS[plant].parameters, name) * rng.uniform(1.0 - spread, 1.0 + spread, n)
         for name in ("fs", "fc") if hasattr(LAWS[plant].parameters, name)
     } | {"inertia": INERTIA * rng.uniform(1.0 - spread, 1.0 + spread, n)} | more  # fmt: skip
-    return case, columns, lanes.prepare(case, columns, step)
+    return case, columns, simd_batch.prepare(case, columns, step)

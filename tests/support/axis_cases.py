@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from stickslip import Model, Record
-from stickslip.identify.axis_trial import Trial
+from stickslip.identify.trial import Trial
 from stickslip.plugins import law
-from stickslip.simulation.driven import Drive, Loop, Mechanics, drive_axis
+from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 INERTIA, FC, SIGMA2 = 4e-4, 0.285, 0.018  # thesis Tables 1 and 4, about
 COUNT = 2.0 * math.pi / 65536.0

@@ -11,8 +11,8 @@ from stickslip.analyse.tracking import tracking_metrics
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError
-from stickslip.identify.nyquist import fastest_pd
-from stickslip.identify.train import fit_train, identified_train, loop_response
+from stickslip.identify.response.drivetrain import fit_drivetrain, identified_drivetrain, loop_response
+from stickslip.identify.response.nyquist import fastest_pd
 from stickslip.machines.machine import machine
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.procedures.base import perform
@@ -36,12 +36,12 @@ def dry():
 
 
 def test_modes_spring_and_masses_are_those_of_the_machine(dry):
-    train, flexible = fit_train(*dry, DRY.inertia), DRY.flexible
-    assert train.sliding == pytest.approx(flexible.modes[1], rel=0.02)
-    assert train.axis.elasticity == pytest.approx(flexible.elasticity, rel=0.03)
-    assert train.axis.disk == pytest.approx(flexible.disk, rel=0.03)
-    assert train.axis.inertia == pytest.approx(DRY.inertia)
-    found = identified_train(dry, train, fastest_pd(dry, DRY.inertia).sentence)
+    drivetrain, flexible = fit_drivetrain(*dry, DRY.inertia), DRY.flexible
+    assert drivetrain.sliding == pytest.approx(flexible.modes[1], rel=0.02)
+    assert drivetrain.axis.elasticity == pytest.approx(flexible.elasticity, rel=0.03)
+    assert drivetrain.axis.disk == pytest.approx(flexible.disk, rel=0.03)
+    assert drivetrain.axis.inertia == pytest.approx(DRY.inertia)
+    found = identified_drivetrain(dry, drivetrain, fastest_pd(dry, DRY.inertia).sentence)
     assert found["mode_sticking"].value < found["mode_sliding"].value
     assert found["spring"].lower < flexible.elasticity < found["spring"].upper
 
@@ -66,7 +66,7 @@ def test_a_pd_is_calm_below_the_bandwidth_that_rings_and_rings_above(dry):
 
 def test_a_rigid_axis_has_no_mode_while_it_slides():
     rigid = replace(DRY.without("flexibility", "encoder-mode", "bandwidth"), delay=0.5)
-    found = fit_train(*responses(rigid), rigid.inertia)
+    found = fit_drivetrain(*responses(rigid), rigid.inertia)
     assert found.axis is None
     assert found.delay == pytest.approx(0.5, abs=0.1)
 

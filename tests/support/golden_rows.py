@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from stickslip.control.block import ControlBlock
+from stickslip.control.registry import control_law
 from stickslip.control.sampled_controller import SampledController
 from stickslip.model import Model
 
@@ -17,8 +18,8 @@ LUGRE = Model("lugre", sigma0=3.5e4, sigma1=0.0, **CURVE)
 GMS = Model("gms", k=[12896.0, 8141.0, 4273.0], alpha=[1 / 3] * 3, c=23.8782, **CURVE)
 
 
-def controller(loop, feedforward=None, observer=None):
-    return SampledController(loop, 1e-3, feedforward, observer, torque_limit=1.0)
+def controller(loop, feedforward=None, observer=None, alone=False):
+    return SampledController(loop, 1e-3, feedforward, observer, torque_limit=1.0, alone=alone)
 
 
 def pd():
@@ -48,8 +49,48 @@ def coulomb(direction, smooth):
     )  # fmt: skip
 
 
-def late(model):
-    return ControlBlock("friction_observer", model, correction=0.0)
+def late(model, correction=0.0):
+    return ControlBlock("friction_observer", model, correction=correction, sigma2=0.018)
+
+
+def bristle(correction, sigma0=3.5e4):
+    return ControlBlock("lugre_observer", sigma0=sigma0, correction=correction, **CURVE)
+
+
+def scaled(model):
+    return ControlBlock(
+        "scaled_feedforward",
+        model,
+        inertia=INERTIA,
+        gain=0.9,
+        sigma2=0.018,
+        corner=200.0,
+        rate=5.0,
+        slowest=0.015,
+    )
+
+
+def least_squares(model):
+    return ControlBlock(
+        "least_squares_feedforward", model, inertia=INERTIA, fc=0.285, sigma2=0.018, gain=0.9, corner=200.0, speed=0.1,
+        slowest=0.015,
+    )  # fmt: skip
+
+
+def robust(inertia_rate):
+    return ControlBlock(
+        "robust_adaptive", inertia=INERTIA, slope=0.5 * W, damping=PD["kd"], layer=0.5, inertia_rate=inertia_rate,
+        level_rate=20.0, speed_rate=20.0, leak=0.02, most_level=1e6, most_speed=1e6, most_inertia=1e6,
+    )  # fmt: skip
+
+
+def learnt(functions, leak=0.05, **more):
+    example = control_law("adaptive_friction").having(functions=functions).example
+    values = {**example, "slope": 0.5 * W, "leak": leak, "largest": 100.0, **more}
+    return ControlBlock("adaptive_friction", None, {"functions": functions}, **values)
+
+
+GRADIENT = ControlBlock("gradient_feedforward", LUGRE, gain=0.9, rate=100.0, slope=60.0)
 
 
 def twisting(form):
@@ -100,6 +141,21 @@ ROWS = {
     "super-twisting 2e4": controller(twisting("explicit")),
     "super-twisting 2e4 implicit": controller(twisting("implicit")),
     "PD + stiction push": controller(pd(), None, PUSH),
+    "PD + DOB 400 w-form": controller(pd(), None, observer(400.0, form="textbook")),
+    "PD + LuGre observer k=1": controller(pd(), None, bristle(1.0)),
+    "PD + LuGre observer k=10": controller(pd(), None, bristle(10.0)),
+    "PD + LuGre observer k=1 sigma0 500": controller(pd(), None, bristle(1.0, 500.0)),
+    "PD + GMS3 observer on v_f k=1": controller(pd(), None, late(GMS, 1.0)),
+    "PD + FF LuGre .9 scale adapted": controller(pd(), scaled(LUGRE), alone=True),
+    "PD + FF LuGre .9 scale adapted + DOB 200 residual": controller(pd(), scaled(LUGRE), observer(200.0)),
+    "PD + FF GMS3 .9 scale adapted + DOB 200 residual": controller(pd(), scaled(GMS), observer(200.0)),
+    "PD + FF LuGre .9 RLS + DOB 200 residual": controller(pd(), least_squares(LUGRE), observer(200.0)),
+    "PD + FF LuGre gradient gain": controller(pd(), GRADIENT, alone=True),
+    "Lee-Kim delta .5": controller(robust(0.0), alone=True),
+    "Lee-Kim delta .5 mass adapted": controller(robust(0.01), alone=True),
+    "PD + two-line adaptive": controller(pd(), None, learnt("lines"), alone=True),
+    "PD + Makkar adaptive": controller(pd(), None, learnt("makkar"), alone=True),
+    "PD + RBF 21 adaptive": controller(pd(), None, learnt("gaussians", 0.01), alone=True),
     "PD + dither .2": controller(pd(), DITHER),
     "PID + dither .2": controller(pid(), DITHER),
 }

@@ -20,7 +20,7 @@ from stickslip.export.job import Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
-HERE = Path(__file__).with_name("cortex")
+HERE = Path(__file__).parents[1] / "export" / "cortex"
 CORE = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
 FLAGS = (*CORE, "-std=c99", "-O2", "-ffunction-sections", "-fdata-sections", "-Wdouble-promotion", "-Werror")
 NEEDED = ("arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm")

@@ -1,0 +1,194 @@
+"""Cogging and friction's ripple recovered from virtual machines whose truth is known, and what compensating it brings.
+
+    python benchmarks/cogging.py [--seeds 5] [--machine NAME ...]
+
+For each machine: slow rotations on its rig, `identify_cogging`, error and correlation of the even part (cogging) and of
+the odd part (ripple) over a turn; speed ripple and tracking error at a constant speed without and with the map found;
+and over the seeds, how many of the 95 % intervals hold the truth. `--none 50`: how many of so many machines without
+cogging and ripple are said to have some.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import stickslip as ss
+from stickslip.control.position import position_feedforward
+from stickslip.identify.cogging import identify_cogging
+from stickslip.identify.estimate import Identification
+from stickslip.machines.angle import AngleMap, harmonic_sum
+from stickslip.machines.machine import Machine, machine
+from stickslip.machines.position_map import PositionMap
+from stickslip.rigs.procedures.base import perform
+from stickslip.rigs.procedures.cogging import Cogging
+from stickslip.rigs.virtual import VirtualRig
+
+MACHINES = ("thesis-dry", "thesis-grease", "direct-drive-24", "gear-50")
+HERE = Path(__file__).parent
+CIRCLE = np.linspace(0.0, 2.0 * np.pi, 8000)
+Values = np.ndarray[Any, np.dtype[np.float64]]
+
+
+def named(name: str) -> Machine:
+    """A machine of the package, or one of the test data."""
+    files = {"direct-drive-24": "direct_drive_24.toml", "gear-50": "gear_50.toml"}
+    return machine(HERE.parent / "tests" / "data" / files[name]) if name in files else machine(name)
+
+
+def speeds_of(plant: Machine) -> tuple[float, ...]:
+    """rad/s, before the procedure lowers them for the highest order."""
+    return (0.9, 0.6, 0.4) if plant.name.startswith("thesis") else (0.6, 0.4)
+
+
+def procedure_of(plant: Machine) -> Cogging:
+    """A stiffer loop where cogging is larger than friction; the highest order is known: slots times gear."""
+    if plant.name.startswith("thesis"):
+        return Cogging(
+            velocities=speeds_of(plant), inertia=plant.inertia, order=max(plant.cogging.order, default=24.0)
+        )
+    return Cogging(
+        velocities=speeds_of(plant), inertia=plant.inertia, bandwidth=30.0, degrees=380.0,
+        order=max(plant.cogging.order),
+    )  # fmt: skip
+
+
+def levels_of(plant: Machine) -> tuple[float, float]:
+    """Mean torque of the contact over the speeds (the bearings' does not ripple), N·m: mean of both directions, half
+    of what they differ by."""
+    clutch = plant.contact.clutch()
+    assert clutch.law.steady is not None
+    speeds = procedure_of(plant).speeds
+    level = float(np.mean([clutch.law.steady(v, clutch.parameters) for v in speeds]))
+    forward, backward = plant.contact.direction
+    return 0.5 * level * (forward + backward), 0.5 * level * (forward - backward)
+
+
+def truth_of(plant: Machine) -> tuple[Values, Values]:
+    """Even part (cogging, and what friction's ripple differs by between the directions) and odd part on `CIRCLE`."""
+    both, apart = levels_of(plant)
+    cogging = np.array([plant.cogging.at(x) for x in CIRCLE])
+    ripple = np.array([plant.contact.ripple.at(x) for x in CIRCLE])
+    return apart * ripple - cogging, both * ripple
+
+
+def found_of(plant: Machine) -> Identification:
+    """What slow rotations show."""
+    return identify_cogging([perform(procedure_of(plant), VirtualRig(plant)).record])
+
+
+def compared(found: Values, true: Values) -> str:
+    """Error of the RMS and correlation of two parts without their means."""
+    a, b = found - found.mean(), true - true.mean()
+    if np.std(b) == 0.0:
+        return "no truth"
+    return (
+        f"error {100.0 * np.std(a - b) / np.std(b):5.2f} % of RMS, correlation {np.corrcoef(a, b)[0, 1]:.5f}"
+        if np.std(a) > 0.0
+        else "nothing found"
+    )
+
+
+def odd_of(result: Identification) -> Values:
+    """Friction over the angle without what a lag with direction explains."""
+    own, angle = result.details["map"], result.details.get("angle")
+    return own.ripple(CIRCLE) if angle is None else own.friction * harmonic_sum(angle.ripple, CIRCLE)
+
+
+def held(result: Identification, plant: Machine) -> dict[str, bool]:
+    """Whether the interval of each amplitude of cogging and of friction's ripple holds the truth; an order that was not
+    found does not."""
+    both, _ = levels_of(plant)
+    true = {f"even[{n:g}]": a for n, a in zip(plant.cogging.order, plant.cogging.amplitude, strict=True)}
+    waves = plant.contact.ripple
+    true |= {f"odd[{n:g}]": a * both for n, a in zip(waves.order, waves.amplitude, strict=True)}
+    own = {e.name: e for e in result.estimates}
+    return {n: n in own and own[n].lower <= a <= own[n].upper for n, a in true.items()}
+
+
+def motion(plant: Machine, result: Identification) -> str:
+    """Speed ripple and tracking error at a constant speed, by what factor smaller with both parts of the map.
+
+    The friction feedforward is the identified level, without and with its ripple. The speed lets the strongest order
+    pass at half the loop's bandwidth at most: beyond, the inertia carries it.
+    """
+    found: PositionMap = result.details["map"]
+    angle: AngleMap = result.details["angle"]
+    gains = ss.place("PD", inertia=plant.inertia, bandwidth=12.0, damping=1.0)
+    loop = ss.ControlBlock("pd", kp=gains.kp, kd=gains.kd)
+    strongest = found.even.order[int(np.argmax(found.even.amplitude))]
+    speed = min(1.0, 2.0 * math.pi * 6.0 / strongest)
+    # Half a sample of hold, the lag of the current loop, and the machine's delay.
+    bandwidth = plant.amplifier.bandwidth
+    lag = 1.0 / (2.0 * math.pi * bandwidth) if math.isfinite(bandwidth) else 0.0
+    lead = (0.5 + plant.delay) * plant.sample_time + lag
+    friction = ss.Model("coulomb", fc=found.friction)
+    sizes: list[tuple[float, float]] = []
+    for model, more in (
+        (friction, []),
+        (angle.on(friction), [position_feedforward(found, angle="reference", lead=lead)]),
+    ):
+        blocks = [ss.ControlBlock("friction_feedforward", model), *more]
+        drive = ss.SampledController(
+            loop, plant.sample_time, feedforward=blocks, torque_limit=plant.limits["torque"]
+        )
+        record = ss.simulate(plant, drive, ss.Reference("ramp", velocity=speed), duration=9.0)
+        late = record.time > 2.0
+        error = (record["position_reference"] - record["position"])[late]
+        # Over 10 ms: counts of the encoder would hide the rest.
+        velocity = np.convolve(record["position"], [0.1] + 19 * [0.0] + [-0.1], "valid") / (
+            2.0 * plant.sample_time
+        )
+        sizes.append((float(np.std(velocity[late[20:]])), float(np.std(error))))
+    return (
+        f"at {speed:.3g} rad/s speed ripple / {sizes[0][0] / sizes[1][0]:.2f}, "
+        f"tracking error / {sizes[0][1] / sizes[1][1]:.2f}"
+    )
+
+
+def judged(name: str, seeds: int) -> None:
+    """Print how close, how sure and of what use the parts of one machine are."""
+    plant, hits = named(name), dict[str, int]()
+    for seed in range(seeds):
+        # Friction that drifts has no true level; all else stays.
+        one = replace(plant, seed=seed).without("drift", "temperature")
+        result = found_of(one)
+        for term, hit in held(result, one).items():
+            hits[term] = hits.get(term, 0) + hit
+        if seed == 0:
+            even, odd = truth_of(one)
+            print(f"{name}: cogging {compared(result.details['map'].beside(CIRCLE), even)}")
+            print(f"{name}: ripple {compared(odd_of(result), odd)}")
+            print(f"{name}: {motion(one, result)}", flush=True)
+    listed = ", ".join(f"{k} {v}" for k, v in hits.items())
+    print(
+        f"{name}: {sum(hits.values())} of {seeds * len(hits)} intervals of amplitudes hold the truth ({listed})",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Print a line for each machine."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--machine", action="append", choices=MACHINES)
+    parser.add_argument("--none", type=int, default=0, metavar="COUNT")
+    args = parser.parse_args()
+    for name in args.machine or MACHINES:
+        judged(name, args.seeds)
+    if args.none:
+        plain, said = machine("thesis-grease").without("position", "cogging"), 0
+        for seed in range(args.none):
+            said += bool(found_of(replace(plain, seed=seed)).details["fit"].terms)
+        print(f"without cogging and ripple: {said} of {args.none} machines are said to have some")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,171 @@
+"""Compensators of the catalogue beside the settings of a law: which is switched on, why the others are not."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_recommend_axes import estimate
+
+from stickslip import plugins
+from stickslip.control.belief import believed
+from stickslip.control.catalogue import CATALOGUE, compensated
+from stickslip.control.files import read_controller
+from stickslip.errors import ParameterError, UnknownName
+from stickslip.identify.identified_file import Identified
+from stickslip.identify.setting import recommend as recommending
+from stickslip.identify.setting.beside import belief_of
+from stickslip.identify.setting.file import write_setting
+from stickslip.identify.setting.recommend import Drive, recommend
+from stickslip.machines.contact import Contact
+from stickslip.machines.encoder import Encoder
+from stickslip.machines.machine import Machine
+from stickslip.model import Model, Reference
+from stickslip.report.recommendation_text import beside_lines
+from stickslip.simulation.closed_loop import simulate
+from stickslip.study.bench_decision import CHATTER
+from stickslip.study.bench_metrics import judged
+from stickslip.verbs.recommend import compensators_of
+
+REFUSED = ("lee-kim", "twisting-implicit", "sliding-mode", "friedland-park", "rbf", "dither")
+"""What the reference found not worth switching on."""
+
+
+@pytest.fixture
+def few(monkeypatch):
+    monkeypatch.setattr(recommending, "GAINS", (0.8,))
+    monkeypatch.setattr(recommending, "LEADS", (0.0,))
+    monkeypatch.setattr(recommending, "BEYOND", ())
+
+
+def known(inertia, sigma0, fs, fc, vs, sigma2, off=1.0):
+    """What was identified: a LuGre law whose levels are known to some per cent, off by that factor."""
+    law = Model("lugre", sigma0=sigma0, sigma1=0.0, fs=off * fs, fc=off * fc, vs=vs, sigma2=sigma2)
+    own = [
+        estimate("fs", "N·m", off * fs, 0.03), estimate("fc", "N·m", off * fc, 0.03),
+        estimate("sigma2", "N·m·s/rad", sigma2, 0.1),
+    ]  # fmt: skip
+    return Identified(Path("m.toml"), law, tuple(own), np.eye(len(own)), {"inertia": inertia})
+
+
+THESIS = {"inertia": 3.8623e-4, "sigma0": 3.5e4, "fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
+
+
+@pytest.mark.usefixtures("few")
+def test_what_is_not_switched_on_is_told_why(tmp_path):
+    drive = Drive(20.0, amplitude=0.2, torque_limit=1.0, encoder_counts=65536.0, linear="PID")
+    found = known(**THESIS)
+    names = ("dob", "ff-dob", "scale-dob", "makkar", "ff-gms", "lugre-observer", *REFUSED)
+    advice = recommend(found, drive, axes=1, confirm=2, compensators=names)
+    why = {b.name: b.why_not for b in advice.beside}
+    assert why["lugre-observer"].startswith(
+        "one count of the encoder, 9.59e-05 rad, bends its bristle by 3.36 N·m"
+    )
+    for name in REFUSED:
+        assert why[name] == CATALOGUE[name].against != ""
+    assert why["ff-gms"].startswith("no GMS law is known")
+    by_label = {b.label: b for b in advice.beside}
+    assert by_label["PD + makkar"].why_not == "it adapts, and nothing under it moves an axis that sticks"
+    # The bare observers hunt at rest on this stiff contact: what is switched on does not.
+    taken = advice.instead
+    lines = beside_lines(advice)
+    if taken is None:
+        assert lines[-1] == "none of these is better than what is said above"
+    else:
+        assert lines[-1].startswith(f"switch on instead: {taken.label}; it leaves at most")
+        file = write_setting(tmp_path / "recommended.toml", found, advice)
+        assert read_controller(file).values() == pytest.approx(taken.controller.values())
+
+
+@pytest.mark.parametrize("law", ["stribeck", "gms", "coulomb", "maxwell_slip", "stribeck_plain", "dahl"])
+def test_a_belief_of_any_law_has_its_level(law):
+    found = plugins.law(law)
+    model = Model(found, **dict(found.example))
+    belief = believed(model, 4e-4)
+    assert belief.inertia == 4e-4
+    assert belief.elements is (model if law == "gms" else None)
+    slow = 5.0 * (found.velocity_scale(model.parameters) if found.velocity_scale else 0.01)
+    assert belief.number("fc") + belief.number("sigma2") * slow == pytest.approx(
+        found.steady(slow, model.parameters)
+    )
+    assert belief.number("sigma0") > belief.number("fs") > 0.0
+
+
+def test_what_is_wrong_is_said_in_a_line():
+    assert compensators_of(("all",)) == tuple(CATALOGUE)
+    with pytest.raises(UnknownName, match="unknown compensator 'dobs'; did you mean 'dob'"):
+        compensators_of(("dobs",))
+    loop = compensated("dob", "PD", belief_of(known(**THESIS).model, Drive(amplitude=0.1), 4e-4))
+    with pytest.raises(ParameterError, match="bring their own loop; leave controller out"):
+        belief_of(known(**THESIS).model, Drive(amplitude=0.1, controller=loop), 4e-4)
+
+
+# ---- "my axis sticks at reversal and my PID hunts; what do I switch on?" -------------------------------------------
+
+STRANGERS = {
+    "direct drive": (
+        {"inertia": 1.2e-3, "sigma0": 2e4, "fs": 0.9, "fc": 0.7, "vs": 0.02, "sigma2": 0.03}, 262_144.0, 10.0, 4.0
+    ),
+    "belt drive": (
+        {"inertia": 5e-3, "sigma0": 8e3, "fs": 2.2, "fc": 1.9, "vs": 0.05, "sigma2": 0.1}, 131_072.0, 8.0, 12.0
+    ),
+}  # fmt: skip
+AMPLITUDE, FREQUENCY, MOVES, RESTS = 0.1, 0.5, 4.0, 20.0
+
+
+def stranger(numbers, counts, limit):
+    """The machine as it is: springs in series and slip one after the other, which no LuGre law has."""
+    springs = numbers["sigma0"] * np.array([0.4, 0.3, 0.2, 0.1])
+    law = Model(
+        "gms", k=springs.tolist(), alpha=[0.25] * 4, c=30.0 * numbers["fc"], fs=numbers["fs"], fc=numbers["fc"],
+        vs=numbers["vs"], sigma2=numbers["sigma2"],
+    )  # fmt: skip
+    return Machine(
+        "stranger", numbers["inertia"], Contact(law), encoder=Encoder(counts=counts), limits={"torque": limit}
+    )
+
+
+def along(machine, control):
+    """Its metrics along a sine that then stops for long."""
+    t = np.arange(0.0, MOVES + 1e-9, 1e-2)
+    w = 2.0 * math.pi * FREQUENCY
+    position, velocity = AMPLITUDE * (1.0 - np.cos(w * t)), AMPLITUDE * w * np.sin(w * t)
+    table = Reference(
+        "table", time=[*t, MOVES + RESTS], position=[*position, position[-1]], velocity=[*velocity[:-1], 0.0, 0.0]
+    )  # fmt: skip
+    return judged(simulate(machine, control, table, MOVES + RESTS, metered=False))
+
+
+def calm(metrics, counts):
+    """Whether it neither hunts nor chatters."""
+    swing = max(2.0 * 2.0 * math.pi / counts, 0.03 * metrics["rms_rad"], 3e-5)
+    return metrics["hunting_rad"] <= swing and metrics["chatter_Nm"] <= CHATTER * metrics["effort_Nm"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STRANGERS)
+def test_a_stranger_whose_pid_hunts_is_told_what_to_switch_on(name):
+    numbers, counts, bandwidth, limit = STRANGERS[name]
+    machine = stranger(numbers, counts, limit)
+    drive = Drive(
+        bandwidth, amplitude=AMPLITUDE, frequency=FREQUENCY, torque_limit=limit, encoder_counts=counts, linear="PID"
+    )  # fmt: skip
+    found = known(**numbers, off=1.04)
+    advice = recommend(found, drive, axes=3, confirm=9, compensators=tuple(CATALOGUE))
+    assert advice.instead is not None
+    given = along(machine, advice.instead.controller)
+    assert calm(given, counts)
+    belief = belief_of(found.model, drive, numbers["inertia"])
+    bench = {}
+    for compensator, entry in CATALOGUE.items():
+        for loop in entry.loops or ("PD",):
+            try:
+                made = compensated(compensator, loop, belief)
+            except ParameterError:  # no GMS law is known
+                continue
+            bench[loop, compensator] = along(machine, made)
+    assert not calm(bench["PID", "none"], counts)  # what the stranger complains of
+    best = min(m["rms_rad"] for m in bench.values() if calm(m, counts))
+    assert given["rms_rad"] <= 1.2 * best

@@ -1,0 +1,1 @@
+"""What tests share: cases, loops, grammars, rigs and files of laws."""

@@ -1,0 +1,79 @@
+"""The drawing of imports has no circle: what is imported late and by name (`importlib`) counts as well."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import stickslip
+
+ROOT = Path(stickslip.__file__).parent
+
+
+def for_types_only(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+
+
+def nodes(tree: ast.AST) -> Iterator[ast.AST]:
+    """All nodes but those that only a type checker runs."""
+    for child in ast.iter_child_nodes(tree):
+        if not for_types_only(child):
+            yield child
+            yield from nodes(child)
+
+
+def named(node: ast.AST) -> list[str]:
+    """The modules that a node imports, as far as its text tells."""
+    if isinstance(node, ast.ImportFrom) and node.module:
+        whole = node.module == "stickslip"
+        return [f"stickslip.{alias.name}" for alias in node.names] if whole else [node.module]
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.Call) and node.args and ast.unparse(node.func).endswith("import_module"):
+        first = node.args[0]
+        if isinstance(first, ast.JoinedStr):
+            first = first.values[0]
+        if isinstance(first, ast.Constant) and isinstance(first.value, str):
+            return [first.value]
+    return []
+
+
+def part(module: str) -> str:
+    """The room, or the file of the package, that a module belongs to."""
+    return module.split(".")[1] if module.startswith("stickslip.") else ""
+
+
+def imports() -> dict[str, set[str]]:
+    parts: dict[str, set[str]] = {}
+    for file in ROOT.rglob("*.py"):
+        mine = part(".".join(("stickslip", *file.relative_to(ROOT).with_suffix("").parts)))
+        if mine == "__init__" or file.name.startswith("template"):
+            continue
+        found = {
+            part(name) for node in nodes(ast.parse(file.read_text(encoding="utf-8"))) for name in named(node)
+        }
+        parts.setdefault(mine, set()).update(found - {mine, "", "__version__"})
+    return parts
+
+
+def circle(found: dict[str, set[str]]) -> str:
+    """The parts that import each other in a circle; empty where there is none."""
+    try:
+        TopologicalSorter(found).prepare()
+    except CycleError as error:
+        return " <- ".join(error.args[1])
+    return ""
+
+
+def test_the_parts_of_the_package_have_an_order() -> None:
+    assert circle(imports()) == ""
+    assert circle({"laws": {"rigs"}, "rigs": {"laws"}}) != ""
+
+
+def test_what_is_imported_by_name_is_seen() -> None:
+    found = imports()
+    assert {"laws", "references"} <= found["plugins"]
+    assert "rigs" not in found["plugins"]
+    assert named(ast.parse('import_module(f"stickslip.rigs.{x}")', mode="eval").body) == ["stickslip.rigs."]

@@ -1,0 +1,71 @@
+"""Jobs in processes of their own: the limit on time is for reading a file, not for what follows."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+
+from stickslip.web.jobs import Job, Jobs
+
+SCRIPT = """
+import json, sys, time
+for line in {first}, {{"tell": "working"}}:
+    print(json.dumps(line), flush=True)
+time.sleep(8.0)
+print(json.dumps({{"done": {{"x": 1}}}}), flush=True)
+"""
+
+
+class Scripted(Jobs):
+    """Jobs whose process runs a script instead of a worker."""
+
+    def __init__(self, first: dict[str, Any]) -> None:
+        super().__init__()
+        self.script = SCRIPT.format(first=first)
+
+    async def _process(self) -> asyncio.subprocess.Process:
+        pipe = asyncio.subprocess.PIPE
+        return await asyncio.create_subprocess_exec(
+            sys.executable, "-c", self.script, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
+        )
+
+
+def apart(work: Coroutine[Any, Any, Any]) -> Any:
+    """Run in a thread of its own: a browser of other tests keeps a loop in this one."""
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(asyncio.run, work).result()
+
+
+async def ended(first: dict[str, Any]) -> tuple[Job, list[dict[str, Any]]]:
+    """A job of 8 s with a limit of 5 s, when it has ended, and what it showed."""
+    jobs, shown = Scripted(first), list[dict[str, Any]]()
+    job = jobs.start("p", "read", "Reading", {}, limit=5.0, meanwhile=shown.append)
+    async for _ in job.lines():
+        pass
+    await jobs.close()
+    return job, shown
+
+
+@pytest.mark.slow
+def test_a_job_that_has_shown_something_may_take_longer() -> None:
+    """The doctor of ten million rows, whose record is in sight already."""
+    job, shown = apart(ended({"shown": {"rows": 7}}))
+    assert (job.state, job.error) == ("done", "")
+    assert shown == [{"rows": 7}]
+    assert job.result == {"x": 1}
+
+
+@pytest.mark.slow
+def test_a_job_that_shows_nothing_is_ended() -> None:
+    """A file on which a reader never comes to an end."""
+    job, shown = apart(ended({"tell": "reading"}))
+    assert job.state == "failed"
+    assert "found no end in 5 s" in job.error
+    assert not shown
+    assert job.process is not None
+    assert job.process.returncode is not None
