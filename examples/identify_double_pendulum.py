@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from scipy import signal
 
-from stickslip.identify.axis_inverse import correlation_lags
 from stickslip.identify.doctor import examine
-from stickslip.identify.profile import inverse_information, long_run
+from stickslip.identify.fit.profile import inverse_information, long_run
+from stickslip.identify.regression.inverse import correlation_lags
 from stickslip.readers.reading import read
 
 BAND = 5.0  # Hz: the torques are sinusoids of 0.8 and 1.6 Hz, and this holds their third harmonics
@@ -103,7 +103,7 @@ def identify(path: Path) -> dict[str, tuple[float, float]]:
     out = {n: (float(v), float(h)) for n, v, h in zip(NAMES, values, half, strict=True)}
     for name, unit in zip(NAMES, UNITS, strict=True):
         value, width = out[name]
-        verdict = "" if abs(value) > width else " (the data do not tell it from 0)"
+        verdict = "" if abs(value) > width else " (the data do not distinguish it from 0)"
         print(f"  {name:4s} {value:9.5f} ± {width:.5f} {unit}{verdict}")
     for label, part in (("fitted", slice(None, border)), ("not fitted", slice(border, None))):
         wrong = torque[part] - columns[part] @ values

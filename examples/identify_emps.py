@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from scipy.io import loadmat
 
-from stickslip.identify.axis import identify_axis
-from stickslip.identify.axis_inverse import inverse_dynamics
-from stickslip.identify.axis_trial import Trial
+from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
-from stickslip.simulation.driven import Loop
+from stickslip.simulation.recorded_input.simulation import Loop
 
 FILE = Path(os.environ.get("STICKSLIP_DATA", "../shared/data")) / "emps" / "DATA_EMPS.mat"
 

@@ -25,11 +25,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from stickslip import plugins
-from stickslip.identify.axis import identify_axis
-from stickslip.identify.axis_output import Extras, OutputError, output_error
-from stickslip.identify.axis_trial import Trial
+from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.axis.output import Extras, OutputError, output_error
+from stickslip.identify.trial import Trial
 from stickslip.machines.servo import Motor, ServoAxis
-from stickslip.simulation.driven import Loop
+from stickslip.simulation.recorded_input.simulation import Loop
 
 SUPPLY = 7.4  # V
 COUNTS, DIVISOR, PWM_LIMIT = 4096.0, 256.0, 885.0
