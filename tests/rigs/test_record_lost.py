@@ -52,6 +52,7 @@ class Disturbed(AxisRig):
     def __init__(self, act: Act, path: Path, at: int, *, blocks: bool) -> None:
         super().__init__(blocks=blocks)
         self._act, self._path, self._at = act, path, at
+        self.noticed: Callable[[], bool] = lambda: True
 
     def exchange(self, torque: float) -> Measurement:
         measured = super().exchange(torque)
@@ -68,6 +69,10 @@ class Disturbed(AxisRig):
         if count - last < self._at <= count:
             self._act(self._path)
             time.sleep(3 * PERIOD)
+            # A loop without a clock would be through before a busy machine lets the thread look at the file.
+            until = time.monotonic() + 10.0
+            while not self.noticed() and time.monotonic() < until:
+                time.sleep(PERIOD)
 
 
 @pytest.mark.parametrize(("realtime", "blocks"), [(True, False), (False, False), (False, True)])
@@ -77,6 +82,8 @@ def test_a_file_that_another_process_changes(name, realtime, blocks, tmp_path):
     path = tmp_path / "run.stream"
     rig = Disturbed(act, path, 60, blocks=blocks)
     with pytest.raises(RecordFault, match=word) as stopped, Loop(rig, path=path, realtime=realtime) as loop:
+        if not realtime:
+            rig.noticed = lambda: loop._stream.fault is not None
         loop.run(sine(400), PD)
     torques = np.array(rig.torques)
     assert torques[-1] == 0.0
