@@ -81,9 +81,10 @@ def test_a_file_that_another_process_changes(name, realtime, blocks, tmp_path):
     act, word = ACTS[name]
     path = tmp_path / "run.stream"
     rig = Disturbed(act, path, 60, blocks=blocks)
-    with pytest.raises(RecordFault, match=word) as stopped, Loop(rig, path=path, realtime=realtime) as loop:
-        if not realtime:
-            rig.noticed = lambda: loop._stream.fault is not None
+    loop = Loop(rig, path=path, realtime=realtime)
+    if not realtime:
+        rig.noticed = lambda: loop._stream.fault is not None
+    with pytest.raises(RecordFault, match=word) as stopped, loop:
         loop.run(sine(400), PD)
     torques = np.array(rig.torques)
     assert torques[-1] == 0.0
