@@ -10,15 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip.analyse.flexibility import (
-    Chain,
     far_inertia,
     flexibility,
     lowest_first_mode,
-    modes,
     sum_of_inverse_squares,
     twist,
 )
 from stickslip.errors import ParameterError
+from stickslip.machines.drivetrain import Chain
 
 TOTAL, SPRINGS = 4.2757e-4, (17800.0, 396.0)
 sizes = st.floats(1e-3, 1.0)
@@ -39,7 +38,7 @@ def test_twists_of_the_thesis(torque, stiffness, printed, room):
 
 
 def test_two_inertias_have_the_textbook_mode():
-    found = modes(Chain((2.0, 3.0), (50.0,)))
+    found = Chain((2.0, 3.0), (50.0,)).modes()
     assert found.frequencies == pytest.approx([0.0, math.sqrt(50.0 * (1 / 2 + 1 / 3)) / (2 * math.pi)])
     assert found.shapes[:, 0] == pytest.approx([1.0, 1.0])
     assert found.shapes[:, 1] == pytest.approx([1.0, -2.0 / 3.0])
@@ -48,7 +47,7 @@ def test_two_inertias_have_the_textbook_mode():
 @given(st.tuples(sizes, sizes, sizes), st.tuples(st.floats(1.0, 1e5), st.floats(1.0, 1e5)))
 def test_no_inertias_go_below_the_bound(parts, springs):
     chain = Chain(tuple(TOTAL * p / sum(parts) for p in parts), springs)
-    frequencies = 2.0 * math.pi * modes(chain).frequencies[1:]
+    frequencies = 2.0 * math.pi * chain.modes().frequencies[1:]
     assert np.sum(frequencies**-2.0) == pytest.approx(sum_of_inverse_squares(chain), rel=1e-6)
     assert frequencies[0] >= 2.0 * math.pi * lowest_first_mode(springs, TOTAL) * (1.0 - 1e-9)
 
@@ -57,7 +56,7 @@ def test_the_bound_is_reached_and_excludes_270_hz():
     floor = lowest_first_mode(SPRINGS, TOTAL)
     assert floor == pytest.approx(303.0, abs=0.1)
     halves = Chain((0.5 * TOTAL, 1e-9 * TOTAL, 0.5 * TOTAL), SPRINGS)
-    assert modes(halves).frequencies[1] == pytest.approx(floor, rel=1e-6)
+    assert halves.modes().frequencies[1] == pytest.approx(floor, rel=1e-6)
     found = flexibility(SPRINGS, TOTAL, claimed=(270.0, 330.0))
     assert "270 Hz is impossible" in "\n".join(found.lines())
     assert "330 Hz is possible" in "\n".join(found.lines())
@@ -72,7 +71,7 @@ def test_printed_270_and_2750_agree_as_frequencies_of_parts():
     product = 17800.0 * rest / (2.0 * math.pi * 2750.0) ** 2
     root = math.sqrt(rest**2 / 4.0 - product)
     parts = (rest / 2.0 + root, rest / 2.0 - root)
-    assert modes(Chain(parts, (17800.0,))).frequencies[1] == pytest.approx(2750.0)
+    assert Chain(parts, (17800.0,)).modes().frequencies[1] == pytest.approx(2750.0)
     assert min(parts) > 0.0
 
 

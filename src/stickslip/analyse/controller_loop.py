@@ -17,11 +17,12 @@ from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 
-from stickslip.analyse.presliding_loop import Contact, describing
+from stickslip.analyse.presliding_loop import describing
 from stickslip.control.block import ControlBlock
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import PLACES
 from stickslip.errors import InputError
+from stickslip.machines.drivetrain import FREE
 from stickslip.model import Model
 from stickslip.spec import Law, Par, Surroundings
 
@@ -212,7 +213,7 @@ def with_springs(controller: SampledController, amplitude: float, frequency: flo
 def _stuck(block: ControlBlock, amplitude: float, frequency: float) -> ControlBlock:
     if block.friction is None:
         return block
-    found = Contact(0.0) if math.isinf(amplitude) else describing(block.friction, amplitude, frequency)
+    found = FREE if math.isinf(amplitude) else describing(block.friction, amplitude, frequency)
     own = {f.name: getattr(block.parameters, f.name) for f in block.law.fields}
     return ControlBlock(block.law, Model(SPRING, stiffness=found.stiffness, damping=found.damping), **own)
 

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyse.controller_loop import LinearController, linearised
-from stickslip.analyse.presliding_loop import Axis, Contact, Drivetrain, Loop, Poles
+from stickslip.analyse.presliding_loop import Axis, Loop, Poles
 from stickslip.analyse.stability import AMPLITUDES, SLOW, edge, stable
 from stickslip.analyse.stability_result import Cycle
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
+from stickslip.machines.drivetrain import Drivetrain, LinearContact
 
 __all__ = ["ControllerStability", "LoopMargins", "controller_stability"]
 
@@ -180,7 +181,7 @@ def slid(axis: Axis) -> Drivetrain:
         fast = FAST * (float(law.velocity_scale(p)) if law.velocity_scale else 0.1)
         slope = float(law.steady(1.1 * fast, p) - law.steady(fast, p)) / (0.1 * fast)
     bearings = replace(axis.drivetrain.bearings, stiffness=0.0)
-    return replace(axis.drivetrain, contact=Contact(0.0, slope), bearings=bearings)
+    return replace(axis.drivetrain, contact=LinearContact(0.0, slope), bearings=bearings)
 
 
 def about(

@@ -18,97 +18,28 @@ reached with J/2 at each end and nothing between. No choice of inertias gives a 
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import accumulate
 from typing import Any
 
-import numpy as np
-
 from stickslip.errors import ParameterError
+from stickslip.machines.drivetrain import Chain, Modes
 
 __all__ = [
-    "Chain",
     "Flexibility",
-    "Modes",
     "far_inertia",
     "flexibility",
     "lowest_first_mode",
-    "modes",
     "twist",
 ]
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
-
-
-@dataclass(frozen=True)
-class Chain:
-    """Inertias in a row, joined by springs, free to turn as a whole.
-
-    Attributes
-    ----------
-    inertias : tuple of float
-        kg·m², motor first.
-    stiffness : tuple of float
-        N·m/rad, one fewer than the inertias.
-    """
-
-    inertias: tuple[float, ...]
-    stiffness: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        _positive("inertias", self.inertias, "kg·m²")
-        _positive("stiffness", self.stiffness, "N·m/rad")
-        if len(self.inertias) != len(self.stiffness) + 1:
-            raise ParameterError(
-                f"chain: {len(self.inertias)} inertias and {len(self.stiffness)} springs; give one spring fewer"
-            )
-
-    @property
-    def total(self) -> float:
-        """kg·m²"""
-        return math.fsum(self.inertias)
-
-    def stiffness_matrix(self) -> Array:
-        """K in J q'' + K q = T, N·m/rad, shape (n, n)."""
-        k = np.zeros((len(self.inertias),) * 2)
-        for i, spring in enumerate(self.stiffness):
-            k[i : i + 2, i : i + 2] += spring * np.array([[1.0, -1.0], [-1.0, 1.0]])
-        return k
-
-
-@dataclass(frozen=True, eq=False)
-class Modes:
-    """Undamped modes of a chain.
-
-    Attributes
-    ----------
-    frequencies : array, shape (n,)
-        Hz, ascending; the first is the rigid motion.
-    shapes : array, shape (n, n)
-        Angles of the inertias (rows) in every mode (columns), the largest 1.
-    """
-
-    frequencies: Array
-    shapes: Array
 
 
 def _positive(name: str, values: Sequence[float], unit: str) -> None:
     for value in values:
         if not (value > 0.0 and math.isfinite(value)):
             raise ParameterError(f"flexibility: {name} = {value:g} {unit} must be greater than 0")
-
-
-def modes(chain: Chain) -> Modes:
-    """Undamped modes of a free chain."""
-    linalg: Any = importlib.import_module("scipy.linalg")
-    squares, shapes = linalg.eigh(chain.stiffness_matrix(), np.diag(chain.inertias))
-    frequencies = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi)
-    frequencies[0] = 0.0  # the rigid motion, exactly
-    largest = shapes[np.argmax(np.abs(shapes), axis=0), np.arange(shapes.shape[1])]
-    return Modes(frequencies, shapes / largest)
 
 
 def twist(torque: float, stiffness: float) -> float:
@@ -245,7 +176,7 @@ def flexibility(
     return Flexibility(
         tuple(stiffness), inertia, dict(given),
         {name: tuple(twist(t, k) for k in stiffness) for name, t in given.items()},
-        lowest_first_mode(stiffness, inertia), chain, modes(chain) if chain else None,
+        lowest_first_mode(stiffness, inertia), chain, chain.modes() if chain else None,
         tuple(claimed), far, tuple(_free_first(stiffness[-1], inertia, last) for last in far),
     )  # fmt: skip
 
@@ -254,7 +185,7 @@ def _free_first(stiffness: float, total: float, last: float) -> float:
     """First mode of the drivetrain when only its last spring gives, Hz."""
     if last >= total:
         return math.nan
-    return float(modes(Chain((total - last, last), (stiffness,))).frequencies[1])
+    return float(Chain((total - last, last), (stiffness,)).modes().frequencies[1])
 
 
 def sum_of_inverse_squares(chain: Chain) -> float:

@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyse.controller_loop import linearised
+from stickslip.analyse.presliding_loop import Loop
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
+from stickslip.machines.drivetrain import Drivetrain
 
 __all__ = ["DAMPING", "HIGHEST", "default_corner", "largest_corner", "poles"]
 
@@ -42,22 +44,9 @@ def poles(controller: SampledController, inertia: float, delay: int = 0) -> Arra
     delay : int
         Samples by which the torque acts late.
     """
-    a, b, c, d = linearised(controller, math.inf, 1.0).state_space()
-    time, n = controller.sample_time, a.shape[0]
-    size = n + 2 + delay
-    whole = np.zeros((size, size))
-    torque = np.zeros(size)  # of this sample, by everything that is remembered
-    torque[:n], torque[n] = c[0], d
-    held = torque if delay == 0 else np.eye(size)[n + 2]
-    whole[:n, :n], whole[:n, n] = a, b[:, 0]
-    whole[n] = 0.5 * time * time / inertia * held
-    whole[n, n] += 1.0
-    whole[n, n + 1] += time
-    whole[n + 1] = time / inertia * held
-    whole[n + 1, n + 1] += 1.0
-    for k in range(delay):  # the oldest torque first
-        whole[n + 2 + k] = torque if k == delay - 1 else np.eye(size)[n + 3 + k]
-    return np.asarray(np.linalg.eigvals(whole), dtype=np.complex128)
+    drive = linearised(controller, math.inf, 1.0, float(delay))
+    found = np.linalg.eigvals(Loop(Drivetrain((inertia,)), drive).matrix())
+    return np.asarray(found, dtype=np.complex128)
 
 
 def damped(values: Array, damping: float) -> bool:

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy import linalg
 
-from stickslip.analyse.controller_loop import linearised
+from stickslip.analyse.controller_loop import LinearController, linearised
+from stickslip.analyse.presliding_loop import Loop
 from stickslip.control.block import ControlBlock
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
+from stickslip.machines.drivetrain import Drivetrain, LinearContact
 
 __all__ = ["Ratios", "largest_stiffness", "objection", "positive_real_ratios", "stuck_radius"]
 
@@ -96,21 +97,9 @@ def stuck_radius(
     delay : int
         Samples by which the torque acts late.
     """
-    a, b, c, d = about_rest(controller)
-    n, size = a.shape[0], a.shape[0] + 2 + delay
-    axis = np.zeros((3, 3))
-    axis[0, 1], axis[1] = 1.0, np.array([-stiffness, -damping, 1.0]) / inertia
-    algebra: Any = linalg
-    moved: Array = algebra.expm(axis * controller.sample_time)
-    whole, torque = np.zeros((size, size)), np.zeros(size)
-    torque[:n], torque[n] = c, d
-    held = torque if delay == 0 else np.eye(size)[n + 2]
-    whole[:n, :n], whole[:n, n] = a, b
-    whole[n : n + 2, n : n + 2] = moved[:2, :2]
-    whole[n : n + 2] += np.outer(moved[:2, 2], held)
-    for k in range(delay):  # the oldest torque first
-        whole[n + 2 + k] = torque if k == delay - 1 else np.eye(size)[n + 3 + k]
-    return float(np.abs(np.linalg.eigvals(whole)).max())
+    drivetrain = Drivetrain((inertia,), contact=LinearContact(stiffness, damping))
+    drive = LinearController(about_rest(controller), controller.sample_time, float(delay))
+    return Loop(drivetrain, drive).poles().radius
 
 
 def about_rest(controller: SampledController) -> tuple[Array, Array, Array, float]:
@@ -127,13 +116,13 @@ def about_rest(controller: SampledController) -> tuple[Array, Array, Array, floa
     others = [b for name, b in controller.blocks.items() if b.law.place == "observer" and name != part]
     rest = linearised(replace(controller, observer=others or None), math.inf, 1.0).state_space()
     n = rest[0].shape[0]
-    a, b, c = np.zeros((n + 2, n + 2)), np.zeros(n + 2), np.zeros(n + 2)
-    a[:n, :n], b[:n], c[:n] = rest[0], rest[1][:, 0], rest[2][0]
+    a, b, c = np.zeros((n + 2, n + 2)), np.zeros((n + 2, 1)), np.zeros((1, n + 2))
+    a[:n, :n], b[:n], c[:, :n] = rest[:3]
     a[n, n], a[n, n + 1], b[n], b[n + 1] = 1.0, -1.0, 1.0 - p.correction * time, 1.0
     viscous = p.gain * p.sigma2 / time
     c += p.gain * p.sigma0 * a[n]
-    c[n + 1] -= viscous
-    return a, b, c, rest[3] + p.gain * p.sigma0 * b[n] + viscous
+    c[0, n + 1] -= viscous
+    return a, b, c, rest[3] + p.gain * p.sigma0 * float(b[n, 0]) + viscous
 
 
 def largest_stiffness(

@@ -8,7 +8,6 @@ the first, the contact on the last. Its torque is held for a sample time, and ma
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -17,13 +16,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from stickslip.analyse.flexibility import Chain
 from stickslip.control.linear import Gains
 from stickslip.errors import ParameterError
+from stickslip.machines.drivetrain import FREE, INPUTS, Drivetrain, LinearContact
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
-__all__ = ["Axis", "Contact", "Drive", "Drivetrain", "Loop", "Poles", "Sampled", "describing"]
+__all__ = ["Axis", "Drive", "Loop", "Poles", "Sampled", "describing"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -31,15 +30,7 @@ STEPS = 64
 """Of a period, in the describing function of a law."""
 
 
-@dataclass(frozen=True)
-class Contact:
-    """A friction law for small motion about rest: torque = stiffness x + damping v (N·m/rad, N·m·s/rad)."""
-
-    stiffness: float
-    damping: float = 0.0
-
-
-def describing(model: Model, amplitude: float, frequency: float) -> Contact:
+def describing(model: Model, amplitude: float, frequency: float) -> LinearContact:
     """A law's first harmonic along a sinusoid about rest: its describing function.
 
     It is what the law's own `step` answers in the second period, so it holds for every law: a contact that sticks is a
@@ -70,128 +61,7 @@ def describing(model: Model, amplitude: float, frequency: float) -> Contact:
                 in_phase += torque * math.sin(angle)
                 in_step += torque * math.cos(angle)
     scale = 2.0 / (STEPS * amplitude)
-    return Contact(max(scale * in_phase, 0.0), scale * in_step / w)  # a jump's phase is only rounded
-
-
-@dataclass(frozen=True)
-class Drivetrain:
-    """What the drive moves, while the contact sticks.
-
-    Attributes
-    ----------
-    inertias : tuple of float
-        kg·m², motor first; one alone is the rigid axis.
-    springs : tuple of float
-        N·m/rad between them.
-    dampers : tuple of float
-        N·m·s/rad beside the springs; empty for none.
-    contact : Contact
-        On the last inertia.
-    encoder : int
-        The inertia whose angle is measured.
-    encoder_mode, encoder_damping : float
-        Resonance of the encoder's mounting, Hz, and its damping ratio; 0 Hz for none.
-    encoder_share : float
-        Part of the reading that goes through it: (1 - share) angle + share (angle of a mass that follows it).
-    amplifier : float
-        Bandwidth of the current loop, Hz (first order); infinite for none.
-    bearings : Contact
-        On the encoder's inertia.
-    """
-
-    inertias: tuple[float, ...]
-    springs: tuple[float, ...] = ()
-    contact: Contact = Contact(0.0)
-    dampers: tuple[float, ...] = ()
-    encoder: int = 0
-    encoder_mode: float = 0.0
-    encoder_damping: float = 0.0
-    encoder_share: float = 1.0
-    amplifier: float = math.inf
-    bearings: Contact = Contact(0.0)
-
-    def __post_init__(self) -> None:
-        Chain(self.inertias, self.springs)
-        if not 0 <= self.encoder < len(self.inertias):
-            raise ParameterError(f"stability: encoder = {self.encoder} is not the number of an inertia")
-        if self.dampers and len(self.dampers) != len(self.springs):
-            raise ParameterError(f"stability: {len(self.dampers)} dampers for {len(self.springs)} springs")
-
-    def softer(self, share: float) -> Drivetrain:
-        """The same, but that the encoder sees only so much of the contact: some of its elements slip."""
-        seen = share * (self.visible - self.bearings.stiffness)
-        if seen <= 0.0:
-            return replace(self, contact=replace(self.contact, stiffness=0.0))
-        behind = 1.0 / seen - math.fsum(1.0 / k for k in self.springs[self.encoder :])
-        return replace(self, contact=replace(self.contact, stiffness=1.0 / behind))
-
-    @property
-    def reach(self) -> float:
-        """How much of a slow motion of the encoder arrives at the contact."""
-        compliance = math.fsum(1.0 / k for k in self.springs[self.encoder :])
-        return 1.0 / (1.0 + self.contact.stiffness * compliance)
-
-    @property
-    def visible(self) -> float:
-        """Stiffness of the contact as the encoder sees it, shaft included, N·m/rad."""
-        behind = self.springs[self.encoder :]
-        beside = self.bearings.stiffness
-        if self.contact.stiffness <= 0.0:
-            return beside
-        return beside + 1.0 / (1.0 / self.contact.stiffness + math.fsum(1.0 / k for k in behind))
-
-    def state_space(self) -> tuple[Array, Array, Array]:
-        """A, B, C of dx/dt = A x + B torque, measured angle = C x."""
-        n = len(self.inertias)
-        chain = Chain(self.inertias, self.springs)
-        stiffness, damping = chain.stiffness_matrix(), np.zeros((n, n))
-        if self.dampers:
-            damping += _chain_matrix(self.dampers, n)
-        stiffness[-1, -1] += self.contact.stiffness
-        damping[-1, -1] += self.contact.damping
-        stiffness[self.encoder, self.encoder] += self.bearings.stiffness
-        damping[self.encoder, self.encoder] += self.bearings.damping
-        mass = np.array(self.inertias)
-        a = np.zeros((2 * n, 2 * n))
-        a[:n, n:] = np.eye(n)
-        a[n:, :n], a[n:, n:] = -stiffness / mass[:, None], -damping / mass[:, None]
-        b, c = np.zeros((2 * n, 1)), np.zeros((1, 2 * n))
-        b[n, 0], c[0, self.encoder] = 1.0 / mass[0], 1.0
-        if self.encoder_mode > 0.0:
-            a, b, c = self._with_encoder(a, b, c)
-        if math.isfinite(self.amplifier):
-            a, b, c = _with_lag(a, b, c, 2.0 * math.pi * self.amplifier)
-        return a, b, c
-
-    def _with_encoder(self, a: Array, b: Array, c: Array) -> tuple[Array, Array, Array]:
-        """A part of the reading follows the angle of the encoder's inertia through a resonance."""
-        n, w = a.shape[0], 2.0 * math.pi * self.encoder_mode
-        wide = np.zeros((n + 2, n + 2))
-        wide[:n, :n] = a
-        damped = 2.0 * self.encoder_damping * w
-        wide[n, n + 1] = 1.0
-        wide[n + 1, :n] = w * w * c[0] + damped * (c @ a)[0]
-        wide[n + 1, n:] = -w * w, -damped
-        out = np.hstack([(1.0 - self.encoder_share) * c, np.array([[self.encoder_share, 0.0]])])
-        return wide, np.vstack([b, np.zeros((2, 1))]), out
-
-
-def _chain_matrix(values: tuple[float, ...], n: int) -> Array:
-    out = np.zeros((n, n))
-    for i, value in enumerate(values):
-        out[i : i + 2, i : i + 2] += value * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    return out
-
-
-def _with_lag(a: Array, b: Array, c: Array, corner: float) -> tuple[Array, Array, Array]:
-    """A first-order lag before the plant."""
-    n = a.shape[0]
-    wide = np.zeros((n + 1, n + 1))
-    wide[:n, :n], wide[:n, n:] = a, b
-    wide[n, n] = -corner
-    into = np.zeros((n + 1, 1))
-    into[n, 0] = corner
-    return wide, into, np.hstack([c, np.zeros((1, 1))])
+    return LinearContact(max(scale * in_phase, 0.0), scale * in_step / w)  # a jump's phase is only rounded
 
 
 class Sampled(Protocol):
@@ -219,7 +89,7 @@ class Drive:
     Attributes
     ----------
     gains : Gains
-    law : Contact
+    law : LinearContact
         What the feedback compensator runs on, while it sticks.
     gain : float
         Factor on the compensating torque.
@@ -232,7 +102,7 @@ class Drive:
     """
 
     gains: Gains
-    law: Contact = Contact(0.0)
+    law: LinearContact = FREE
     gain: float = 1.0
     filter_hz: float = 0.0
     sample_time: float = 1e-3
@@ -313,14 +183,10 @@ class Poles:
 @lru_cache(maxsize=512)
 def held(drivetrain: Drivetrain, sample_time: float, late: float) -> tuple[Array, Array, Array, Array]:
     """From sample to sample: A, B of the new torque, which acts from `late` samples on, B of the one before, C."""
-    linalg: Any = importlib.import_module("scipy.linalg")
-    a, b, c = drivetrain.state_space()
-    n = a.shape[0]
-    both = np.zeros((n + 1, n + 1))
-    both[:n, :n], both[:n, n:] = a, b
-    first = linalg.expm(both * sample_time * late)
-    then = linalg.expm(both * sample_time * (1.0 - late))
-    return then[:n, :n] @ first[:n, :n], then[:n, n:], then[:n, :n] @ first[:n, n:], c
+    system, command = drivetrain.state_space(), INPUTS.index("command")
+    first, then = system.over(sample_time * late), system.over(sample_time * (1.0 - late))
+    into, before = then.held[:, [command]], first.held[:, [command]]
+    return then.moved @ first.moved, into, then.moved @ before, system.c
 
 
 @dataclass(frozen=True)

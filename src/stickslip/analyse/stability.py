@@ -24,16 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyse.presliding_loop import (
-    Axis,
-    Contact,
-    Drive,
-    Drivetrain,
-    Loop,
-    Poles,
-    Sampled,
-    describing,
-)
+from stickslip.analyse.presliding_loop import Axis, Drive, Loop, Poles, Sampled, describing
 from stickslip.analyse.stability_result import (
     FILTERS,
     GAINS,
@@ -47,6 +38,7 @@ from stickslip.analyse.stability_result import (
 )
 from stickslip.control.controller import highest_corner
 from stickslip.control.linear import Gains
+from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
 from stickslip.model import Model
 
 __all__ = ["AMPLITUDES", "COUNTED", "SLOW", "edge", "gain_margin", "stability", "stable", "with_law"]
@@ -90,7 +82,7 @@ def edge(good: Callable[[float], bool], points: Array) -> float:
     return float(points[-1])
 
 
-def gain_margin(drivetrain: Drivetrain, drive: Drive, law: Contact) -> float:
+def gain_margin(drivetrain: Drivetrain, drive: Drive, law: LinearContact) -> float:
     """The loop is stable for all gains from 0 to this, at most `MOST_GAIN`; NaN where it is unstable without any."""
     # Steep laws go unstable at tiny gains: the first points are close together.
     points = np.concatenate([[0.0], np.geomspace(1e-4, 0.1, 10), np.linspace(0.2, MOST_GAIN, 29)])
@@ -101,7 +93,7 @@ def _linear_limit(drivetrain: Drivetrain, drive: Drive) -> float:
     def good(s: float) -> bool:
         g = drive.gains
         scaled = Gains(g.kp * s * s, g.ki * s**3, g.kd * s, g.kr * s)
-        return stable(drivetrain, replace(drive, gains=scaled, law=Contact(0.0)))
+        return stable(drivetrain, replace(drive, gains=scaled, law=FREE))
 
     return edge(good, np.geomspace(0.02, 20.0, 61))
 
@@ -112,7 +104,7 @@ def with_law(
     """Drivetrain and drive at an amplitude of the encoder; the compensator sees what its filter leaves of it."""
     drivetrain = axis.at(amplitude, frequency)
     if model is None:
-        return drivetrain, replace(drive, law=Contact(0.0), filter_hz=0.0)
+        return drivetrain, replace(drive, law=FREE, filter_hz=0.0)
     left = 1.0
     if drive.filter_hz > 0.0:
         left = 1.0 / math.sqrt(1.0 + (frequency / drive.filter_hz) ** 4)
@@ -214,7 +206,7 @@ def stability(
     ------
     ParameterError
     """
-    alone = replace(drive, law=Contact(0.0), filter_hz=0.0)
+    alone = replace(drive, law=FREE, filter_hz=0.0)
     rows = [_margins("", axis, alone, None)]
     rows += [
         _margins(name, axis, replace(alone, filter_hz=f), model) for name, model in models.items() for f in filters

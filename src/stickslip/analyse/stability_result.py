@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyse.presliding_loop import Axis, Contact, Drive, Drivetrain, Poles
+from stickslip.analyse.presliding_loop import Axis, Drive, Poles
+from stickslip.machines.drivetrain import Drivetrain, LinearContact
 
 __all__ = ["FILTERS", "GAINS", "MOST_GAIN", "TIMES", "Cycle", "Map", "Margins", "Recommended", "Stability"]
 
@@ -40,7 +41,7 @@ class Margins:
     ----------
     name : str
         Empty: no compensation.
-    law : Contact
+    law : LinearContact
         The compensator's law at the small amplitude.
     filter_hz : float
         Of its input; 0 for none.
@@ -60,7 +61,7 @@ class Margins:
     """
 
     name: str
-    law: Contact
+    law: LinearContact
     filter_hz: float
     at_one: Poles
     gain: float

@@ -22,7 +22,7 @@ from stickslip.control.compensator import COMPENSATORS
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import LimitCrossed
-from stickslip.identify.response.drivetrain import Drivetrain
+from stickslip.identify.response.drivetrain import FittedDrivetrain
 from stickslip.identify.response.nyquist import Fastest
 from stickslip.identify.setting.recommend import laws_of
 from stickslip.machines.angle import AngleMap
@@ -115,7 +115,7 @@ class Known:
     model : Model
         Friction as the encoder sees it.
     angle : AngleMap
-    drivetrain : Drivetrain
+    drivetrain : FittedDrivetrain
     stiffness : float
         Before sliding, at the encoder, N·m/rad.
     resolution : float
@@ -127,7 +127,7 @@ class Known:
     inertia: float
     model: Model
     angle: AngleMap
-    drivetrain: Drivetrain
+    drivetrain: FittedDrivetrain
     stiffness: float
     resolution: float
     fastest: Fastest

@@ -9,8 +9,9 @@ import math
 from dataclasses import dataclass
 
 from stickslip.errors import ParameterError
+from stickslip.machines.drivetrain import Chain
 
-__all__ = ["FlexibleAxis", "lowest_first_mode"]
+__all__ = ["FlexibleAxis"]
 
 
 @dataclass(frozen=True)
@@ -56,11 +57,9 @@ class FlexibleAxis:
     @property
     def modes(self) -> tuple[float, float, float]:
         """Undamped modes of the free axis, Hz: 0, that of the shaft, that of the coupling."""
-        j1, j2, j3, k1, k2 = self.rotor, self.shaft, self.disk, self.coupling, self.elasticity
-        half = 0.5 * (k1 * (1.0 / j1 + 1.0 / j2) + k2 * (1.0 / j2 + 1.0 / j3))
-        product = k1 * k2 * self.inertia / (j1 * j2 * j3)
-        upper = half + math.sqrt(half * half - product)
-        return 0.0, math.sqrt(product / upper) / (2.0 * math.pi), math.sqrt(upper) / (2.0 * math.pi)
+        chain = Chain((self.rotor, self.shaft, self.disk), (self.coupling, self.elasticity))
+        zero, first, second = chain.modes().frequencies.tolist()
+        return zero, first, second
 
     @property
     def dampers(self) -> tuple[float, float]:
@@ -81,12 +80,3 @@ class FlexibleAxis:
         """Stiffness of the contact whose stiffness at the encoder is `visible`; infinite if the shaft is softer."""
         rest = 1.0 / visible - 1.0 / self.elasticity
         return 1.0 / rest if rest > 0.0 else math.inf
-
-
-def lowest_first_mode(inertia: float, coupling: float, elasticity: float) -> float:
-    """The lowest first mode, Hz, that any division of the inertia (kg·m²) into three has.
-
-    The slowest division leaves nothing between coupling and shaft: both in series, between two equal halves.
-    """
-    series = 1.0 / (1.0 / coupling + 1.0 / elasticity)
-    return math.sqrt(4.0 * series / inertia) / (2.0 * math.pi)

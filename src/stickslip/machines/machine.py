@@ -17,6 +17,7 @@ from stickslip import plugins
 from stickslip.config import Table, read_toml
 from stickslip.errors import ConfigError, ParameterError, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
+from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
@@ -165,6 +166,42 @@ class Machine:
         seen = self.flexible.visible(own) if self.flexible and own > 0.0 else own
         beside = self.contact.bearings.stiffness if self.contact.bearings.coulomb > 0.0 else 0.0
         return seen + beside
+
+    @property
+    def stuck_bearings(self) -> LinearContact:
+        """The bearings for small motion: they stick like their spring, and are viscous always."""
+        bearings = self.contact.bearings
+        return LinearContact(bearings.stiffness if bearings.coulomb > 0.0 else 0.0, bearings.viscous)
+
+    def linear(self, contact: LinearContact = FREE, bearings: LinearContact | None = None) -> Drivetrain:
+        """This machine as a linear system: inertias, springs, current loop and encoder, without noise and delay.
+
+        Parameters
+        ----------
+        contact : LinearContact
+            What its friction is for the motion in question (`stickslip.analyse.presliding_loop.describing`); left out,
+            the contact slides and its torque is an input (``load``).
+        bearings : LinearContact, optional
+            What its bearings are (`stuck_bearings`); left out, they slide and are viscous.
+
+        Returns
+        -------
+        Drivetrain
+            ``.state_space()`` gives A, B, C with the names of states and inputs, ``.chain.modes()`` the free modes.
+        """
+        flexible, encoder = self.flexible, self.encoder
+        return Drivetrain(
+            (flexible.rotor, flexible.shaft, flexible.disk) if flexible else (self.inertia,),
+            (flexible.coupling, flexible.elasticity) if flexible else (),
+            contact,
+            flexible.dampers if flexible else (),
+            encoder=1 if flexible else 0,
+            encoder_mode=encoder.mode if encoder.mode_share > 0.0 else 0.0,
+            encoder_damping=encoder.mode_damping,
+            encoder_share=encoder.mode_share,
+            amplifier=self.amplifier.bandwidth,
+            bearings=bearings or LinearContact(0.0, self.contact.bearings.viscous),
+        )
 
     def without(self, *names: str) -> Machine:
         """This machine with imperfections switched off.

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyse.dependence import Dependence
-from stickslip.analyse.flexibility import Chain, Flexibility, modes
+from stickslip.analyse.flexibility import Flexibility
 from stickslip.analyse.motor_vs_sensor import Sides
 from stickslip.analyse.repeatability import Repeated
 from stickslip.analyse.spectrum import Spectrum
+from stickslip.machines.drivetrain import Chain
 from stickslip.report.plots import SPARE, Curve, Panel, Style, envelope, save, scaled
 
 __all__ = [
@@ -162,14 +163,14 @@ def picture_of_flexibility(found: Flexibility) -> Drawn:
         for i, (label, part) in enumerate(SPLITS.items()):
             # Of what the last inertia leaves, `part` is the middle one's.
             f = [
-                modes(Chain(((1 - s) * (1 - part) * found.inertia, (1 - s) * part * found.inertia, s * found.inertia),
-                            found.stiffness)).frequencies[1]
+                Chain(((1 - s) * (1 - part) * found.inertia, (1 - s) * part * found.inertia, s * found.inertia),
+                      found.stiffness).modes().frequencies[1]
                 for s in SHARES
             ]  # fmt: skip
             curves.append(Curve(100.0 * SHARES, np.array(f), label, LINES[i]))
     else:
         f = [
-            modes(Chain(((1 - s) * found.inertia, s * found.inertia), found.stiffness[-1:])).frequencies[1]
+            Chain(((1 - s) * found.inertia, s * found.inertia), found.stiffness[-1:]).modes().frequencies[1]
             for s in SHARES
         ]
         curves.append(Curve(100.0 * SHARES, np.array(f), "last spring alone", MAIN))

@@ -18,10 +18,11 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identify.fit.filters import cross_spectrum, spectrum
+from stickslip.machines.drivetrain import Drivetrain, LinearContact
 from stickslip.machines.flexible import FlexibleAxis
 from stickslip.record import Record
 
-__all__ = ["Drivetrain", "LoopResponse", "fit_drivetrain", "identified_drivetrain", "loop_response"]
+__all__ = ["FittedDrivetrain", "LoopResponse", "fit_drivetrain", "identified_drivetrain", "loop_response"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
@@ -112,7 +113,7 @@ def loop_response(
 
 
 @dataclass(frozen=True)
-class Drivetrain:
+class FittedDrivetrain:
     """Two inertias with a spring between, as both responses show them.
 
     Attributes
@@ -135,7 +136,7 @@ class Drivetrain:
     spread: tuple[float, ...] = ()
 
 
-def fit_drivetrain(sliding: LoopResponse, sticking: LoopResponse, inertia: float) -> Drivetrain:
+def fit_drivetrain(sliding: LoopResponse, sticking: LoopResponse, inertia: float) -> FittedDrivetrain:
     """Motor side, load side, spring, damping and delay from both responses, by least squares on their logarithms.
 
     Sticking, the load side stands still: its mode is the motor side's on the spring. What is beside one mode (an
@@ -154,7 +155,7 @@ def fit_drivetrain(sliding: LoopResponse, sticking: LoopResponse, inertia: float
     """
     free, held = sliding.peak, sticking.peak
     if over_rigid(sliding, inertia) < PEAK:
-        return Drivetrain(None, rigid_delay(sliding, inertia), math.nan, held)
+        return FittedDrivetrain(None, rigid_delay(sliding, inertia), math.nan, held)
     if not held < free:
         raise InputError(
             f"the mode while sticking, {held:.3g} Hz, must lie below that while sliding, {free:.3g} Hz; excite more"
@@ -184,7 +185,7 @@ def fit_drivetrain(sliding: LoopResponse, sticking: LoopResponse, inertia: float
     level = 2.0 * float(found.fun @ found.fun) / (found.fun.size - 4)
     information: Array = np.asarray(found.jac.T @ found.jac, dtype=np.float64)
     spread = np.sqrt(np.diag(level * np.linalg.inv(information)))
-    return Drivetrain(axis, float(found.x[3]), free, held, tuple(float(s) for s in spread))
+    return FittedDrivetrain(axis, float(found.x[3]), free, held, tuple(float(s) for s in spread))
 
 
 def over_rigid(r: LoopResponse, inertia: float) -> float:
@@ -212,20 +213,19 @@ def modelled(x: Array, r: LoopResponse, inertia: float, stuck: bool) -> Complex:
     motor = inertia / (1.0 + share)
     load = inertia - motor
     spring = motor * (2.0 * math.pi * held) ** 2
-    s = 2j * math.pi * r.frequency
     rub = 2.0 * damping * math.sqrt(spring / (1.0 / motor + 1.0 / load))
-    link = spring + rub * s
     plant = (
-        1.0 / (motor * s**2 + link)
+        Drivetrain((motor,), contact=LinearContact(spring, rub))  # its load side stands still
         if stuck
-        else (load * s**2 + link) / (s**2 * (motor * load * s**2 + link * (motor + load)))
+        else Drivetrain((motor, load), (spring,), dampers=(rub,))
     )
-    turn = s * r.sample_time
-    return plant * (1.0 - np.exp(-turn)) / turn * np.exp(-turn * x[3])
+    turn = 2j * math.pi * r.frequency * r.sample_time
+    hold = (1.0 - np.exp(-turn)) / turn
+    return plant.state_space().response(r.frequency) * hold * np.exp(-turn * x[3])
 
 
 def identified_drivetrain(
-    responses: Sequence[LoopResponse], drivetrain: Drivetrain, said: str
+    responses: Sequence[LoopResponse], drivetrain: FittedDrivetrain, said: str
 ) -> Identification:
     """Modes and delay as an identification without a law; `said` is what is known of the PD that it bears."""
     estimates = [
@@ -272,7 +272,7 @@ def within(name: str, unit: str, symbol: str, value: float, std: float) -> Estim
     return Estimate(name, unit, symbol, value, std, low, high, not why, why)
 
 
-def picture_of(responses: Sequence[LoopResponse], drivetrain: Drivetrain) -> Picture:
+def picture_of(responses: Sequence[LoopResponse], drivetrain: FittedDrivetrain) -> Picture:
     """Acceleration per torque over the frequency, measured and fitted."""
     traces: list[Trace] = []
     for r, kind in zip(responses, ("points", "open points"), strict=True):
@@ -292,7 +292,7 @@ def picture_of(responses: Sequence[LoopResponse], drivetrain: Drivetrain) -> Pic
     )  # fmt: skip
 
 
-def coordinates(axis: FlexibleAxis, drivetrain: Drivetrain) -> Array:
+def coordinates(axis: FlexibleAxis, drivetrain: FittedDrivetrain) -> Array:
     """A drivetrain as `modelled` takes it."""
     return np.array([
         math.log(axis.disk / (axis.inertia - axis.disk)), math.log(drivetrain.sticking), math.log(axis.damping),

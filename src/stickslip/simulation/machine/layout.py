@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import compiled_law, flat, kernel
+from stickslip.machines.drivetrain import INPUTS, StateSpace
 from stickslip.machines.machine import Machine
 from stickslip.simulation.machine import step
 from stickslip.simulation.machine.step import plant_of, sample
@@ -99,71 +99,25 @@ def substeps_of(machine: Machine, stiffness: float) -> int:
 
 def transition(machine: Machine, h: float, damped: bool) -> tuple[dict[str, int], Array]:
     """Where the states lie, and the exact flow of the linear part over h with what each input adds to it."""
-    a, places = linear_part(machine)
-    size = a.shape[0]
-    inputs = np.zeros((size, 4))  # motor, cogging, bearings, friction
-    flexible = machine.flexible
-    inertias = (flexible.rotor, flexible.shaft, flexible.disk) if flexible else (machine.inertia,) * 3
-    rotor, shaft, disk = places["rotor"] + 1, places["shaft"] + 1, places["disk"] + 1
-    if places["lag"]:
-        inputs[places["lag"], 0] = 2.0 * math.pi * machine.amplifier.bandwidth
-    else:
-        inputs[rotor, 0] = 1.0 / inertias[0]
-    inputs[rotor, 1] = 1.0 / inertias[0]
-    inputs[shaft, 2] = 1.0 / inertias[1]
-    inputs[disk, 3] = 1.0 / inertias[2]
-    # Van Loan 1978: input held (first block) and rising from 0 to 1 (second block) over h.
-    big = np.zeros((size + 8, size + 8))
-    big[:size, :size], big[:size, size : size + 4] = a * h, inputs * h
-    big[size : size + 4, size + 4 :] = np.eye(4)
-    linalg: Any = importlib.import_module("scipy.linalg")
-    flow = np.asarray(linalg.expm(big), dtype=np.float64)[:size]
-    held, rising = flow[:, size : size + 4], flow[:, size + 4 :]
-    out = np.zeros((size, size + step.INPUTS))
-    out[:, :size] = flow[:, :size]
-    out[:, size + step.IN_MOTOR] = held[:, 0]
-    out[:, size + step.IN_COG] = held[:, 1]
-    out[:, size + step.IN_BEARING] = held[:, 2]
-    out[:, size + step.IN_FIRST] = 0.0 if damped else held[:, 3] - rising[:, 3]
-    out[:, size + step.IN_LAST] = held[:, 3] if damped else rising[:, 3]
-    return {**places, "size": size}, out
-
-
-def linear_part(machine: Machine) -> tuple[Array, dict[str, int]]:
-    """dx/dt = A x: positions and velocities in turn, then the motor's lagging torque, then the encoder's mode."""
-    flexible, amplifier, encoder = machine.flexible, machine.amplifier, machine.encoder
-    bodies = 3 if flexible else 1
-    lag = 2 * bodies if math.isfinite(amplifier.bandwidth) else 0
-    mode = 2 * bodies + (1 if lag else 0) if encoder.mode > 0.0 and encoder.mode_share > 0.0 else 0
-    size = 2 * bodies + (1 if lag else 0) + (2 if mode else 0)
-    a = np.zeros((size, size))
-    inertias = (flexible.rotor, flexible.shaft, flexible.disk) if flexible else (machine.inertia,)
-    for body in range(bodies):
-        a[2 * body, 2 * body + 1] = 1.0
-    if flexible:
-        springs = (flexible.coupling, flexible.elasticity)
-        for i, (k, d) in enumerate(zip(springs, flexible.dampers, strict=True)):
-            for body, sign in ((i, -1.0), (i + 1, 1.0)):
-                a[2 * body + 1, 2 * i] += sign * k / inertias[body]
-                a[2 * body + 1, 2 * i + 2] -= sign * k / inertias[body]
-                a[2 * body + 1, 2 * i + 1] += sign * d / inertias[body]
-                a[2 * body + 1, 2 * i + 3] -= sign * d / inertias[body]
+    system = machine.linear().state_space()
     places = {
-        "rotor": 0, "shaft": 2 if flexible else 0, "disk": 4 if flexible else 0, "lag": lag, "mode": mode,
+        "rotor": 0, "shaft": 2 if machine.flexible else 0, "disk": 4 if machine.flexible else 0,
+        "lag": place_of("torque", system), "mode": place_of("mode", system), "size": len(system.states),
     }  # fmt: skip
-    shaft = places["shaft"]
-    viscous = machine.contact.bearings.viscous
-    a[shaft + 1, shaft + 1] -= viscous / (flexible.shaft if flexible else machine.inertia)
-    if lag:
-        a[lag, lag] = -2.0 * math.pi * amplifier.bandwidth
-        a[1, lag] = 1.0 / inertias[0]
-    if mode:
-        omega = 2.0 * math.pi * encoder.mode
-        a[mode, mode + 1] = 1.0
-        a[mode + 1, mode], a[mode + 1, shaft] = -(omega**2), omega**2
-        a[mode + 1, mode + 1] = -2.0 * encoder.mode_damping * omega
-        a[mode + 1, shaft + 1] = 2.0 * encoder.mode_damping * omega
-    return a, places
+    size, flow = places["size"], system.over(h)
+    out = np.zeros((size, size + step.INPUTS))
+    out[:, :size] = flow.moved
+    for column, source in ((step.IN_MOTOR, "command"), (step.IN_COG, "motor"), (step.IN_BEARING, "encoder")):
+        out[:, size + column] = flow.held[:, INPUTS.index(source)]
+    held, rising = flow.held[:, INPUTS.index("load")], flow.rising[:, INPUTS.index("load")]
+    out[:, size + step.IN_FIRST] = 0.0 if damped else held - rising
+    out[:, size + step.IN_LAST] = held if damped else rising
+    return places, out
+
+
+def place_of(name: str, system: StateSpace) -> int:
+    """The place of a state; 0 where the machine has none of that name."""
+    return system.states.index(name) if name in system.states else 0
 
 
 def numbers_of(machine: Machine, parts: int, states: int, places: dict[str, int], damped: bool) -> Array:
