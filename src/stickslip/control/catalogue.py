@@ -172,15 +172,51 @@ def twisting(belief: Belief, form: str) -> ControlBlock:
     )
 
 
+def stands_below(belief: Belief) -> float:
+    """rad/s: the speed from which an axis does not stand."""
+    return max(2.0 * belief.number("vs"), 0.2 * belief.flicker)
+
+
 def push(belief: Belief) -> ControlBlock:
     """An error-sign push."""
-    speed = max(2.0 * belief.number("vs"), 0.2 * belief.flicker)
-    return ControlBlock("stiction_push", torque=0.9 * belief.number("fs"), error=2e-3, speed=speed)
+    return ControlBlock(
+        "stiction_push", torque=0.9 * belief.number("fs"), error=2e-3, speed=stands_below(belief)
+    )
 
 
-def dither(belief: Belief) -> ControlBlock:
+def stiffness(belief: Belief) -> float:
+    """N·m/rad, of the PD."""
+    return belief.inertia * belief.pace**2
+
+
+def filled_up(belief: Belief) -> ControlBlock:
+    """Nonlinear Coulomb: a fifth above break-away, by a layer nine times as stiff as the PD."""
+    torque, gain = 1.2 * belief.number("fs"), stiffness(belief)
+    return ControlBlock("nonlinear_coulomb", torque=torque, gain=gain, layer=torque / (8.0 * gain))
+
+
+def springs(belief: Belief) -> ControlBlock:
+    """Nonlinear Maxwell-slip: together eight times as stiff as the PD, and just below break-away."""
+    whole = 8.0 * stiffness(belief)
+    return ControlBlock(
+        "nonlinear_maxwell_slip",
+        k=[x * whole / 7.0 for x in (4.0, 2.0, 1.0)],
+        w=[0.3 * belief.number("fs")] * 3,
+    )
+
+
+def knocker(belief: Belief) -> ControlBlock:
+    """Pulses of half the break-away, two samples of ten."""
+    fs = belief.number("fs")
+    return ControlBlock("knocker", torque=0.5 * fs, samples=10.0, width=2.0, least=1e-3 * fs)
+
+
+def dither(belief: Belief, given: str = "always") -> ControlBlock:
     """A square wave at a quarter of the sample rate."""
-    return ControlBlock("dither", torque=0.6 * belief.number("fs"), samples=4.0)
+    more: dict[str, Any] = {"error": 2e-3, "speed": stands_below(belief)} if given == "stuck" else {}
+    return ControlBlock(
+        "dither", None, {"given": given}, torque=0.6 * belief.number("fs"), samples=4.0, **more
+    )
 
 
 # ---- the catalogue -------------------------------------------------------------------------------------------------
@@ -286,6 +322,16 @@ CATALOGUE: Mapping[str, Compensator] = {
         "inside its layer friction leaves a standing error of T F / (J lambda)",
     ),
     "push": Compensator("push along the error's sign", LEVELS, lambda b: {"observer": push(b)}, ("PD",)),
+    "nonlinear-coulomb": Compensator(
+        "torque filled up to break-away", LEVELS, lambda b: {"observer": filled_up(b)}, ("PD",)
+    ),
+    "nonlinear-maxwell": Compensator(
+        "Maxwell-slip springs over the error", LEVELS, lambda b: {"observer": springs(b)}, ("PD",)
+    ),
+    "knocker": Compensator("pulses along the integral", LEVELS, lambda b: {"observer": knocker(b)}, ("PID",)),
+    "dither-stuck": Compensator(
+        "dither where the axis stands off", LEVELS, lambda b: {"feedforward": dither(b, "stuck")}, ("PID",)
+    ),
     "dither": Compensator(
         "dither", LEVELS, lambda b: {"feedforward": dither(b)},
         against="it excites the axis at rest and heats the motor permanently",

@@ -27,4 +27,7 @@ CONTROL_LAWS = (
     "disturbance_observer",
     "extended_state_observer",
     "stiction_push",
+    "nonlinear_coulomb",
+    "nonlinear_maxwell_slip",
+    "knocker",
 )

@@ -1,11 +1,14 @@
-"""Dither: a square wave of torque that keeps the contact moving. It heats the motor for as long as it runs."""
+"""Dither: a square wave of torque that keeps the contact moving. It heats the motor for as long as it runs.
+
+Given only where the axis stands off its reference, it ends with the error that it is there for.
+"""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip.spec import Choice, Option, Par
 
 __all__ = ["CONTROL_LAW"]
 
@@ -25,6 +28,33 @@ class State(NamedTuple):
     passed: Annotated[float, Par("-", "k", "samples since the period began")]
 
 
+def always(y: Any, p: Any) -> float:
+    """The share of the wave that is given: all of it."""
+    return 1.0
+
+
+class Where(NamedTuple):
+    """Parameters of a wave that is given where it is needed."""
+
+    error: Annotated[float, Par("rad", "e_p", "error from which it is given whole", positive=True)]
+    speed: Annotated[float, Par("rad/s", "v_p", "speed from which nothing is given", positive=True)]
+
+
+def stuck(y: Any, p: Any) -> float:
+    """The share of the wave that is given: it falls with the error, and with the speed."""
+    return min(abs(y.error) / p.error, 1.0) * min(max(1.0 - abs(y.slow_velocity) / p.speed, 0.0), 1.0)
+
+
+GIVEN = Choice(
+    "given",
+    "share",
+    {"always": Option(always), "stuck": Option(stuck, Where, example={"error": 2e-3, "speed": 0.02})},
+    "always",
+    "where the wave is given: everywhere, or where the axis stands off its reference",
+)
+share = always
+
+
 def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     """Torque, N·m."""
     torque = p.torque
@@ -33,7 +63,7 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     z.passed += 1.0
     if z.passed >= p.samples:
         z.passed = 0.0
-    return torque
+    return share(y, p) * torque
 
 
 def check(p: Any) -> str:
@@ -51,4 +81,5 @@ CONTROL_LAW = ControlLaw(
     example={"torque": 0.2, "samples": 4.0},
     State=State,
     check=check,
+    choices=(GIVEN,),
 )  # fmt: skip
