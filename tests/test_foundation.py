@@ -126,6 +126,11 @@ def test_choices_make_one_law_each():
     assert min(g.mode) > 0.0
 
 
+def test_a_law_is_shown_by_its_name_and_choices():
+    assert repr(GMS) == "Law('gms')"
+    assert repr(GMS.having(curve="table")) == "Law('gms', curve='table')"
+
+
 def test_scaled_model():
     model = Model("gms", **GMS.example).scaled(fs=1.1, fc=1.1)
     assert model.parameters.fs == pytest.approx(0.3685)

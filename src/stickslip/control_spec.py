@@ -86,7 +86,7 @@ def friction_steady(v: float, p: Any) -> float:
     return 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ControlLaw(Configurable):
     """A control law (see the module's docstring for its functions and their arguments).
 

@@ -195,6 +195,10 @@ class Configurable(Described):
     state_fields: tuple[Field, ...]
     example: Mapping[str, Any]
 
+    def __repr__(self) -> str:
+        chosen = "".join(f", {k}={v!r}" for k, v in self.chosen.items())
+        return f"{type(self).__name__}({self.name!r}{chosen})"
+
     def option_fields(self, own: type) -> dict[str, Field]:
         """The fields of a ``Params`` class and of the chosen options, by name; the first of a name holds."""
         fields: dict[str, Field] = {}
@@ -288,7 +292,7 @@ class Configurable(Described):
         return flat
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Law(Configurable):
     """A friction law (see the module's docstring for its functions and their arguments).
 

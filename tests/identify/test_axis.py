@@ -191,6 +191,12 @@ def test_records_that_cannot_be_used_say_why() -> None:
     still = Trial("still", np.arange(1000) * 1e-3, np.zeros(1000), np.zeros(1000))
     with pytest.raises(InputError, match="nothing excites inertia, fv, fc"):
         inverse_dynamics([still], AXIS)
+    t = np.arange(4000) * 1e-3
+    forward = Trial(
+        "forward", t, 0.5 * t + 0.05 * np.sin(6.0 * t), np.full(4000, 0.3) + 0.01 * np.cos(6.0 * t)
+    )
+    with pytest.raises(InputError, match="effects of fc and offset cannot be told apart"):
+        inverse_dynamics([forward], AXIS)
     with pytest.raises(InputError, match="too few"):
         Trial("short", np.arange(10.0), np.zeros(10), np.zeros(10))
     with pytest.raises(InputError, match="row 3"):

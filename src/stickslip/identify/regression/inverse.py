@@ -161,10 +161,9 @@ def inverse_dynamics(
     size = np.linalg.norm(w, axis=0)
     rank = np.linalg.matrix_rank(w / np.where(size > 0.0, size, 1.0), tol=1e-8)
     if rank < len(names):
-        still = [n for n, s in zip(names, size, strict=True) if s == 0.0]
-        what = f"nothing excites {', '.join(still)}" if still else "their effects cannot be told apart"
         raise InputError(
-            f"inverse dynamics: {what} in this motion; record both directions and several speeds"
+            f"inverse dynamics: {_undetermined(names, w, size)} in this motion; "
+            "record both directions and several speeds"
         )
     values: Array = np.linalg.lstsq(w, y, rcond=None)[0].astype(np.float64)
     residual = y - w @ values
@@ -178,6 +177,16 @@ def inverse_dynamics(
         np.concatenate([c.time for c in columns]), np.concatenate([c.velocity for c in columns]),
         np.concatenate([c.position for c in columns]),
     )  # fmt: skip
+
+
+def _undetermined(names: Sequence[str], w: Array, size: Array) -> str:
+    """What rows `w` without full rank do not tell, in words; `size` is the norm of each column."""
+    still = [n for n, s in zip(names, size, strict=True) if s == 0.0]
+    if still:
+        return f"nothing excites {', '.join(still)}"
+    without = np.abs(np.linalg.svd(w / size, full_matrices=False)[2][-1])
+    tied = [n for n, part in zip(names, without, strict=True) if part > 0.1 * without.max()]
+    return f"the effects of {', '.join(tied[:-1])} and {tied[-1]} cannot be told apart"
 
 
 def refuse_harmonics(trials: Sequence[Trial], harmonics: int, *, simulated: bool = False) -> None:
