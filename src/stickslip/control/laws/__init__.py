@@ -18,6 +18,8 @@ CONTROL_LAWS = (
     "gradient_feedforward",
     "inertia_feedforward",
     "position_feedforward",
+    "learned_feedforward",
+    "table_feedforward",
     "dither",
     "friction_feedback",
     "friction_observer",
