@@ -21,7 +21,7 @@ import platform
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -53,6 +53,7 @@ __all__ = [
     "compiled_notice",
     "compiled_profile",
     "compiled_sample",
+    "compiled_step",
     "kernel",
     "loaded",
     "pointer",
@@ -73,6 +74,11 @@ SIGNATURES = {
     "sample": FLOAT(FLOAT, FLOAT, FLOAT, FLOAT, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
     "guarded": FLOAT(ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
 }
+
+NO_ADDRESS: dict[str, Any] = {"no_cfunc_wrapper": True}
+"""For functions that nobody calls by address: numba would compile each once more with a C signature."""
+INNER: dict[str, Any] = {"no_cpython_wrapper": True, **NO_ADDRESS}
+"""For functions that compiled code alone calls."""
 
 # ---- where compiled code is kept --------------------------------------------------------------------------
 
@@ -141,7 +147,13 @@ def kernel(*, exact: bool = True, inline: bool = False) -> Callable[[Any], Any]:
     def decorate(function: Any) -> Any:
         return _cached(
             lambda: numba.njit(
-                function, cache=True, nogil=True, fastmath=fast, error_model="numpy", forceinline=inline
+                function,
+                cache=True,
+                nogil=True,
+                fastmath=fast,
+                error_model="numpy",
+                forceinline=inline,
+                **NO_ADDRESS,
             )
         )
 
@@ -240,6 +252,24 @@ def compiled_law(law: Law) -> LawPointers:
         return _laws[id(law)][1]
 
 
+_steps: dict[int, tuple[Law, int]] = {}
+
+
+def compiled_step(law: Law) -> int:
+    """Compile a law's step alone, or fetch it from the cache; returns its address.
+
+    Raises
+    ------
+    LawError
+        If the step is outside the scalar subset.
+    """
+    with _decorating:
+        if id(law) not in _steps:
+            address = _compile(f"{law.name}_step", {"step": law.step}, law_layouts(law))["step"]
+            _steps[id(law)] = (law, address)
+        return _steps[id(law)][1]
+
+
 def entries_of(law: Law) -> dict[str, Callable[..., Any]]:
     """The functions of a law that kernels may call."""
     names = ("step", "rate", "guards", "switch", "steady", "holding")
@@ -274,20 +304,30 @@ def _compile(
 ) -> dict[str, int]:
     """Translate, write to a file named after its content, compile; returns name to address."""
     functions = lower({f"_{entry}_": function for entry, function in entries.items()}, layouts)
-    lines = ["import math", "from stickslip.jit import compile_entry, compile_inner", ""]
-    for function in functions.values():
-        lines += ["@compile_inner", ast.unparse(function), ""]
-    for entry in entries:
-        arguments = ", ".join(a.arg for a in functions[f"_{entry}_"].args.args)
-        lines += [
-            f"@compile_entry({entry!r})",
-            f"def {entry}({arguments}):",
-            f"    return _{entry}_({arguments})",
-            "",
-        ]
-    text = "\n".join(lines)
+    text = _program(functions, entries)
     module = loaded(f"{name.replace('-', '_')}_{hashlib.sha256(text.encode()).hexdigest()[:16]}", text)
     return {entry: int(getattr(module, entry).address) for entry in entries}
+
+
+def _program(functions: Mapping[str, ast.FunctionDef], entries: Iterable[str]) -> str:
+    """The text of a generated file: the functions, each entry under its own name."""
+    names = {f"_{entry}_": entry for entry in entries}
+    calls = [c.func for f in functions.values() for c in ast.walk(f) if isinstance(c, ast.Call)]
+    called = {function.id for function in calls if isinstance(function, ast.Name)}
+    lines = ["import math", "from stickslip.jit import compile_entry, compile_inner", ""]
+    for name, function in functions.items():
+        entry = names.get(name)
+        # What no other function calls need not be compiled twice, for itself and for its address.
+        if entry is not None and name not in called:
+            function.name = entry
+            lines += [f"@compile_entry({entry!r})", ast.unparse(function), ""]
+            continue
+        lines += ["@compile_inner", ast.unparse(function), ""]
+        if entry is not None:
+            arguments = ", ".join(a.arg for a in function.args.args)
+            head = [f"@compile_entry({entry!r})", f"def {entry}({arguments}):"]
+            lines += [*head, f"    return {name}({arguments})", ""]
+    return "\n".join(lines)
 
 
 def loaded(name: str, text: str) -> Any:
@@ -396,7 +436,7 @@ def exponential_less_one(x: float) -> float:
 
 def compile_inner(function: Any) -> Any:
     """Decorator of generated files: a function that entries call."""
-    return numba.njit(function, error_model="numpy")
+    return numba.njit(function, error_model="numpy", **INNER)
 
 
 def compile_entry(name: str) -> Callable[[Any], Any]:

@@ -69,7 +69,7 @@ def test_a_terminal_sees_how_far_it_is():
 
 
 def test_what_is_compiled_is_told_and_what_is_kept_is_not(told):
-    @jit.compile_inner
+    @jit.compile_inlined
     def twice(x):
         return 2.0 * x
 

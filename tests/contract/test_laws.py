@@ -23,7 +23,7 @@ from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import ParameterError
-from stickslip.jit import compiled_law, flat
+from stickslip.jit import compiled_step, flat
 from stickslip.laws import LAWS as BUILT_IN
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
@@ -64,7 +64,7 @@ class Compiled:
     def __init__(self, law: Law, p) -> None:
         pointer = ctypes.POINTER(ctypes.c_double)
         kind = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * 3, pointer, pointer, pointer)
-        self.function = kind(compiled_law(law).step)
+        self.function = kind(compiled_step(law))
         self.p, self.u = flat(law.pack(p)), flat(list(U))
         self.z = flat(law.pack_state(law.state(p)))
 

@@ -19,7 +19,7 @@ from stickslip.errors import InputError
 from stickslip.export import c99, c99_controller
 from stickslip.export.golden import Golden, golden, random_steps, room_beside_jumps
 from stickslip.export.job import Job
-from stickslip.jit import call_sample, call_step, compiled_law, flat, kernel, pointer
+from stickslip.jit import call_sample, call_step, compiled_step, flat, kernel, pointer
 from stickslip.laws import LAWS as BUILT_IN
 from stickslip.model import Model
 from stickslip.simulation._sampled import compiled
@@ -109,7 +109,7 @@ def run_law(step, v0, v1, dt, position, z, p, u, out):
 def by_compiled_python(model, v0, v1, dt, position):
     law, p, out = model.law, model.parameters, np.empty(v0.size)
     z = flat(law.pack_state(law.state(p)))
-    run_law(compiled_law(law).step, v0, v1, dt, position, z, flat(law.pack(p)), np.array(Surroundings()), out)
+    run_law(compiled_step(law), v0, v1, dt, position, z, flat(law.pack(p)), np.array(Surroundings()), out)
     return out
 
 

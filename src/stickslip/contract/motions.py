@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import ParameterError
-from stickslip.jit import call_step, compiled_law, flat, kernel, pointer
+from stickslip.jit import call_step, compiled_step, flat, kernel, pointer
 from stickslip.laws import COMMON_CHOICES
 from stickslip.spec import Law, Surroundings
 
@@ -133,7 +133,7 @@ def batch(law: Law, p: Any, velocity: Array, dt: Array) -> tuple[Array, Array]:
     """Torques of the compiled law, N·m, shape (cases, steps), and the last states, shape (cases, states)."""
     z0 = flat(law.pack_state(law.state(p)))
     torque, end = np.zeros(velocity.shape), np.zeros((velocity.shape[0], z0.size))
-    drive(compiled_law(law).step, z0, flat(law.pack(p)), flat(list(U)), velocity, dt, torque, end)
+    drive(compiled_step(law), z0, flat(law.pack(p)), flat(list(U)), velocity, dt, torque, end)
     return torque, end
 
 
