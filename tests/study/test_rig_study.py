@@ -1,36 +1,57 @@
-"""The study of thesis chapter 4 on the virtual machines: cases, variants, what is kept, a small run."""
+"""The study of thesis chapter 4 on the virtual machines: its runs, variants, what is kept, a small run."""
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from stickslip.cli import main
+from stickslip.errors import ConfigError, Interrupted
 from stickslip.machines.machine import machine
-from stickslip.study import rig_study
-from stickslip.study.rig_cases import GROUPS
-from stickslip.study.rig_study import NOMINAL, all_cases, run_case, run_rig_study, variant
+from stickslip.study import study as studies
+from stickslip.study.experiments import NOMINAL, ExperimentRun, ExperimentView, experiments_of, variant
+from stickslip.study.plan import load, select
+from stickslip.study.rerun import rerun
 from stickslip.thesis.rig_claims import CLAIMS
 from stickslip.thesis.rig_verdicts import Judged, main_share
 
+LAWS = ("coulomb", "stribeck", "lugre", "gms")
+NOT_MORE = {"seeds": 0, "ablation": False}
 
-def test_every_experiment_of_chapter_4_is_a_case():
-    cases = all_cases()
-    assert len({c.key for c in cases}) == len(cases)
-    for group in GROUPS:
-        names = {c.controller for c in cases if c.group is group}
-        assert {
-            f"{way}-{law}" for way in ("FF", "FB") for law in ("coulomb", "stribeck", "lugre", "gms")
-        } < names
-        assert {"FB-gms10", group.linear} < names
-    figures = {f for g in GROUPS for f in g.figures}
+
+@pytest.fixture(scope="module")
+def chapter_4():
+    return load("thesis-rig", given=NOT_MORE)
+
+
+def test_every_experiment_of_chapter_4_is_there(chapter_4):
+    runs = chapter_4.runs
+    assert len(runs) == len({r.key for r in runs}) == 138
+    experiments = experiments_of(chapter_4.config)
+    for e in experiments:
+        names = {r.compared for r in runs if r.experiment == e.name}
+        assert {f"{way}-{law}" for way in ("FF", "FB") for law in LAWS} < names
+        assert {"FB-gms10", e.linear, *e.beside} < names
+    figures = {f for e in experiments for f in e.figures}
     assert {"4.15", "4.16", "4.39", "4.51", "7.2", "7.3", "7.4", "7.5"} <= figures
-    low = next(c for c in cases if c.key == "dry-low-PD36/FB-gms10")
+    low = next(r for r in runs if r.key == "own/low/dry/PD36-FB-gms10")
     assert low.control.gains.kp == pytest.approx(19.7612, rel=1e-4)  # Table 6
-    assert low.control.compensator
     assert low.control.compensator.filter_hz == 10.0
+    assert (low.control.torque_limit, low.control.sample_time) == (1.085, 1e-3)
+
+
+def test_with_every_imperfection_and_twenty_starts_it_has_5244_runs():
+    assert len(load("thesis-rig").runs) == 138 * (1 + 17 + 20)
+
+
+def test_parts_of_names_select_runs_in_every_variant():
+    runs = load("thesis-rig", given={"seeds": 1, "ablation": False}).runs
+    assert {r.friction for r in select(runs, ["grease"])} == {"grease", "grease-seed-1"}
+    some = select(runs, ["grease-low-PD25", "FF-gms"])
+    assert [r.key for r in some] == ["own/low/grease/PD25-FF-gms", "own/low/grease-seed-1/PD25-FF-gms"]
 
 
 def test_variants_differ_in_what_they_say():
@@ -39,52 +60,115 @@ def test_variants_differ_in_what_they_say():
     assert variant(plant, "without delay").switched_off == ("delay",)
     other = variant(plant, "seed 3")
     assert other.seed != plant.seed
-    assert other.contact.ripple.amplitude == plant.contact.ripple.amplitude
-    assert other.contact.ripple.phase != plant.contact.ripple.phase
+    assert other.contact == plant.contact
+    assert other.start_angle != plant.start_angle
 
 
 def test_a_run_is_the_same_twice_and_feels_its_seed():
-    case = next(c for c in all_cases(["grease-low-PD25"]) if c.controller == "PD")
-    plant = machine("thesis-grease")
-    first, stopped = run_case(plant, case)
-    again, _ = run_case(plant, case)
-    other, _ = run_case(variant(plant, "seed 1"), case)
-    assert not stopped
-    assert len(first) == 5000
-    assert np.array_equal(first["position"], again["position"])
-    assert not np.array_equal(first["position"], other["position"])
+    runs = {r.key: r for r in load("thesis-rig", given={"seeds": 1, "ablation": False}).runs}
+    first = runs["own/low/grease/PD25-PD"].execute()
+    again = runs["own/low/grease/PD25-PD"].execute()
+    other = runs["own/low/grease-seed-1/PD25-PD"].execute()
+    assert not first.failure
+    assert len(first.record) == 5000
+    assert len(other.record) == 2  # of a variant the ends are kept
+    assert np.array_equal(first.record["position"], again.record["position"])
+    assert first.metrics == again.metrics
+    assert first.metrics["position_rms_rad"] != other.metrics["position_rms_rad"]
+
+
+def test_an_interrupted_run_is_no_result(chapter_4, monkeypatch):
+    def asked(self, plant):
+        raise Interrupted("SIGINT asked for the end")
+
+    monkeypatch.setattr(ExperimentRun, "measured", asked)
+    with pytest.raises(Interrupted):
+        chapter_4.runs[0].execute()
 
 
 @pytest.mark.slow
-def test_a_small_study_is_judged_kept_and_reported(tmp_path, capsys, monkeypatch):
+def test_a_small_study_is_judged_kept_reported_and_run_again(tmp_path, capsys, monkeypatch):
     out = tmp_path / "rig"
-    command = [
-        "study",
-        "thesis-rig",
-        "--only",
-        "grease-step-PID10",
-        "--seeds",
-        "1",
-        "--no-ablation",
-        "--out",
-        str(out),
-    ]
-    assert main([*command, "--json"]) == 0
+    command = ["study", "thesis-rig", "--only", "grease-step-PID10", "--seeds", "1", "--no-ablation"]
+    assert main([*command, "--out", str(out), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     judged = {s["id"]: s["word"] for s in told["statements"]}
     assert judged["grease-step-PID10-FB"] in ("holds", "does not hold")
     assert judged["dry-low-PID"] == "not run"
     report = (out / "report.html").read_text(encoding="utf-8")
     assert "grease-step-PID10-FB" in report
-    assert "thesis-grease" in (out / "manifest.json").read_text(encoding="utf-8")
+    manifest = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
+    assert {"thesis-dry.toml", "thesis-grease.toml"} <= {entry["written"] for entry in manifest["inputs"]}
     lines = (out / "metrics.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 1 + 2 * 10
+    found = rerun(out)
+    assert (found.runs, found.differences) == (20, [])
 
     def never(*_):
         raise AssertionError("a finished run was run again")
 
-    monkeypatch.setattr(rig_study, "run_case", never)
-    assert len(run_rig_study(out, only=["grease-step-PID10"], seeds=1, ablation=False).runs) == 20
+    monkeypatch.setattr(studies, "execute", never)
+    study = load("thesis-rig", given={"seeds": 1, "ablation": False})
+    again = studies.run(study, out, ["grease-step-PID10"])
+    assert len(again.runs) == 20
+    assert ExperimentView(again).varied() == ["as it is", "seed 1"]
+
+
+OWN = """
+title = "Mine"
+[machines.mine]
+machine = "ideal"
+[references.slow]
+kind = "sine"
+amplitude = 0.1
+frequency = 1.0
+duration = 0.2
+[laws.half]
+law = "coulomb"
+fc = 0.1
+sigma2 = 0.0
+[controllers.FF-half]
+compensator = "feedforward"
+law = "half"
+[experiments.first]
+machine = "mine"
+reference = "slow"
+linear = "PD"
+bandwidth_hz = 10.0
+damping = 1.0
+"""
+
+
+def test_experiments_of_ones_own_are_a_study(tmp_path, capsys):
+    """Another machine, reference and law, run and reported by the same command."""
+    file = tmp_path / "mine.toml"
+    file.write_text(OWN)
+    assert main(["study", str(file), "--out", str(tmp_path / "out"), "--seeds", "1"]) == 0
+    said = capsys.readouterr().out
+    assert "PD10-FF-half" in said
+    assert "mine-seed-1" in said
+    assert "least RMS error" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('machine = "mine"', 'machine = "other"', "experiments.first.machine = 'other' is not known"),
+        ('linear = "PD"', 'linear = "P"', "experiments.first.linear = 'P' is not known"),
+        ('title = "Mine"', "seeds = 1.5", "seeds = 1.5 must be a whole number"),
+        ('title = "Mine"', "ablation = 1", "ablation = 1 must be true or false"),
+        (
+            "[experiments.first]",
+            "[experiments.first]\nbeside = []",
+            "experiments.first.beside = \\[\\] is empty",
+        ),
+    ],
+)
+def test_what_cannot_be_an_experiment_is_said(old, new, said, tmp_path):
+    file = Path(tmp_path / "mine.toml")
+    file.write_text(OWN.replace(old, new))
+    with pytest.raises(ConfigError, match=said):
+        load(file)
 
 
 def test_main_statements_are_counted_over_what_was_run():
@@ -93,7 +177,17 @@ def test_main_statements_are_counted_over_what_was_run():
     assert main_share(judged) == {"PID of 36 Hz oscillates": (1, 1), "GMS feedback is unstable": (1, 2)}
 
 
-@pytest.mark.parametrize("more", [["--only", "lowest"], ["--seeds", "-1"], ["--jobs", "0"], ["--print"]])
+@pytest.mark.parametrize("more", [["--only", "lowest"], ["--seeds", "-1"], ["--jobs", "0"]])
 def test_bad_input_is_one_line(more, capsys):
     assert main(["study", "thesis-rig", *more]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_its_file_is_printed(capsys):
+    assert main(["study", "thesis-rig", "--print"]) == 0
+    assert "[experiments.dry-low-PD36]" in capsys.readouterr().out
+
+
+def test_seeds_are_for_experiments(capsys):
+    assert main(["study", "thesis", "--seeds", "3"]) == 2
+    assert "thesis.toml has no [experiments.NAME]; leave out seeds" in capsys.readouterr().err

@@ -14,6 +14,13 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from stickslip.errors import InputError, Interrupted
+
+if TYPE_CHECKING:
+    from stickslip.study.plan import Study
+    from stickslip.study.result import StudyResult
 
 SUMMARY = "compare controllers over references and friction models"
 
@@ -37,24 +44,19 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seeds",
         type=int,
-        default=20,
         metavar="N",
-        help="thesis-rig: additional start angles per run (default 20)",
+        help="experiments: further start angles per run (thesis-rig: 20)",
     )
     parser.add_argument(
         "--no-ablation",
         action="store_true",
-        help="thesis-rig: skip the runs with one imperfection removed",
+        help="experiments: skip the runs with one imperfection removed",
     )
     parser.add_argument("--print", action="store_true", help="print the study's TOML and run nothing")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run, print the table, write the report."""
-    if args.study == "thesis-rig":
-        from stickslip.cli import _rig_study
-
-        return _rig_study.run(args)
     from stickslip.study.bench import is_bench
 
     if is_bench(args.study):
@@ -62,39 +64,71 @@ def run(args: argparse.Namespace) -> int:
 
         return _bench.run(args)
     from stickslip.cli import _output
-    from stickslip.errors import InputError
-    from stickslip.report import write
     from stickslip.study import study as studies
     from stickslip.study.plan import select
 
-    study = studies.load(args.study)
+    study = studies.load(args.study, given=_given(args))
     if args.print:
         print(study.source.read_text(encoding="utf-8"), end="")
         return 0
-    out: Path = args.out or Path(f"study-{study.name}")
     only = None if args.only is None else [part.strip() for part in args.only.split(",")]
     if only is not None and not all(only):
         raise InputError(f"--only {args.only!r} has an empty part; give names like low,step")
+    result, report = _ran(study, only, args)
+    # The folder may hold more of the study than was asked for; only that is shown.
+    chosen = {p.key for p in select([*study.runs, *study.extras], only or ())}
+    shown = replace(
+        result,
+        runs=[r for r in result.runs if r.key in chosen],
+        extras=[r for r in result.extras if r.key in chosen],
+    )
+    _show(shown, report, len(result.runs), args.json)
+    failed = [r for r in (*shown.runs, *shown.extras) if r.failure]
+    return _output.report_failures([(r.key, r.failure, r.path) for r in failed])
+
+
+def _given(args: argparse.Namespace) -> dict[str, Any]:
+    """What the options say of experiments instead of the study's file."""
+    if args.seeds is not None and args.seeds < 0:
+        raise InputError(f"--seeds {args.seeds} must be 0 or more")
+    seeds = {} if args.seeds is None else {"seeds": args.seeds}
+    return seeds | ({"ablation": False} if args.no_ablation else {})
+
+
+def _ran(study: Study, only: list[str] | None, args: argparse.Namespace) -> tuple[StudyResult, Path | None]:
+    """Run it and write its report."""
+    from stickslip.cli import _output
+    from stickslip.report import write
+    from stickslip.study import study as studies
+
+    out: Path = args.out or Path(f"study-{study.name}")
     try:
         with _output.progress_bar(study.name) as progress:
             result = studies.run(study, out, only, args.jobs, progress)
-        if not args.no_report:
-            _output.say("drawing figures ...")
-        report = None if args.no_report else write(result)
-    except KeyboardInterrupt:
+        if args.no_report:
+            return result, None
+        _output.say("drawing figures ...")
+        return result, write(result)
+    except (KeyboardInterrupt, Interrupted):
         raise KeyboardInterrupt(
             f"finished runs are kept in {out}; run the same command again to resume"
         ) from None
-    # The folder may hold more of the study than was asked for; only that is shown.
-    names = [*study.runs, *study.extras]
-    shown = replace(
-        result,
-        runs=select(result.runs, only or (), names),
-        extras=select(result.extras, only or (), names),
-    )
-    if args.json:
+
+
+def _show(shown: StudyResult, report: Path | None, kept: int, as_json: bool) -> None:
+    """Print the statements of experiments, else the table of runs."""
+    from stickslip.cli import _output
+
+    judged: list[Any] = []
+    if "experiments" in shown.config:
+        from stickslip.cli import _statements
+
+        judged = _statements.judged_in(shown)
+        if judged and as_json:
+            _output.print_json(_statements.statements_as_data(shown, judged, report))
+        elif judged:
+            _statements.print_statements(shown, judged, report)
+    if not judged and as_json:
         _output.print_json(_output.result_as_data(shown, report))
-    else:
-        _output.print_study(shown, report, len(result.runs))
-    failed = [r for r in (*shown.runs, *shown.extras) if r.failure]
-    return _output.report_failures([(r.key, r.failure, r.path) for r in failed])
+    elif not judged:
+        _output.print_study(shown, report, kept)

@@ -53,6 +53,10 @@ def write(result: StudyResult) -> Path:
     InputError
         If the folder cannot be written.
     """
+    if "experiments" in result.config:
+        from stickslip.report.rig_report import write_rig_report
+
+        return write_rig_report(result)
     from stickslip.report._view import StudyView
     from stickslip.report.html import render
     from stickslip.report.page import replaced, unwritable

@@ -1,9 +1,10 @@
-"""The report of `stickslip study thesis-rig`: statements, figures, ablation and seeds in one HTML file."""
+"""The report of experiments on rigs (`stickslip study thesis-rig`): statements, figures, ablation and seeds."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,11 @@ from stickslip.report.conclusions import rig_conclusion
 from stickslip.report.html import image
 from stickslip.report.page import filled, replaced, unwritable
 from stickslip.report.plots import REFERENCE, Curve, Panel, draw, envelope, style_of
-from stickslip.study.rig_cases import GROUPS, Group
-from stickslip.study.rig_study import NOMINAL, RigResult, RigView
+from stickslip.study.experiments import Experiment, ExperimentView, experiments_of
+from stickslip.study.result import Run, StudyResult
 from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share
 
-__all__ = ["draw_groups", "verdict_table", "write_rig_report"]
+__all__ = ["draw_experiments", "verdict_table", "write_rig_report"]
 
 MARKS = {True: ("yes", "holds"), False: ("no", "does not hold"), None: ("open", "not run")}
 WINDOWS = {"low": (2.5, 5.0), "high": (0.0, 20.0), "step": (0.0, 1.5)}
@@ -33,57 +34,62 @@ ABLATED = (
 """Runs and metrics of the table of imperfections."""
 
 
-def draw_groups(result: RigResult, folder: Path) -> list[dict[str, Any]]:
-    """Draw every group's responses; returns what the report needs of each."""
-    out: list[dict[str, Any]] = []
-    for group in GROUPS:
-        keys = [
-            run.key for run in result.runs if run.variant == NOMINAL and run.key.startswith(group.name + "/")
-        ]
-        if keys:
-            out.append(_drawn(result, group, keys, folder / group.name))
-    return out
-
-
-def _drawn(result: RigResult, group: Group, keys: Sequence[str], stem: Path) -> dict[str, Any]:
-    names = [key.rpartition("/")[2] for key in keys]
-    linear = [n for n in names if "-" not in n]
-    panels = [
-        _panel(result, group, [*linear, *(n for n in names if n.startswith(kind))], note)
-        for kind, note in (("FF", "feedforward"), ("FB", "feedback"))
-        if any(n.startswith(kind) for n in names)
+def draw_experiments(result: StudyResult, folder: Path) -> list[dict[str, Any]]:
+    """Draw every experiment's responses; returns what the report needs of each."""
+    view = ExperimentView(result)
+    return [
+        _drawn(one, runs, folder / one.name)
+        for one in experiments_of(result.config)
+        if (runs := view.nominal(one))
     ]
-    runs = {run.key: run for run in result.runs if run.variant == NOMINAL}
-    best = min(keys, key=lambda key: runs[key].metrics["position_rms_rad"])
+
+
+def _drawn(one: Experiment, runs: Mapping[str, Run], stem: Path) -> dict[str, Any]:
+    linear = [n for n in runs if "-" not in n]
+    kinds = {"FF": "feedforward", "FB": "feedback", "": "others"}
+    groups: dict[str, list[str]] = {kind: [] for kind in kinds}
+    for name in runs:
+        if name not in linear:
+            groups[name[:2] if name[:2] in kinds else ""].append(name)
+    panels = [
+        _panel(one, {n: runs[n] for n in (*linear, *names)}, kinds[kind])
+        for kind, names in groups.items()
+        if names
+    ]
+    best = min(runs, key=lambda name: runs[name].metrics["position_rms_rad"])
     rms = 1e3 * runs[best].metrics["position_rms_rad"]
-    title = f"{group.friction}, {group.reference}, {group.linear} {group.bandwidth:g} Hz"
-    title += f" (thesis figures {' and '.join(group.figures)})"
-    message = f"least RMS error: {best.rpartition('/')[2]}, {rms:.3g} mrad"
+    title = f"{one.machine}, {one.reference}, {one.linear} {one.bandwidth:g} Hz"
+    title += f" (thesis figures {' and '.join(one.figures)})" if one.figures else ""
+    message = f"least RMS error: {best}, {rms:.3g} mrad"
     draw(stem, title, message, panels, 2.1)
-    return {"id": group.name, "title": title, "caption": message, **image(stem)}
+    return {"id": one.name, "title": title, "caption": message, **image(stem)}
 
 
-def _panel(result: RigResult, group: Group, names: Sequence[str], note: str) -> Panel:
-    start, end = WINDOWS[group.reference]
+def _panel(one: Experiment, runs: Mapping[str, Run], note: str) -> Panel:
+    start, end = WINDOWS.get(one.reference, (0.0, math.inf))
     curves: list[Curve] = []
     reference: Curve | None = None
-    for name in names:
-        record = result.record(f"{group.name}/{name}")
+    goal = np.zeros(1)
+    for name, run in runs.items():
+        record = run.record()
         time = record.time - record.time[0]
+        goal, end = 1e3 * record["position_reference"], min(end, float(time[-1]))
         inside = (time >= start) & (time <= end)
         if not np.any(inside):
             continue
-        if name == names[-1]:  # over the others
-            wanted = 1e3 * record["position_reference"][inside]
-            reference = Curve(*envelope(time[inside], wanted), "reference", REFERENCE)
+        if name == list(runs)[-1]:  # over the others
+            reference = Curve(*envelope(time[inside], goal[inside]), "reference", REFERENCE)
         path = 1e3 * record["position"][inside]
         style = style_of("gms10" if name.endswith("gms10") else name, ("gms10",))
         curves.append(
             Curve(*envelope(time[inside], path, 260), name.removeprefix("FF-").removeprefix("FB-"), style)
         )
-    travel = 1e3 * {"low": 0.02, "high": 1.0, "step": 0.01}[group.reference]
     curves += [reference] if reference else []
-    return Panel(curves, "position (mrad)", "time (s)", (start, end), (-0.45 * travel, 1.45 * travel), note)
+    ends = (float(np.min(goal)), float(np.max(goal)))
+    margin = 0.45 * (ends[1] - ends[0])
+    return Panel(
+        curves, "position (mrad)", "time (s)", (start, end), (ends[0] - margin, ends[1] + margin), note
+    )
 
 
 def verdict_table(judged: Sequence[Judged]) -> list[dict[str, Any]]:
@@ -98,14 +104,18 @@ def verdict_table(judged: Sequence[Judged]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _ablation(result: RigResult) -> list[dict[str, Any]]:
+def _ablation(view: ExperimentView) -> list[dict[str, Any]]:
     """The chosen metrics as the machines are, and without each imperfection."""
-    found = {(run.variant, run.key): run.metrics for run in result.runs}
     rows: list[dict[str, Any]] = []
-    for name in [v for v in result.variants if not v.startswith("seed ")]:
-        cells = [found.get((name, key), {}).get(metric) for key, metric, _ in ABLATED]
-        rows.append({"name": name, "cells": ["" if c is None else f"{1e3 * c:.3g}" for c in cells]})
-    return rows if len(rows) > 1 else []
+    for name in [v for v in view.varied() if not v.startswith("seed ")]:
+        cells: list[str] = []
+        for case, metric, _ in ABLATED:
+            try:
+                cells.append(f"{1e3 * view.metric(name, case, metric):.3g}")
+            except KeyError:
+                cells.append("")
+        rows.append({"name": name, "cells": cells})
+    return rows if len(rows) > 1 and any("".join(row["cells"]) for row in rows) else []
 
 
 def _tally(judged: Sequence[Judged]) -> Iterator[dict[str, Any]]:
@@ -119,20 +129,20 @@ def _tally(judged: Sequence[Judged]) -> Iterator[dict[str, Any]]:
             yield {"count": count, "words": words}
 
 
-def best_pairs(result: RigResult) -> list[tuple[float, float]]:
-    """RMS error of the best linear controller and of the best compensator of every group that has both."""
+def best_pairs(view: ExperimentView) -> list[tuple[float, float]]:
+    """RMS error of the best linear controller and of the best compensator of every experiment that has both."""
     pairs: list[tuple[float, float]] = []
-    for group in GROUPS:
+    for one in view.experiments.values():
         errors: dict[bool, list[float]] = {False: [], True: []}
-        for run in result.runs:
-            if run.variant == NOMINAL and run.key.startswith(group.name + "/") and not run.stopped:
-                errors["-" in run.key.rpartition("/")[2]].append(run.metrics["position_rms_rad"])
+        for name, run in view.nominal(one).items():
+            if not run.failure:
+                errors["-" in name].append(run.metrics["position_rms_rad"])
         if errors[False] and errors[True]:
             pairs.append((min(errors[False]), min(errors[True])))
     return pairs
 
 
-def write_rig_report(result: RigResult) -> Path:
+def write_rig_report(result: StudyResult) -> Path:
     """Draw the figures and write ``report.html``; returns it.
 
     Raises
@@ -140,26 +150,28 @@ def write_rig_report(result: RigResult) -> Path:
     InputError
         If the folder cannot be written.
     """
-    judged = judged_over(RigView(result), result.variants)
+    view = ExperimentView(result)
+    judged = judged_over(view, view.varied())
     target = result.folder / "report.html"
     try:
-        figures = draw_groups(result, result.folder / "figures")
+        figures = draw_experiments(result, result.folder / "figures")
     except OSError as error:
         raise unwritable(target, error) from None
     counted, mains = list(_tally(judged)), main_share(judged)
+    nominal = {run.key for one in view.experiments.values() for run in view.nominal(one).values()}
     html = filled(
         "rig.html",
-        title="Chapter 4 of the thesis on a virtual machine",
-        ran=f"{len(result.runs)} runs, {len(result.variants)} variants, {result.manifest['wall_s']:.0f} s",
-        conclusion=rig_conclusion(counted, mains, best_pairs(result)),
+        title=result.manifest["title"],
+        ran=f"{len(result.runs)} runs, {len(view.varied())} variants, {result.manifest['timings']['wall_s']:.0f} s",
+        conclusion=rig_conclusion(counted, mains, best_pairs(view)),
         tally=counted,
         mains=[{"text": t, "held": a, "of": b} for t, (a, b) in mains.items()],
         rows=verdict_table(judged),
-        seeds=result.manifest["seeds"],
-        ablation=_ablation(result),
+        seeds=result.config.get("seeds", 0),
+        ablation=_ablation(view),
         columns=[text for *_, text in ABLATED],
         figures=figures,
-        stopped=[run for run in result.runs if run.stopped and run.variant == NOMINAL],
-        manifest=json.dumps(result.manifest, indent=1),
+        stopped=[run for run in result.runs if run.failure and run.key in nominal],
+        manifest=json.dumps({k: v for k, v in result.manifest.items() if k != "runs"}, indent=1),
     )
     return replaced(target, html)

@@ -16,7 +16,7 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.study import build
 from stickslip.study.build import Numerics, Placement
-from stickslip.study.planned_run import OWN, PlannedRun, frictions_of
+from stickslip.study.planned_run import FAMILIES, OWN, PlannedRun, frictions_of
 from stickslip.study.result import Run
 
 __all__ = [
@@ -30,8 +30,7 @@ __all__ = [
 ]
 
 SLIP_RULES = ("signed", "literal")
-BUILT_IN = ("thesis", "imperfections")
-FAMILIES = ("slip_rule", "reference", "friction", "controller")
+BUILT_IN = ("thesis", "imperfections", "thesis-rig")
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,9 @@ class Study:
     files: Mapping[str, Path]
 
 
-def load(study: str | Path, moved: Mapping[str, Path] | None = None) -> Study:
+def load(
+    study: str | Path, moved: Mapping[str, Path] | None = None, given: Mapping[str, Any] | None = None
+) -> Study:
     """Read a study: the path of a TOML file, or the name of one that ships with the package.
 
     Parameters
@@ -100,6 +101,8 @@ def load(study: str | Path, moved: Mapping[str, Path] | None = None) -> Study:
     study : str or Path
     moved : mapping of str to Path, optional
         Where files that the study refers to lie now, by the path as written.
+    given : mapping of str to number or bool, optional
+        ``seeds`` and ``ablation`` of a study of experiments, instead of its file's.
 
     Raises
     ------
@@ -109,18 +112,32 @@ def load(study: str | Path, moved: Mapping[str, Path] | None = None) -> Study:
     name = str(study)
     if name in BUILT_IN:
         table = read_toml(Path(__file__).with_name(f"{name}.toml"), f"{name}.toml", moved)
-        return _study(name, Path(__file__).with_name(f"{name}.toml"), table)
+        return _study(name, Path(__file__).with_name(f"{name}.toml"), _with(given, table))
     path = Path(study)
     if path.suffix != ".toml" and not path.exists():
         raise ConfigError(
             f"unknown study {name!r}; give the path of a TOML file, or one of {', '.join(BUILT_IN)}"
         )
-    return _study(path.stem, path, read_toml(path, moved=moved))
+    return _study(path.stem, path, _with(given, read_toml(path, moved=moved)))
+
+
+def _with(given: Mapping[str, Any] | None, table: Table) -> Table:
+    """The table with what is given instead of its own."""
+    if given and not table.has("experiments"):
+        raise ConfigError(
+            f"{table.label()} has no [experiments.NAME]; leave out {' and '.join(sorted(given))}"
+        )
+    return Table({**table.values, **(given or {})}, table.document)
 
 
 def _study(name: str, path: Path, table: Table) -> Study:
     with table:
         title = table.text("title", name)
+        if table.has("experiments"):
+            from stickslip.study.experiments import planned_experiments
+
+            runs = planned_experiments(table)
+            return Study(name, title, runs, [], [], [], table.values, path, dict(table.document.files))
         rules = table.texts("slip_rules", SLIP_RULES) if table.has("slip_rules") else [None]
         parts = _Parts.read(table)
         runs = parts.runs(rules, parts.motions, parts.frictions, parts.controllers)
@@ -360,11 +377,16 @@ def select(
     ------
     UnknownName
     """
-    names = {family: dict.fromkeys(getattr(run, family) for run in all_runs or runs) for family in FAMILIES}
-    wanted: dict[str, set[str]] = {}
+    named = [_names(run) for run in all_runs or runs]
+    names = {family: dict.fromkeys(one[family] for one in named) for family in (named[0] if named else ())}
+    chosen: dict[str, set[str]] = {}
     for part in parts:
-        family = next((f for f in FAMILIES if part in names[f]), None)
+        family = next((f for f in names if part in names[f]), None)
         if family is None:
             raise UnknownName("part of a run's name", part, [n for known in names.values() for n in known])
-        wanted.setdefault(family, set()).add(part)
-    return [run for run in runs if all(getattr(run, f) in chosen for f, chosen in wanted.items())]
+        chosen.setdefault(family, set()).add(part)
+    return [run for run in runs if all(_names(run)[f] in some for f, some in chosen.items())]
+
+
+def _names(run: PlannedRun | Run) -> Mapping[str, str]:
+    return run.names if isinstance(run, PlannedRun) else {f: getattr(run, f) for f in FAMILIES}

@@ -5,25 +5,43 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import time
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import ControlLaw
-from stickslip.errors import ConfigError, InputError
+from stickslip.errors import ConfigError, InputError, SimulationError
 from stickslip.machines.machine import Machine
 from stickslip.machines.numbers import machine_numbers
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulation.closed_loop import check_machine_run, integrator_for, prepare
+from stickslip.record import Record
+from stickslip.simulation.closed_loop import check_machine_run, integrator_for, prepare, run_case, simulate
 from stickslip.study.build import Numerics
 from stickslip.study.provenance import engine_hash, source_hash
 
-__all__ = ["OWN", "PlannedRun", "control_laws_of", "described", "frictions_of"]
+__all__ = ["OWN", "Executed", "PlannedRun", "control_laws_of", "described", "frictions_of"]
 
 OWN = "own"
 """What stands for the slip rule in the name of a run whose laws keep rules of their own."""
+FAMILIES = ("slip_rule", "reference", "friction", "controller")
+
+
+@dataclass(frozen=True)
+class Executed:
+    """A run that has been simulated: its record, why it ended early (or nothing), its CPU time in s."""
+
+    record: Record
+    failure: str
+    seconds: float
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Metrics by name; empty if the run ended early."""
+        return dict(self.record.meta.get("metrics", {}))
 
 
 @dataclass(frozen=True)
@@ -46,6 +64,11 @@ class PlannedRun:
         return f"{self.slip_rule}/{self.reference}/{self.friction}/{self.controller}"
 
     @property
+    def names(self) -> Mapping[str, str]:
+        """Its name in every family of names, by which `stickslip study --only` finds it."""
+        return {family: getattr(self, family) for family in FAMILIES}
+
+    @property
     def rule(self) -> str | None:
         """The slip rule that the file gives for the whole run; None where each law keeps its own."""
         return None if self.slip_rule == OWN else self.slip_rule
@@ -53,9 +76,9 @@ class PlannedRun:
     @functools.cached_property
     def fingerprint(self) -> str:
         """A hash of everything that determines the run's numbers."""
-        return hashlib.sha256(json.dumps(self._content(), sort_keys=True).encode()).hexdigest()
+        return hashlib.sha256(json.dumps(self.content(), sort_keys=True).encode()).hexdigest()
 
-    def _content(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """What the fingerprint is made of."""
         laws = [self.axis.friction.law, *(m.law for m in frictions_of(self.control))]
         return {
@@ -96,6 +119,31 @@ class PlannedRun:
             integrator_for(case, n.integrator)
         except InputError as error:
             raise ConfigError(f"run {self.key}: {error}") from None
+
+    def execute(self, check: bool = False) -> Executed:
+        """Simulate it, once its `check` passes; a run that ends early gives what was computed until then.
+
+        With `check` the record's meta has the estimate of its error (`stickslip.simulate`); whether the run depends on
+        its start it has anyway where the exact integrator runs it.
+        """
+        n, start, failure = self.numerics, time.thread_time(), ""
+        try:
+            if isinstance(self.axis, Machine):
+                record = simulate(
+                    self.axis, self.control, self.motion, self.duration,
+                    slip_rule=self.rule, output=n.output, check=check,
+                )  # fmt: skip
+            else:
+                case = prepare(
+                    self.axis, self.control, self.motion, self.duration,
+                    tolerance=n.tolerance, slip_rule=self.rule, output=n.output,
+                )  # fmt: skip
+                record = run_case(case, n.integrator, n.time_step, self.rule, check=check, start=True)
+        except SimulationError as error:
+            if error.record is None:
+                raise
+            record, failure = error.record, str(error)
+        return Executed(record, failure, time.thread_time() - start)
 
 
 def described(machine: Machine) -> dict[str, Any]:

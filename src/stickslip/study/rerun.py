@@ -45,8 +45,9 @@ Former = tuple[str, dict[str, float]]
 """Why a run ended early (empty: it did not), and its metrics."""
 
 
-def _former(folder: Path) -> tuple[Path, dict[str, Path], dict[str, Former], dict[str, Any]]:
-    """The study's file, the copies of the others by where they lay, every run as it was, and the versions."""
+def _former(folder: Path) -> tuple[Path, dict[str, Path], dict[str, Former], dict[str, Any], dict[str, Any]]:
+    """The study's file, the copies of the others by where they lay, every run as it was, the versions, and what the
+    command gave instead of the file."""
     manifest = read_manifest(folder)
     try:
         source, *others = manifest["inputs"]
@@ -58,7 +59,9 @@ def _former(folder: Path) -> tuple[Path, dict[str, Path], dict[str, Former], dic
             )
             for e in manifest["runs"]
         }
-        return folder / source["copy"], moved, before, dict(manifest["versions"])
+        config: dict[str, Any] = manifest.get("configuration", {})
+        given = {k: config[k] for k in ("seeds", "ablation") if k in config and "experiments" in config}
+        return folder / source["copy"], moved, before, dict(manifest["versions"]), given
     except KeyError as error:
         why = f"an entry {error} is missing"
     except (TypeError, ValueError, AttributeError) as error:
@@ -76,8 +79,8 @@ def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comp
     """
     if jobs < 1:
         raise InputError(f"jobs = {jobs} must be at least 1")
-    source, moved, before, then = _former(folder)
-    study = load(source, moved)
+    source, moved, before, then, given = _former(folder)
+    study = load(source, moved, given)
     everything = [*study.runs, *study.extras]
     planned = [p for p in everything if p.key in before]
     if missing := sorted(before.keys() - {p.key for p in planned}):

@@ -9,18 +9,14 @@ import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from stickslip.capacity import insist_on_jobs
-from stickslip.errors import SimulationError
-from stickslip.machines.machine import Machine
-from stickslip.record import Record
-from stickslip.simulation.closed_loop import prepare, run_case, simulate
 from stickslip.study import files
 from stickslip.study.plan import Study, load, load_run, select
-from stickslip.study.planned_run import PlannedRun
+from stickslip.study.planned_run import Executed, PlannedRun
 from stickslip.study.result import Run, StudyResult
 
 __all__ = ["PlannedRun", "Study", "execute", "load", "load_run", "run", "select"]
@@ -29,45 +25,9 @@ Progress = Callable[[int, int], None]
 """Called with the number of runs finished and the number of all."""
 
 
-@dataclass(frozen=True)
-class Executed:
-    """A run that has been simulated: its record, why it ended early (or nothing), its CPU time in s."""
-
-    record: Record
-    failure: str
-    seconds: float
-
-    @property
-    def metrics(self) -> dict[str, float]:
-        """Metrics by name; empty if the run ended early."""
-        return dict(self.record.meta.get("metrics", {}))
-
-
 def execute(planned: PlannedRun, check: bool = False) -> Executed:
-    """Simulate one `planned` run that its `check` passes; one that ends early gives what was computed until then.
-
-    With `check` the record's meta has the estimate of its error (`stickslip.simulate`); whether the run depends on its
-    start it has anyway where the exact integrator runs it.
-    """
-    n = planned.numerics
-    start, failure = time.thread_time(), ""
-    try:
-        if isinstance(planned.axis, Machine):
-            record = simulate(
-                planned.axis, planned.control, planned.motion, planned.duration,
-                slip_rule=planned.rule, output=n.output, check=check,
-            )  # fmt: skip
-            return Executed(record, "", time.thread_time() - start)
-        case = prepare(
-            planned.axis, planned.control, planned.motion, planned.duration,
-            tolerance=n.tolerance, slip_rule=planned.rule, output=n.output,
-        )  # fmt: skip
-        record = run_case(case, n.integrator, n.time_step, planned.rule, check=check, start=True)
-    except SimulationError as error:
-        if error.record is None:
-            raise
-        record, failure = error.record, str(error)
-    return Executed(record, failure, time.thread_time() - start)
+    """Simulate one run (`PlannedRun.execute`)."""
+    return planned.execute(check)
 
 
 def run(

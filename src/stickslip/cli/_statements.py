@@ -1,0 +1,47 @@
+"""What `stickslip study` prints of experiments: the thesis's statements that were judged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from stickslip.report.rig_report import verdict_table
+from stickslip.study.experiments import ExperimentView
+from stickslip.study.result import StudyResult
+from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share
+
+__all__ = ["judged_in", "print_statements", "statements_as_data"]
+
+
+def judged_in(result: StudyResult) -> list[Judged]:
+    """Every statement on the variants that were run; empty for experiments on which none can be judged."""
+    if "experiments" not in result.config:
+        return []
+    view = ExperimentView(result)
+    judged = judged_over(view, view.varied())
+    return judged if any(j.holds is not None for j in judged) else []
+
+
+def statements_as_data(result: StudyResult, judged: list[Judged], report: Path | None) -> dict[str, Any]:
+    """Plain data."""
+    return {
+        "folder": str(result.folder), "report": str(report) if report else None,
+        "statements": verdict_table(judged), "main": main_share(judged),
+    }  # fmt: skip
+
+
+def print_statements(result: StudyResult, judged: list[Judged], report: Path | None) -> None:
+    """One line a statement, the main ones, and where the files lie."""
+    for row in verdict_table(judged):
+        if row["word"] != "not run":
+            share = f"  ({row['share']} starts)" if row["share"] else ""
+            print(f"{row['word']:<14} {row['id']:<28} {row['text']}{share}")
+    print()
+    for text, (held, of) in main_share(judged).items():
+        print(f"{held} of {of}  {text}")
+    hold, fail = (sum(j.holds is value for j in judged) for value in (True, False))
+    wall = result.manifest["timings"]["wall_s"]
+    print(f"{hold} statements hold, {fail} do not; {len(result.runs)} runs, {wall:.1f} s")
+    for path in (result.folder / "metrics.csv", result.folder / "manifest.json", report):
+        if path:
+            print(path)
