@@ -23,7 +23,7 @@ from stickslip.identify.fit.smooth import Window, seen
 from stickslip.identify.regression.band_fit import Number
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import inverse_dynamics
-from stickslip.identify.regression.orders import explained_by
+from stickslip.identify.regression.orders import Harmonic
 from stickslip.identify.regression.regression import regress_axis, together
 from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
@@ -360,4 +360,30 @@ def test_friction_is_not_believed_where_the_axis_does_not_follow(logs: Any) -> N
 def test_a_harmonic_that_no_row_resolves_explains_nothing() -> None:
     """Fast rows damp it to 0 throughout."""
     residual = np.random.default_rng(1).standard_normal(50)
-    assert explained_by(np.zeros((50, 2)), np.ones((50, 1)) / np.sqrt(50.0), residual)[0] == 0.0
+    assert Harmonic.of(np.zeros((50, 2)), np.ones((50, 1)) / np.sqrt(50.0), residual).explained == 0.0
+
+
+def test_a_harmonic_explains_what_least_squares_say_it_does() -> None:
+    """Beside columns that are there, and beside those that are added."""
+    random = np.random.default_rng(2)
+    rows, basis = random.standard_normal((80, 2)), np.linalg.qr(random.standard_normal((80, 5)))[0]
+    residual = random.standard_normal(80)
+    left = [residual - b @ (b.T @ residual) for b in (basis[:, :3], basis)]
+    first = Harmonic.of(rows, basis[:, :3], left[0])
+    for harmonic, r, b in (
+        (first, left[0], basis[:, :3]),
+        (first.beside(rows, basis[:, 3:], left[1]), left[1], basis),
+    ):
+        after = np.linalg.lstsq(np.column_stack([b, rows]), r, rcond=None)[1][0]
+        assert harmonic.explained == pytest.approx(r @ r - after, rel=1e-6)
+
+
+def test_a_long_series_is_seen_in_blocks_as_in_one_piece() -> None:
+    series = np.cumsum(np.random.default_rng(3).standard_normal(300_000))
+    window = Window(0.02, 1e-3)
+    whole, slope = seen(series, window.weights(0), window.weights(1))
+    reach = window.reach
+    for at in (0, 5, 16_383, 150_000, 299_999):
+        rows = np.pad(series, reach, mode="edge")[at : at + 2 * reach + 1]
+        assert whole[at] == pytest.approx(rows @ window.weights(0), rel=1e-9)
+        assert slope[at] == pytest.approx(rows @ window.weights(1), rel=1e-6, abs=1e-6)

@@ -21,6 +21,8 @@ CORNER = 0.1325
 """Corner frequency (-3 dB) of a Gaussian window times its width: sqrt(ln 2) / (2 pi)."""
 REACH = 4.5
 """Widths after which the window ends."""
+BLOCK = 1 << 14
+"""Rows of a block of a long series, at least."""
 NARROWEST = 1.5
 """Rows of the narrowest window whose derivatives are still those of a Gaussian."""
 
@@ -81,13 +83,17 @@ class Window:
 def seen(series: Array, *weights: Array) -> list[Array]:
     """The series, shape (n,), through each set of weights, at every row; the ends are continued by their last value."""
     reach = max(w.size for w in weights) // 2
-    padded = np.pad(series, reach, mode="edge")
-    size = 1 << (padded.size + 2 * reach).bit_length()
-    spectrum = np.fft.rfft(padded, size)
+    size = 1 << (series.size + 4 * reach).bit_length()
+    block = max(BLOCK, 1 << (16 * reach).bit_length())
+    # A long series goes in blocks that overlap by the reach: they stay in the processor's cache.
+    size, step = (size, series.size) if size <= 8 * block else (block, block - 2 * reach)
+    count = -(-series.size // step)
+    padded = np.pad(series, (reach, reach + size + count * step - series.size), mode="edge")
+    frames = np.lib.stride_tricks.sliding_window_view(padded, size)[: count * step : step]
+    spectrum = np.fft.rfft(frames, axis=1)
     out: list[Array] = []
     for w in weights:
-        own = w.size // 2
-        full = np.fft.irfft(spectrum * np.fft.rfft(w[::-1], size), size)
-        begin = reach + own
-        out.append(full[begin : begin + series.size])
+        full = np.fft.irfft(spectrum * np.fft.rfft(w[::-1], size), size, axis=1)
+        begin = reach + w.size // 2
+        out.append(full[:, begin : begin + step].ravel()[: series.size])
     return out

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -69,46 +70,79 @@ def shown_orders(records: Sequence[SlidingRows], skew: float, candidates: Sequen
     size = np.linalg.norm(columns, axis=0)
     columns = columns[:, size > 0.0] / size[size > 0.0]
     left, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    basis = left[:, singular > 1e-6 * singular[0]]
-    residual = torque - basis @ (basis.T @ torque)
-    pool = {o: np.concatenate([r.around(o) for r in records]) for o in candidates}
+    basis: Array = np.asarray(left[:, singular > 1e-6 * singular[0]], dtype=np.float64)
+    residual: Array = np.asarray(torque - basis @ (basis.T @ torque), dtype=np.float64)
+    pool: dict[float, Harmonic] = {}
+    for order in candidates:
+        pool[order] = Harmonic.of(around(records, order), basis, residual)
     stroke = strokes_of(records)
     piece = pieces_of(stroke, rows_in(PIECE, records))
     found: list[float] = []
     while len(found) < MOST and pool:
         power = float(residual @ residual)
-        explained, order, own = max(
-            (
-                (*explained_by(h, basis, residual)[:1], o, explained_by(h, basis, residual)[1])
-                for o, h in pool.items()
-            ),
-            key=lambda entry: entry[0],
-        )
+        explained, order = max((h.explained, o) for o, h in pool.items())
         independent = torque.size / memory_of(residual, stroke)
         if power <= 0.0 or independent * explained / power < 2.0 * math.log(len(candidates)) + SURE:
             break
+        rows = around(records, order)
+        own = rows - basis @ (basis.T @ rows)
         if held_out_power(own, residual, piece % 2 == 0) > power - HELPS * explained:
             break
         found.append(order)
         del pool[order]
-        added, _ = np.linalg.qr(own)
-        basis = np.column_stack([basis, added])
+        added: Array = np.asarray(np.linalg.qr(own)[0], dtype=np.float64)
+        basis = np.asarray(np.column_stack([basis, added]), dtype=np.float64)
         residual = residual - added @ (added.T @ residual)
+        if len(found) < MOST:
+            for other, harmonic in pool.items():
+                pool[other] = harmonic.beside(around(records, other), added, residual)
     return found
 
 
-def explained_by(harmonic: Array, basis: Array, residual: Array) -> tuple[float, Array]:
-    """Power of the residual that a harmonic's own part explains, and that part."""
-    own = harmonic - basis @ (basis.T @ harmonic)
-    # A harmonic that no row resolves is 0 throughout.
-    if np.min(np.linalg.norm(own, axis=0)) <= OWN * np.max(np.linalg.norm(harmonic, axis=0)):
-        return 0.0, own
-    products = own.T @ own
-    seen = own.T @ residual
-    told = np.asarray(
-        np.linalg.solve(products + 1e-9 * np.trace(products) * np.eye(2), seen), dtype=np.float64
-    )
-    return float(seen @ told), own
+def around(records: Sequence[SlidingRows], order: float) -> Array:
+    """Cosine and sine of an order at every row, shape (n, 2)."""
+    return np.concatenate([r.around(order) for r in records])
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """What a harmonic shares with a residual and with the columns before it: its rows need not be kept.
+
+    Attributes
+    ----------
+    products : array, shape (2, 2)
+        Of its cosine and sine with each other.
+    own : array, shape (2, 2)
+        The same, of the part that no column before it explains.
+    seen : array, shape (2,)
+        Its products with the residual, which those columns do not explain.
+    """
+
+    products: Array
+    own: Array
+    seen: Array
+
+    @staticmethod
+    def of(rows: Array, basis: Array, residual: Array) -> Harmonic:
+        """Of rows of shape (n, 2), beside an orthonormal basis of shape (n, k)."""
+        products: Array = np.asarray(rows.T @ rows)
+        return Harmonic(products, products, np.zeros(2)).beside(rows, basis, residual)
+
+    def beside(self, rows: Array, added: Array, residual: Array) -> Harmonic:
+        """The same with orthonormal columns added to the basis, and another residual."""
+        mixing: Array = np.asarray(added.T @ rows)
+        return replace(self, own=self.own - mixing.T @ mixing, seen=rows.T @ residual)
+
+    @property
+    def explained(self) -> float:
+        """Power of the residual that its own part explains; none where that part is hardly there."""
+        # A harmonic that no row resolves is 0 throughout.
+        if np.min(np.diag(self.own)) <= OWN**2 * np.max(np.diag(self.products)):
+            return 0.0
+        told: Array = np.asarray(
+            np.linalg.solve(self.own + 1e-9 * np.trace(self.own) * np.eye(2), self.seen), dtype=np.float64
+        )
+        return float(self.seen @ told)
 
 
 def held_out_power(own: Array, residual: Array, half: np.ndarray[Any, np.dtype[np.bool_]]) -> float:
