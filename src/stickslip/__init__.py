@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from stickslip.verbs.export import ExportResult, export
     from stickslip.verbs.identification import IdentificationResult
     from stickslip.verbs.identify import identify
+    from stickslip.verbs.learn import LearningResult, learn
     from stickslip.verbs.reading import read
     from stickslip.verbs.recommend import RecommendationResult, recommend
     from stickslip.verbs.sweep import SweepResult, sweep
@@ -52,6 +53,7 @@ _HOME = {
     "IdentificationResult": "verbs.identification",
     "InputError": "errors",
     "Law": "spec",
+    "LearningResult": "verbs.learn",
     "Machine": "machines.machine",
     "Mode": "spec",
     "Model": "model",
@@ -71,6 +73,7 @@ _HOME = {
     "doctor": "verbs.doctor",
     "law": "plugins",
     "law_names": "plugins",
+    "learn": "verbs.learn",
     "load_machine": "machines.machine",
     "pd": "control.linear",
     "pid": "control.linear",
@@ -95,6 +98,7 @@ __all__ = [
     "IdentificationResult",
     "InputError",
     "Law",
+    "LearningResult",
     "Machine",
     "Mode",
     "Model",
@@ -116,6 +120,7 @@ __all__ = [
     "identify",
     "law",
     "law_names",
+    "learn",
     "load_machine",
     "pd",
     "pid",

@@ -24,12 +24,24 @@ from stickslip.errors import InputError, Interrupted, ModelRemark, StickslipErro
 __all__ = ["VERBS", "allow_code_argument", "main", "parser_of"]
 
 VERBS = (
-    "study", "sweep", "tune", "simulate", "identify", "doctor", "analyse", "compare", "recommend", "demo",
+    "study", "sweep", "tune", "simulate", "learn", "identify", "doctor", "analyse", "compare", "recommend", "demo",
     "rig", "laws", "law", "cite", "rerun", "export", "web", "warm-up", "version"
 )  # fmt: skip
 
 
-CODE = ("study", "sweep", "tune", "simulate", "identify", "compare", "recommend", "cite", "rerun", "export")
+CODE = (
+    "study",
+    "sweep",
+    "tune",
+    "simulate",
+    "learn",
+    "identify",
+    "compare",
+    "recommend",
+    "cite",
+    "rerun",
+    "export",
+)
 """Verbs that read TOML files in which laws may be named; `rig` and `analyse` have the option in their actions."""
 
 

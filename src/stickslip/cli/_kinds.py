@@ -19,6 +19,7 @@ WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "sweep": {"sweep": ("sweep", "tuning")},
     "tune": {"tune": ("tuning", "sweep")},
     "simulate": {"file": ("simulation", "model")},
+    "learn": {"file": ("simulation", "model")},
     "study": {"study": ("study",)},
     "export": {"file": ("model", "simulation", "map")},
     "rig": {"rig": ("rig",)},

@@ -274,6 +274,17 @@ class SampledController:
                 flat.extend(value)
         return flat
 
+    def unpacked_state(self, flat: Sequence[float]) -> SimpleNamespace:
+        """The state of the laws that `packed_state` made this flat list of."""
+        z, numbers = self.state(), iter(flat)
+        fields = [*zip(self.state_fields, self._paths("state_fields"))]
+        for f, path in sorted(fields, key=lambda pair: pair[0].per_element):
+            owner = _at(z, path[:-1])
+            before = getattr(owner, path[-1])
+            value = [float(next(numbers)) for _ in before] if f.per_element else float(next(numbers))
+            setattr(owner, path[-1], value)
+        return z
+
     def _paths(self, kind: str) -> list[tuple[str, ...]]:
         """Where each field lies among the parts: ``("feedforward", "friction", "sigma0")``."""
         paths: list[tuple[str, ...]] = []

@@ -13,10 +13,21 @@ from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
 from stickslip.jit import call_sample, compiled_sample, flat, kernel, pointer
 
-__all__ = ["Sampled", "compiled", "measured_position", "replay"]
+__all__ = [
+    "COMPENSATION",
+    "FAULT",
+    "FEEDFORWARD",
+    "Sampled",
+    "compiled",
+    "measured_position",
+    "replay",
+    "replay_memory",
+]
 
-COMPENSATION, FAULT = ([f.name for f in MEMORY_FIELDS].index(name) for name in ("others", "fault"))
-"""Places of the compensating torque and of the fault in the memory."""
+COMPENSATION, FAULT, FEEDFORWARD = (
+    [f.name for f in MEMORY_FIELDS].index(name) for name in ("others", "fault", "feedforward")
+)
+"""Places of the compensating torque, of the fault and of the feedforward in the memory."""
 
 
 @kernel()
@@ -77,3 +88,17 @@ def replay(sampled: Sampled, inputs: Any, surroundings: Any, torque: Any, fault:
             pointer(surroundings, 0),
         )  # fmt: skip
         fault[i] = sampled.memory[sampled.fault]
+
+
+@kernel()
+def replay_memory(
+    sampled: Sampled, inputs: Any, surroundings: Any, place: int, torque: Any, seen: Any
+) -> None:
+    """As `replay`; `seen` gets what stands at a place of the memory after every sample."""
+    for i in range(inputs.shape[0]):
+        torque[i] = call_sample(
+            sampled.address, inputs[i, 0], inputs[i, 1], inputs[i, 2], inputs[i, 3], pointer(sampled.settings, 0),
+            pointer(sampled.memory, 0), pointer(sampled.state, 0), pointer(sampled.parameters, 0),
+            pointer(surroundings, 0),
+        )  # fmt: skip
+        seen[i] = sampled.memory[place]

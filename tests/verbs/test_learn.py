@@ -1,0 +1,128 @@
+"""The verb learn: what it learns makes the motion better, and is given on by the controller that it writes."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.cli import main
+from stickslip.control.files import read_controller
+from stickslip.errors import InputError
+from stickslip.machines.contact import Contact
+from stickslip.machines.encoder import Encoder
+from stickslip.machines.machine import Machine
+from stickslip.machines.motor import Harmonics
+from support.golden_rows import INERTIA, ROWS
+
+FRICTION = ss.Model(
+    "gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, fs=0.335, fc=0.285, vs=0.01, sigma2=0.018
+)
+AXIS = ss.RigidAxis(INERTIA, FRICTION)
+BRISK = ss.Reference("sine", amplitude=0.1, frequency=2.0)
+RIPPLE = Machine(
+    "ripple", INERTIA, Contact(FRICTION), cogging=Harmonics((102,), (0.0526,), (2.28,)), encoder=Encoder()
+)
+"""The thesis's axis with a ripple like the reference's, whose files do not give it: order and size are inferred."""
+FILE = """
+[axis]
+inertia = 3.8623e-4
+[friction]
+law = "coulomb"
+fc = 0.285
+sigma2 = 0.018
+[reference]
+kind = "sine"
+amplitude = 0.1
+frequency = 2.0
+duration = 0.5
+[controller]
+sample_time = 0.001
+torque_limit = 1.0
+placement = {bandwidth_hz = 20.0, damping = 1.0}
+loop = {law = "pd"}
+observer = {law = "disturbance_observer", corner = 200.0}
+"""
+
+
+def error_with(controller, reference, duration, axis=AXIS):
+    record = ss.simulate(axis, controller, reference, duration, metered=False)
+    error = (record["position_reference"] - record["position"])[record["event"] == 0.0]
+    return math.sqrt(float(np.mean(error[: round(duration / 1e-3)] ** 2)))
+
+
+def test_a_motion_that_repeats_becomes_better_over_time():
+    found = ss.learn(AXIS, ROWS["PD + DOB 200"], BRISK, 0.5, repetitions=4)
+    assert len(found.errors) == 4
+    assert found.errors[3] < 0.3 * found.errors[0]
+    assert found.errors[0] == pytest.approx(error_with(ROWS["PD + DOB 200"], BRISK, 0.5), rel=1e-6)
+    assert error_with(found.controller, BRISK, 0.5) == pytest.approx(min(found.errors), rel=1e-6)
+    assert found.block.law.option_of("over") == "time"
+    assert "|Q (1 - L T)| is at most" in str(found)
+
+
+def test_what_was_learned_over_the_angle_serves_another_motion():
+    found = ss.learn(AXIS, ROWS["PD + DOB 200"], BRISK, 0.5, over="angle", repetitions=5)
+    assert found.errors[4] < 0.4 * found.errors[0]
+    up, down = (np.array(getattr(found.block.parameters, name)) for name in ("forward", "backward"))
+    middle = slice(20, 44)
+    assert up[middle] == pytest.approx(0.285, rel=0.15)  # F_C and a part of sigma2 v
+    assert down[middle] == pytest.approx(-0.285, rel=0.15)
+    slower = ss.Reference("sine", amplitude=0.1, frequency=1.0)
+    alone = error_with(ROWS["PD + DOB 200"], slower, 1.0)
+    assert error_with(found.controller, slower, 1.0) < 0.6 * alone
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("row", "before", "after"), [("PD + DOB 200", 1.44, 0.26), ("PID + FF LuGre .9", 1.06, 0.30)]
+)
+def test_cogging_is_learned_as_on_the_bench_of_the_reference(row, before, after):
+    """The reference has 1.36 (1.60 later) to 0.28 and 1.08 (1.10) to 0.50 mrad."""
+    slow = ss.Reference("sine", amplitude=0.11885, frequency=0.4)
+    found = ss.learn(RIPPLE, ROWS[row], slow, 2.5, over="angle", repetitions=10)
+    assert 1e3 * found.errors[0] == pytest.approx(before, rel=0.02)
+    assert 1e3 * np.median(found.errors[5:]) < 1.2 * after
+
+
+def test_what_diverges_is_refused_in_a_line():
+    with pytest.raises(InputError, match=r"at 1\d\d Hz, not below 1.*lower corner or rate") as refused:
+        ss.learn(AXIS, ROWS["PD + DOB 200"], BRISK, 0.5, corner=400.0)
+    assert "\n" not in str(refused.value)
+    with pytest.raises(InputError, match=r"not below 1.*lower bins or rate"):
+        ss.learn(AXIS, ROWS["PD + DOB 200"], BRISK, 0.5, over="angle", bins=2048)
+    with pytest.raises(InputError, match=r"rate = 2\.5 converges with no filter"):
+        ss.learn(AXIS, ROWS["PD + DOB 200"], BRISK, 0.5, rate=2.5)
+
+
+def test_what_cannot_be_repeated_is_refused():
+    step = ss.Reference("step", amplitude=0.01, tau=0.02)
+    for more, said in (
+        ({"over": "angle", "reference": step}, "rad from its start"),
+        ({"duration": 0.50001}, "whole number of samples"),
+        ({"repetitions": 0}, "repetitions = 0"),
+        ({"over": "angle", "corner": 20.0}, "belong to learning over time"),
+        ({"over": "speed"}, "unknown domain of learning 'speed'"),
+        ({"controller": ROWS["PD + FF LuGre .9 + DOB 400 whole (wrong)"]}, "cancels every feedforward"),
+        ({"controller": ss.Controller(ss.pd(6.0, 0.1))}, "continuous time"),
+    ):
+        given = {"controller": ROWS["PD + DOB 200"], "reference": BRISK, "duration": 0.5, **more}
+        with pytest.raises(InputError, match=said):
+            ss.learn(AXIS, **given)
+
+
+def test_the_command_writes_a_controller_that_runs(tmp_path: Path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("my.toml").write_text(FILE)
+    assert main(["learn", "my.toml", "--repetitions", "3", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["controller"] == "my-learned.toml"
+    controller = read_controller("my-learned.toml")
+    assert isinstance(controller, ss.SampledController)
+    axis = ss.RigidAxis(INERTIA, ss.Model("coulomb", fc=0.285, sigma2=0.018))
+    assert error_with(controller, BRISK, 0.5, axis) == pytest.approx(min(said["errors"]), rel=1e-6)
+    assert main(["learn", "my.toml", "--corner", "400"]) == 2
