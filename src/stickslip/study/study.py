@@ -26,7 +26,14 @@ Progress = Callable[[int, int], None]
 
 
 def execute(planned: PlannedRun, check: bool = False) -> Executed:
-    """Simulate one run (`PlannedRun.execute`)."""
+    """Simulate one run (`PlannedRun.execute`).
+
+    Parameters
+    ----------
+    planned : PlannedRun
+    check : bool
+        Whether the record's meta has the estimate of its error.
+    """
     return planned.execute(check)
 
 
