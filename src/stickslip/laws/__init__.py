@@ -18,6 +18,7 @@ LAWS = (
     "static",
     "stribeck_plain",
     "stribeck",
+    "makkar",
     "karnopp",
     "armstrong",
     "dahl",
