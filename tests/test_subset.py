@@ -249,3 +249,24 @@ def wrong_count(v, z, p):
 def test_what_is_wrong_with_a_part_is_said(function, words):
     with pytest.raises(LawError, match=words):
         lower({"f": function}, PARTS)
+
+
+def halved(x, p):
+    return scale(0.5 * x, p)
+
+
+def called_as_states_are(z, m, p):
+    """Numbers under names that structures have elsewhere, given on under others."""
+    return halved(z, p) + halved(m, p) * z
+
+
+def of_numbers(v, z, p):
+    return called_as_states_are(v + z.x, v, p)
+
+
+def test_a_number_may_be_called_as_a_structure_is():
+    functions = lower({"of_numbers": of_numbers}, {**LAYOUTS, "m": Layout(("x",))})
+    scope = {"math": math}
+    exec("\n".join(ast.unparse(f) for f in functions.values()), scope)
+    p, z = Bag(a=2.0, b=0.5), Bag(x=0.3)
+    assert of_numbers(0.7, z, p) == scope["of_numbers"](0.7, [0.3], [2.0, 0.5, 0.0, 0.0])

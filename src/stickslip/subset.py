@@ -174,13 +174,15 @@ class _Target:
     """A function to translate; one for v < 0 reads the parameters that hold there.
 
     ``views`` are the arguments that stand for another structure than their name says, or for a part of one;
-    ``part`` is the part for which the function, and what it calls, is translated.
+    ``part`` is the part for which the function, and what it calls, is translated. ``numbers`` are the arguments that are
+    called as a structure is, and are numbers.
     """
 
     function: Callable[..., Any]
     negative: bool = False
     views: tuple[tuple[str, _View], ...] = ()
     part: str = ""
+    numbers: tuple[str, ...] = ()
 
 
 @dataclass
@@ -192,7 +194,8 @@ class _Names:
     def of(self, wanted: str, target: _Target) -> str:
         name, count = wanted + (NEGATIVE if target.negative else ""), 1
         views = tuple((name, view.base, view.prefix) for name, view in target.views)
-        key = (getattr(target.function, "__code__", target.function), target.negative, views, target.part)
+        code = getattr(target.function, "__code__", target.function)
+        key = (code, target.negative, views, target.part, target.numbers)
         while self.taken.setdefault(name, key) != key:
             count += 1
             name = f"{wanted}_{count}"
@@ -221,7 +224,8 @@ def _translate(
             "`return` and a number"
         )
     arguments = [a.arg for a in tree.args.args]
-    views = {a: _View(a, "", layouts[a]) for a in arguments if a in layouts} | dict(target.views)
+    structures = [a for a in arguments if a in layouts and a not in target.numbers]
+    views = {a: _View(a, "", layouts[a]) for a in structures} | dict(target.views)
     translator = _Translator(where, layouts, arguments, views, function.__globals__, flat, names, target)
     translator.rename(tree)
     body = [s for s in (translator.visit(statement) for statement in tree.body) if s is not None]
@@ -436,13 +440,17 @@ class _Translator(ast.NodeTransformer):
     def aimed(self, node: ast.Call, function: Callable[..., Any]) -> _Target:
         """The callee, for the parts of structures that it is called with."""
         views: list[tuple[str, _View]] = []
+        numbers: list[str] = []
         for formal, actual in zip(inspect.signature(function).parameters, node.args):
             view = self.view(self.positive(actual))
-            if view is not None and (view.prefix or self.layouts.get(formal) != view.layout):
+            if view is None and formal in self.layouts:
+                numbers.append(formal)
+            elif view is not None and (view.prefix or self.layouts.get(formal) != view.layout):
                 views.append((formal, view))
         negative = self.negative or any(map(self.is_negative, node.args))
         prefixes = [view.prefix for _, view in views if view.prefix]
-        return _Target(function, negative, tuple(views), max(prefixes, key=len, default=self.target.part))
+        part = max(prefixes, key=len, default=self.target.part)
+        return _Target(function, negative, tuple(views), part, tuple(numbers))
 
     def passed(self, node: ast.Call, target: _Target) -> list[ast.expr]:
         """The arguments of a call; a structure of which several parts are meant is passed once."""
