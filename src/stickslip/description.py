@@ -33,7 +33,7 @@ class Par:
     ``positive`` makes the lower bound 0, excluded. A parameter without ``default`` must be given. ``shares`` says
     that the values of all elements add up to 1, ``directional`` that the two directions of motion may have
     different values. A parameter with several values has one per element, or one per whatever else ``per`` names;
-    parameters with the same ``per`` have equally many.
+    parameters with the same ``per`` have equally many. ``whole`` says that only whole numbers mean anything.
     """
 
     unit: str
@@ -46,6 +46,7 @@ class Par:
     shares: bool = False
     directional: bool = False
     per: str = "element"
+    whole: bool = False
 
     def complaint(self, value: float) -> str:
         """Say what is wrong with `value`, or return the empty string."""
@@ -57,6 +58,8 @@ class Par:
             return f"must be at least {self.lower:g}"
         if value > self.upper:
             return f"must be at most {self.upper:g}"
+        if self.whole and not value.is_integer():
+            return "must be a whole number"
         return ""
 
     @property

@@ -201,3 +201,67 @@ def test_what_cannot_be_tuned(tmp_path, capsys):
     sweep = load(path)
     with pytest.raises(InputError, match="too many for every setting"):
         tuning.tune(sweep, sweep.runs[0])
+
+
+KNOCKED = COMPOSED.replace(
+    'observer = {law = "disturbance_observer", corner = 20.0}',
+    'observer = {law = "knocker", torque = 0.05, samples = 10, width = 2}',
+).replace('law = "pd"', 'law = "pid"')
+
+
+@pytest.mark.parametrize(
+    ("study", "numbers", "ranges"),
+    [
+        (COMPOSED, {"observer_corner": 20.0, "loop_kp": None}, {"observer_corner": (4.0, 100.0)}),
+        (
+            KNOCKED.replace('{law = "pid"}', '{law = "pid", at_rest = "reset", kept = 0.5}'),
+            {"loop_kept": 0.5, "observer_width": 2.0, "observer_samples": 10.0},
+            {"loop_kept": (0.0, 1.0), "observer_width": (1.0, 10.0), "observer_samples": (2.0, 50.0)},
+        ),
+    ],
+)
+def test_a_number_without_a_range_has_that_of_its_law(tmp_path, study, numbers, ranges):
+    """Between finite bounds; else factors of 5 on the study's own number, up to a bound."""
+    (tmp_path / "study.toml").write_text(study)
+    head = OF_COMPOSED.partition('[tune."')[0]
+    (tmp_path / "mine.toml").write_text(head + "".join(f'[tune."controller.{name}"]\n' for name in numbers))
+    sweep = load(tmp_path / "mine.toml")
+    run = sweep.runs[0]
+    for spread in sweep.tuned:
+        name = spread.name.removeprefix("controller.")
+        own = run.control.values()[name]
+        assert numbers[name] in (None, own)
+        factor = own if spread.factor else 1.0
+        assert (factor * spread.low, factor * spread.high) == pytest.approx(
+            ranges.get(name, (0.2 * own, 5.0 * own))
+        )
+
+
+def test_whole_numbers_are_tuned_as_whole_numbers(tmp_path, monkeypatch):
+    monkeypatch.setattr(tuning, "GENERATIONS", 1)
+    (tmp_path / "study.toml").write_text(KNOCKED)
+    head = OF_COMPOSED.partition('[tune."')[0]
+    (tmp_path / "mine.toml").write_text(
+        head + '[tune."controller.observer_samples"]\n[tune."controller.observer_torque"]\n'
+    )
+    sweep = load(tmp_path / "mine.toml")
+    tuned = tuning.tune(sweep, sweep.runs[0])
+    periods = tuned.tried[:, 0]
+    assert np.array_equal(periods, np.round(periods))
+    assert len(set(periods)) > 3
+    # A period not longer than a pulse is refused by the law: such a setting fails, and is not chosen.
+    assert np.array_equal(np.isinf(tuned.scores[:, 0]), periods <= 2.0)
+    assert tuned.scores_after[0] < tuned.scores_before[0]
+
+
+def test_a_number_that_has_no_usual_range_is_told(tmp_path):
+    study = COMPOSED.replace("corner = 20.0", "corner = 20.0, delay = 0")
+    (tmp_path / "study.toml").write_text(study.replace('law = "pd"', 'law = "gains", kp = 1.0'))
+    head = OF_COMPOSED.partition('[tune."')[0]
+    for name, said in (
+        ("loop_ki", r"controller.loop_ki = 0 has no usual range; give range = \[low, high\]"),
+        ("observer_cornre", "no run has a number|give one of scale"),
+    ):
+        (tmp_path / "mine.toml").write_text(head + f'[tune."controller.{name}"]\n')
+        with pytest.raises(ConfigError, match=said):
+            load(tmp_path / "mine.toml")

@@ -63,6 +63,8 @@ def bounds(law: Configurable) -> Verdict:
             wrong.append(f.par.lower - 1.0)
         if f.par.upper < math.inf:
             wrong.append(f.par.upper + 1.0)
+        if f.par.whole:
+            wrong.append(max(f.par.lower, 0.0) + 0.5)
         for x in wrong:
             value = [x] * len(good[f.name]) if f.per_element and f.name in good else x
             if not _refused(lambda v=value, n=f.name: law.parameters({**good, n: v}), f.name):

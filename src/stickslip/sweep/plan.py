@@ -22,6 +22,7 @@ from stickslip.study.plan import Study
 from stickslip.study.planned_run import PlannedRun
 from stickslip.study.provenance import file_hash
 from stickslip.sweep.numbers import belongs, value_of, varied
+from stickslip.sweep.ranges import admitted, usual
 from stickslip.sweep.sample import LEVEL, METHODS, Drawn, Spread, count_of
 
 __all__ = ["BUILT_IN", "Sweep", "load"]
@@ -153,7 +154,7 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
     metrics = table.texts("metrics", METRICS) if table.has("metrics") else list(USUAL)
     check = table.flag("check", True)
     drawn, left_out = _drawn(table, {r.axis.friction.law.name for r in runs})
-    tuned = _spreads(table, "tune", drawn.method) if table.has("tune") else []
+    tuned = _spreads(table, "tune", drawn.method, runs) if table.has("tune") else []
     step, device = _lanes(table, metrics)
     title = table.text("title", _title(name, study, drawn, tuned))
     percentile = table.positive("percentile", "%", 95.0) if tuned else 95.0
@@ -231,12 +232,14 @@ def _drawn(table: Table, laws: set[str]) -> tuple[Drawn, tuple[str, ...]]:
     return Drawn(method, tuple(spreads), cases, seed, estimates, correlation, nested), left_out
 
 
-def _spreads(table: Table, key: str, method: str) -> list[Spread]:
-    """The numbers of a table of ranges."""
+def _spreads(table: Table, key: str, method: str, runs: Sequence[PlannedRun] = ()) -> list[Spread]:
+    """The numbers of a table of ranges; one that names none has the usual range of the `runs`."""
     family, found = table.table(key), list[Spread]()
     for name in family.values:
         with family.table(name) as t:
-            found.append(_spread(name, t, method))
+            own = t.values or not any(belongs(run, name) for run in runs)
+            with t.blamed():
+                found.append(_spread(name, t, method) if own else usual(runs, name))
     return found
 
 
@@ -324,12 +327,15 @@ def _check(sweep: Sweep, table: Table) -> None:
             _try(
                 run, {k: _plain(v[0]) for k, v in sweep.values(run, numbers[None, :]).items()}, table, "vary"
             )
-        for s in (s for s in sweep.tuned if belongs(run, s.name)):
+        # Where a law's numbers exclude each other within their usual ranges, the search finds out.
+        given = [s for s in sweep.tuned if sweep.config["tune"][s.name]]
+        for s in (s for s in given if belongs(run, s.name)):
             base = value_of(run, s.name)
             if isinstance(base, tuple):
                 raise ConfigError(f"{table.label('tune')}: {s.name} is a list; name an element, {s.name}[0]")
             for end in (s.low, s.high):
-                _try(run, {s.name: end * (base if s.factor else 1.0)}, table, "tune")
+                number = end * (base if s.factor else 1.0)
+                _try(run, {s.name: admitted(run, s.name, number)}, table, "tune")
 
 
 def _try(run: PlannedRun, values: Mapping[str, Any], table: Table, key: str) -> None:

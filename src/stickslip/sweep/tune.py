@@ -20,6 +20,7 @@ from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.block import measured
 from stickslip.sweep.numbers import belongs, value_of
 from stickslip.sweep.plan import Sweep
+from stickslip.sweep.ranges import admitted
 
 __all__ = ["Tuned", "front", "tune"]
 
@@ -112,7 +113,8 @@ def tune(sweep: Sweep, run: PlannedRun, progress: Callable[[int, int], None] | N
         return percentiles(found.metrics, sweep.percentile)
 
     def objective(u: Array) -> float:
-        numbers = np.array([b * float(s.at(np.asarray(x))) for s, b, x in zip(spreads, bases, u)])
+        places = zip(spreads, bases, u)
+        numbers = np.array([admitted(run, s.name, b * float(s.at(np.asarray(x)))) for s, b, x in places])
         tried.append(numbers)
         scores.append(score(numbers))
         if progress:

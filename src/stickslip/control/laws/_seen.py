@@ -85,12 +85,9 @@ def held(last: float, now: float, y: Any, z: Any, p: Any, u: Any) -> float:
 class Steps(NamedTuple):
     """Parameter of the division."""
 
-    substeps: Annotated[float, Par("-", "", "steps into which a sample is divided", lower=1.0, upper=1000.0)]
-
-
-def whole(p: Any) -> str:
-    """A sample is divided into whole steps."""
-    return "" if float(p.substeps).is_integer() else f"substeps = {p.substeps:g} must be a whole number"
+    substeps: Annotated[
+        float, Par("-", "", "steps into which a sample is divided", lower=1.0, upper=1000.0, whole=True)
+    ]
 
 
 def in_steps(last: float, now: float, y: Any, z: Any, p: Any, u: Any) -> float:
@@ -114,7 +111,7 @@ OVER_SAMPLE = Choice(
     {
         "linear": Option(linear),
         "held": Option(held),
-        "in_steps": Option(in_steps, Steps, check=whole, example={"substeps": 4.0}),
+        "in_steps": Option(in_steps, Steps, example={"substeps": 4.0}),
     },
     "linear",
     "how the velocity runs over a sample",

@@ -29,7 +29,15 @@ class Params(NamedTuple):
     corner: Annotated[float, Par("1/s", "g", "corner of the low-pass Q", positive=True)]
     delay: Annotated[
         float,
-        Par("-", "d", "samples by which the torque acts later", lower=0.0, upper=MOST_DELAY, default=0.0),
+        Par(
+            "-",
+            "d",
+            "samples by which the torque acts later",
+            lower=0.0,
+            upper=MOST_DELAY,
+            default=0.0,
+            whole=True,
+        ),
     ]
 
 
@@ -192,13 +200,6 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     return z.estimate
 
 
-def check(p: Any) -> str:
-    """The delay is a whole number of samples."""
-    if p.delay != math.floor(p.delay):
-        return f"delay = {p.delay:g} must be a whole number of samples"
-    return ""
-
-
 CONTROL_LAW = ControlLaw(
     "disturbance_observer", Params, sample, "observer",
     title="Disturbance observer",
@@ -206,7 +207,6 @@ CONTROL_LAW = ControlLaw(
     source=("ohnishi1996", "deluca2003"),
     example={"inertia": 3.8623e-4, "corner": 400.0},
     State=State,
-    check=check,
     linear=True,
     integrates=True,
     choices=(FED_WITH, ALIGNED, FORM, ORDER, AT_REST),

@@ -18,7 +18,7 @@ class Params(NamedTuple):
 
     torque: Annotated[float, Par("N·m", "A", "amplitude", positive=True)]
     samples: Annotated[
-        float, Par("-", "N", "samples of a period, the first half of them positive", lower=2.0)
+        float, Par("-", "N", "samples of a period, the first half of them positive", lower=2.0, whole=True)
     ]
 
 
@@ -69,7 +69,7 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
 def check(p: Any) -> str:
     """A period is an even number of samples: the mean is 0."""
     if p.samples % 2.0 != 0.0:
-        return f"samples = {p.samples:g} must be an even whole number"
+        return f"samples = {p.samples:g} must be even"
     return ""
 
 
