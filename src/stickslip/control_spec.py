@@ -9,6 +9,8 @@ Argument order, everywhere: signals of the loop ``y``, state ``z``, parameters `
 ``sample(y, z, p, u)``                   torque of this sample, N·m; advances ``z`` (an estimator: the velocity, rad/s)
 ``take_over(missing, y, z, p, u)``       changes ``z`` so that the torque would be ``missing`` N·m higher; returns
                                          what it could not take over, N·m
+``accelerating(y, z, p, u)``             of a feedforward: the part of its torque that accelerates the nominal
+                                         inertia, N·m; an observer's residual keeps it
 ``check(p)``                             a sentence that says what is wrong with the parameters, or ""
 ``delay(p, sample_time)``                of an estimator: its delay at low frequency, s
 ``continuous(p)``                        the law in continuous time: of a loop `stickslip.control.linear.Gains`, of one
@@ -18,8 +20,8 @@ Argument order, everywhere: signals of the loop ``y``, state ``z``, parameters `
 ``placed(inertia, bandwidth, damping)``  parameters that place the poles of the loop without friction, by name
 =======================================  ===========================================================
 
-``sample`` and ``take_over`` are written in the scalar subset (`stickslip.subset`). ``y`` has the fields of
-`Signals`, ``u`` those of `stickslip.spec.Surroundings`. A law that holds a friction law calls ``friction(v0,
+``sample``, ``take_over`` and ``accelerating`` are written in the scalar subset (`stickslip.subset`). ``y`` has the
+fields of `Signals`, ``u`` those of `stickslip.spec.Surroundings`. A law that holds a friction law calls ``friction(v0,
 v1, dt, z.friction, p.friction, u)``, and ``friction_steady(v, p.friction)`` for its torque at constant velocity.
 """
 
@@ -58,10 +60,10 @@ class Signals(NamedTuple):
     applied: Annotated[float, Par("N·m", "T_m", "torque applied since the last sample, after the limit")]
     commanded: Annotated[float, Par("N·m", "", "the same before the limit")]
     residual: Annotated[
-        float, Par("N·m", "", "torque applied since the last sample minus the feedforward in it")
+        float, Par("N·m", "", "torque applied since the last sample minus the compensation fed forward in it")
     ]
     feedforward: Annotated[
-        float, Par("N·m", "T_ff", "feedforward of this sample; 0 while feedforwards are computed")
+        float, Par("N·m", "T_ff", "compensation fed forward in this sample; 0 while it is computed")
     ]
     others: Annotated[float, Par("N·m", "T_hat", "torque of the places that ran before in this sample")]
     torque_limit: Annotated[float, Par("N·m", "T_max", "largest torque")]
@@ -105,7 +107,7 @@ class ControlLaw(Configurable):
         Parameters for an axis of 3.8623e-4 kg·m² at 1 kHz, for documentation and the contract tests.
     State : type or None
         As ``Params``, for the internal state. Everything is 0 at the start.
-    take_over, check, delay, continuous, placed : callable or None
+    take_over, accelerating, check, delay, continuous, placed : callable or None
     linear : bool
         Superposition holds while the torque is within its limit. A declaration: the contract tests try it.
     holds_friction : bool
@@ -132,6 +134,7 @@ class ControlLaw(Configurable):
     example: Mapping[str, Any]
     State: type | None = None
     take_over: Callable[..., float] | None = None
+    accelerating: Callable[..., float] | None = None
     check: Callable[[Any], str] | None = None
     delay: Callable[[Any, float], float] | None = None
     continuous: Callable[[Any], Any] | None = None
@@ -165,7 +168,10 @@ class ControlLaw(Configurable):
             "Parameters": make(self.Params.__name__, list(fields)),
             "example": self.option_examples(self.example, fields),
             "check": first_complaint(checks),
-            **{name: bound(getattr(self, name), scope) for name in ("sample", "take_over", "delay")},
+            **{
+                name: bound(getattr(self, name), scope)
+                for name in ("sample", "take_over", "accelerating", "delay")
+            },
         }
         for name, part in parts.items():
             object.__setattr__(self, name, part)

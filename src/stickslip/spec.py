@@ -138,7 +138,8 @@ class Described:
             raise ParameterError(f"{self.name}: {label} = {value!r} must be a number in {f.par.unit}")
         complaint = f.par.complaint(float(value))
         if complaint:
-            raise ParameterError(f"{self.name}: {label} = {value:g} {f.par.unit} {complaint}")
+            unit = "" if f.par.unit == "-" else f" {f.par.unit}"
+            raise ParameterError(f"{self.name}: {label} = {value:g}{unit} {complaint}")
         return float(value)
 
     def elements_in(self, p: Any) -> int:

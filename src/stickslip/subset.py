@@ -174,8 +174,8 @@ class _Target:
     """A function to translate; one for v < 0 reads the parameters that hold there.
 
     ``views`` are the arguments that stand for another structure than their name says, or for a part of one;
-    ``part`` is the part for which the function, and what it calls, is translated. ``numbers`` are the arguments that are
-    called as a structure is, and are numbers.
+    ``part`` is the part for which the function, and what it calls, is translated. ``numbers`` are the
+    arguments that are called as a structure is, and are numbers.
     """
 
     function: Callable[..., Any]

@@ -296,3 +296,30 @@ def test_a_friction_observers_correction_is_a_velocity_besides():
     error = inputs[:, 1] - inputs[:, 0]
     apart = torques_of(corrected, inputs) - torques_of(late, inputs)
     assert apart == pytest.approx(0.8 * 0.5 * 3.0 * error, abs=1e-14)
+
+
+def test_what_accelerates_the_inertia_is_no_compensation_to_an_observer():
+    """A sinusoid without friction: with the inertia fed forward nothing is left, under an observer as without one."""
+    inertia, w, time = 4e-4, 40.0, 1e-3
+    inputs = np.arange(2000) * time
+    errors = {}
+    for observed in (False, True):
+        for fed in (0.0, inertia):
+            made = SampledController(
+                ControlBlock("pd", kp=6.0, kd=0.1), time,
+                ControlBlock("inertia_feedforward", inertia=fed, offset=0.05),
+                ControlBlock("disturbance_observer", inertia=inertia, corner=200.0) if observed else None,
+            )  # fmt: skip
+            n, m, z, p = made.settings, made.memory(), made.state(), made.parameters
+            u, sample = SimpleNamespace(**Surroundings()._asdict()), made.functions["sample"]
+            x, v, worst = 0.0, 0.2 * w, 0.0
+            for t in inputs:
+                wanted = (0.2 * np.sin(w * t), 0.2 * w * np.cos(w * t), -0.2 * w**2 * np.sin(w * t))
+                torque = sample(float(x), *map(float, wanted), n, m, z, p, u) - 0.05
+                worst = max(worst, abs(wanted[0] - x)) if t > 1.0 else worst
+                x += time * (v + 0.5 * time * torque / inertia)
+                v += time * torque / inertia
+            errors[observed, fed > 0.0] = worst
+    # The offset is a disturbance that is fed forward: the observer leaves it to the feedforward.
+    assert errors[True, True] < 0.2 * errors[True, False]
+    assert errors[True, True] == pytest.approx(errors[False, True], rel=0.1)

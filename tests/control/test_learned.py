@@ -20,6 +20,7 @@ LEARNING = {
     "PD + FF LuGre gradient gain": "feedforward_learnt",
     "PD + Makkar adaptive": "observer_weight",
     "Lee-Kim delta .5": "loop_level",
+    "PD + Friedland-Park 200 on v_f": "observer_level",
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +78,25 @@ def test_what_is_not_switched_on_is_told_why(tmp_path):
         assert lines[-1].startswith(f"switch on instead: {taken.label}; it leaves at most")
         file = write_setting(tmp_path / "recommended.toml", found, advice)
         assert read_controller(file).values() == pytest.approx(taken.controller.values())
+
+
+@pytest.mark.usefixtures("few")
+def test_inertia_and_offset_are_fed_forward_with_compensators_as_with_settings():
+    found = known(**THESIS)
+    found = replace(found, axis={**found.axis, "offset": 0.03})
+    drive = Drive(20.0, amplitude=0.2, torque_limit=1.0, encoder_counts=65536.0)
+    names = ("none", "ff-dob", "lee-kim")
+    fed = recommend(found, drive, axes=1, confirm=0, compensators=names)
+    made = {b.name: b.controller for b in fed.beside if b.loop != "PID"}
+    for name, inertia in (("none", THESIS["inertia"]), ("ff-dob", THESIS["inertia"]), ("lee-kim", 0.0)):
+        own = next(b for b in made[name].blocks.values() if b.law.name == "inertia_feedforward")
+        assert own.own == {"inertia": inertia, "offset": 0.03}, (
+            name
+        )  # Lee and Kim's law has an inertia of its own
+    bare = recommend(found, drive, axes=1, confirm=0, compensators=names, feed_inertia=False)
+    assert all(b.controller.answers_to_acceleration == (b.name == "lee-kim") for b in bare.beside)
+    errors = [next(b for b in x.beside if b.label == "PD + ff-dob").errors[0] for x in (bare, fed)]
+    assert errors[1] < errors[0]
 
 
 @pytest.mark.parametrize("law", ["stribeck", "gms", "coulomb", "maxwell_slip", "stribeck_plain", "dahl"])

@@ -2,8 +2,8 @@
 
 Written in the scalar subset (`stickslip.subset`). Arguments: settings ``n``, memory ``m`` (which begins with
 what the laws see: `stickslip.control_spec.Signals`), and the laws' states ``z`` and parameters ``p``, each law
-a part of them; surroundings ``u``. The functions `estimate`, `feedforwards`, `observers`, `loops` and
-`left_over` call the laws of one controller; `stickslip.control.sampled_controller` writes them.
+a part of them; surroundings ``u``. The functions `estimate`, `feedforwards`, `accelerations`, `observers`,
+`loops` and `left_over` call the laws of one controller; `stickslip.control.sampled_controller` writes them.
 
 An input that is no number leaves the memory alone: the torque that is held fades to 0, ``fault`` counts the
 samples, and the first usable one goes on from there. Positions may be split into whole turns and the rest
@@ -81,6 +81,11 @@ def estimate(m: Any, z: Any, p: Any, u: Any) -> float:
 
 def feedforwards(m: Any, z: Any, p: Any, u: Any) -> float:
     """Torque of the feedforwards, N·m."""
+    return 0.0
+
+
+def accelerations(m: Any, z: Any, p: Any, u: Any) -> float:
+    """The part of the feedforwards that accelerates the nominal inertia, N·m."""
     return 0.0
 
 
@@ -175,8 +180,9 @@ def respond(n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
     m.residual = m.applied - m.feedforward
     m.feedforward = 0.0
     m.others = 0.0
-    m.feedforward = feedforwards(m, z, p, u)
-    m.others = m.feedforward
+    m.others = feedforwards(m, z, p, u)
+    # What accelerates the nominal inertia compensates nothing: an observer finds it in the acceleration.
+    m.feedforward = m.others - accelerations(m, z, p, u)
     m.others += observers(m, z, p, u)
     torque = m.others + loops(m, z, p, u)
     m.started = 1.0

@@ -346,20 +346,27 @@ def _at(whole: Any, path: Sequence[str]) -> Any:
 # ---- the functions that call the laws -----------------------------------------------------------------------------
 
 SUMS = {
-    "estimate": ("estimator", "Velocity by the estimator, rad/s."),
-    "feedforwards": ("feedforward", "Torque of the feedforwards, N·m."),
-    "observers": ("observer", "Torque of the observers, N·m."),
-    "loops": ("loop", "Torque of the control loop, N·m."),
-}
+    "estimate": ("estimator", "sample", "Velocity by the estimator, rad/s."),
+    "feedforwards": ("feedforward", "sample", "Torque of the feedforwards, N·m."),
+    "accelerations": (
+        "feedforward", "accelerating", "The part of the feedforwards that accelerates the nominal inertia, N·m.",
+    ),
+    "observers": ("observer", "sample", "Torque of the observers, N·m."),
+    "loops": ("loop", "sample", "Torque of the control loop, N·m."),
+}  # fmt: skip
 
 
 def _written(blocks: Mapping[str, ControlBlock]) -> dict[str, Callable[..., float]]:
-    """`estimate`, `feedforwards`, `observers`, `loops` and `left_over` of these laws."""
+    """The functions of `SUMS` and `left_over` of these laws."""
     lines: list[str] = []
     scope: dict[str, Any] = {}
-    for name, (place, about) in SUMS.items():
-        parts = [part for part, block in blocks.items() if block.law.place == place]
-        calls = [f"{part}_sample(m, z.{part}, p.{part}, u)" for part in parts]
+    for name, (place, function, about) in SUMS.items():
+        parts = [
+            part
+            for part, block in blocks.items()
+            if block.law.place == place and getattr(block.law, function) is not None
+        ]
+        calls = [f"{part}_{function}(m, z.{part}, p.{part}, u)" for part in parts]
         # One call a line: languages that pass structures by value have no other place for it.
         lines += [
             f"def {name}(m, z, p, u):",
@@ -367,7 +374,7 @@ def _written(blocks: Mapping[str, ControlBlock]) -> dict[str, Callable[..., floa
             f"    torque = {calls[0] if calls else '0.0'}",
         ]
         lines += [*(f"    torque += {call}" for call in calls[1:]), "    return torque", ""]
-        scope |= {f"{part}_sample": blocks[part].function("sample") for part in parts}
+        scope |= {f"{part}_{function}": blocks[part].function(function) for part in parts}
     able = [part for part, block in blocks.items() if block.law.take_over]
     scope |= {f"{part}_take_over": blocks[part].function("take_over") for part in able}
     lines += [

@@ -10,7 +10,7 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.control_spec import ControlLaw
-from stickslip.spec import Choice, Option, Par
+from stickslip.spec import Choice, Learned, Option, Par
 
 __all__ = ["CONTROL_LAW"]
 
@@ -33,7 +33,7 @@ class Params(NamedTuple):
 class State(NamedTuple):
     """Internal state."""
 
-    level: Annotated[float, Par("N·m", "a", "level of friction")]
+    level: Annotated[float, Learned("N·m", "a", "level of friction")]
     velocity: Annotated[float, Par("rad/s", "v", "velocity one sample ago")]
 
 

@@ -24,10 +24,16 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     return p.inertia * y.reference_acceleration + p.offset
 
 
+def accelerating(y: Any, z: Any, p: Any, u: Any) -> float:
+    """The part that is no compensation, N·m."""
+    return p.inertia * y.reference_acceleration
+
+
 CONTROL_LAW = ControlLaw(
     "inertia_feedforward", Params, sample, "feedforward",
     title="Inertia feedforward",
     equation=r"T = J \ddot\theta_d + T_0",
     source=("thesis eq. 3.1",),
     example={"inertia": 3.8623e-4},
+    accelerating=accelerating,
 )  # fmt: skip

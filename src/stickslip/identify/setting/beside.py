@@ -15,6 +15,7 @@ import numpy as np
 
 from stickslip.analyse.observer_guard import objection
 from stickslip.control.belief import Belief, believed
+from stickslip.control.block import ControlBlock
 from stickslip.control.catalogue import CATALOGUE, LOOPS, compensated
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade
@@ -93,7 +94,14 @@ def belief_of(model: Model, drive: Drive, inertia: float) -> Belief:
     )  # fmt: skip
 
 
-def tried_beside(names: Sequence[str], belief: Belief, bench: Bench, others: Bench) -> tuple[Beside, ...]:
+def tried_beside(
+    names: Sequence[str],
+    belief: Belief,
+    bench: Bench,
+    others: Bench,
+    inertia: float = 0.0,
+    offset: float = 0.0,
+) -> tuple[Beside, ...]:
     """The compensators of those names, best first: those to be switched on, then the others.
 
     The best is confirmed on the other axes, where its errors then are.
@@ -105,8 +113,11 @@ def tried_beside(names: Sequence[str], belief: Belief, bench: Bench, others: Ben
     belief : Belief
     bench, others : Bench
         Axes on which they are chosen, and confirmed.
+    inertia, offset : float
+        kg·m² and N·m, fed forward with each of them as with the settings of a law.
     """
-    found = [judged(name, loop, belief, bench) for name in names for loop in CATALOGUE[name].loops or ("",)]
+    pairs = [(name, loop) for name in names for loop in CATALOGUE[name].loops or ("",)]
+    found = [judged(name, loop, belief, bench, inertia, offset) for name, loop in pairs]
     ready = sorted((b for b in found if not b.why_not), key=lambda b: b.worst)
     left = [b for b in found if b.why_not]
     while ready:
@@ -118,16 +129,35 @@ def tried_beside(names: Sequence[str], belief: Belief, bench: Bench, others: Ben
     return tuple(left)
 
 
-def judged(name: str, loop: str, belief: Belief, bench: Bench) -> Beside:
+def judged(
+    name: str, loop: str, belief: Belief, bench: Bench, inertia: float = 0.0, offset: float = 0.0
+) -> Beside:
     """One of them on every axis, up to the first on which it is not safe."""
     try:
         made = compensated(name, loop or LOOPS[0], belief)
     except ParameterError as error:
         return Beside(name, loop, (), str(error).removeprefix("belief: "), None)
-    made = replace(made, encoder_counts=bench.drive.encoder_counts)
+    made = replace(fed(made, inertia, offset), encoder_counts=bench.drive.encoder_counts)
     if why := refused(name, made, belief, bench.drive):
         return Beside(name, loop, (), why, made)
     return on_axes(Beside(name, loop, (), "", made), bench, " ")
+
+
+def fed(made: SampledController, inertia: float, offset: float) -> SampledController:
+    """The controller with inertia and offset fed forward; without the inertia where it feeds one forward itself."""
+    inertia = 0.0 if made.answers_to_acceleration else inertia
+    if inertia == offset == 0.0:
+        return made
+    own = [block for block in made.blocks.values() if block.law.place == "feedforward"]
+    return replace(
+        made, feedforward=[*own, ControlBlock("inertia_feedforward", inertia=inertia, offset=offset)]
+    )
+
+
+def feeds_friction(made: SampledController) -> bool:
+    """Whether it feeds forward more than inertia and offset."""
+    laws = [block.law for block in made.blocks.values() if block.law.place == "feedforward"]
+    return any(law.accelerating is None for law in laws)
 
 
 def refused(name: str, made: SampledController, belief: Belief, drive: Drive) -> str:
@@ -179,7 +209,7 @@ def unsafe_at(beside: Beside, before: Trial, after: Trial, drive: Drive) -> list
     if math.isclose(after.moving["position_rms_rad"], before.moving["position_rms_rad"], rel_tol=1e-3):
         return []
     found = list(dangers(before, after, drive))
-    if beside.controller.feedforward is not None:
+    if feeds_friction(beside.controller):
         bearable = list(dangers(before, after, drive, feedforward=True))
         found = [said for said in found if said == AT_REST or said in bearable]
     return found

@@ -201,12 +201,8 @@ def recommend(
         axes = confirm = 0  # Nothing of the friction would be drawn.
     laws = laws_of(cautious(found))
     offset = float(found.axis.get("offset", 0.0) or 0.0)
-    settings = [
-        replace(setting, offset=offset)
-        for setting in settings_of(
-            laws, drive, float(j) if feed_inertia and not feeds_inertia(linear) else 0.0
-        )
-    ]
+    fed = float(j) if feed_inertia and not feeds_inertia(linear) else 0.0
+    settings = [replace(setting, offset=offset) for setting in settings_of(laws, drive, fed)]
     # Each with the linear controller alone; then leads, the guard and the gains beyond.
     more = (axes + 1) * (len(LEADS) + 1 + len(BEYOND)) + (confirm + 1) * (3 + len(BEYOND))
     account = Account(progress, len(settings), axes + 1, more)
@@ -239,7 +235,8 @@ def recommend(
         margin, unsafe_gain = margin_of(chosen.setting, unsafe, [c.setting for c in beyond if not c.unsafe])
     beside, hunts = (), ""
     if compensators:
-        beside = tried_beside(compensators, belief_of(found.model, drive, float(j)), bench, others)
+        belief = belief_of(found.model, drive, float(j))
+        beside = tried_beside(compensators, belief, bench, others, fed, offset)
         hunts = limit_cycle(chosen.setting.on(linear, laws[chosen.setting.law]), bench) if chosen else ""
     account.end()
     notes = [
