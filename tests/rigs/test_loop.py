@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 import time
 from dataclasses import replace
 
@@ -148,15 +147,37 @@ def test_an_exception_outside_the_loop_ramps_the_torque_down():
     assert not rig.open_now
 
 
+class Signalled(AxisRig):
+    """The axis; a signal comes at its 300th sample, however busy the machine is."""
+
+    def __init__(self, number: int, *, blocks: bool) -> None:
+        super().__init__(blocks=blocks)
+        self._number, self._sent = number, False
+
+    def exchange(self, torque: float):
+        measured = super().exchange(torque)
+        self._signal()
+        return measured
+
+    def exchange_block(self, control, setpoints, rows):
+        count = super().exchange_block(control, setpoints, rows)
+        self._signal()
+        return count
+
+    def _signal(self) -> None:
+        if len(self.torques) >= 300 and not self._sent:
+            self._sent = True
+            os.kill(os.getpid(), self._number)
+
+
 @pytest.mark.parametrize("blocks", [True, False])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_run_by_its_ramp(blocks, number, tmp_path):
-    rig = AxisRig(blocks=blocks)
+    rig = Signalled(number, blocks=blocks)
     before = signal.getsignal(number)
-    timer = threading.Timer(0.3, os.kill, (os.getpid(), number))
-    timer.start()
     with pytest.raises(Interrupted, match=number.name), Loop(rig, path=tmp_path / "run.stream") as loop:
-        loop.run(sine(1_000_000), PD)
+        loop.run(sine(20_000), PD)
+    assert 300 <= len(rig.torques) < 1000
     assert rig.torques[-1] == 0.0
     assert not rig.open_now
     assert signal.getsignal(number) == before

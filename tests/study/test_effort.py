@@ -36,12 +36,12 @@ def test_a_reference_that_turns_too_often(kind, frequency):
 
 
 def test_a_phase_or_a_staircase_of_any_size_takes_no_time():
-    begin = time.monotonic()
+    begin = time.process_time()
     shifted = ss.Reference("harmonic", amplitude=0.01, frequency=1.0, phase=2e9)
     assert len(shifted.breaks(2.0)) == 4
     stairs = ss.Reference("staircase", height=0.1, dwell=0.1, steps=1e15)
     assert len(stairs.breaks(1.0)) in (9, 10)
-    assert time.monotonic() - begin < 5.0
+    assert time.process_time() - begin < 5.0
 
 
 @pytest.mark.parametrize("step", [1e-300, 1e-12, 5e-324])

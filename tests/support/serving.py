@@ -60,7 +60,7 @@ def stop_server(served: Served) -> str:
     """End it as Ctrl-C does. Returns what it said on stderr."""
     served.process.terminate()
     try:
-        return served.process.communicate(timeout=30)[1]
+        return served.process.communicate(timeout=120)[1]
     except subprocess.TimeoutExpired:
         served.process.kill()
         raise

@@ -12,6 +12,7 @@ import mmap
 import os
 import resource
 import sys
+import time
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,7 @@ class Counted(AxisRig):
 
     def exchange_block(self, control: Any, wanted: Any, rows: Any) -> int:
         count = super().exchange_block(control, wanted, rows)
+        time.sleep(1e-3)
         self._shared[1] = self.torques[-1]
         self._shared[0] += count
         return count
@@ -57,7 +59,9 @@ def work(order: dict[str, Any]) -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (order["file_limit"], order["file_limit"]))
     rig = Counted(order["count"], blocks=order["blocks"])
     with Loop(rig, path=order["path"], realtime=order["realtime"]) as loop:
-        loop.run(motion(300_000), PD)
+        # Through only where whoever should kill it keeps it waiting for minutes.
+        for _ in range(100):
+            loop.run(motion(300_000), PD)
 
 
 def child(order: dict[str, Any], pipe: int) -> None:

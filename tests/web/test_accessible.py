@@ -88,7 +88,7 @@ def test_axe_finds_nothing(
         if view == "real":
             page.get_by_label("Procedure", exact=True).select_option("presliding")
             page.get_by_role("button", name="Show the plan").click()
-            page.get_by_label("This moves a real machine").check(timeout=30_000)
+            page.get_by_label("This moves a real machine").check()
         page.wait_for_timeout(500)
         page.screenshot(path=tmp_path / f"{view}-{width}-{scheme}.png", full_page=True)
         page.add_script_tag(path=AXE)

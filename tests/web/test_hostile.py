@@ -133,7 +133,7 @@ def test_a_file_beyond_the_limit_is_413_and_leaves_nothing(tmp_path: Path) -> No
         assert not list((tmp_path / "projects").rglob("upload*"))
     finally:
         served.process.terminate()
-        served.process.wait(20)
+        served.process.wait(120)
 
 
 # ---- requests that no page of ours sends ----------------------------------------------------------------------------

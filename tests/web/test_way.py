@@ -94,7 +94,7 @@ def test_cancel_ends_the_work_and_keeps_the_log(page: Any, served: Served) -> No
     assert at_work
     page.get_by_role("button", name="Cancel").click()
     page.wait_for_selector(".problem:has-text('cancelled')")
-    assert not psutil.wait_procs(at_work, timeout=30)[1]
+    assert not psutil.wait_procs(at_work, timeout=120)[1]
     page.get_by_role("link", name="Back to the log").click()
     page.wait_for_selector(".view.log .findings")
     assert "6000 rows" in page.locator(".facts").inner_text()
@@ -155,8 +155,8 @@ def test_the_server_ends_with_its_workers(tmp_path: Path, asked: signal.Signals)
     assert children
     client.close()
     served.process.send_signal(asked)
-    said = served.process.communicate(timeout=60)[1]
+    said = served.process.communicate(timeout=120)[1]
     assert "Traceback" not in said
     assert "Error" not in said
     assert served.process.returncode in (0, 130, -signal.SIGTERM)
-    assert not psutil.wait_procs(children, timeout=30)[1]
+    assert not psutil.wait_procs(children, timeout=120)[1]
