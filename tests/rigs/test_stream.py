@@ -71,6 +71,8 @@ def victim() -> Iterator[Victim]:
     process.close()
 
 
+# The 100 ms are real time: a thread writes the rows, and a busy machine may keep it from that.
+@pytest.mark.flaky(reruns=2)
 @pytest.mark.parametrize(("realtime", "blocks"), [(True, False), (False, True), (False, False)])
 def test_kill_9_at_any_instant_loses_at_most_100_ms(victim, tmp_path, realtime, blocks):
     rng = random.Random(5 + 2 * realtime + blocks)
