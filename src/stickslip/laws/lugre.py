@@ -1,7 +1,9 @@
 """LuGre: the mean deflection z of elastic bristles.
 
 dz/dt = v - sigma0 |v| z / s(v),  F = sigma0 z + sigma1 dz/dt + sigma2 v; thesis eqs. 2.8 to 2.10 (Table 4),
-Canudas de Wit et al. 1995. Passive for sigma2 >= sigma1 (F_S - F_C)/F_C (Barabanov and Ortega 2000).
+Canudas de Wit et al. 1995. Passive for sigma2 >= sigma1 (F_S - F_C)/F_C (Barabanov and Ortega 2000): a stiff contact
+that is well damped while it sticks (sigma1 near 2 sqrt(sigma0 J)) is not. With sigma1 exp(-(v/v_d)^2) it is, as the
+damping fades before the bristles slip (Olsson 1996).
 """
 
 from __future__ import annotations
@@ -9,12 +11,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.laws._curve import CURVE, extremes
+from stickslip.laws._curve import CURVE, GRID, extremes
 from stickslip.laws._curve import stribeck as sliding
 from stickslip.laws._curve import stribeck_scale as sliding_scale
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
-from stickslip.spec import Bristle, Law, Par
+from stickslip.spec import Bristle, Choice, Law, Option, Par
 
 __all__ = ["LAW"]
 
@@ -32,10 +34,52 @@ class State(NamedTuple):
     z: Annotated[float, Par("rad", "z", "mean bristle deflection")]
 
 
+# ---- micro-viscous damping -----------------------------------------------------------------------------------------
+
+
+def constant(v: float, p: Any) -> float:
+    """sigma_1, N·m·s/rad; thesis eq. 2.9."""
+    return p.sigma1
+
+
+class Fading(NamedTuple):
+    """Parameter of fading damping."""
+
+    vd: Annotated[float, Par("rad/s", "v_d", "velocity over which the damping fades", positive=True)]
+
+
+def fading(v: float, p: Any) -> float:
+    """sigma_1 exp(-(v/v_d)^2), N·m·s/rad; Olsson 1996."""
+    return p.sigma1 * math.exp(-(v / p.vd) * (v / p.vd))
+
+
+def fading_scale(p: Any) -> float:
+    """The velocity over which it fades, rad/s."""
+    return p.vd
+
+
+DAMPING = Choice(
+    "damping",
+    replaces="damping",
+    options={
+        "constant": Option(constant),
+        "fading": Option(
+            fading, Fading, example={"vd": 1e-3}, velocity_scale=fading_scale, keeps_elements=False
+        ),
+    },
+    default="constant",
+    meaning="micro-viscous damping sigma1 over the velocity",
+)
+damping = constant
+
+
+# ---- the law -------------------------------------------------------------------------------------------------------
+
+
 def rate(v: float, z: Any, p: Any, u: Any, dz: Any) -> float:
     """Torque now, N·m; writes dz/dt, rad/s. Thesis eqs. 2.8, 2.9."""
     dz.z = v - p.sigma0 * abs(v) / sliding(v, p) * z.z
-    return p.sigma0 * z.z + p.sigma1 * dz.z + viscous(v, p)
+    return p.sigma0 * z.z + damping(v, p) * dz.z + viscous(v, p)
 
 
 def steady(v: float, p: Any) -> float:
@@ -81,7 +125,7 @@ def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
     else:
         z.z = relax(v0, v1, dt, z.z, s1, p)
     dz = v1 - p.sigma0 * abs(v1) / s1 * z.z
-    return p.sigma0 * z.z + p.sigma1 * dz + viscous(v1, p)
+    return p.sigma0 * z.z + damping(v1, p) * dz + viscous(v1, p)
 
 
 def stored(z: Any, p: Any) -> float:
@@ -90,9 +134,17 @@ def stored(z: Any, p: Any) -> float:
 
 
 def is_passive(p: Any) -> bool:
-    """Barabanov and Ortega's condition, necessary and sufficient for the curve of eq. 2.10."""
+    """Barabanov and Ortega's condition, necessary and sufficient for the curve of eq. 2.10.
+
+    Of fading damping sigma1(v)^2 v <= 4 s(v) (sigma1(v) + sigma2) at every speed, sufficient by the energy stored.
+    """
     low, high = extremes(sliding, p, sliding_scale(p))
-    return p.sigma2 >= p.sigma1 * (high - low) / low
+    if p.sigma2 >= p.sigma1 * (high - low) / low:
+        return True
+    speeds = [x * sliding_scale(p) for x in GRID]
+    if damping(speeds[-1], p) == p.sigma1:
+        return False
+    return all(damping(v, p) ** 2 * v <= 4.0 * sliding(v, p) * (damping(v, p) + p.sigma2) for v in speeds)
 
 
 def modes(p: Any) -> Bristle:
@@ -106,7 +158,7 @@ LAW = Law(
     step,
     title="LuGre",
     equation=r"\dot z = v - \sigma_0 \frac{|v|}{s(v)} z,\quad F = \sigma_0 z + \sigma_1 \dot z + \sigma_2 v",
-    source=("thesis eqs. 2.8 to 2.10", "canudas1995", "barabanov2000"),
+    source=("thesis eqs. 2.8 to 2.10", "canudas1995", "barabanov2000", "olsson1996"),
     example={
         "sigma0": 3.5e4,
         "sigma1": 0.1,
@@ -119,8 +171,8 @@ LAW = Law(
     rate=rate,
     steady=steady,
     modes=modes,
-    choices=(CURVE, VISCOUS),
-    passive="sigma2 >= sigma1 (fs - fc) / fc",
+    choices=(CURVE, VISCOUS, DAMPING),
+    passive="sigma2 >= sigma1 (fs - fc) / fc, or fading damping with sigma1(v)^2 v <= 4 s(v) (sigma1(v) + sigma2)",
     is_passive=is_passive,
     stored=stored,
 )
