@@ -24,6 +24,7 @@ CONTROL_LAWS = (
     "friction_feedback",
     "friction_observer",
     "lugre_observer",
+    "dual_observer",
     "coulomb_observer",
     "adaptive_friction",
     "disturbance_observer",
