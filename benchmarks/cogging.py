@@ -1,11 +1,13 @@
 """Cogging and friction's ripple recovered from virtual machines whose truth is known, and what compensating it brings.
 
-    python benchmarks/cogging.py [--seeds 5] [--machine NAME ...]
+    python benchmarks/cogging.py [--seeds 5] [--machine NAME ...] [--coverage 50] [--none 50]
 
 For each machine: slow rotations on its rig, `identify_cogging`, error and correlation of the even part (cogging) and of
 the odd part (ripple) over a turn; speed ripple and tracking error at a constant speed without and with the map found;
 and over the seeds, how many of the 95 % intervals hold the truth. `--none 50`: how many of so many machines without
-cogging and ripple are said to have some.
+cogging and ripple are said to have some. `--coverage 50`: intervals alone, on so many machines a seed each, whose
+phases the seed draws and whose friction drifts and warms up; half the travel and no choice of the number of orders, so
+that a machine takes seconds.
 """
 
 from __future__ import annotations
@@ -21,16 +23,24 @@ import numpy as np
 import stickslip as ss
 from stickslip.control.position import position_feedforward
 from stickslip.identify.cogging import identify_cogging
+from stickslip.identify.cogging.fitting import fit
+from stickslip.identify.cogging.orders import grid_of, moving_columns, path
+from stickslip.identify.cogging.result import estimates_of
+from stickslip.identify.cogging.rows import places_of
 from stickslip.identify.estimate import Identification
 from stickslip.machines.angle import AngleMap, harmonic_sum
 from stickslip.machines.machine import Machine, machine
+from stickslip.machines.motor import Harmonics
 from stickslip.machines.position_map import PositionMap
+from stickslip.record import Record
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.cogging import Cogging
 from stickslip.rigs.virtual import VirtualRig
 
 MACHINES = ("thesis-dry", "thesis-grease", "direct-drive-24", "gear-50")
 HERE = Path(__file__).parent
+FRESH = 5000
+"""First seed where nothing was chosen on the seeds before."""
 CIRCLE = np.linspace(0.0, 2.0 * np.pi, 8000)
 Values = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -100,15 +110,62 @@ def odd_of(result: Identification) -> Values:
     return own.ripple(CIRCLE) if angle is None else own.friction * harmonic_sum(angle.ripple, CIRCLE)
 
 
+def amplitudes_of(plant: Machine, factor: float = 1.0) -> dict[str, float]:
+    """True amplitudes of cogging and of friction's ripple by the names of their estimates, N·m."""
+    both, _ = levels_of(plant)
+    waves = plant.contact.ripple
+    true = {f"even[{n:g}]": a for n, a in zip(plant.cogging.order, plant.cogging.amplitude, strict=True)}
+    return true | {
+        f"odd[{n:g}]": a * both * factor for n, a in zip(waves.order, waves.amplitude, strict=True)
+    }
+
+
 def held(result: Identification, plant: Machine) -> dict[str, bool]:
     """Whether the interval of each amplitude of cogging and of friction's ripple holds the truth; an order that was not
     found does not."""
-    both, _ = levels_of(plant)
-    true = {f"even[{n:g}]": a for n, a in zip(plant.cogging.order, plant.cogging.amplitude, strict=True)}
-    waves = plant.contact.ripple
-    true |= {f"odd[{n:g}]": a * both for n, a in zip(waves.order, waves.amplitude, strict=True)}
     own = {e.name: e for e in result.estimates}
-    return {n: n in own and own[n].lower <= a <= own[n].upper for n, a in true.items()}
+    return {n: n in own and own[n].lower <= a <= own[n].upper for n, a in amplitudes_of(plant).items()}
+
+
+def drawn(plant: Machine, seed: int) -> Machine:
+    """The machine with phases of cogging and ripple that a seed draws."""
+    rng = np.random.default_rng(1000 + seed)
+
+    def turned(waves: Harmonics) -> Harmonics:
+        return replace(waves, phase=tuple(rng.uniform(-math.pi, math.pi, len(waves.order)).tolist()))
+
+    contact = replace(plant.contact, ripple=turned(plant.contact.ripple))
+    return replace(plant, seed=seed, cogging=turned(plant.cogging), contact=contact)
+
+
+def changed(plant: Machine, record: Record) -> float:
+    """Mean factor that drift and warmth put on friction during a record."""
+    drift, heat = plant.contact.drift, plant.contact.heat
+    late = np.maximum(record.time - drift.begin, 0.0)
+    warm = np.exp(heat.coefficient * (record["temperature"] - heat.reference))
+    return float(np.mean((1.0 - drift.change * np.expm1(-late / drift.time)) * warm))
+
+
+def covered(name: str, seeds: int) -> None:
+    """Print how many intervals of amplitudes hold the truth, over drawn machines."""
+    hits, sure = dict[str, int](), dict[str, list[float]]()
+    for seed in range(FRESH, FRESH + seeds):
+        plant = drawn(named(name), seed)
+        record = perform(replace(procedure_of(plant), degrees=380.0), VirtualRig(plant)).record
+        places = places_of(record, "motor_torque")[0]
+        moving = moving_columns(places)
+        found = fit(places, path(places, grid_of(places), moving), moving)
+        own = {e.name: e for e in estimates_of(found, "N·m", None, ())}
+        for term, true in amplitudes_of(plant, changed(plant, record)).items():
+            hit = term in own and own[term].lower <= true <= own[term].upper
+            hits[term] = hits.get(term, 0) + hit
+            sure.setdefault(term, []).append(own[term].std / true if term in own else math.nan)
+    each = ", ".join(f"{k} {v} (std {1e6 * float(np.nanmedian(sure[k])):.0f} ppm)" for k, v in hits.items())
+    total = sum(hits.values())
+    rate = 100.0 * total / (seeds * len(hits))
+    print(
+        f"{name}: {total} of {seeds * len(hits)} intervals hold the truth, {rate:.1f} % ({each})", flush=True
+    )
 
 
 def motion(plant: Machine, result: Identification) -> str:
@@ -180,12 +237,16 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--machine", action="append", choices=MACHINES)
     parser.add_argument("--none", type=int, default=0, metavar="COUNT")
+    parser.add_argument("--coverage", type=int, default=0, metavar="COUNT")
     args = parser.parse_args()
-    for name in args.machine or MACHINES:
-        judged(name, args.seeds)
+    for name in args.machine or (() if args.none else MACHINES):
+        if args.coverage:
+            covered(name, args.coverage)
+        else:
+            judged(name, args.seeds)
     if args.none:
         plain, said = machine("thesis-grease").without("position", "cogging"), 0
-        for seed in range(args.none):
+        for seed in range(FRESH, FRESH + args.none):
             said += bool(found_of(replace(plain, seed=seed)).details["fit"].terms)
         print(f"without cogging and ripple: {said} of {args.none} machines are said to have some")
 

@@ -17,7 +17,8 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.axis.result import speed_of
 from stickslip.identify.cogging import angle_of, chosen_terms, map_of
-from stickslip.identify.cogging.orders import HIGHEST, Fit, Orders, columns, moving_columns
+from stickslip.identify.cogging.fitting import Fit
+from stickslip.identify.cogging.orders import HIGHEST, Orders, columns, moving_columns
 from stickslip.identify.cogging.remarks import Lag, eccentricities, lag_of
 from stickslip.identify.cogging.result import ROUND, Choice, estimates_of, pictures_of, remarks_of
 from stickslip.identify.cogging.rows import Places
@@ -61,6 +62,10 @@ class SlidingPlaces(Places):
     def beside(self) -> Array:
         """Columns of what else the torque may hold, shape (n, k)."""
         return self.others
+
+    def motion(self, orders: Sequence[float]) -> Array:
+        """Velocity and acceleration, which the windows free of noise, shape (n, 2)."""
+        return np.column_stack([self.velocity, self.acceleration])
 
     def damping(self, order: float) -> Array:
         """What the window leaves of a wave of this order, shape (n,)."""
@@ -140,7 +145,7 @@ def over_angle(trials: Sequence[Trial], axis: ServoAxis, skew: float | None, reg
     found, choice, terms = chosen_terms(places, orders, moving)
     lag, eccentric = lag_of(found), eccentricities(found)
     estimates = [
-        e for e in estimates_of(found, moving, "N·m", lag, eccentric)
+        e for e in estimates_of(found, "N·m", lag, eccentric)
         if e.name.partition("[")[0] in ("even", "odd", "lag", "eccentricity")
     ]  # fmt: skip
     if not any(e.identified for e in estimates):
@@ -179,7 +184,7 @@ def places_of(sliding: Regression, axis: ServoAxis) -> SlidingPlaces:
     width = np.concatenate([np.abs(r.speed) * r.window.width for r in rows])
     return SlidingPlaces(
         angle, torque, direction, speed, fixed[:, 0], strokes_of(rows).astype(np.intp), width,
-        independent(core, np.column_stack(others)),
+        np.zeros(angle.size), np.zeros((angle.size, 2)), independent(core, np.column_stack(others)),
     )  # fmt: skip
 
 

@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.cogging.fitting import Fit, fit
 from stickslip.identify.cogging.moving import Motion, in_motion, speed_control
 from stickslip.identify.cogging.orders import (
-    Fit,
     Orders,
     chosen,
-    fit,
     grid_of,
     interleaved,
     left_out,
@@ -100,7 +99,7 @@ def identify_cogging(
         name = str(record.meta.get("reading", {}).get("file", "")) or f"record {i + 1}"
         notes += motion_notes(name, unit, motion, line)
         motions += [motion] if motion is not None else []
-    estimates = estimates_of(found, moving, unit, lag, eccentric)
+    estimates = estimates_of(found, unit, lag, eccentric)
     model, angle = _model(the_map, terms, lag.orders if lag else ())
     misfit = {
         "rms": float(np.sqrt(np.mean(found.residual**2))), "places_left_out": choice.harmonics[0],

@@ -13,16 +13,15 @@ from typing import Any, Literal
 
 import numpy as np
 
+from stickslip.identify.cogging.noise import memory
 from stickslip.identify.cogging.rows import Places
 
 __all__ = [
     "MOST",
-    "Fit",
     "Orders",
     "Term",
     "chosen",
     "columns",
-    "fit",
     "grid_of",
     "interleaved",
     "left_out",
@@ -41,9 +40,6 @@ MOST = 60
 """Orders, of both parts together."""
 SURE = 10.0
 """Beyond twice the logarithm of how many are tried: what an order explains, in variances of the noise."""
-LAGS = 60
-FADED = 0.05
-"""Correlation of the residual from which on places count as independent."""
 FOLDS, SECTORS = 4, 12
 HIGHEST = 1500
 RESOLVED = 0.8
@@ -54,10 +50,8 @@ BENT = 1.2
 """Between the speeds of a curve, at least."""
 WHOLE = 0.25
 """Of a turn, from which on orders are whole numbers a turn; below, halves of the way travelled."""
-STROKES = 4
-"""Strokes in motion, from which on the intervals hold what they differ by."""
-CARRIED = 0.1
-"""Of what velocity and acceleration take out of an order, not believed: both are smoothed, and friction lags."""
+WARMS = 30.0
+"""s, from which on friction's level may have changed."""
 ENOUGH = 1.005
 """Of the least error, within which fewer orders are taken."""
 
@@ -96,7 +90,10 @@ def columns(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Arr
     d = places.direction
     out = [np.ones(len(places)), d]
     speed = np.abs(places.velocity)
-    kinds = {"viscous": places.velocity, "curve": speed * places.velocity, "inertia": places.acceleration}
+    kinds = {
+        "viscous": places.velocity, "curve": speed * places.velocity, "drift": d * places.time,
+        "inertia": places.acceleration,
+    }  # fmt: skip
     out += [*(kinds[name] for name in moving), *places.beside.T]
     for part, n in terms:
         # A mean over an angle is smaller than the wave itself.
@@ -107,14 +104,17 @@ def columns(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Arr
 
 def moving_columns(places: Places) -> tuple[str, ...]:
     """ "viscous", where there is more than one speed (else friction's level has it), "curve" where there are three;
-    "inertia", where speed varies."""
+    "drift", where friction was long enough seen to change; "inertia", where speed varies."""
     speed = np.abs(places.velocity)
-    low, middle, high = np.percentile(speed, [10, 50, 90]).tolist()
-    several, three = high > 1.5 * low, high > BENT * middle and middle > BENT * low
+    low, second, third, high = np.percentile(
+        speed, [10, 40, 60, 90]
+    ).tolist()  # of two, both are in the middle
+    several, three = high > 1.5 * low, high > BENT * third and second > BENT * low
     swings = float(np.percentile(np.abs(places.acceleration), 90)) > STEADY * float(np.median(speed**2))
     return (
         *(("viscous",) if several else ()),
         *(("curve",) if three else ()),
+        *(("drift",) if float(np.ptp(places.time)) > WARMS and several else ()),
         *(("inertia",) if swings else ()),
     )
 
@@ -177,18 +177,6 @@ def path(places: Places, orders: Orders, moving: Sequence[str], most: int = MOST
     return terms
 
 
-def memory(residual: Array, stroke: Integers) -> float:
-    """Places over which a residual is correlated within a stroke: what the variance of a mean is greater by."""
-    power, total = float(residual @ residual), 1.0
-    for lag in range(1, min(LAGS, residual.size - 1)):
-        same = stroke[lag:] == stroke[:-lag]
-        share = float(np.sum((residual[lag:] * residual[:-lag])[same])) / max(power, 1e-300)
-        if share < FADED:
-            break
-        total += 2.0 * share
-    return total
-
-
 # ---- how many --------------------------------------------------------------------------------------------------------
 
 
@@ -239,56 +227,3 @@ def growing(fitted: Places, out: Places, terms: Sequence[Term], moving: Sequence
 def chosen(errors: Array) -> int:
     """The fewest terms whose error is within `ENOUGH` of the least."""
     return int(np.flatnonzero(errors <= ENOUGH * float(errors.min()))[0])
-
-
-# ---- the fit ---------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Terms with their values: ``values`` in the order of `columns`, with their covariance."""
-
-    terms: tuple[Term, ...]
-    values: Array
-    covariance: Array
-    residual: Array
-    first: int
-    """Columns before those of the terms."""
-
-    def pair(self, term: Term) -> Array:
-        """Cosine and sine of a term."""
-        i = self.first + 2 * self.terms.index(term)
-        return self.values[i : i + 2]
-
-    def spread(self, term: Term) -> Array:
-        """Their covariance, shape (2, 2)."""
-        i = self.first + 2 * self.terms.index(term)
-        return self.covariance[i : i + 2, i : i + 2]
-
-
-def fit(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Fit:
-    """Least squares.
-
-    The covariance counts correlated places once. To it come what the strokes differ by (friction and what the motion
-    carries change with the speed), and a share of what velocity and acceleration took out of each order.
-    """
-    matrix = columns(places, terms, moving)
-    q, r = np.linalg.qr(matrix)
-    values: Array = np.asarray(np.linalg.solve(r, q.T @ places.torque), dtype=np.float64)
-    residual = places.torque - matrix @ values
-    free = max(1, len(places) - matrix.shape[1])
-    variance = float(residual @ residual) / free * memory(residual, places.stroke)
-    inverse = np.linalg.inv(r)
-    first = matrix.shape[1] - 2 * len(terms)
-    covariance = variance * inverse @ inverse.T
-    strokes = np.unique(places.stroke)
-    if moving and strokes.size >= STROKES:
-        sums = np.array([matrix[places.stroke == s].T @ residual[places.stroke == s] for s in strokes])
-        spread = inverse @ inverse.T @ sums.T
-        covariance = covariance + strokes.size / (strokes.size - 1.0) * spread @ spread.T
-    carried: Array = matrix[:, 2:first] @ values[2:first]
-    for i in range(first, matrix.shape[1], 2):
-        own = matrix[:, i : i + 2]
-        share = CARRIED * np.linalg.solve(own.T @ own, own.T @ (carried - float(np.mean(carried))))
-        covariance[i : i + 2, i : i + 2] += float(share @ share) * np.eye(2)
-    return Fit(tuple(terms), values, covariance, residual, first)

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.cogging.orders import Fit, Term
+from stickslip.identify.cogging.fitting import Fit
+from stickslip.identify.cogging.orders import Term
 
 __all__ = ["Eccentricity", "Lag", "eccentricities", "lag_of"]
 

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.identify.cogging.fitting import Fit
 from stickslip.identify.cogging.moving import Motion
-from stickslip.identify.cogging.orders import Fit, Orders, Term, columns
+from stickslip.identify.cogging.orders import Orders, Term, columns
 from stickslip.identify.cogging.remarks import Eccentricity, Lag
 from stickslip.identify.cogging.rows import Places
 from stickslip.identify.estimate import Estimate, Picture, Trace
@@ -44,17 +45,21 @@ class Choice:
         return "table" if self.table[which] < ALIKE * self.harmonics[which] else "harmonics"
 
 
-def estimates_of(
-    fit: Fit, moving: Sequence[str], unit: str, lag: Lag | None, eccentric: Sequence[Eccentricity]
-) -> list[Estimate]:
+def estimates_of(fit: Fit, unit: str, lag: Lag | None, eccentric: Sequence[Eccentricity]) -> list[Estimate]:
     """Levels, then amplitude of every order, then what explains some of them."""
-    names = ["offset", "friction", *moving]
-    units = {"viscous": f"{unit}·s/rad", "curve": f"{unit}·s²/rad²", "inertia": f"{unit}·s²/rad"}
-    symbols = {"offset": "T_0", "friction": "F_C", "viscous": "sigma_2", "curve": "F_2", "inertia": "J"}
+    names = ["offset", "friction", *fit.moving]
+    known = {
+        "offset": ("T_0", ""), "friction": ("F_C", ""), "viscous": ("sigma_2", "·s/rad"), "curve": ("F_2", "·s²/rad²"),
+        "drift": ("F_t", "/s"), "inertia": ("J", "·s²/rad"), "delay": ("tau", "s"),
+    }  # fmt: skip
     out = [
-        _estimate(n, units.get(n, unit), symbols[n], float(fit.values[i]), math.sqrt(fit.covariance[i, i]))
+        _estimate(
+            n, known[n][1] if n == "delay" else unit + known[n][1], known[n][0], float(fit.values[i]),
+            math.sqrt(fit.covariance[i, i]),
+        )
         for i, n in enumerate(names)
-    ]
+        if n in known
+    ]  # fmt: skip
     for term in sorted(fit.terms, key=lambda x: (x[0], x[1])):
         part, n = term
         pair, spread = fit.pair(term), fit.spread(term)
@@ -207,7 +212,9 @@ def shown_of(places: Places, fit: Fit) -> tuple[float, float]:
 def interval_of(fit: Fit, angle: Array) -> Array:
     """Half the 95 % interval of the even part at angles, shape (n,)."""
     zeros = np.zeros(angle.size)
-    at = Places(angle, zeros, zeros, zeros, zeros, np.zeros(angle.size, dtype=np.intp), zeros)
+    at = Places(
+        angle, zeros, zeros, zeros, zeros, np.zeros(angle.size, dtype=np.intp), zeros, zeros, np.zeros((angle.size, 2))
+    )  # fmt: skip
     x = columns(at, fit.terms, ())
     inner = np.zeros((angle.size, fit.values.size))
     inner[:, :2] = x[:, :2]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.record import Record
 
-__all__ = ["FASTEST", "Places", "joined", "places_of", "velocity_of"]
+__all__ = ["FASTEST", "Places", "joined", "least_squares", "places_of", "velocity_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Integers = np.ndarray[Any, np.dtype[np.intp]]
@@ -58,6 +58,10 @@ class Places:
         Number of the way without reversal.
     width : array, shape (n,)
         Angle over which the rows were averaged, rad; 0 at standstill.
+    time : array, shape (n,)
+        s, one record after another.
+    swing : array, shape (n, 2)
+        Velocity without its running mean, rad/s, and acceleration, rad/s², from neighbouring rows; 0 at standstill.
     """
 
     angle: Array
@@ -67,6 +71,8 @@ class Places:
     acceleration: Array
     stroke: Integers
     width: Array
+    time: Array
+    swing: Array
 
     def __len__(self) -> int:
         return int(self.angle.size)
@@ -84,11 +90,28 @@ class Places:
         """What the mean over `width` leaves of a wave of this order, shape (n,)."""
         return np.sinc(order * self.width / (2.0 * math.pi))
 
+    def motion(self, orders: Sequence[float]) -> Array:
+        """Velocity and acceleration without their noise: running mean and waves of these orders, shape (n, 2)."""
+        out = np.column_stack([self.velocity, np.zeros(len(self))])
+        edges = np.flatnonzero(np.diff(self.stroke) != 0) + 1
+        for rows in np.split(np.arange(len(self)), edges):
+            if rows.size > 2 * (2 * len(orders) + 1):
+                angles = np.outer(self.angle[rows], orders)
+                waves = np.column_stack([np.ones(rows.size), np.cos(angles), np.sin(angles)])
+                out[rows] += waves @ least_squares(waves, self.swing[rows])
+        return out
+
     @property
     def spacing(self) -> float:
         """Median angle between neighbours of a stroke, rad."""
         steps = np.abs(np.diff(self.angle))[np.diff(self.stroke) == 0]
         return float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else math.inf
+
+
+def least_squares(matrix: Array, right: Array) -> Array:
+    """Values of the columns, by an orthogonal factor."""
+    q, r = np.linalg.qr(matrix)
+    return np.asarray(np.linalg.solve(r, q.T @ right), dtype=np.float64)
 
 
 def places_of(record: Record, torque: str) -> tuple[Places, bool]:
@@ -106,8 +129,8 @@ def places_of(record: Record, torque: str) -> tuple[Places, bool]:
     group = _stands(t, q, reference)
     if group is None:
         velocity = velocity_of(record)[good]
-        return _rotation(t, q, y, velocity), False
-    return _standing(group, q, y, q if reference is None else reference), True
+        return _rotation(t - t[0], q, y, velocity), False
+    return _standing(group, t - t[0], q, y, q if reference is None else reference), True
 
 
 def velocity_of(record: Record) -> Array:
@@ -122,13 +145,12 @@ def velocity_of(record: Record) -> Array:
 
 
 def joined(parts: Sequence[Places]) -> Places:
-    """All records in one, their strokes counted on."""
-    count, out = 0, list[Places]()
+    """All records in one, their strokes and times counted on."""
+    count, late, out = 0, 0.0, list[Places]()
     for p in parts:
-        out.append(
-            Places(p.angle, p.torque, p.direction, p.velocity, p.acceleration, p.stroke + count, p.width)
-        )
+        out.append(replace(p, stroke=p.stroke + count, time=p.time + late))
         count += int(p.stroke.max(initial=-1)) + 1
+        late = float(out[-1].time.max(initial=late))
     return Places(*(np.concatenate([getattr(p, n) for p in out]) for n in Places.__dataclass_fields__))
 
 
@@ -156,7 +178,7 @@ def _stands(t: Array, q: Array, reference: Array | None) -> Integers | None:
     return np.where(kept, group, -1)
 
 
-def _standing(group: Integers, q: Array, y: Array, way: Array) -> Places:
+def _standing(group: Integers, t: Array, q: Array, y: Array, way: Array) -> Places:
     """The mean of every place, with the direction that led there."""
     names, at = np.unique(group[group >= 0], return_inverse=True)
     rows = np.flatnonzero(group >= 0)
@@ -169,11 +191,10 @@ def _standing(group: Integers, q: Array, y: Array, way: Array) -> Places:
     def mean(x: Array) -> Array:
         return np.bincount(at, x[rows], minlength=names.size) / count
 
-    zeros = np.zeros(names.size)
-    return _settled(mean(q), mean(y), mean(way), zeros, zeros)
+    return _settled(mean(q), mean(y), mean(way), mean(t))
 
 
-def _settled(angle: Array, torque: Array, way: Array, velocity: Array, acceleration: Array) -> Places:
+def _settled(angle: Array, torque: Array, way: Array, time: Array) -> Places:
     """Directions and strokes, without what follows a turn-round too closely."""
     step = np.diff(way, prepend=way[0])
     if step.size > 1:
@@ -187,9 +208,10 @@ def _settled(angle: Array, torque: Array, way: Array, velocity: Array, accelerat
     start = way[np.maximum(first - 1, 0)]
     gone = np.abs(way - start[stroke])
     keep = (sign != 0.0) & (gone >= min(AFTER[0], AFTER[1] * float(np.ptp(way))))
+    zeros = np.zeros(np.count_nonzero(keep))
     return Places(
-        angle[keep], torque[keep], sign[keep], velocity[keep], acceleration[keep], stroke[keep],
-        np.zeros(np.count_nonzero(keep)),
+        angle[keep], torque[keep], sign[keep], zeros, zeros, stroke[keep], zeros, time[keep],
+        np.zeros((zeros.size, 2)),
     )  # fmt: skip
 
 
@@ -210,7 +232,7 @@ def _rotation(t: Array, q: Array, y: Array, velocity: Array) -> Places:
         moving[np.clip(turns + k, 0, t.size - 1)] = False
     if not np.any(moving):
         none = np.zeros(0)
-        return Places(none, none, none, none, none, np.zeros(0, dtype=np.intp), none)
+        return Places(none, none, none, none, none, np.zeros(0, dtype=np.intp), none, none, np.zeros((0, 2)))
     sign = np.sign(velocity)
     stroke = (
         np.cumsum(np.concatenate([[True], (np.diff(sign) != 0.0) | (np.diff(moving.astype(int)) != 0)])) - 1
@@ -219,19 +241,44 @@ def _rotation(t: Array, q: Array, y: Array, velocity: Array) -> Places:
     key = np.concatenate([[True], (np.diff(cell) != 0) | (np.diff(stroke) != 0)])
     at = np.cumsum(key) - 1
     count = np.bincount(at)
-    means = [np.bincount(at, x) / count for x in (q, y, velocity, acceleration)]
+    means = [np.bincount(at, x) / count for x in (q, y, velocity, acceleration, t, *_swing(t, q, velocity).T)]
     first = np.flatnonzero(key)
     used, number = moving[first], stroke[first]
     begin = np.array([q[np.searchsorted(stroke, s)] for s in range(int(stroke[-1]) + 1)])
     far = np.abs(means[0] - begin[number]) >= min(AFTER[0], AFTER[1] * float(np.ptp(q)))
     keep = used & far
-    angle, torque, v, a = (m[keep] for m in means)
+    angle, torque, v, a, time, rate, slope = (m[keep] for m in means)
     for stretch in np.split(np.arange(v.size), np.flatnonzero(np.diff(number[keep]) != 0) + 1):
         v[stretch] = _smooth(v[stretch], max(1, stretch.size // PART))
     spread = np.bincount(at, (q - means[0][at]) ** 2) / count
     # A uniform spread of this width has this variance.
     width = np.sqrt(12.0 * spread[keep])
-    return Places(angle, torque, np.sign(v), v, a, number[keep].astype(np.intp), width)
+    return Places(
+        angle, torque, np.sign(v), v, a, number[keep].astype(np.intp), width, time,
+        np.column_stack([rate - v, slope]),
+    )  # fmt: skip
+
+
+def _swing(t: Array, q: Array, velocity: Array) -> Array:
+    """Velocity and acceleration from polynomials over `WINDOW` on each side, flat up to high orders, shape (n, 2)."""
+    step = float(np.median(np.diff(t)))
+    reach = max(3, round(WINDOW / max(step, 1e-9)))
+    out = np.column_stack([velocity, np.zeros(t.size)])
+    if t.size <= 2 * reach:
+        return out
+    slope, bow = np.linalg.pinv(np.vander(np.arange(-reach, reach + 1), 5, increasing=True))[1:3]
+    inner = slice(reach, t.size - reach)
+    (rate, curve), (pace, uneven) = (
+        (np.convolve(x, slope[::-1], "valid"), 2.0 * np.convolve(x, bow[::-1], "valid"))
+        for x in (q - q[0], t - t[0])
+    )
+    rate = rate / pace
+    out[inner] = np.column_stack([rate, (curve - rate * uneven) / pace**2])
+    gaps = np.flatnonzero(np.diff(t) > GAP * step)
+    for k in range(1 - reach, reach + 1):  # beside a gap a row has no neighbours
+        rows = np.clip(gaps + k, 0, t.size - 1)
+        out[rows] = np.column_stack([velocity[rows], np.zeros(rows.size)])
+    return out
 
 
 def _smooth(x: Array, reach: int) -> Array:
