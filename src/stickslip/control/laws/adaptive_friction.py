@@ -1,8 +1,8 @@
 """Friction learnt as a sum of functions of the reference velocity, by the gradient of the error.
 
 dW_i/dt = Gamma_i (phi_i(v_d) s - sigma_l W_i) with s = de/dt + lambda e; the torque is the sum of W_i phi_i. The
-functions are those of Makkar's smooth Stribeck curve, two straight lines a direction, or Gaussians. While the
-reference stands still nothing is given and nothing is learnt.
+functions are those of Makkar's smooth Stribeck curve, two straight lines a direction, a polynomial, or Gaussians, over
+the angle too. While the reference stands still nothing is given and nothing is learnt.
 
 Gamma phi'phi acts like an integral gain on s: what sample time and delay leave of stability bounds it. A leak
 (sigma-modification) and a bound hold the weights.
@@ -17,6 +17,8 @@ from stickslip.control_spec import ControlLaw
 from stickslip.spec import Choice, Learned, Option, Par
 
 __all__ = ["CONTROL_LAW"]
+
+TURN = 2.0 * math.pi  # rad
 
 
 class Params(NamedTuple):
@@ -109,6 +111,30 @@ def eight(p: Any) -> str:
     return "" if len(p.rate) == 8 else f"rate has {len(p.rate)} values; two lines a direction have 8"
 
 
+class Polynomial(NamedTuple):
+    """Parameters of the polynomial."""
+
+    smooth: Annotated[float, Par("rad/s", "v_eps", "speed up to which the level rises", positive=True)]
+    top: Annotated[
+        float,
+        Par("rad/s", "v_0", "speed by which speeds are divided; beyond it the powers hold", positive=True),
+    ]
+
+
+def polynomial(v: float, s: float, y: Any, z: Any, p: Any) -> float:
+    """Torque by sign(v) (|v| / v0)^i, N·m."""
+    side = min(max(v / p.smooth, -1.0), 1.0)
+    share = min(abs(v) / p.top, 1.0)
+    power = 1.0
+    torque = 0.0
+    for i in range(len(p.rate)):
+        value = side * power
+        z.weight[i] = learnt(z.weight[i], p.rate[i], value, s, y, p)
+        torque += value * z.weight[i]
+        power = power * share
+    return torque
+
+
 class Gaussians(NamedTuple):
     """Parameters of the Gaussians."""
 
@@ -142,7 +168,41 @@ def gaussians(v: float, s: float, y: Any, z: Any, p: Any) -> float:
     return torque
 
 
+class OverAngle(NamedTuple):
+    """Parameters of the Gaussians besides those over the velocity."""
+
+    centre: Annotated[
+        tuple[float, ...],
+        Par("-", "c_i", "centre of Gaussian i over the velocity, from -1 to 1", lower=-2.0, upper=2.0),
+    ]
+    angle: Annotated[tuple[float, ...], Par("rad", "a_i", "its centre over the angle")]
+    width: Annotated[float, Par("-", "", "width of the Gaussians over the velocity", positive=True)]
+    reach: Annotated[float, Par("rad", "", "width of the Gaussians over the angle", positive=True)]
+    fine: Annotated[
+        float,
+        Par("rad/s", "v_0", "speed up to which the axis is linear; above it is logarithmic", positive=True),
+    ]
+    top: Annotated[float, Par("rad/s", "", "speed that lies at 1 on the axis", positive=True)]
+
+
+def over_angle(v: float, s: float, y: Any, z: Any, p: Any) -> float:
+    """Torque by Gaussians of the logarithm of the velocity and of the reference's angle, N·m."""
+    place = arsinh(v / p.fine) / arsinh(p.top / p.fine)
+    torque = 0.0
+    for i in range(len(p.rate)):
+        off = (place - p.centre[i]) / p.width
+        away = (TURN * y.turns + (y.position - p.angle[i]) + y.error) / p.reach
+        value = math.exp(-off * off - away * away)
+        z.weight[i] = learnt(z.weight[i], p.rate[i], value, s, y, p)
+        torque += value * z.weight[i]
+    return torque
+
+
 TENTHS = [0.1 * i for i in range(-10, 11)]
+GRID = {
+    "rate": [12.0] * 20, "centre": [-0.8, -0.4, 0.0, 0.4, 0.8] * 4, "angle": [0.25 * (i // 5) for i in range(20)],
+    "width": 0.4, "reach": 0.25, "fine": 1e-3, "top": 0.35,
+}  # fmt: skip
 GAUSSIANS = {"rate": [12.0] * len(TENTHS), "centre": TENTHS, "width": 0.1, "fine": 1e-3, "top": 0.35}
 
 FUNCTIONS = Choice(
@@ -161,7 +221,11 @@ FUNCTIONS = Choice(
             example={"rate": [12.0] * 8, "corner": 0.02, "smooth": 1e-3, "speed": 0.1},
             check=eight,
         ),
+        "polynomial": Option(
+            polynomial, Polynomial, example={"rate": [12.0] * 4, "smooth": 1e-3, "top": 0.35}
+        ),
         "gaussians": Option(gaussians, Gaussians, example=GAUSSIANS),
+        "gaussians_over_angle": Option(over_angle, OverAngle, example=GRID),
     },
     "makkar",
     "of which functions of the velocity friction is the sum",
