@@ -75,6 +75,7 @@ class Drive:
         network.NOTIFIER_CYCLE = 0.02
         with network.connect(**self.bus):
             sdo = network.add_node(NODE, canopen.ObjectDictionary()).sdo
+            sdo.RESPONSE_TIMEOUT = 30.0  # nothing is measured here
             for index, sub, form, value in objects:
                 sdo.download(index, sub, struct.pack(form, value))
 
