@@ -428,7 +428,7 @@ def rms_from(m, start, controller, angle):
     rig = VirtualRig(m)
     loop = holder(rig, m.inertia, 8.0)
     with Loop(rig) as run:
-        run.run(move(rig, loop, 0.0, start, m.inertia).wanted, loop)
+        run.run(move(rig, loop, 0.0, start, m.inertia).setpoints, loop)
         run.run(setpoints(200))
     rig.pause(3600.0)
     done = perform(Following(using=controller, over=angle), rig)

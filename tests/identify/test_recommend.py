@@ -351,7 +351,7 @@ def test_what_acts_beside_friction_is_on_the_axes() -> None:
     ):
         trial = run(plant, linear, drive)
         assert not isinstance(trial, str)
-        rests[name] = float(trial.wanted[-1] - trial.position[-1])
+        rests[name] = float(trial.reference[-1] - trial.position[-1])
     assert rests["offset"] == pytest.approx(0.2 / linear.linear.kp, rel=0.01)
     assert rests["wave"] == pytest.approx(
         -0.1 * math.cos(0.5 - 3.0 * rests["wave"]) / linear.linear.kp, rel=0.01
@@ -360,7 +360,7 @@ def test_what_acts_beside_friction_is_on_the_axes() -> None:
         Plant(INERTIA, plain, offset=0.2), replace(linear, compensator=Feedforward(plain, offset=0.2)), drive
     )
     assert not isinstance(fed, str)
-    assert abs(fed.wanted[-1] - fed.position[-1]) < 1e-4
+    assert abs(fed.reference[-1] - fed.position[-1]) < 1e-4
 
 
 def test_it_is_tried_along_the_motion_of_the_log_or_asked_for_one() -> None:

@@ -162,7 +162,7 @@ def test_the_reference_velocity_is_of_the_instant_on_some_axes_and_of_the_last_s
     for backward in (False, True):
         trial = run(Plant(INERTIA, smooth, backward=backward), drive.loop(INERTIA), drive)
         assert not isinstance(trial, str)
-        errors[backward] = trial.wanted - trial.position
+        errors[backward] = trial.reference - trial.position
     w = 2.0 * math.pi * drive.frequency
     stiffness = PD.kp - INERTIA * w * w + 1j * w * PD.kd
     late = (

@@ -43,7 +43,7 @@ def test_a_machine_without_imperfections_is_the_rigid_axis_bit_for_bit():
     beside = {"offset": 0.02, "waves": ((3.0, 0.01, 0.5),)}
     rigid = Plant(INERTIA, LUGRE, **beside, delay=0.4, bandwidth=800.0)
     other = Plant(INERTIA, LUGRE, **beside, machine=known)
-    one, two = (simulated(p, drive.loop(INERTIA), drive.wanted, 1e-3) for p in (rigid, other))
+    one, two = (simulated(p, drive.loop(INERTIA), drive.reference, 1e-3) for p in (rigid, other))
     assert np.ptp(one) > 0.1
     assert np.array_equal(one, two)
 

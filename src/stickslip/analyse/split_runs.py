@@ -11,7 +11,7 @@ from stickslip.record import Record
 __all__ = ["pieces"]
 
 SAME = 1e-6
-"""Relative change of the wanted velocity from which another run begins."""
+"""Relative change of the reference velocity from which another run begins."""
 GAP = 50.0
 """Usual distances between two rows, from which one is a pause."""
 FEWEST = 20
@@ -35,10 +35,10 @@ def pieces(name: str, record: Record) -> list[tuple[str, Record]]:
         runs = np.split(np.arange(len(record)), np.flatnonzero(steps > GAP * np.median(steps)) + 1)
         return [(f"{name} {i + 1}", rows_of(record, rows)) for i, rows in enumerate(runs)]
     if kind == "sliding":
-        wanted = record["velocity_reference"]
-        edges = np.flatnonzero(np.abs(np.diff(wanted)) > SAME * np.abs(wanted[:-1])) + 1
+        reference = record["velocity_reference"]
+        edges = np.flatnonzero(np.abs(np.diff(reference)) > SAME * np.abs(reference[:-1])) + 1
         parts = [p for p in np.split(np.arange(len(record)), edges) if p.size >= FEWEST]
-        return [(f"{name} {float(wanted[p[0]]):+.3g} rad/s", rows_of(record, p)) for p in parts]
+        return [(f"{name} {float(reference[p[0]]):+.3g} rad/s", rows_of(record, p)) for p in parts]
     return [(name, record)]
 
 

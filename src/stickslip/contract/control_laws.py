@@ -319,12 +319,12 @@ def continuous(law: ControlLaw) -> Verdict:
     reference, position = 0.02 * np.sin(20.0 * t), 0.015 * np.sin(20.0 * t - 0.2) + 0.015 * math.sin(0.2)
     velocities = 0.4 * np.cos(20.0 * t), 0.3 * np.cos(20.0 * t - 0.2)
     inputs = np.column_stack([position, reference, velocities[0], np.zeros(len(t))])
-    wanted = answer(law, form, reference - position, velocities, time)
+    expected = answer(law, form, reference - position, velocities, time)
     quiet = ControlBlock("pd", kp=0.0, kd=0.0)
-    off = torques(around(block_of(law), quiet, math.inf, time), inputs)[BEGUN:] - wanted[BEGUN:]
+    off = torques(around(block_of(law), quiet, math.inf, time), inputs)[BEGUN:] - expected[BEGUN:]
     # Where a contact reverses within a sample, its torque is off by that sample's displacement.
     size = np.abs(off).max() if isinstance(form, Gains) else np.sqrt(np.mean(off**2))
-    apart = float(size / np.abs(wanted).max())
+    apart = float(size / np.abs(expected).max())
     said = f"samples of {time:g} s are {apart:.2g} of the largest torque off it"
     return held("continuous", said) if apart <= 1e-3 else failed("continuous", said)
 

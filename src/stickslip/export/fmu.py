@@ -91,7 +91,7 @@ def check(job: Job, export: Export) -> Check:
     """Validate the units in FMPy and play the vectors in it."""
     vectors = moved(job)
     inputs = {k: getattr(vectors, k) for k in ("velocity", "acceleration", "position")}
-    wanted = np.genfromtxt(str(export.files["golden.csv"]).splitlines(), delimiter=",", names=True)[
+    expected = np.genfromtxt(str(export.files["golden.csv"]).splitlines(), delimiter=",", names=True)[
         "torque_Nm"
     ]
     errors: dict[str, float] = {}
@@ -101,7 +101,7 @@ def check(job: Job, export: Export) -> Check:
         answer = played(unit, vectors.time, vectors.dt, inputs, ("friction_torque",))
         if isinstance(answer, Check):
             return answer
-        errors[name] = float(np.abs(answer[:, 0] - wanted).max())
+        errors[name] = float(np.abs(answer[:, 0] - expected).max())
     worst = max(errors.values())
     return Check(worst == 0.0, f"FMPy: valid; at most {worst:.3g} N·m off the definition", errors)
 

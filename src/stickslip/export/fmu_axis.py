@@ -122,18 +122,18 @@ def as_csv(vectors: Driven) -> str:
 
 def check(job: Job, export: Export) -> Check:
     """Validate the units in FMPy and drive them as the package's own axis was driven."""
-    wanted = np.genfromtxt(str(export.files["golden.csv"]).splitlines(), delimiter=",", names=True)
+    expected = np.genfromtxt(str(export.files["golden.csv"]).splitlines(), delimiter=",", names=True)
     errors: dict[str, float] = {}
-    still = np.zeros(wanted.size)  # the package's axis takes no account of a slow change over time
+    still = np.zeros(expected.size)  # the package's axis takes no account of a slow change over time
     for name, unit in export.files.items():
         if not name.endswith(".fmu"):
             continue
         answer = played(
-            unit, still, wanted["dt_s"], {"torque": wanted["torque_Nm"]}, ("position", "velocity")
+            unit, still, expected["dt_s"], {"torque": expected["torque_Nm"]}, ("position", "velocity")
         )
         if isinstance(answer, Check):
             return answer
-        off = np.abs(answer - np.column_stack([wanted["position_rad"], wanted["velocity_rad_s"]]))
+        off = np.abs(answer - np.column_stack([expected["position_rad"], expected["velocity_rad_s"]]))
         errors[name] = float(off.max())
     worst = max(errors.values())
     return Check(

@@ -128,7 +128,7 @@ def check(export: Export, name: str) -> Check:
     rows = np.genfromtxt(str(export.files["golden_samples.csv"]).splitlines()[1:], delimiter=",")
     names = (*GIVEN, "torque", "load", "temperature")
     time, given = rows[:, 0], dict(zip(names, rows.T[1:]))
-    wanted, dt = given.pop("torque"), np.full(len(rows), rows[1, 0])
+    expected, dt = given.pop("torque"), np.full(len(rows), rows[1, 0])
     errors: dict[str, float] = {}
     for file, unit in export.files.items():
         if not file.endswith(".fmu"):
@@ -136,7 +136,7 @@ def check(export: Export, name: str) -> Check:
         answer = played(unit, time, dt, given, ("torque",))
         if isinstance(answer, Check):
             return answer
-        errors[file] = float(np.abs(answer[:, 0] - wanted).max())
+        errors[file] = float(np.abs(answer[:, 0] - expected).max())
     worst = max(errors.values())
     return Check(worst == 0.0, f"FMPy: valid; at most {worst:.3g} N·m off the definition", errors)
 

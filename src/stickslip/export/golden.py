@@ -165,14 +165,14 @@ def room_beside_jumps(
 class Samples(NamedTuple):
     """Samples of a controller in order; shape (n,) each.
 
-    position, wanted in rad, wanted_velocity in rad/s, wanted_acceleration in rad/s², torque in N·m, temperature in
+    position and reference in rad, their velocity in rad/s and acceleration in rad/s², torque in N·m, temperature in
     degrees Celsius.
     """
 
     position: Array
-    wanted: Array
-    wanted_velocity: Array
-    wanted_acceleration: Array
+    reference: Array
+    reference_velocity: Array
+    reference_acceleration: Array
     torque: Array
     load: Array
     temperature: Array
@@ -192,15 +192,15 @@ def random_motion(
     )
     speed[::5] = 0.0
     velocity: Array = speed[pieces]
-    wanted = FAR + np.cumsum(velocity) * sample_time
+    reference = FAR + np.cumsum(velocity) * sample_time
     lag = 1e-3 * np.cumsum(draw.standard_normal(count) * (velocity != 0.0)) * math.sqrt(sample_time)
-    position = wanted - lag
+    position = reference - lag
     # The axis is blocked until the limit holds the torque back, and comes free again.
     blocked = slice(count // 2, 3 * count // 4)
     position[blocked] -= 2.0 * min(reach, 1.0)
     position[count // 4 : count // 4 + 3] = math.nan
-    wanted[count - 20] = math.nan
-    return position, wanted, velocity, np.gradient(velocity, sample_time)
+    reference[count - 20] = math.nan
+    return position, reference, velocity, np.gradient(velocity, sample_time)
 
 
 def sampled_torques(
@@ -216,7 +216,7 @@ def sampled_torques(
 HEADS: dict[type, str] = {
     Golden: "v0_rad_s,v1_rad_s,dt_s,position_rad,torque_Nm",
     Surrounded: "v0_rad_s,v1_rad_s,dt_s,position_rad,torque_Nm,load,temperature_degC,time_s",
-    Samples: "position_rad,wanted_rad,wanted_velocity_rad_s,wanted_acceleration_rad_s2,torque_Nm,"
+    Samples: "position_rad,reference_rad,reference_velocity_rad_s,reference_acceleration_rad_s2,torque_Nm,"
     "load,temperature_degC",
 }
 

@@ -204,7 +204,7 @@ def trial_of(
     if "position" not in record.channels:
         raise InputError("the record has no channel 'position'; map one to it")
     found = next((c for c in channels if c in record.channels), None)
-    wanted = next((c for c in REFERENCES if c in record.channels), None)
+    reference = next((c for c in REFERENCES if c in record.channels), None)
     factor = axis.position_factor
     # A time may occur twice where a simulated signal jumps: the later row counts.
     keep = np.concatenate([np.diff(record.time) != 0.0, [True]])
@@ -218,7 +218,7 @@ def trial_of(
         factor * column("position"),
         column(found) if found else None,
         DRIVES.get(found, "torque") if found else output,
-        factor * column(wanted) if wanted else None,
+        factor * column(reference) if reference else None,
         loop,
         column("supply") if "supply" in record.channels else None,
         gain,

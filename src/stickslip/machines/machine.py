@@ -415,13 +415,13 @@ def _ripple(top: Table, contact: Contact) -> Harmonics:
         return Harmonics()
     with table:
         shape = _harmonics(table)
-        wanted = table.positive("peak_to_peak", "N·m")
+        peak = table.positive("peak_to_peak", "N·m")
         clutch = contact.clutch()
         level = clutch.law.steady(LEVEL_SPEED, clutch.parameters) if clutch.law.steady else 0.0
         size = shape.peak_to_peak()
         if not (level > 0.0 and size > 0.0):
             raise table.error("peak_to_peak", "needs a law that slides and amplitudes that are not all zero")
-        return shape.scaled(wanted / (level * size))
+        return shape.scaled(peak / (level * size))
 
 
 def _cogging(top: Table) -> Harmonics:

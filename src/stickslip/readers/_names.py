@@ -115,7 +115,7 @@ WHOLE = _table(
 )
 """Whole names (or their last part) that name a quantity."""
 
-WANTED = _words(
+OF_REFERENCE = _words(
     """
     cmd command commanded demand demanded des desired drehzahlsollwert fuehrungsgroesse goal input
     lagesoll lagesollwert nsoll planned possoll ref reference set setpoint setpos setvelo soll
@@ -123,7 +123,7 @@ WANTED = _words(
     vorgabe vsoll ziel
     """
 )
-"""Words that say that a quantity is wanted, not measured."""
+"""Words that say that a quantity is a reference, not measured."""
 
 SECONDS = frozenset(["sec", "secs"])
 """Names of a time that are its unit. A bare "s" may as well be a displacement (and does not beat a "t")."""
@@ -280,7 +280,7 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
     """The quantity that a name speaks of, and how surely."""
     if role := _whole(bare):
         return role, 2
-    wanted = not WANTED.isdisjoint(parts)
+    is_reference = not OF_REFERENCE.isdisjoint(parts)
     found = [role for role, known in WORDS.items() if not set(known).isdisjoint(parts)]
     if "load" in found and len(found) > 1:
         found.remove("load")  # "load position" is a position on the load's side
@@ -304,23 +304,23 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
         rest = [
             w
             for w in parts
-            if w not in SKIP and w not in WANTED and w not in LOAD_SIDE and w not in MOTOR_SIDE
+            if w not in SKIP and w not in OF_REFERENCE and w not in LOAD_SIDE and w not in MOTOR_SIDE
         ]
         role = _whole(rest[0]) if len(rest) == 1 else ""
         if not role:
             return "", 0
         found = [role]
     role = found[0]
-    if wanted and role == "motor_torque":
+    if is_reference and role == "motor_torque":
         return role, 0
-    if wanted:
+    if is_reference:
         role = REFERENCED.get(role, role if role.endswith("_reference") else "")
     return role, 1
 
 
 def _role_by_unit(parts: list[str], unit: Unit) -> str:
     """What an unknown name with a telling unit must be; empty where the unit tells too little."""
-    if not WANTED.isdisjoint(parts):
+    if not OF_REFERENCE.isdisjoint(parts):
         return ""
     return {"angular velocity": "velocity", "torque": "motor_torque", "current": "current", "voltage": "voltage",
             "temperature": "temperature", "angle": "position"}.get(unit.kind, "")  # fmt: skip

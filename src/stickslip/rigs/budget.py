@@ -61,7 +61,7 @@ class Budget:
             watcher.join()
 
     def call(
-        self, controller: Callable[[Measurement, Setpoint], float], measured: Measurement, wanted: Setpoint
+        self, controller: Callable[[Measurement, Setpoint], float], measured: Measurement, setpoint: Setpoint
     ) -> float:
         """The controller's torque, N·m.
 
@@ -72,7 +72,7 @@ class Budget:
         """
         self._since = time.monotonic()
         try:
-            torque = controller(measured, wanted)
+            torque = controller(measured, setpoint)
         finally:
             with self._lock:  # once the thread has taken over, this waits for the end of its ramp
                 took = time.monotonic() - self._since

@@ -41,7 +41,7 @@ __all__ = ["Loop", "PythonController"]
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Result = TypeVar("Result")
 PythonController = Callable[[Measurement, Setpoint], float]
-"""A controller in Python: the torque from what is measured and wanted, N·m. It runs sample by sample."""
+"""A controller in Python: the torque from what is measured and the setpoint, N·m. It runs sample by sample."""
 
 BLOCK = 50
 """Samples of one compiled block: a signal is heard, and rows are committed, at least that often"""
@@ -113,7 +113,7 @@ class Loop:
         self._signals = Signals()
         self._undo = ExitStack()
         self._scratch = np.zeros(len(COLUMNS))
-        self._wanted = np.zeros(len(Setpoint._fields))
+        self._setpoint = np.zeros(len(Setpoint._fields))
         self._step = Step(self._control)
 
     # ---- arming and disarming ------------------------------------------------------------------------------
@@ -186,7 +186,7 @@ class Loop:
 
     def run(
         self,
-        wanted: Array,
+        setpoints: Array,
         controller: Controller | SampledController | PythonController | None = None,
         *,
         travel: float = math.inf,
@@ -195,7 +195,7 @@ class Loop:
 
         Parameters
         ----------
-        wanted : array, shape (n, 5)
+        setpoints : array, shape (n, 5)
             A `Setpoint` per sample (`stickslip.rigs.rig.setpoints`).
         controller : Controller, SampledController, callable or None
             None: the setpoints' torques alone.
@@ -215,13 +215,13 @@ class Loop:
             After the torque was ramped to zero: why.
         """
         stream = self._open_stream()
-        if wanted.ndim == 2 and wanted.shape[1] == len(Setpoint._fields) - 1:
-            wanted = np.column_stack([wanted, np.zeros(len(wanted))])  # without an acceleration
-        insist_on_setpoints(wanted)
+        if setpoints.ndim == 2 and setpoints.shape[1] == len(Setpoint._fields) - 1:
+            setpoints = np.column_stack([setpoints, np.zeros(len(setpoints))])  # without an acceleration
+        insist_on_setpoints(setpoints)
         self._take_over(self.prepare(controller), travel)
         begin = stream.count
         self._pace.restart()
-        table = np.ascontiguousarray(wanted, dtype=np.float64)
+        table = np.ascontiguousarray(setpoints, dtype=np.float64)
         python = controller if callable(controller) else None
         if self.rig.capabilities.blocks and not self.realtime and python is None:
             self._in_blocks(stream, table)
@@ -305,20 +305,20 @@ class Loop:
 
     # ---- samples -------------------------------------------------------------------------------------------
 
-    def _by_samples(self, stream: Stream | None, wanted: Array, python: PythonController | None) -> None:
+    def _by_samples(self, stream: Stream | None, setpoints: Array, python: PythonController | None) -> None:
         """Sample by sample through `Rig.exchange`."""
-        times = self._pace.room(len(wanted))
-        place, stride = wanted.ctypes.data, wanted.strides[0]
+        times = self._pace.room(len(setpoints))
+        place, stride = setpoints.ctypes.data, setpoints.strides[0]
         with ExitStack() as undo:
             undo.enter_context(self._pace.counting())
             ask = None if python is None else self._within_budget(stream, python, undo)
-            for k in range(len(wanted)):
+            for k in range(len(setpoints)):
                 if ask is None:
                     self._sample(stream, place + k * stride, times[k])
                 else:
-                    self._ask_python(ask, wanted[k])
+                    self._ask_python(ask, setpoints[k])
                     if self._control.safety[STATE] != STOPPED:
-                        self._sample(stream, self._wanted.ctypes.data, times[k])
+                        self._sample(stream, self._setpoint.ctypes.data, times[k])
                 if self._control.safety[STATE] >= STOPPED:
                     return
 
@@ -337,7 +337,7 @@ class Loop:
         rests = self._control.safety[TORQUE] == 0.0
         budget = Budget(self.rig.sample_time, self._budget, take_over, rests=rests)
         undo.enter_context(budget.watched())
-        return lambda measured, wanted: budget.call(python, measured, wanted)
+        return lambda measured, setpoint: budget.call(python, measured, setpoint)
 
     def _sample(self, stream: Stream | None, setpoint: int, times: Any) -> None:
         """One sample: control, record, keep pace, exchange. No exception leaves it: each is a reason to stop."""
@@ -383,22 +383,22 @@ class Loop:
 
     def _ask_python(self, python: PythonController, setpoint: Array) -> None:
         """The setpoint with the torque of a controller written in Python added."""
-        self._wanted[:] = setpoint
+        self._setpoint[:] = setpoint
         try:
-            self._wanted[2] += python(Measurement(*self._control.measured), Setpoint(*setpoint))
+            self._setpoint[2] += python(Measurement(*self._control.measured), Setpoint(*setpoint))
         except BaseException as error:
             self._ask(error)
 
-    def _in_blocks(self, stream: Stream, wanted: Array) -> None:
+    def _in_blocks(self, stream: Stream, setpoints: Array) -> None:
         """In compiled blocks through `BlockRig.exchange_block`."""
         rig = cast(BlockRig, self.rig)
         done = 0
-        while done < len(wanted) and self._control.safety[STATE] < STOPPED and not self._signals.number:
+        while done < len(setpoints) and self._control.safety[STATE] < STOPPED and not self._signals.number:
             if stream.fault is not None:
                 break
             try:
-                rows = stream.room(min(BLOCK, len(wanted) - done))
-                count = rig.exchange_block(self._control, wanted[done : done + len(rows)], rows)
+                rows = stream.room(min(BLOCK, len(setpoints) - done))
+                count = rig.exchange_block(self._control, setpoints[done : done + len(rows)], rows)
             except BaseException as error:
                 self._ask(error)
                 return
@@ -421,10 +421,10 @@ class Loop:
 
     def _ramp(self, stream: Stream | None) -> None:
         """Samples until the torque is zero; the ramp is the compiled one, so its length is bounded."""
-        self._wanted[:] = 0.0
+        self._setpoint[:] = 0.0
         times = np.zeros(len(TIMES), dtype=np.int64)
         while self._control.safety[STATE] != STOPPED:
-            self._sample(stream, self._wanted.ctypes.data, times)
+            self._sample(stream, self._setpoint.ctypes.data, times)
 
     def _ramp_down(self) -> None:
         """Take the torque away without a fault: before a pause and at the end."""

@@ -64,7 +64,7 @@ class Measurement(NamedTuple):
 
 
 class Setpoint(NamedTuple):
-    """What is wanted during one sample."""
+    """The reference during one sample."""
 
     position: float = 0.0
     """rad"""
@@ -100,7 +100,7 @@ def setpoints(
     return table
 
 
-def insist_on_setpoints(wanted: Array) -> None:
+def insist_on_setpoints(table: Array) -> None:
     """Refuse setpoints that no loop can follow, before any of them is given.
 
     Raises
@@ -109,13 +109,13 @@ def insist_on_setpoints(wanted: Array) -> None:
         For another shape, or the first that is no number.
     """
     names = Setpoint._fields
-    if wanted.ndim != 2 or wanted.shape[1] != len(names):
-        raise InputError(f"setpoints have shape {wanted.shape}; give (n, {len(names)}), see setpoints()")
-    wrong = np.argwhere(~np.isfinite(wanted))
+    if table.ndim != 2 or table.shape[1] != len(names):
+        raise InputError(f"setpoints have shape {table.shape}; give (n, {len(names)}), see setpoints()")
+    wrong = np.argwhere(~np.isfinite(table))
     if wrong.size:
         row, column = wrong[0].tolist()
         raise InputError(
-            f"setpoint {row} has {names[column]} = {wanted[row, column]:g}, which must be a finite number; fix what "
+            f"setpoint {row} has {names[column]} = {table[row, column]:g}, which must be a finite number; fix what "
             "made it"
         )
 
@@ -136,7 +136,7 @@ class Limits:
     temperature : float
         Highest, degrees Celsius; infinite where it is not measured.
     following_error : float
-        Largest distance between wanted and measured position while the loop is closed, rad.
+        Largest distance between reference and measured position while the loop is closed, rad.
     stop_time : float
         The declared time of a stop, s: from the sample that sees the reason until the torque command is zero. The
         torque falls by ``torque / stop_time``, so a smaller torque is gone sooner.
@@ -163,8 +163,8 @@ class Limits:
         if math.isnan(self.temperature):
             raise ParameterError("limits: temperature = nan °C must be a number")
 
-    def narrowed(self, wanted: Limits) -> Limits:
-        """Return the limits `wanted`, which may not be wider than these.
+    def narrowed(self, narrower: Limits) -> Limits:
+        """Return the limits `narrower`, which may not be wider than these.
 
         Raises
         ------
@@ -172,14 +172,14 @@ class Limits:
             Which limit is, and the value here.
         """
         for name in ("torque", "speed", "temperature", "following_error", "stop_time"):
-            value, most = getattr(wanted, name), getattr(self, name)
+            value, most = getattr(narrower, name), getattr(self, name)
             if value > most:
                 raise InputError(f"limits: {name} = {value:g} is wider than the rig's {most:g}")
-        if wanted.position[0] < self.position[0] or wanted.position[1] > self.position[1]:
+        if narrower.position[0] < self.position[0] or narrower.position[1] > self.position[1]:
             raise InputError(
-                f"limits: position = {wanted.position} rad is wider than the rig's {self.position}"
+                f"limits: position = {narrower.position} rad is wider than the rig's {self.position}"
             )
-        return wanted
+        return narrower
 
     def text(self, name: str) -> str:
         """A limit for people, without its unit; empty where there is none of that name."""

@@ -8,8 +8,8 @@ setpoint and no controller can prolong it.
 
 While the loop is open the laws run, so that an observer knows the disturbance when it is closed.
 
-Arguments: what is measured ``y`` (`Measurement`) and wanted ``w`` (`Setpoint`), the bounds ``b``, the memory of the
-safety ``s``, and the controller's settings ``n``, memory ``m``, and laws ``z``, ``p``, ``u``.
+Arguments: what is measured ``y`` (`Measurement`) and its setpoint ``w`` (`Setpoint`), the bounds ``b``, the memory of
+the safety ``s``, and the controller's settings ``n``, memory ``m``, and laws ``z``, ``p``, ``u``.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def idle(y: Any, w: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
 
 
 def control(y: Any, w: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
-    """The torque that is wanted, N·m; a controller that takes over starts where the last command left the axis."""
+    """The controller's torque, N·m; one that takes over starts where the last command left the axis."""
     u.time = y.time
     if abs(y.temperature) < UNBOUNDED:
         u.temperature = y.temperature

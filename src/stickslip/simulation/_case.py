@@ -75,13 +75,13 @@ def controller_told(controller: Controller | SampledController) -> dict[str, Any
     return {"gains": controller.gains._asdict(), **_compensator_told(controller.compensator)}
 
 
-def _compensator_told(helper: Compensator | None) -> dict[str, Any]:
+def _compensator_told(compensator: Compensator | None) -> dict[str, Any]:
     """The same of a compensator; nothing where there is none."""
-    if helper is None:
+    if compensator is None:
         return {}
     numbers = ("gain", "filter_hz", "lead", "deadband", "offset", "inertia_feedforward", "substeps")
-    own = {name: getattr(helper, name) for name in numbers}
-    return {"compensator": {"kind": helper.name, **own, **helper.model.as_dict()}}
+    own = {name: getattr(compensator, name) for name in numbers}
+    return {"compensator": {"kind": compensator.name, **own, **compensator.model.as_dict()}}
 
 
 @dataclass(frozen=True)
@@ -221,10 +221,10 @@ def ruled_in(
         return controller
     if isinstance(controller, SampledController):
         return controller.holding(lambda model: ruled(model, slip_rule))
-    helper = controller.compensator
-    if helper is None:
+    compensator = controller.compensator
+    if compensator is None:
         return controller
-    return replace(controller, compensator=replace(helper, model=ruled(helper.model, slip_rule)))
+    return replace(controller, compensator=replace(compensator, model=ruled(compensator.model, slip_rule)))
 
 
 def held_in(controller: Controller | SampledController) -> dict[str, Model | None]:

@@ -52,7 +52,7 @@ def new_meter(duration: float, settle_band: float, window: float = MAX_WINDOW) -
 
 # ---- rows of the nodes: position error, velocity error, position, velocity, reference velocity, and the torques of
 # motor, friction and compensator
-ERROR, ERROR_RATE, AT, SPEED, WANTED, MOTOR, FRICTION, HELP, SIGNALS = range(9)
+ERROR, ERROR_RATE, AT, SPEED, REFERENCE_SPEED, MOTOR, FRICTION, COMPENSATING, SIGNALS = range(9)
 
 
 @kernel(exact=False)
@@ -76,11 +76,13 @@ def meter(acc: Any, turns: Any, t: float, h: float, nodes: Any) -> None:
         e2 += w * nodes[ERROR, i] * nodes[ERROR, i]
         ev2 += w * nodes[ERROR_RATE, i] * nodes[ERROR_RATE, i]
         tm2 += w * nodes[MOTOR, i] * nodes[MOTOR, i]
-        df2 += w * (nodes[FRICTION, i] - nodes[HELP, i]) * (nodes[FRICTION, i] - nodes[HELP, i])
+        df2 += (
+            w * (nodes[FRICTION, i] - nodes[COMPENSATING, i]) * (nodes[FRICTION, i] - nodes[COMPENSATING, i])
+        )
         mean += w * nodes[ERROR, i]
         work += w * nodes[MOTOR, i] * nodes[SPEED, i]
         loss += w * nodes[FRICTION, i] * nodes[SPEED, i]
-        helped += w * nodes[HELP, i] * nodes[SPEED, i]
+        helped += w * nodes[COMPENSATING, i] * nodes[SPEED, i]
     scale = h / 90.0
     acc[E2] += scale * e2
     acc[EV2] += scale * ev2
@@ -272,8 +274,8 @@ def reversals(acc: Any, turns: Any, t: float, h: float, nodes: Any, second: bool
                     turns[n, 1] = acc[TURN_POSITION]
                     acc[TURN_COUNT] += 1.0
             acc[SIDE] = side
-        if abs(nodes[WANTED, i]) > TRIGGER:
-            side = 1.0 if nodes[WANTED, i] > 0.0 else -1.0
+        if abs(nodes[REFERENCE_SPEED, i]) > TRIGGER:
+            side = 1.0 if nodes[REFERENCE_SPEED, i] > 0.0 else -1.0
             if side * acc[REFERENCE_SIDE] < 0.0:
                 acc[REFERENCE_REVERSALS] += 1.0
             acc[REFERENCE_SIDE] = side
@@ -284,7 +286,7 @@ def standstill(acc: Any, t: float, h: float, nodes: Any) -> None:
     """Find standstills: |v| below the trigger for at least 10 ms while the reference moves."""
     for i in range(5):
         v = nodes[SPEED, i] if i == 0 else crest(nodes, i)
-        still = abs(v) < TRIGGER and abs(nodes[WANTED, i]) > MOVING
+        still = abs(v) < TRIGGER and abs(nodes[REFERENCE_SPEED, i]) > MOVING
         now = t + 0.25 * h * i
         if still and acc[STILL_SINCE] < 0.0:
             acc[STILL_SINCE] = now

@@ -57,10 +57,10 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     inside = min(max(s / p.layer, -1.0), 1.0)
     outside = s - p.layer * inside
     speed = abs(y.velocity)
-    wanted = y.reference_acceleration + p.slope * rate
-    torque = z.inertia * wanted + p.damping * outside + (z.level + z.rise * speed) * inside
+    virtual_acceleration = y.reference_acceleration + p.slope * rate
+    torque = z.inertia * virtual_acceleration + p.damping * outside + (z.level + z.rise * speed) * inside
     kept = math.exp(-p.leak * y.elapsed)
-    grown = z.inertia + y.elapsed * p.inertia_rate * outside * wanted
+    grown = z.inertia + y.elapsed * p.inertia_rate * outside * virtual_acceleration
     z.inertia = min(max(grown, 0.0), p.most_inertia * p.inertia)
     z.level = min(kept * z.level + y.elapsed * p.level_rate * abs(outside), p.most_level)
     z.rise = min(kept * z.rise + y.elapsed * p.speed_rate * abs(outside) * speed, p.most_speed)

@@ -98,12 +98,12 @@ def _judged(
     """What friction and inertia leave where they are fitted, with the delay of the map that leaves least."""
     solve = np.linalg.pinv(matrix[fitted])
 
-    def left(wanted: Array) -> tuple[float, float, Array]:
-        values = solve @ wanted[fitted]
-        squares = (wanted - matrix @ values) ** 2
+    def left(torque: Array) -> tuple[float, float, Array]:
+        values = solve @ torque[fitted]
+        squares = (torque - matrix @ values) ** 2
         return math.sqrt(float(np.mean(squares[fitted]))), math.sqrt(float(np.mean(squares[judged]))), values
 
-    tries = [(delay, *left(wanted)) for delay, wanted in after.items()]
+    tries = [(delay, *left(torque)) for delay, torque in after.items()]
     delay, least, with_map, values = min(tries, key=lambda one: one[1])
     return least, Motion(with_map, left(torque)[1], float(values[0]), float(values[1]), math.nan, True, delay)
 

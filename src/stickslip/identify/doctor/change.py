@@ -197,9 +197,9 @@ def _system(smooth: Smooth, rows: Any) -> System:
     return System(v, matrix / np.where(size > 0.0, size, 1.0), slice(1, 1 + curve.shape[1]))
 
 
-def _least(matrix: Array, wanted: Array) -> Array:
+def _least(matrix: Array, target: Array) -> Array:
     """Least squares; the smallest values where several serve."""
-    return cast("tuple[Array, ...]", np.linalg.lstsq(matrix, wanted, rcond=1e-9))[0]
+    return cast("tuple[Array, ...]", np.linalg.lstsq(matrix, target, rcond=1e-9))[0]
 
 
 def _hats(x: Array, knots: Array) -> Array:

@@ -274,11 +274,11 @@ def fit_bristles(
     def bristles(position: Array) -> Array:
         return np.concatenate([position[p] - np.mean(position[p]) for p in pieces])
 
-    wanted = bristles(response.position)
-    enough = ENOUGH / wanted.size
+    measured = bristles(response.position)
+    enough = ENOUGH / measured.size
 
     def apart(stepped: Simulation) -> Residuals:
-        return lambda u: bristles(stepped.position(u)) - wanted
+        return lambda u: bristles(stepped.position(u)) - measured
 
     def descended(u: Array) -> tuple[Array, float]:
         return descend_by_secants(
@@ -291,7 +291,7 @@ def fit_bristles(
     undamped[vector.names.index("sigma1")] = 0.0
     near = min((descended(u) for u in (vector.start, undamped)), key=lambda found: found[1])[0]
     return fit(
-        apart(simulation.graded(near, vs)), vector, noise=noise, size=float(np.max(np.abs(wanted))),
+        apart(simulation.graded(near, vs)), vector, noise=noise, size=float(np.max(np.abs(measured))),
         starts=near[None, :], tolerance=enough, difference=DIFFERENCE,
     )  # fmt: skip
 

@@ -219,10 +219,10 @@ def limit_cycle(controller: Controller | SampledController, bench: Bench) -> str
     """What it does at rest for long after the motion on the best estimate, where it goes to and fro, or ""."""
     drive, before = bench.drive, bench.before(0)
     assert isinstance(before, Trial)
-    last = drive.wanted[-1] * np.array([1.0, 0.0, 0.0])
+    last = drive.reference[-1] * np.array([1.0, 0.0, 0.0])
     held = np.tile(last, (round(RESTS / drive.sample_time), 1))
-    wanted = np.vstack([drive.wanted, held])
-    position = simulated(bench.plants[0], controller, wanted)
+    reference = np.vstack([drive.reference, held])
+    position = simulated(bench.plants[0], controller, reference)
     bench.ran()
     if position is None:
         return "at rest position or velocity left every reasonable bound"

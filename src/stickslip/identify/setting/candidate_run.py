@@ -175,21 +175,21 @@ class Drive:
         return sinusoid(self.amplitude, self.frequency)
 
     @cached_property
-    def wanted(self) -> Array:
+    def reference(self) -> Array:
         """Position, velocity and acceleration of the motion at every sample, shape (n, 3), `HOLD` at rest behind it."""
         return self.path.sampled(self.sample_time)
 
     @cached_property
-    def wanted_backward(self) -> Array:
+    def reference_backward(self) -> Array:
         """The same, its velocity the mean over the sample before."""
-        out = self.wanted.copy()
+        out = self.reference.copy()
         out[:, 1] = np.diff(out[:, 0], prepend=out[0, 0]) / self.sample_time
         return out
 
     @cached_property
     def stops(self) -> float:
         """How often the motion stops or turns, 1/s."""
-        side = np.sign(np.diff(self.wanted[:, 0]))
+        side = np.sign(np.diff(self.reference[:, 0]))
         return float(np.sum((side[:-1] != 0.0) & (side[1:] != side[:-1]))) / (side.size * self.sample_time)
 
     def as_dict(self) -> dict[str, Any]:
@@ -250,8 +250,9 @@ class Trial:
     Attributes
     ----------
     moving : mapping of str to float
-        Metrics of the motion: ``position_rms_rad``, ``velocity_above_50Hz_rms_rad_s``, ``speed_rms_rad_s`` (wanted).
-    position, wanted : array, shape (n,)
+        Metrics of the motion: ``position_rms_rad``, ``velocity_above_50Hz_rms_rad_s``; ``speed_rms_rad_s`` of
+        the reference.
+    position, reference : array, shape (n,)
         Of the axis and its reference at every sample, rad.
     sample_time : float
         s
@@ -259,13 +260,13 @@ class Trial:
 
     moving: dict[str, float]
     position: Array
-    wanted: Array
+    reference: Array
     sample_time: float
 
     def restless(self, swing: float) -> tuple[float, float]:
         """Swings per second by more than `swing`, rad: beyond those of the reference in all, and at rest behind it."""
         last = self.position.size - round(0.5 * HOLD / self.sample_time)
-        beyond = turns(self.position, swing) - turns(self.wanted, swing)
+        beyond = turns(self.position, swing) - turns(self.reference, swing)
         return beyond / (self.position.size * self.sample_time), turns(self.position[last:], swing) / (
             0.5 * HOLD
         )
@@ -278,25 +279,25 @@ class Trial:
 
 def run(plant: RigidAxis, controller: Controller | SampledController, drive: Drive) -> Trial | str:
     """The motion and the rest behind it; the reason where it cannot be run to its end."""
-    wanted = drive.wanted_backward if isinstance(plant, Plant) and plant.backward else drive.wanted
-    position = simulated(plant, controller, wanted)
+    reference = drive.reference_backward if isinstance(plant, Plant) and plant.backward else drive.reference
+    position = simulated(plant, controller, reference)
     if position is None:
         return "position or velocity left every reasonable bound"
     time = controller.sample_time
-    moving = len(wanted) - round(HOLD / time)
+    moving = len(reference) - round(HOLD / time)
     velocity = np.diff(position, append=position[-1]) / time
     return Trial(
         {
-            "position_rms_rad": math.sqrt(float(np.mean((wanted[:moving, 0] - position[:moving]) ** 2))),
+            "position_rms_rad": math.sqrt(float(np.mean((reference[:moving, 0] - position[:moving]) ** 2))),
             "velocity_above_50Hz_rms_rad_s": above(velocity, FAST, time),
-            "speed_rms_rad_s": math.sqrt(float(np.mean(wanted[:moving, 1] ** 2))),
+            "speed_rms_rad_s": math.sqrt(float(np.mean(reference[:moving, 1] ** 2))),
         },
-        position, np.ascontiguousarray(wanted[:, 0]), time,
+        position, np.ascontiguousarray(reference[:, 0]), time,
     )  # fmt: skip
 
 
 def simulated(
-    plant: RigidAxis, controller: Controller | SampledController, wanted: Array, start: float = 0.0
+    plant: RigidAxis, controller: Controller | SampledController, reference: Array, start: float = 0.0
 ) -> Array | None:
     """Positions of the axis itself at every sample along a reference, rad; None where it diverges.
 
@@ -307,7 +308,11 @@ def simulated(
     stand_at(start, arrays[0], arrays[2])
     look(*arrays, control.measured)
     path = setpoints(
-        len(wanted), position=wanted[:, 0], velocity=wanted[:, 1], acceleration=wanted[:, 2], closed=1.0
+        len(reference),
+        position=reference[:, 0],
+        velocity=reference[:, 1],
+        acceleration=reference[:, 2],
+        closed=1.0,
     )
     positions = np.empty(len(path))
     done = follow(*arrays, control, path, np.empty(len(COLUMNS)), positions)

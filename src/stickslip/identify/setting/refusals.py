@@ -64,7 +64,7 @@ def held(found: Identified, alone: Trial | str, drive: Drive) -> Trial:
     ------
     InputError
     """
-    size = float(np.std(drive.wanted[:, 0]))
+    size = float(np.std(drive.reference[:, 0]))
     if not isinstance(alone, str):
         error = alone.moving["position_rms_rad"]
         if error <= LOST * size:

@@ -110,11 +110,11 @@ class Plan:
 class Step:
     """A segment of the loop.
 
-    ``wanted`` are its setpoints, ``keep`` says whether the record holds it (every ``average`` samples as their mean),
-    ``pause`` is a rest before it (s), ``travel`` ends it early.
+    ``setpoints`` are those of its samples, ``keep`` says whether the record holds it (every ``average`` samples as
+    their mean), ``pause`` is a rest before it (s), ``travel`` ends it early.
     """
 
-    wanted: Array
+    setpoints: Array
     controller: Controller | SampledController | None = None
     keep: bool = False
     average: int = 1
@@ -369,7 +369,7 @@ def _one(loop: Loop, step: Step, kept: list[tuple[str, Array]], progress: Any) -
         loop.prepare(step.controller)
     if step.pause > 0.0:
         loop.pause(step.pause)
-    rows = loop.run(step.wanted, step.controller, travel=step.travel)
+    rows = loop.run(step.setpoints, step.controller, travel=step.travel)
     if step.keep:
         kept.append((step.label, averaged(rows, step.average)))
     return rows

@@ -133,14 +133,14 @@ class Inertia(Procedure):
         yield running
         count = samples(rig, self.duration)
         t = dt * np.arange(1, count + 1)
-        wanted = setpoints(
+        sent = setpoints(
             count,
             position=end + v * t,
             velocity=v,
             torque=bias + self.noise(count, dt, rms, place),
             closed=1.0,
         )
-        rows = yield Step(wanted, damp, keep=True, label=f"{rms / self.torque_constant:.3g} A RMS")
+        rows = yield Step(sent, damp, keep=True, label=f"{rms / self.torque_constant:.3g} A RMS")
         yield brake(rig, follow, float(rows[-1, POSITION]), v, inertia)
         yield Step(setpoints(round(0.2 / dt)))
 

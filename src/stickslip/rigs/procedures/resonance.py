@@ -79,10 +79,10 @@ class Resonance(Procedure):
         yield running
         count = samples(rig, self.duration)
         t = rig.sample_time * np.arange(1, count + 1)
-        wanted = setpoints(
+        sent = setpoints(
             count, position=end + v * t, velocity=v, torque=self.noise(rig, self.running(rig), 0), closed=1.0
         )
-        rows = yield Step(wanted, loop, keep=True, label="sliding")
+        rows = yield Step(sent, loop, keep=True, label="sliding")
         yield brake(rig, loop, float(rows[-1, REFERENCE]), v, self.inertia)
         yield now(rig, 0.5)
         still = setpoints(count, torque=self.noise(rig, self.stuck, 1))

@@ -99,21 +99,21 @@ class Sliding(Procedure):
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
         """The mean speed of the last revolution was held within 1 %; its ripple is reported."""
         out: list[Check] = []
-        wanted = record["velocity_reference"]
-        edges = np.flatnonzero(np.abs(np.diff(wanted)) > 1e-9 * np.abs(wanted[:-1])) + 1
+        reference = record["velocity_reference"]
+        edges = np.flatnonzero(np.abs(np.diff(reference)) > 1e-9 * np.abs(reference[:-1])) + 1
         parts = [p for p in np.split(np.arange(len(record)), edges) if p.size > 2]
         for rows in parts:
             out.append(self._held(record, rows, rig.sample_time))
         return tuple(out)
 
     def _held(self, record: Record, rows: np.ndarray, sample_time: float) -> Check:  # type: ignore[type-arg]
-        time, position, wanted = (
+        time, position, reference = (
             record.time[rows],
             record["position"][rows],
             record["velocity_reference"][rows],
         )
         far = np.abs(position - position[0]) >= math.radians(max(self.degrees - 360.0, 0.0))
-        t, x, v = time[far], position[far], float(wanted[0])
+        t, x, v = time[far], position[far], float(reference[0])
         if t.size < 3:
             return Check(f"{v:g} rad/s", False, "the axis did not travel a revolution")
         mean = float((x[-1] - x[0]) / (t[-1] - t[0]))

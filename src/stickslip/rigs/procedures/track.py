@@ -102,7 +102,7 @@ class Track(Procedure):
         return super().with_options(given)
 
     @property
-    def wanted(self) -> tuple[Reference, float]:
+    def motion(self) -> tuple[Reference, float]:
         """Reference and duration, s."""
         if self.reference not in REFERENCES:
             raise UnknownName("reference", self.reference, REFERENCES)
@@ -229,7 +229,7 @@ class Track(Procedure):
 
     def samples(self, rig: Rig) -> Any:
         """Positions, velocities and accelerations of the reference, shape (n, 3)."""
-        reference, seconds = self.wanted
+        reference, seconds = self.motion
         t = rig.sample_time * np.arange(samples(rig, seconds))
         return reference.sample(t)
 
@@ -257,7 +257,7 @@ class Track(Procedure):
         rows = yield Step(setpoints(round(0.05 / rig.sample_time)), pause=self.wait)
         samples = self.samples(rig)
         position = float(rows[-1, POSITION]) + samples[:, 0]
-        wanted = setpoints(
+        sent = setpoints(
             len(samples),
             position=position,
             velocity=samples[:, 1],
@@ -265,7 +265,7 @@ class Track(Procedure):
             torque=self.angle().torque(position),
             closed=1.0,
         )
-        yield Step(wanted, self.made(rig), keep=True, label=self.reference)
+        yield Step(sent, self.made(rig), keep=True, label=self.reference)
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
         """The error and the torque's saturation; both are what is looked for, so that neither fails."""

@@ -79,10 +79,22 @@ ROOT_2 = math.sqrt(2.0)
 
 def arrays_of(case: Case) -> tuple[Any, Any]:
     """Integers a and workspace w of a case, laid out as above."""
-    plant, helper = case.plant, case.compensator
+    plant, compensator = case.plant, case.compensator
     place = PLANT_PARAMETERS + plant.parameters.size
-    sizes = [plant.state.size, plant.state.size + helper.state.size, place, place + helper.parameters.size]
-    integers = [case.profile, *plant.addresses, *helper.addresses, *sizes, *plant.modes, *helper.modes]
+    sizes = [
+        plant.state.size,
+        plant.state.size + compensator.state.size,
+        place,
+        place + compensator.parameters.size,
+    ]
+    integers = [
+        case.profile,
+        *plant.addresses,
+        *compensator.addresses,
+        *sizes,
+        *plant.modes,
+        *compensator.modes,
+    ]
     remembered = np.zeros(SURROUNDINGS - NUMBERS)
     remembered[REFERENCE_TIME - NUMBERS] = math.nan
     workspace = np.concatenate(
@@ -91,7 +103,7 @@ def arrays_of(case: Case) -> tuple[Any, Any]:
             remembered,
             surroundings(case.numbers),
             plant.parameters,
-            helper.parameters,
+            compensator.parameters,
             case.reference_parameters,
         ]
     )
@@ -158,10 +170,10 @@ def rates(a: Any, w: Any, t: float, y: Any, k: Any, row: int) -> None:
     w[SURROUNDINGS], w[TIME] = y[POSITION], t
     v = 0.0 if is_held(a, w) else y[VELOCITY]
     w[SEEN_VELOCITY] = v
-    helped = 0.0
+    compensation = 0.0
     if w[SOURCE] != NO_COMPENSATOR:
         seen = compensator_velocity(a, w, y)
-        helped = w[GAIN] * call_rate(
+        compensation = w[GAIN] * call_rate(
             a[COMPENSATOR + RATE],
             seen,
             pointer(y, compensator),
@@ -175,7 +187,7 @@ def rates(a: Any, w: Any, t: float, y: Any, k: Any, row: int) -> None:
             k[row, FILTER_1] = y[FILTER_2]
             k[row, FILTER_2] = corner * corner * (raw - y[FILTER_1]) - ROOT_2 * corner * y[FILTER_2]
     error = w[THETA_D] - y[POSITION]
-    demand = w[KP] * error + w[KR] * w[OMEGA_D] - w[KD] * v + w[KI] * y[INTEGRAL] + helped
+    demand = w[KP] * error + w[KR] * w[OMEGA_D] - w[KD] * v + w[KI] * y[INTEGRAL] + compensation
     motor = min(max(demand, -w[TORQUE_LIMIT]), w[TORQUE_LIMIT])
     if is_held(a, w):
         friction = motor
@@ -201,7 +213,7 @@ def rates(a: Any, w: Any, t: float, y: Any, k: Any, row: int) -> None:
     k[row, INTEGRAL] = error
     w[MOTOR_TORQUE] = motor
     w[FRICTION_TORQUE] = friction
-    w[COMPENSATION_TORQUE] = helped
+    w[COMPENSATION_TORQUE] = compensation
     w[DEMAND] = demand
 
 

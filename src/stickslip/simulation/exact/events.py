@@ -211,25 +211,25 @@ def locate(
 ) -> float:  # fmt: skip
     """Root of `trigger` in [low, high], from its far side: regula falsi (Anderson and Björck), then bisection.
 
-    The motion at `high` is (theta, v); that at the root is kept in `segment`. Wanted is a value just beyond the
+    The motion at `high` is (theta, v); that at the root is kept in `segment`. Sought is a value just beyond the
     root, so that iterates from both sides are good.
     """
-    wanted = 25.0 * tol
+    margin = 25.0 * tol
     segment[POSITION_EVENT] = theta
     segment[VELOCITY_EVENT] = v
-    low_miss = min(g_low, 0.0) - wanted
-    high_miss = g_high - wanted
+    low_miss = min(g_low, 0.0) - margin
+    high_miss = g_high - margin
     # The misses that guide the search are weighted; this is the true one at `high`.
     beyond = high_miss
     side = 0
     turn = 0
-    while beyond > wanted and high - low > 1e-3 * tol:
+    while beyond > margin and high - low > 1e-3 * tol:
         x = (low * high_miss - high * low_miss) / (high_miss - low_miss)
         if turn > 10 or not low < x < high:
             x = 0.5 * (low + high)
         theta, v = state_at(lin, segment, x)
-        miss = trigger(parameters, plan, elements, sides, loop, theta, v) - wanted
-        if miss >= -wanted:
+        miss = trigger(parameters, plan, elements, sides, loop, theta, v) - margin
+        if miss >= -margin:
             if side == 1:
                 low_miss *= 1.0 - miss / high_miss if miss < high_miss else 0.5
             high = x

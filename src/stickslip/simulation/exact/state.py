@@ -267,7 +267,7 @@ def curve_slope(parameters: Any, plan: Any, sides: Any, side: int, v: float) -> 
 @kernel(exact=False, inline=True)
 def torques(
     parameters: Any, plan: Any, sides: Any, loop: Any, r: float, goal: float, rate: float, integral: float,
-    theta: float, v: float, s_plant: float, s_helper: float,
+    theta: float, v: float, s_plant: float, s_compensator: float,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Motor, friction and compensating torque, N·m."""
     helped = r - parameters[KP] * goal - parameters[KR] * rate
@@ -275,7 +275,7 @@ def torques(
         model = (
             sides[SIDE_SIZE + SPRING] * theta
             + sides[SIDE_SIZE + SPRING_OFFSET]
-            + s_helper
+            + s_compensator
             + sides[SIDE_SIZE + DAMPING] * v
         )
         helped -= sides[SIDE_SIZE + WEIGHT] * model

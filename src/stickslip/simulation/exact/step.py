@@ -243,9 +243,9 @@ def loop_terms(
     travelled = (
         impulse - lin.damping * (theta_end - loop[POSITION]) - lin.inertia * (v_end - loop[VELOCITY])
     ) * lin.compliance
-    wanted = h / 30.0 * (7.0 * (loop[GOAL] + segment[GOAL_END]) + 16.0 * segment[GOAL_MID])
-    wanted += h * h / 60.0 * (loop[GOAL_RATE] - segment[RATE_END])
-    segment[INTEGRAL_END] = loop[INTEGRAL] + wanted - travelled
+    reference_integral = h / 30.0 * (7.0 * (loop[GOAL] + segment[GOAL_END]) + 16.0 * segment[GOAL_MID])
+    reference_integral += h * h / 60.0 * (loop[GOAL_RATE] - segment[RATE_END])
+    segment[INTEGRAL_END] = loop[INTEGRAL] + reference_integral - travelled
     e0 = loop[GOAL] - loop[POSITION]
     e_mid = segment[GOAL_MID] - theta_mid
     slopes = loop[GOAL_RATE] - loop[VELOCITY] - segment[RATE_MID] + v_mid

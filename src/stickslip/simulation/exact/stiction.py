@@ -56,9 +56,9 @@ def rest(
     theta = loop[POSITION]
     look_ahead(parameters, plan, cells, loop, segment, h, 0.0)
     remember(segment, (theta, 0.0, 0.0, 0.0), h, 0.0, 0.0, theta, 0.0, theta, 0.0, 0)
-    wanted = h / 30.0 * (7.0 * (loop[GOAL] + segment[GOAL_END]) + 16.0 * segment[GOAL_MID])
-    wanted += h * h / 60.0 * (loop[GOAL_RATE] - segment[RATE_END])
-    segment[INTEGRAL_END] = loop[INTEGRAL] + wanted - theta * h
+    reference_integral = h / 30.0 * (7.0 * (loop[GOAL] + segment[GOAL_END]) + 16.0 * segment[GOAL_MID])
+    reference_integral += h * h / 60.0 * (loop[GOAL_RATE] - segment[RATE_END])
+    segment[INTEGRAL_END] = loop[INTEGRAL] + reference_integral - theta * h
     segment[POSITION_EVENT] = theta
     segment[VELOCITY_EVENT] = 0.0
     low = 0.0
@@ -89,9 +89,9 @@ def excess(
     r, _, goal, rate = command(parameters, plan, cells, loop, loop[TIME] + x)
     torque = applied(parameters, plan, elements, sides, loop) + r - loop[R]
     if parameters[KI] != 0.0:
-        wanted = x / 30.0 * (7.0 * (loop[GOAL] + goal) + 16.0 * middle)
-        wanted += x * x / 60.0 * (loop[GOAL_RATE] - rate)
-        torque += parameters[KI] * (wanted - loop[POSITION] * x)
+        reference_integral = x / 30.0 * (7.0 * (loop[GOAL] + goal) + 16.0 * middle)
+        reference_integral += x * x / 60.0 * (loop[GOAL_RATE] - rate)
+        torque += parameters[KI] * (reference_integral - loop[POSITION] * x)
     return abs(torque) - max(stiction(plan, sides), 0.0)
 
 

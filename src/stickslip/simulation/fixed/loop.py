@@ -26,12 +26,12 @@ from stickslip.simulation._case import (
 
 # ---- the state at one time: these entries, then the plant's state, then the compensator's -----------------
 (
-    POSITION, VELOCITY, INTEGRAL, FILTERED, FILTER_RATE, POSITION_D, VELOCITY_D, LINEAR, HELP, MOTOR,
+    POSITION, VELOCITY, INTEGRAL, FILTERED, FILTER_RATE, POSITION_D, VELOCITY_D, LINEAR, COMPENSATING, MOTOR,
     FRICTION, SIDE, LEAVING, GATHERED, HEAD,
 ) = range(15)  # fmt: skip
 # SIDE is the direction of motion, or at rest the one from which the axis came; LEAVING the one in which it is
-# about to go (0: none); HELP includes the gain. GATHERED is, at rest in a band of velocities (Karnopp), the momentum
-# gathered there over the inertia, rad/s.
+# about to go (0: none); COMPENSATING includes the gain. GATHERED is, at rest in a band of velocities (Karnopp), the
+# momentum gathered there over the inertia, rad/s.
 
 STEP, HOLDING = 0, 6  # places in `Side.addresses`
 TIME = 3  # place in the surroundings
@@ -45,8 +45,8 @@ class Loop(NamedTuple):
     numbers: Any
     plant: Any
     plant_parameters: Any
-    helper: Any
-    helper_parameters: Any
+    compensator: Any
+    compensator_parameters: Any
     profile: int
     reference_parameters: Any
     plant_states: int
@@ -99,19 +99,19 @@ def step_plant(loop: Loop, z: Any, v0: float, v1: float, h: float) -> float:
 
 
 @kernel()
-def step_helper(loop: Loop, z: Any, v0: float, v1: float, h: float) -> float:
+def step_compensator(loop: Loop, z: Any, v0: float, v1: float, h: float) -> float:
     """Advance the compensator's law inside the state `z`; returns gain times torque, N·m."""
     loop.surroundings[0] = z[POSITION]
     state = pointer(z, HEAD + loop.plant_states)
-    p, u = pointer(loop.helper_parameters, 0), pointer(loop.surroundings, 0)
-    return loop.numbers[GAIN] * call_step(loop.helper[STEP], v0, v1, h, state, p, u)
+    p, u = pointer(loop.compensator_parameters, 0), pointer(loop.surroundings, 0)
+    return loop.numbers[GAIN] * call_step(loop.compensator[STEP], v0, v1, h, state, p, u)
 
 
 @kernel()
-def helper_jumps(loop: Loop) -> bool:
+def compensator_jumps(loop: Loop) -> bool:
     """Whether the compensating torque jumps where the axis passes through rest."""
     n = loop.numbers
-    return n[SOURCE] == FROM_MEASUREMENT and n[FILTER] == 0.0 and loop.helper[HOLDING] != 0
+    return n[SOURCE] == FROM_MEASUREMENT and n[FILTER] == 0.0 and loop.compensator[HOLDING] != 0
 
 
 @kernel()
@@ -134,9 +134,9 @@ def plant_slides(loop: Loop, z: Any, side: float) -> float:
 
 
 @kernel()
-def helper_slides(loop: Loop, z: Any, side: float) -> float:
+def compensator_slides(loop: Loop, z: Any, side: float) -> float:
     """Compensating torque of a law that jumps at zero, on one side of it, N·m."""
-    return step_helper(loop, z, side * TINY, side * TINY, 0.0)
+    return step_compensator(loop, z, side * TINY, side * TINY, 0.0)
 
 
 @kernel()
@@ -156,7 +156,7 @@ def limited(n: Any, torque: float) -> float:
 def set_motor(loop: Loop, z: Any) -> None:
     """Motor torque of the controller."""
     z[LINEAR] = linear_torque(loop.numbers, z)
-    z[MOTOR] = limited(loop.numbers, z[LINEAR] + z[HELP])
+    z[MOTOR] = limited(loop.numbers, z[LINEAR] + z[COMPENSATING])
 
 
 @kernel()
@@ -190,7 +190,7 @@ def look_ahead(loop: Loop, a: Any, t: float, h: float) -> None:
         if n[FILTER] > 0.0:
             low_pass(n, a, ahead, v0, v1, h, 0.5)
             v0, v1 = a[FILTERED], ahead[FILTERED]
-        ahead[HELP] = step_helper(loop, ahead, v0, v1, h)
+        ahead[COMPENSATING] = step_compensator(loop, ahead, v0, v1, h)
 
 
 @kernel()
@@ -205,5 +205,5 @@ def restart(loop: Loop, z: Any, t: float) -> None:
         if n[FILTER] > 0.0:
             v = z[FILTERED]
         if n[SOURCE] == FROM_REFERENCE or z[VELOCITY] != 0.0:
-            z[HELP] = step_helper(loop, z, v, v, 0.0)
+            z[COMPENSATING] = step_compensator(loop, z, v, v, 0.0)
     set_motor(loop, z)

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.jit import call_profile, kernel, pointer
 from stickslip.simulation._meter import MAX_WINDOW, meter
-from stickslip.simulation.fixed.loop import FRICTION, HELP, MOTOR, NUDGE, POSITION, VELOCITY, Loop
+from stickslip.simulation.fixed.loop import COMPENSATING, FRICTION, MOTOR, NUDGE, POSITION, VELOCITY, Loop
 
 STEPS, OUTPUTS, EVENTS, ROWS = range(4)  # of the counts
 JUMP = 1e-9  # N·m, from which a change of torque at one time is a jump
@@ -55,7 +55,7 @@ def write(
     row[4] = a[VELOCITY] + x * (b[VELOCITY] - a[VELOCITY])
     row[5] = a[MOTOR] + x * (b[MOTOR] - a[MOTOR])
     row[6] = a[FRICTION] + x * (b[FRICTION] - a[FRICTION])
-    row[7] = a[HELP] + x * (b[HELP] - a[HELP])
+    row[7] = a[COMPENSATING] + x * (b[COMPENSATING] - a[COMPENSATING])
     row[8] = event
     counts[ROWS] += 1
     return rows
@@ -109,7 +109,7 @@ def measure(loop: Loop, a: Any, b: Any, t: float, h: float, accumulator: Any, tu
             nodes[4, i] = loop.motion[1]
             nodes[5, i] = a[MOTOR] + x * (b[MOTOR] - a[MOTOR])
             nodes[6, i] = a[FRICTION] + x * (b[FRICTION] - a[FRICTION])
-            nodes[7, i] = a[HELP] + x * (b[HELP] - a[HELP])
+            nodes[7, i] = a[COMPENSATING] + x * (b[COMPENSATING] - a[COMPENSATING])
         meter(
             accumulator, turns, t + h * window / windows, h / windows,
             nodes)  # fmt: skip

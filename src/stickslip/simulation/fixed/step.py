@@ -29,12 +29,12 @@ from stickslip.simulation._case import (
     SOURCE,
 )
 from stickslip.simulation.fixed.loop import (
+    COMPENSATING,
     FILTER_RATE,
     FILTERED,
     FRICTION,
     GATHERED,
     HEAD,
-    HELP,
     HOLDING,
     INTEGRAL,
     LEAVING,
@@ -46,9 +46,9 @@ from stickslip.simulation.fixed.loop import (
     VELOCITY,
     VELOCITY_D,
     Loop,
+    compensator_jumps,
+    compensator_slides,
     copy,
-    helper_jumps,
-    helper_slides,
     limited,
     look_ahead,
     low_pass,
@@ -56,7 +56,7 @@ from stickslip.simulation.fixed.loop import (
     plant_slides,
     set_motor,
     sign,
-    step_helper,
+    step_compensator,
     step_plant,
 )
 
@@ -93,16 +93,20 @@ def close(loop: Loop, a: Any, b: Any, h: float, v1: float, side: float, w: float
     if n[SOURCE] == FROM_REFERENCE:
         for i in range(HEAD + loop.plant_states, b.size):
             b[i] = ahead[i]
-        b[HELP], b[FILTERED], b[FILTER_RATE] = ahead[HELP], ahead[FILTERED], ahead[FILTER_RATE]
+        b[COMPENSATING], b[FILTERED], b[FILTER_RATE] = (
+            ahead[COMPENSATING],
+            ahead[FILTERED],
+            ahead[FILTER_RATE],
+        )
     elif n[SOURCE] == FROM_MEASUREMENT:
         y0, y1 = v0, v1
         if n[FILTER] > 0.0:
             low_pass(n, a, b, v0, v1, h, w)
             y1 = b[FILTERED]
             y0 = a[FILTERED] if w < 1.0 else y1
-        b[HELP] = step_helper(loop, b, y0, y1, h)
-        if over and helper_jumps(loop):
-            b[HELP] = helper_slides(loop, b, side)
+        b[COMPENSATING] = step_compensator(loop, b, y0, y1, h)
+        if over and compensator_jumps(loop):
+            b[COMPENSATING] = compensator_slides(loop, b, side)
     set_motor(loop, b)
     return b[MOTOR] - b[FRICTION]
 
@@ -178,7 +182,7 @@ def damped_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> bool:
     step_plant(loop, base, middle[VELOCITY], middle[VELOCITY], rest)
     if loop.numbers[SOURCE] == FROM_MEASUREMENT:
         v = middle[FILTERED] if loop.numbers[FILTER] > 0.0 else middle[VELOCITY]
-        step_helper(loop, base, v, v, rest)
+        step_compensator(loop, base, v, v, rest)
     look_ahead(loop, a, t, h)
     done = solve(loop, base, b, part, 0.0, 1.0)
     b[SIDE] = sign(b[VELOCITY])
@@ -191,8 +195,8 @@ def drive(loop: Loop, z: Any, side: float) -> float:
     friction, motor = z[FRICTION], z[MOTOR]
     if loop.plant[HOLDING] != 0:
         friction = plant_holds(loop, z, side)
-    if helper_jumps(loop):
-        motor = limited(loop.numbers, z[LINEAR] + helper_slides(loop, z, side))
+    if compensator_jumps(loop):
+        motor = limited(loop.numbers, z[LINEAR] + compensator_slides(loop, z, side))
     return motor - friction
 
 
@@ -217,8 +221,8 @@ def leave(loop: Loop, z: Any, side: float) -> None:
     z[LEAVING] = side
     if loop.plant[HOLDING] != 0:
         z[FRICTION] = plant_slides(loop, z, side)
-    if helper_jumps(loop):
-        z[HELP] = helper_slides(loop, z, side)
+    if compensator_jumps(loop):
+        z[COMPENSATING] = compensator_slides(loop, z, side)
         set_motor(loop, z)
 
 
@@ -329,7 +333,7 @@ def near_rest(loop: Loop, v0: float, v1: float) -> float:
 def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, bool]:
     """A step of the trapezoid, cut at a reversal; returns the time taken (< 0: no solution) and whether."""
     side = sign(a[VELOCITY]) if a[VELOCITY] != 0.0 else a[LEAVING]
-    jumping = side if loop.plant[HOLDING] != 0 or helper_jumps(loop) else 0.0
+    jumping = side if loop.plant[HOLDING] != 0 or compensator_jumps(loop) else 0.0
     look_ahead(loop, a, t, h)
     if not solve(loop, a, b, h, jumping, 0.5):
         return -1.0, False
@@ -404,7 +408,7 @@ def advance(loop: Loop, a: Any, b: Any, t: float, h: float, cap: float) -> tuple
         return (h, False) if done else (-1.0, False)
     if loop.numbers[PLANT_BAND] > 0.0 and a[VELOCITY] == 0.0:
         return band_step(loop, a, b, t, h)
-    if a[VELOCITY] == 0.0 and a[LEAVING] == 0.0 and (loop.plant[HOLDING] != 0 or helper_jumps(loop)):
+    if a[VELOCITY] == 0.0 and a[LEAVING] == 0.0 and (loop.plant[HOLDING] != 0 or compensator_jumps(loop)):
         side = departure(loop, a)
         if side == 0.0:
             taken = rest_step(loop, a, b, t, h)

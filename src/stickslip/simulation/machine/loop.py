@@ -148,11 +148,11 @@ def _filtered_as(controller: Controller, machine: Machine) -> Controller:
             f"controller: encoder_counts = {controller.encoder_counts:g}, the machine {machine.name} has an encoder of "
             f"its own ({machine.encoder.counts:g}); leave it out"
         )
-    helper = controller.compensator
-    if helper is None:
+    compensator = controller.compensator
+    if compensator is None:
         return controller
-    helper = replace(helper, filter_hz=helper.filter_hz or machine.filter or None)
-    return replace(controller, sample_time=machine.sample_time, compensator=helper)
+    compensator = replace(compensator, filter_hz=compensator.filter_hz or machine.filter or None)
+    return replace(controller, sample_time=machine.sample_time, compensator=compensator)
 
 
 def rows_at(
@@ -236,7 +236,7 @@ def start_at(laid: Laid, initial: tuple[float, float]) -> None:
 
 # ---- the loop ---------------------------------------------------------------------------------------------------
 
-AT, SPEED, FRICTION, MOTOR, HELP, ENDS = range(6)
+AT, SPEED, FRICTION, MOTOR, COMPENSATING, ENDS = range(6)
 """Of one end of a sample: position, velocity, and the torques of friction, motor and compensator."""
 TEMPERATURE, TIME = Surroundings._fields.index("temperature"), Surroundings._fields.index("time")
 TRIPPED, NO_NUMBER = 1, 2
@@ -255,7 +255,7 @@ def drive(
     now(plant, measured, begin)
     for k in range(samples + 1):
         torque = act(control, measured, k * period, profile, reference, around, motion)
-        begin[HELP] = control.memory[control.compensation]
+        begin[COMPENSATING] = control.memory[control.compensation]
         if counts[1] < places.size and places[counts[1]] == k:
             row(rows[counts[1]], k * period, motion, begin, measured, torque)
             counts[1] += 1
@@ -265,7 +265,7 @@ def drive(
             break
         sample(plant, torque, measured)
         now(plant, measured, end)
-        end[HELP] = begin[HELP]
+        end[COMPENSATING] = begin[COMPENSATING]
         gather(accumulator, turns, k * period, period, begin, end, profile, reference, motion, nodes)
         begin[:] = end
         counts[0] = k + 1
@@ -302,7 +302,7 @@ def row(out: Any, time: float, motion: Any, begin: Any, measured: Any, torque: f
     """A row of the record, in the order of `COLUMNS`."""
     out[0], out[1], out[2] = time, motion[0], motion[1]
     out[3], out[4], out[5], out[6], out[7], out[8] = (
-        begin[AT], begin[SPEED], begin[MOTOR], begin[FRICTION], begin[HELP], 0.0,
+        begin[AT], begin[SPEED], begin[MOTOR], begin[FRICTION], begin[COMPENSATING], 0.0,
     )  # fmt: skip
     out[9], out[10], out[11], out[12] = measured[1], torque, measured[3], measured[4]
 
@@ -329,5 +329,5 @@ def gather(
             nodes[4, i] = motion[1]
             nodes[5, i] = b[MOTOR]
             nodes[6, i] = a[FRICTION] + x * (b[FRICTION] - a[FRICTION])
-            nodes[7, i] = b[HELP]
+            nodes[7, i] = b[COMPENSATING]
         meter(accumulator, turns, t + h * window / windows, h / windows, nodes)

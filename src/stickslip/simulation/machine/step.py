@@ -161,10 +161,10 @@ def near_rest(plant: Plant, v0: float, free: float, gain: float, h: float, z: in
     if enough(rest, 0.0):
         return 0.0
     side = -1.0 if rest > 0.0 else 1.0
-    wanted = abs(rest)
+    needed = abs(rest)
     power = memory[POWER] if memory[POWER] > 0.0 else 1.0
     factor = memory[FACTOR] if memory[FACTOR] > 0.0 else memory[SLOPE]
-    x = (wanted / factor) ** (1.0 / power)
+    x = (needed / factor) ** (1.0 / power)
     low, high = 0.0, math.inf
     last_x, last_rise = 0.0, 0.0
     for _ in range(12):
@@ -177,12 +177,12 @@ def near_rest(plant: Plant, v0: float, free: float, gain: float, h: float, z: in
         memory[POWER], memory[FACTOR] = power, rise / x**power
         if enough(f, x):
             return side * x
-        if rise > wanted:
+        if rise > needed:
             high = x
         else:
             low = x
         last_x, last_rise = x, rise
-        x *= (wanted / rise) ** (1.0 / power)
+        x *= (needed / rise) ** (1.0 / power)
         if not low < x < high:
             x = 0.5 * (low + high) if math.isfinite(high) else 4.0 * low
     memory[POWER] = 0.0
@@ -323,9 +323,9 @@ def sample(plant: Plant, torque: float, measured: Any) -> None:
     """Let a torque command (N·m) act for a sample, and measure."""
     n, memory = plant.numbers, plant.memory
     x, tick = HEAD, memory[TICK]
-    wanted = converted(torque / n[KT], n[COMMAND_STEP])
-    wanted = min(max(wanted, -n[LIMIT]), n[LIMIT])
-    before, memory[PENDING] = memory[PENDING], wanted
+    demand = converted(torque / n[KT], n[COMMAND_STEP])
+    demand = min(max(demand, -n[LIMIT]), n[LIMIT])
+    before, memory[PENDING] = memory[PENDING], demand
     noise = n[CURRENT_NOISE] * gaussian(n[SEED], tick, 0) if n[CURRENT_NOISE] > 0.0 else 0.0
     on = n[KT] if memory[TRIPPED] == 0.0 else 0.0
     drive = on * (before + noise)
@@ -337,7 +337,7 @@ def sample(plant: Plant, torque: float, measured: Any) -> None:
     late = int(n[DELAY])
     for i in range(count):
         if i == late:
-            drive = on * (wanted + noise)
+            drive = on * (demand + noise)
         substep(plant, drive, factor, h)
         power += memory[FRICTION] * memory[x + disk + 1]
     if abs(memory[x + int(n[SHAFT]) + 1]) > n[MAX_SPEED] or not math.isfinite(memory[x + disk]):

@@ -57,13 +57,13 @@ from stickslip.simulation.many.simd_step import (
     NUMBERS,
     POSITION,
     RATE_2,
+    RATE_BEGIN,
+    RATE_END,
     RESIDUAL_2,
     SPEED_PEAK,
     SUMS,
     UNRESOLVED,
     VELOCITY,
-    WANTED_BEGIN,
-    WANTED_END,
     WORK,
     accept,
     finish,
@@ -90,14 +90,14 @@ def measure_all(z: Any, lane: int, c: Any, weight: float, now: Any, fine: bool, 
     highest(z, lane, ERROR_LOW, -error, fine)
     highest(z, lane, ERROR_HIGH, error, fine)
     z[ERROR_SUM * LANES + lane] += weight * error
-    rate = now[WANTED_END] - v
+    rate = now[RATE_END] - v
     z[RATE_2 * LANES + lane] += weight * rate * rate
     highest(z, lane, SPEED_PEAK, abs(v), fine)
     friction = torque(z, lane, c, 0)
     helped = gain(c, z, lane) * now[FED_END]
     if KIND_1 >= 0:
         helped += gain(c, z, lane) * torque(z, lane, c, 1)
-    motor = kp(c, z, lane) * error + kr(c, z, lane) * now[WANTED_END] - kd(c, z, lane) * v
+    motor = kp(c, z, lane) * error + kr(c, z, lane) * now[RATE_END] - kd(c, z, lane) * v
     motor += ki(c, z, lane) * z[INTEGRAL * LANES + lane] + helped
     highest(z, lane, MOTOR_PEAK, abs(motor), fine)
     z[MOTOR_2 * LANES + lane] += weight * motor * motor
@@ -176,9 +176,9 @@ def clear(z: Any, lane: int) -> None:
 def edge(reference: Any, t: int, begins: bool) -> Any:
     """What `measure` reads at the begin or at the end of step t."""
     goal = reference[t, GOAL_BEGIN] if begins else reference[t, GOAL_END]
-    wanted = reference[t, WANTED_BEGIN] if begins else reference[t, WANTED_END]
+    rate_now = reference[t, RATE_BEGIN] if begins else reference[t, RATE_END]
     fed = reference[t, FED_BEGIN] if begins else reference[t, FED_END]
-    return (goal, goal, wanted, wanted, fed, fed)
+    return (goal, goal, rate_now, rate_now, fed, fed)
 
 
 def run_parts(z: Any, c: Any, h: float, reference: Any, cuts: Any, sums: Any, base: int, count: int) -> None:

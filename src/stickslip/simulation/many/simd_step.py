@@ -57,7 +57,7 @@ SUMS = SLIPS + ELEMENTS
 # From NUMBERS on: what varies from case to case.
 
 # ---- entries of `now`: the reference at begin and end of the step, its feedforward in the mean, at end and begin ----
-GOAL_BEGIN, GOAL_END, WANTED_BEGIN, WANTED_END, FED_MEAN, FED_END, FED_BEGIN = range(7)
+GOAL_BEGIN, GOAL_END, RATE_BEGIN, RATE_END, FED_MEAN, FED_END, FED_BEGIN = range(7)
 MOST_EVENTS = 16  # in a step
 SHORTEST = 1e-6  # part of a step that is not worth another one
 FAR = 1e300
@@ -115,9 +115,9 @@ def trial(z: Any, lane: int, c: Any, h: float, part: float, now: Any) -> bool:
         held -= weight * helped
     # ---- the end velocity, from a linear equation ----
     goal = now[GOAL_END] - 0.5 * part * (now[GOAL_END] - now[GOAL_BEGIN])
-    wanted = now[WANTED_END] - 0.5 * part * (now[WANTED_END] - now[WANTED_BEGIN])
+    goal_rate = now[RATE_END] - 0.5 * part * (now[RATE_END] - now[RATE_BEGIN])
     integral = z[INTEGRAL * LANES + lane]
-    drive = kp(c, z, lane) * (goal - x0) + kr(c, z, lane) * wanted - held
+    drive = kp(c, z, lane) * (goal - x0) + kr(c, z, lane) * goal_rate - held
     drive += ki(c, z, lane) * (integral + 0.5 * dt * (goal - x0)) + gain(c, z, lane) * now[FED_MEAN]
     slope = 0.25 * dt * (kp(c, z, lane) + stuck + 0.5 * dt * ki(c, z, lane)) + 0.5 * (
         kd(c, z, lane) + damping

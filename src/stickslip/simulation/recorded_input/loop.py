@@ -56,9 +56,9 @@ def control(c: Any, m: Any, reference: float, position: float, dt: float) -> flo
         velocity = 0.5 * (position - m[BEFORE_LAST]) / dt
     else:
         velocity = (position - m[LAST]) / dt
-    wanted = (reference - m[LAST_REFERENCE]) / dt
+    reference_rate = (reference - m[LAST_REFERENCE]) / dt
     m[ERROR_SUM] += 0.5 * dt * (error + m[LAST_ERROR])
-    out = c[KP] * error + c[KI] * m[ERROR_SUM] + c[KR] * wanted - c[KD] * velocity
+    out = c[KP] * error + c[KI] * m[ERROR_SUM] + c[KR] * reference_rate - c[KD] * velocity
     m[BEFORE_LAST], m[LAST] = m[LAST], position
     m[LAST_REFERENCE], m[LAST_ERROR] = reference, error
     return limited(c[SIGNAL_GAIN] * out, c[LIMIT])
@@ -120,7 +120,7 @@ def follow(
     loss = n[BACK_EMF]
     for k in range(rows):
         # Without supply the winding is open: no current flows, so nothing is lost to it.
-        wanted, firm = signals[k, GOAL], signals[k, FIRM] != 0.0
+        goal, firm = signals[k, GOAL], signals[k, FIRM] != 0.0
         # Behind a low-pass, the damper is what it remembers and a damper on the velocity that the step solves for.
         forgets = 1.0 if firm else c[FORGETS]
         damping, kept = forgets * signals[k, DAMPING], (1.0 - forgets) * signals[k, DAMPING] * m[BEHIND]
@@ -148,13 +148,13 @@ def follow(
                 break
             rate = slope(c, signals, k, dt)
             gain = n[DRIVE_GAIN] * signals[k, SUPPLY]
-            n[PUSH] = push + damping * wanted + disturbance[k]
+            n[PUSH] = push + damping * goal + disturbance[k]
             for i in range(substeps):
                 advance(plant, state, z, gain * (u + rate * h * i), gain * rate, h)
                 y = seen(n, y, state[0])
-        moved = (y if n[BACKLASH] > 0.0 else state[0]) - first if k < rows - 1 else wanted * dt
-        out[k, OUT_CORRECTION] = pulled + damping * (wanted - moved / dt)
-        m[BEHIND] += c[FORGETS] * (wanted - moved / dt - m[BEHIND])
+        moved = (y if n[BACKLASH] > 0.0 else state[0]) - first if k < rows - 1 else goal * dt
+        out[k, OUT_CORRECTION] = pulled + damping * (goal - moved / dt)
+        m[BEHIND] += c[FORGETS] * (goal - moved / dt - m[BEHIND])
         if firm and k < rows - 1:
             state[0] += min(dt * c[RETURNS], 1.0) * beyond(c, signals[k + 1, POSITION] - state[0])
             y = seen(n, y, state[0])

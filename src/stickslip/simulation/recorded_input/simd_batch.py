@@ -25,7 +25,7 @@ MOST = 200  # iterations of a stage
     INERTIA, OFFSET, DRIVE_GAIN, BACK_EMF, LOAD_MOTOR, LOAD_EXTERNAL, SCALED, SPRING, FORGETS, RETURNS, SLACK,
     ROUNDING, NUMBERS,
 ) = range(13)  # fmt: skip
-# ---- rows of the signals: torque's signal, position now and next, damping, velocity wanted, whether the damper is
+# ---- rows of the signals: torque's signal, position now and next, damping, velocity to follow, whether the damper is
 # firm, torque from outside, whether the row is followed by another, and after how long -----------------------------
 SIGNAL, SEEN, NEXT, DAMPING, GOAL, FIRM, DISTURBANCE, GOES_ON, PERIOD, SIGNALS = range(10)
 # ---- rows of w behind the signals: the axis, the stage that is solved, and its iteration ---------------------------
