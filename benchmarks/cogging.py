@@ -29,7 +29,8 @@ from stickslip.identify.cogging.result import estimates_of
 from stickslip.identify.cogging.rows import places_of
 from stickslip.identify.estimate import Identification
 from stickslip.machines.angle import AngleMap, harmonic_sum
-from stickslip.machines.machine import Machine, machine
+from stickslip.machines.files import machine
+from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Harmonics
 from stickslip.machines.position_map import PositionMap
 from stickslip.record import Record

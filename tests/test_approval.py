@@ -14,7 +14,7 @@ from stickslip.approval import approved_file
 from stickslip.cli import main
 from stickslip.errors import CodeRefused
 from stickslip.identify.identified_file import read_identified
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.rigs.files import read_rig
 from stickslip.study.plan import load, load_run
 

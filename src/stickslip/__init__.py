@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from stickslip.control.sampled_controller import SampledController
     from stickslip.control_spec import ControlLaw
     from stickslip.errors import InputError, SimulationError, StickslipError
-    from stickslip.machines.machine import Machine, load_machine
+    from stickslip.machines.files import load_machine
+    from stickslip.machines.machine import Machine
     from stickslip.machines.rigid import RigidAxis
     from stickslip.model import Model, Reference
     from stickslip.plugins import law, law_names
@@ -74,7 +75,7 @@ _HOME = {
     "law": "plugins",
     "law_names": "plugins",
     "learn": "verbs.learn",
-    "load_machine": "machines.machine",
+    "load_machine": "machines.files",
     "pd": "control.linear",
     "pid": "control.linear",
     "place": "control.linear",

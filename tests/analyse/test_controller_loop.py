@@ -20,7 +20,7 @@ from stickslip.control.linear import place
 from stickslip.control.registry import control_law, control_law_names
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.study.controller_confirmed import confirmed_controller, scaled
 from stickslip.study.stability_map import moved
 

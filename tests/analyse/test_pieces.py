@@ -9,7 +9,7 @@ from stickslip.analyse.dependence import dependence
 from stickslip.analyse.motor_vs_sensor import sides
 from stickslip.analyse.repeatability import repeatability
 from stickslip.analyse.split_runs import pieces
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.report.analysis_pictures import draw_analysis, picture_of_dependence
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.repeat import Repeat

@@ -16,7 +16,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate

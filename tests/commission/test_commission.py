@@ -32,7 +32,8 @@ from stickslip.identify.sliding.segments import constant_velocity_segments
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
-from stickslip.machines.machine import Machine, machine
+from stickslip.machines.files import machine
+from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
 from stickslip.record import Record

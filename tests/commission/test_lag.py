@@ -11,7 +11,7 @@ from stickslip.commission.friction_lag import lag_of
 from stickslip.commission.stiffness import with_lag
 from stickslip.errors import InputError
 from stickslip.machines.angle import AngleMap
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.machines.motor import Harmonics
 from stickslip.model import Model
 from stickslip.rigs.procedures.attraction import Attraction

@@ -11,7 +11,7 @@ import pytest
 import stickslip as ss
 from stickslip.control.position import position_feedforward
 from stickslip.errors import ParameterError
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.machines.position_map import PositionMap, Waves
 
 TURN = 2.0 * np.pi

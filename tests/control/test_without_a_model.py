@@ -12,7 +12,7 @@ from stickslip.control.belief import Belief
 from stickslip.control.block import ControlBlock
 from stickslip.control.catalogue import compensated
 from stickslip.errors import ParameterError
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.study.bench_metrics import judged
 
 INERTIA = 3.8623e-4

@@ -8,7 +8,7 @@ import pytest
 from stickslip.errors import InputError
 from stickslip.identify.sliding.position_dependence import identify_angle
 from stickslip.machines.angle import AngleMap
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.machines.motor import Harmonics
 from stickslip.model import Model
 from stickslip.rigs.procedures.base import perform

@@ -13,7 +13,7 @@ from stickslip.identify.cogging import identify_cogging
 from stickslip.identify.cogging.moving import speed_control
 from stickslip.identify.methods import method_named
 from stickslip.identify.methods.method import Options
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.machines.position_map import PositionMap, Waves
 from stickslip.record import Record
 from stickslip.rigs.procedures.base import perform

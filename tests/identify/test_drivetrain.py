@@ -13,7 +13,7 @@ from stickslip.control.linear import place
 from stickslip.errors import InputError
 from stickslip.identify.response.drivetrain import fit_drivetrain, identified_drivetrain, loop_response
 from stickslip.identify.response.nyquist import fastest_pd
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.resonance import Resonance

@@ -16,7 +16,7 @@ from stickslip.identify.presliding.hysteresis import (
     templates_for,
 )
 from stickslip.identify.presliding.presliding import cycles, identify_presliding
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.report.identification import draw_identification
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.presliding import Presliding

@@ -24,7 +24,8 @@ from stickslip.identify.setting.plant import Plant
 from stickslip.identify.setting.recommend import Drive, recommend
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
-from stickslip.machines.machine import Machine, machine
+from stickslip.machines.files import machine
+from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.model import Model
 

@@ -10,7 +10,7 @@ import pytest
 import stickslip as ss
 from stickslip.errors import ParameterError
 from stickslip.machines.contact import Drift
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 
 
 def test_friction_drops_when_its_drift_begins():

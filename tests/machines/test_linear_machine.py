@@ -9,7 +9,7 @@ import pytest
 
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import INPUTS, Chain, Drivetrain, LinearContact
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.simulation.machine.layout import lay_out_machine
 
 FREQUENCY = np.array([0.5, 20.0, 290.0, 310.0, 800.0, 2750.0, 6000.0])

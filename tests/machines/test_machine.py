@@ -9,8 +9,9 @@ import pytest
 
 from stickslip.analyse.flexibility import lowest_first_mode
 from stickslip.errors import ConfigError, ParameterError, UnknownName
+from stickslip.machines.files import library, machine
 from stickslip.machines.flexible import FlexibleAxis
-from stickslip.machines.machine import IMPERFECTIONS, library, machine
+from stickslip.machines.machine import IMPERFECTIONS
 from stickslip.machines.motor import Harmonics
 
 LIBRARY = Path(__file__).parents[2] / "src" / "stickslip" / "machines" / "library"

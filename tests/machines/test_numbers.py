@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError, ParameterError
-from stickslip.machines.machine import library, machine
+from stickslip.machines.files import library, machine
 from stickslip.machines.numbers import machine_numbers, with_numbers
 
 

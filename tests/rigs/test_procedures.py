@@ -16,7 +16,7 @@ from stickslip.identify.presliding.breakaway import find_breaks
 from stickslip.identify.response.inertia import inertia
 from stickslip.identify.sliding.segments import sliding_points
 from stickslip.identify.trial import trial_of
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 from stickslip.rigs.procedures import PROCEDURES, procedure

@@ -13,7 +13,8 @@ from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError, UnknownName
-from stickslip.machines.machine import IMPERFECTIONS, machine
+from stickslip.machines.files import machine
+from stickslip.machines.machine import IMPERFECTIONS
 from stickslip.rigs.files import read_rig
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import BlockRig, Rig, setpoints

@@ -13,7 +13,8 @@ import stickslip as ss
 from stickslip.errors import Divergence, InputError, ParameterError
 from stickslip.machines.contact import Bearings, Contact
 from stickslip.machines.encoder import Encoder
-from stickslip.machines.machine import IMPERFECTIONS, Machine, machine
+from stickslip.machines.files import machine
+from stickslip.machines.machine import IMPERFECTIONS, Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import setpoints

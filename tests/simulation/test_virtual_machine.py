@@ -10,7 +10,8 @@ import pytest
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.machines.contact import Contact
-from stickslip.machines.machine import Machine, machine
+from stickslip.machines.files import machine
+from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate

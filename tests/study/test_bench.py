@@ -9,7 +9,7 @@ import pytest
 
 from stickslip.control.catalogue import CATALOGUE, Belief, compensated
 from stickslip.errors import ConfigError, ParameterError, UnknownName
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.report.bench_report import write_bench_report

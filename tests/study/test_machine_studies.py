@@ -10,7 +10,8 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import ConfigError
-from stickslip.machines.machine import IMPERFECTIONS, machine
+from stickslip.machines.files import machine
+from stickslip.machines.machine import IMPERFECTIONS
 from stickslip.study import study as studies
 from stickslip.study.plan import load, load_run
 from stickslip.sweep.block import measured

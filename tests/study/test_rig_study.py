@@ -10,7 +10,7 @@ import pytest
 
 from stickslip.cli import main
 from stickslip.errors import ConfigError, Interrupted
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.study import study as studies
 from stickslip.study.experiments import NOMINAL, ExperimentRun, ExperimentView, experiments_of, variant
 from stickslip.study.plan import load, select

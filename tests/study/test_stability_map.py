@@ -8,7 +8,7 @@ from stickslip.analyse.machine_axis import axis_of
 from stickslip.analyse.presliding_loop import Drive
 from stickslip.analyse.stability import stability
 from stickslip.control.linear import place
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.report.analysis_pictures import draw_analysis
 from stickslip.report.stability_pictures import picture_of_confirmed
 from stickslip.study.stability_map import confirmed

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from stickslip.machines.machine import machine
+from stickslip.machines.files import machine
 from stickslip.rigs._control import COLUMNS, Control
 from stickslip.rigs.rig import Capabilities, Limits, Measurement
 from stickslip.rigs.virtual import VirtualRig

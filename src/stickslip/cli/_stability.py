@@ -131,7 +131,7 @@ def composed(
 def machine_of(args: argparse.Namespace) -> Machine:
     """The machine without what is switched off."""
     from stickslip.errors import InputError
-    from stickslip.machines.machine import machine
+    from stickslip.machines.files import machine
 
     if args.amplitude < 0.0 or any(f < 0.0 for f in args.filter):
         raise InputError("--amplitude and --filter must be 0 or greater")

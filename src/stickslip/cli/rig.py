@@ -96,7 +96,8 @@ def run(args: argparse.Namespace) -> int:
 
 def listed() -> int:
     """Machines, procedures, imperfections."""
-    from stickslip.machines.machine import IMPERFECTIONS, library, machine
+    from stickslip.machines.files import library, machine
+    from stickslip.machines.machine import IMPERFECTIONS
     from stickslip.rigs.kinds import rig_kind_names
     from stickslip.rigs.procedures import PROCEDURES, procedure
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from stickslip.config import Table
 from stickslip.errors import InputError
-from stickslip.machines.machine import IMPERFECTIONS, Machine, machine
+from stickslip.machines.files import machine
+from stickslip.machines.machine import IMPERFECTIONS, Machine
 from stickslip.rigs._control import Control
 from stickslip.rigs._virtual import run_block
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog

@@ -17,7 +17,8 @@ from stickslip.control.registry import law_files
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import ConfigError, InputError
-from stickslip.machines.machine import IMPERFECTIONS, Machine, machine
+from stickslip.machines.files import machine
+from stickslip.machines.machine import IMPERFECTIONS, Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.model_tables import friction_laws, model, models, refuse_unknown

@@ -10,7 +10,6 @@ import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,8 +22,8 @@ from stickslip.control.files import is_composed
 from stickslip.control.linear import LINEAR
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import Interrupted, RigError
-from stickslip.machines import machine as machines
-from stickslip.machines.machine import IMPERFECTIONS, Machine, library
+from stickslip.machines.files import LIBRARY, library
+from stickslip.machines.machine import IMPERFECTIONS, Machine
 from stickslip.model import Model, Reference
 from stickslip.record import Record
 from stickslip.rigs.loop import Loop
@@ -263,11 +262,10 @@ def _controllers(
 
 def _note_inputs(table: Table) -> None:
     """Machines of the library are inputs too: the manifest has their SHA-256 (decision 0014)."""
-    place = Path(machines.__file__).parent / "library"
     for one in table.tables("machines").values():
         name = one.values.get("machine")
         if name in library():
-            table.document.files[f"{name}.toml"] = place / f"{name}.toml"
+            table.document.files[f"{name}.toml"] = LIBRARY / f"{name}.toml"
 
 
 # ---- results --------------------------------------------------------------------------------------------------------

@@ -25,7 +25,8 @@ from stickslip.identify.setting import recommend as setting
 from stickslip.identify.setting.candidate_run import Drive
 from stickslip.identify.setting.file import setting_table, write_setting
 from stickslip.identify.setting.recommend import Candidate, Recommendation
-from stickslip.machines.machine import Machine, load_machine
+from stickslip.machines.files import load_machine
+from stickslip.machines.machine import Machine
 from stickslip.model import Model
 from stickslip.readers.reading import read
 from stickslip.report.recommendation_text import recommendation_lines, reduction, safety

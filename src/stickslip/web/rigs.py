@@ -160,7 +160,7 @@ def described() -> dict[str, Any]:
     """Machines of the library, and the procedures with their options."""
     from dataclasses import fields
 
-    from stickslip.machines.machine import library, machine
+    from stickslip.machines.files import library, machine
     from stickslip.rigs.procedures import PROCEDURES, procedure
 
     machines = [{"name": name, "title": machine(name).title} for name in library()]
@@ -203,7 +203,7 @@ def asked_of(project: Project, data: dict[str, Any]) -> tuple[dict[str, Any], It
     ------
     Refused, NotThere
     """
-    from stickslip.machines.machine import library
+    from stickslip.machines.files import library
     from stickslip.rigs.procedures import PROCEDURES
 
     procedure, rig = text(data, "procedure"), rig_of(project, data)
