@@ -19,13 +19,14 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from stickslip.cli import _files
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
+    from stickslip.commission.commission import Commissioned
     from stickslip.finding import Finding
     from stickslip.rigs.procedures.base import Performed, Plan, Procedure
     from stickslip.rigs.rig import Rig
@@ -206,23 +207,15 @@ def told(plan: Plan, rig: Rig, args: argparse.Namespace) -> int:
 def commissioned(args: argparse.Namespace) -> int:
     """`stickslip rig commission`."""
     from stickslip.cli import _output
-    from stickslip.commission.commission import commission, planned
+    from stickslip.commission.commission import commission
     from stickslip.commission.headline import headline
-    from stickslip.commission.recommended import write_recommended
     from stickslip.commission.resume import claimed
     from stickslip.errors import InputError
-    from stickslip.identify.model_file import versions, write_model
-    from stickslip.report.identified import Source, write_identification
     from stickslip.study.files import prepared_folder
 
     rig = rig_of(args)
     if args.dry_run:
-        total = 0.0
-        for plan in planned(rig, cogging=args.cogging):
-            total += plan.duration + plan.pauses
-            print("\n".join(plan.text))
-        print(f"time    up to {clock(total)}")
-        return 0
+        return print_plan(rig, args.cogging)
     if args.out.is_file():
         raise InputError(f"--out {args.out} is a file; give a folder")
     folder: Path = prepared_folder(args.out)
@@ -240,27 +233,9 @@ def commissioned(args: argparse.Namespace) -> int:
         raise KeyboardInterrupt(
             f"the records are kept in {folder}; run the same command again, without --force, to resume"
         ) from None
-    stages = [s for s in found.stages if s.name != "angle"]  # another look at the sliding record
-    records = {s.name: s.performed.record for s in stages}
-    data = [described(folder / f"{name}.npz", len(record)) for name, record in records.items()]
-    model = write_model(folder / "model.toml", found.result, data=data)
-    advice = found.recommended
-    if advice and advice.chosen:
-        write_recommended(folder / "recommended.toml", advice)
-    lines = headline(
-        found,
-        f"stickslip rig run track --rig {args.rig} --set compensator=recommended "
-        f"--set model={folder / 'recommended.toml'}",
-    )
-    sources = [Source(s.name, s.performed.record, findings_of(s.performed)) for s in stages]
-    report = write_identification(
-        folder / "report.html",
-        found.result,
-        sources,
-        title=f"Commissioning of {rig.name}",
-        versions=versions(),
-        headline=lines,
-    )
+    track = f"stickslip rig run track --rig {args.rig} --set compensator=recommended"
+    lines = headline(found, f"{track} --set model={folder / 'recommended.toml'}")
+    model, report = write_commissioned(found, rig, folder, lines)
     if args.json:
         said = {word.lower(): line for word, line in lines}
         _output.print_json({**found.result.as_dict(), "headline": said, "folder": str(folder)})
@@ -272,6 +247,45 @@ def commissioned(args: argparse.Namespace) -> int:
         print(f"- {note}")
     print(f"model: {model}\nreport: {report}\nrecords: {folder}")
     return 0
+
+
+def print_plan(rig: Rig, cogging: Literal["", "rotation", "standstill"]) -> int:
+    """What `stickslip rig commission` would do, and how long it takes at most."""
+    from stickslip.commission.commission import planned
+
+    total = 0.0
+    for plan in planned(rig, cogging=cogging):
+        total += plan.duration + plan.pauses
+        print("\n".join(plan.text))
+    print(f"time    up to {clock(total)}")
+    return 0
+
+
+def write_commissioned(
+    found: Commissioned, rig: Rig, folder: Path, lines: Sequence[tuple[str, str]]
+) -> tuple[Path, Path]:
+    """Write model.toml, recommended.toml where there is one, and the report; returns the model and the report."""
+    from stickslip.commission.recommended import write_recommended
+    from stickslip.identify.model_file import versions, write_model
+    from stickslip.report.identified import Source, write_identification
+
+    stages = [s for s in found.stages if s.name != "angle"]  # another look at the sliding record
+    records = {s.name: s.performed.record for s in stages}
+    data = [described(folder / f"{name}.npz", len(record)) for name, record in records.items()]
+    model = write_model(folder / "model.toml", found.result, data=data)
+    advice = found.recommended
+    if advice and advice.chosen:
+        write_recommended(folder / "recommended.toml", advice)
+    sources = [Source(s.name, s.performed.record, findings_of(s.performed)) for s in stages]
+    report = write_identification(
+        folder / "report.html",
+        found.result,
+        sources,
+        title=f"Commissioning of {rig.name}",
+        versions=versions(),
+        headline=lines,
+    )
+    return model, report
 
 
 def findings_of(performed: Performed) -> list[Finding]:

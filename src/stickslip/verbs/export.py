@@ -197,26 +197,16 @@ def export(
         One line that names what the target cannot carry, or what is missing, and the remedy.
     """
     if position_map or only_map(source) or (to in MAP_TARGETS and to not in TARGETS):
-        for option, asked in (
-            ("single", single), ("controller", controller), ("compensator", compensator), ("nearest", nearest),
-        ):  # fmt: skip
-            if asked:
-                raise InputError(f"--{option}: a torque over the angle has none; leave it out")
-        target, own = map_target(to), name or "cogging"
-        made = written(map_in(source, to), target, own, settings)
-        return saved(ExportResult(target, own, made.files, (*made.notes, f"tried: {target.tried}")), folder)
+        asked = {"single": single, "controller": controller, "compensator": compensator, "nearest": nearest}
+        return saved(exported_map(source, to, name or "cogging", settings, asked), folder)
     chosen = target_named(to)
     if single and not chosen.precision:
         raise InputError(f"--single: {chosen.name} supports only one precision; leave it out")
     options = CompensatorOptions(
         sample_time, substeps, gain, lead, deadband, offset, inertia_feedforward, filter_hz
     )
-    if (
-        isinstance(source, RecommendationResult)
-        and compensator is None
-        and chosen.name in CONTROLLER_TARGETS
-        and not options.given
-    ):
+    advised = isinstance(source, RecommendationResult) and chosen.name in CONTROLLER_TARGETS
+    if compensator is None and advised and not options.given:
         compensator = "recommended"
     controller = controller or isinstance(source, (Controller, SampledController)) or own_loop(source)
     refuse_controllers(chosen, controller, compensator)
@@ -229,28 +219,48 @@ def export(
         raise InputError(f"--nearest: {chosen.name} carries {chosen.carries}; leave it out")
     if controller or compensator:
         settings_of(chosen, settings or {})
-        if compensator:
-            made = compensator_of(content, model_of(source, content), options, compensator)
-            offset = made.compensator.offset if made.compensator else 0.0
-        else:
-            made, offset = controller_in(source), 0.0
-        whole = composed_of(made)
-        result = carried(source, whole, chosen, own, single, check)
-        notes = (*result.notes, *notes_on_controller(content, whole, compensator, offset))
-        return saved(replace(result, notes=notes), folder)
+        result = exported_controller(source, content, chosen, own, options, compensator, single, check)
+        return saved(result, folder)
     job = job_of(source, content, own, chosen)
-    job = replace(
-        job,
-        single=single,
-        nearest=nearest,
-        top_speed=top_speed,
-        settings={**job.settings, **(settings or {})},
-    )
+    given = {**job.settings, **(settings or {})}
+    job = replace(job, single=single, nearest=nearest, top_speed=top_speed, settings=given)
+    return saved(exported_law(content, job, chosen, check), folder)
+
+
+def exported_map(
+    source: Source, to: str, name: str, settings: Mapping[str, str | float] | None, asked: Mapping[str, Any]
+) -> ExportResult:
+    """A torque over the angle; `asked` are options that it has none of."""
+    for option, given in asked.items():
+        if given:
+            raise InputError(f"--{option}: a torque over the angle has none; leave it out")
+    target = map_target(to)
+    made = written(map_in(source, to), target, name, settings)
+    return ExportResult(target, name, made.files, (*made.notes, f"tried: {target.tried}"))
+
+
+def exported_controller(
+    source: Source, content: Table, chosen: Target, name: str, options: CompensatorOptions,
+    compensator: str | None, single: bool, check: bool,
+) -> ExportResult:  # fmt: skip
+    """The controller of the source, or the compensator asked for on its law."""
+    if compensator:
+        made = compensator_of(content, model_of(source, content), options, compensator)
+        offset = made.compensator.offset if made.compensator else 0.0
+    else:
+        made, offset = controller_in(source), 0.0
+    whole = composed_of(made)
+    result = carried(source, whole, chosen, name, single, check)
+    return replace(result, notes=(*result.notes, *notes_on_controller(content, whole, compensator, offset)))
+
+
+def exported_law(content: Table, job: Job, chosen: Target, check: bool) -> ExportResult:
+    """The law alone."""
     settings_of(chosen, job.settings)
     files = chosen.write(job)
     notes = (*files.notes, *around_of(chosen, job), *notes_on(content, job))
     tried = chosen.check(job, files) if check and chosen.check else None
-    return saved(ExportResult(chosen, own, files.files, notes, tried), folder)
+    return ExportResult(chosen, job.name, files.files, notes, tried)
 
 
 def own_loop(source: Source) -> bool:

@@ -15,7 +15,7 @@ from stickslip.errors import InputError
 from stickslip.identify.doctor import Diagnosis, examine
 from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.methods import method_named
-from stickslip.identify.methods.method import Options
+from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.on_a_line import along_a_line
 from stickslip.identify.regression.regressions import Regress, Regressions
 from stickslip.identify.trial import DRIVES
@@ -142,17 +142,29 @@ position_map, load, intervals, robust
         why = "the friction itself is recorded, and no torque of a drive"
         tell(f"{why}: --method hysteresis is taken, a law along the motion")
     kind.check(records, options)
+    tell_warnings(sources, tell)
+    progress(f"method {kind.name}, {sum(len(r) for r in records)} samples")
+    found = with_notes(kind.identify(records, options), kind, records, options, left_out)
+    found = replace(found, findings=tuple(f for s in sources for f in s.findings))
+    return IdentificationResult(found, tuple(sources), law_file(found, () if inverse else laws))
+
+
+def tell_warnings(sources: Sequence[Source], tell: Callable[[str], None]) -> None:
+    """Tell what the doctor warns of."""
     for s in sources:
         for finding in s.findings:
             if finding.level == "warning":
                 tell(f"{s.about['file'] or s.name}: {finding.line()}")
-    progress(f"method {kind.name}, {sum(len(r) for r in records)} samples")
-    found = kind.identify(records, options)
+
+
+def with_notes(
+    found: Identification, kind: Method, records: Sequence[Record], options: Options, more: Sequence[str]
+) -> Identification:
+    """What was found in the units of the records, with what a reader must know of it."""
     if kind.name not in ("axis", "inertia") and all(r.units.get("position") == "m" for r in records):
         found = along_a_line(found)
-    notes = (*found.notes, *assumptions(found, options, kind.name), *load_note(records, found), *left_out)
-    found = replace(found, notes=notes, findings=tuple(f for s in sources for f in s.findings))
-    return IdentificationResult(found, tuple(sources), law_file(found, () if inverse else laws))
+    said = (*assumptions(found, options, kind.name), *load_note(records, found), *more)
+    return replace(found, notes=(*found.notes, *said))
 
 
 def refused_for(method: str, holds_out: bool, threshold: float | None, hold_out: bool, over: bool) -> None:
