@@ -65,7 +65,7 @@ def procedure_of(plant: Machine) -> Cogging:
         )
     return Cogging(
         velocities=speeds_of(plant), inertia=plant.inertia, bandwidth=30.0, degrees=380.0,
-        order=max(plant.cogging.order),
+        order=max(plant.cogging.order, default=168.0),
     )  # fmt: skip
 
 
@@ -240,16 +240,16 @@ def main() -> None:
     parser.add_argument("--none", type=int, default=0, metavar="COUNT")
     parser.add_argument("--coverage", type=int, default=0, metavar="COUNT")
     args = parser.parse_args()
-    for name in args.machine or (() if args.none else MACHINES):
+    for name in () if args.none else args.machine or MACHINES:
         if args.coverage:
             covered(name, args.coverage)
         else:
             judged(name, args.seeds)
     if args.none:
-        plain, said = machine("thesis-grease").without("position", "cogging"), 0
+        plain, said = named((args.machine or ["thesis-grease"])[0]).without("position", "cogging"), 0
         for seed in range(FRESH, FRESH + args.none):
             said += bool(found_of(replace(plain, seed=seed)).details["fit"].terms)
-        print(f"without cogging and ripple: {said} of {args.none} machines are said to have some")
+        print(f"{plain.name} without cogging and ripple: {said} of {args.none} are said to have some")
 
 
 if __name__ == "__main__":

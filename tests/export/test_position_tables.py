@@ -20,6 +20,7 @@ from stickslip.export.maps import MAP_TARGETS, map_target, written
 from stickslip.export.position_tables import c_table, moteus, odrive, vesc
 from stickslip.machines.position_map import PositionMap, Waves
 from support.hal_component import Component
+from support.lisp import Lisp
 from support.structured_text import Program
 
 TURN = 2.0 * np.pi
@@ -123,16 +124,8 @@ def read_c(files, angles, folder):
 
 
 def read_vesc(files, angles, folder):
-    """As the program does it: bytes to int16, high byte first."""
-    text = files["cogging.lisp"]
-    body = re.search(r"cogging-table \[([\d\s]+)\]", text)[1]
-    whole = np.array(body.split(), dtype=np.uint8).view(">i2")
-    scale = float(re.search(r"cogging-scale ([\d.]+)\)", text)[1])
-    place = np.degrees(angles) * float(re.search(r"\* degrees ([\d.]+)\)", text)[1])
-    low = place.astype(int)
-    assert text.count("(") == text.count(")")
-    both = scale * whole[low % whole.size], scale * whole[(low + 1) % whole.size]
-    return (1.0 - place + low) * both[0] + (place - low) * both[1]
+    program = Lisp(files["cogging.lisp"])
+    return np.array([program("cogging-at", degrees) for degrees in np.degrees(angles).tolist()])
 
 
 def read_st(text, angles):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.cli import main
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.cogging import identify_cogging
 from stickslip.identify.cogging.moving import speed_control
@@ -16,6 +18,7 @@ from stickslip.identify.methods.method import Options
 from stickslip.machines.files import machine
 from stickslip.machines.position_map import PositionMap, Waves
 from stickslip.record import Record
+from stickslip.report.after_a_map import after_a_map
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.cogging import Cogging
 from stickslip.rigs.procedures.standstill import Standstill
@@ -269,6 +272,28 @@ def test_from_arrays_to_a_report(tmp_path):
     in_torque = ss.identify(record_of_torque(), method="cogging").identification
     assert not any("Assumed" in n for n in in_torque.notes)  # the level of friction is what was identified
     assert "orders" in result.report(tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_command_after_a_map_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for unit in ("A", "N·m"):
+        rows = standstill(plain, places=300, unit=unit)
+        column = "current [A]" if unit == "A" else "motor_torque [N·m]"
+        head = f"time [s],position [rad],position_reference [rad],{column}"
+        table = [rows.time, rows["position"], rows["position_reference"], rows["motor_torque"]]
+        np.savetxt(
+            "map.csv", np.column_stack(table), delimiter=",", header=head, comments="", encoding="utf-8"
+        )
+        assert main(["identify", "map.csv", "--method", "cogging", "--out", "found"]) == 0
+        (last,) = (x for x in capsys.readouterr().out.splitlines() if x.startswith("next: "))
+        assert main(last.removeprefix("next: stickslip ").split()) == 0
+        assert "cogging_table" in (tmp_path / "cogging" / "cogging.h").read_text(encoding="utf-8")
+        shutil.rmtree("cogging")
+
+
+def test_without_a_torque_over_the_angle_the_axis_is_next():
+    found = identify_cogging([standstill(lambda q, s: FRICTION * s + 0.0 * q)])
+    assert after_a_map(found, "model.toml")[1].startswith("stickslip identify ")
 
 
 def test_a_map_is_read_back():

@@ -23,6 +23,7 @@ from stickslip.identify.motion import speeds_of
 from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record, encoder_step
+from stickslip.report.after_a_map import after_a_map
 from stickslip.report.plots import quantity
 from stickslip.report.sliding_torque import Sliding, sliding_of
 
@@ -314,6 +315,8 @@ def next_steps(
 ) -> list[Step]:  # fmt: skip
     """The next commands: towards a setting where what matters is identified, towards another record where not."""
     wanted = [Step(s) for s in found.measure_next]
+    if found.method == "cogging":
+        return [*wanted, Step(*after_a_map(found, model_file))]
     if found.model is None:
         # A procedure for one thing: the law is told by sliding.
         command = f"stickslip identify sliding.npz --method sliding --out {shlex.quote(str(model_file))}"

@@ -1,0 +1,22 @@
+"""What comes after a torque over the angle: its export, or the axis where none shows."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+from stickslip.identify.estimate import Identification
+
+__all__ = ["after_a_map"]
+
+
+def after_a_map(found: Identification, model_file: str | Path) -> tuple[str, str]:
+    """What to do, and the command."""
+    waves = any(e.identified for e in found.estimates if e.name.partition("[")[0] in ("even", "odd"))
+    if not waves and found.details["map"].form != "table":
+        return "No torque depends on the angle; identify the axis:", "stickslip identify log.csv --out axis"
+    law = " --position-map" if found.model is not None else ""
+    return (
+        "Write the map for the drive (c99, moteus, odrive, vesc, st, beckhoff or linuxcnc):",
+        f"stickslip export {shlex.quote(str(model_file))} --to c99{law} --out cogging",
+    )
