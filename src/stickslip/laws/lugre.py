@@ -108,11 +108,13 @@ def relax(v0: float, v1: float, dt: float, z: float, end: float, p: Any) -> floa
         s0 = -s0
         s1 = -s1
     gain = -math.expm1(-exponent)
-    if exponent > 1e-4:
-        follow = 1.0 - gain / exponent
-    else:
+    rise = 0.0
+    if s1 != s0:  # at constant velocity the division is spared
         follow = 0.5 * exponent
-    return z * (1.0 - gain) + (s0 * gain + (s1 - s0) * follow) / p.sigma0
+        if exponent > 1e-4:
+            follow = 1.0 - gain / exponent
+        rise = (s1 - s0) * follow
+    return z * (1.0 - gain) + (s0 * gain + rise) / p.sigma0
 
 
 def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:

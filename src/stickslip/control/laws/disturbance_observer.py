@@ -51,6 +51,8 @@ class State(NamedTuple):
     torque_1: Annotated[float, Par("N·m", "", "torque one sample before the last")]
     torque_2: Annotated[float, Par("N·m", "", "torque two samples before the last")]
     torque_3: Annotated[float, Par("N·m", "", "torque three samples before the last")]
+    weight: Annotated[float, Par("-", "", "1 - exp(-g T), by which the low-pass moves in a sample")]
+    weight_at: Annotated[float, Par("-", "g T", "corner times sample time that it holds for")]
 
 
 # ---- what it is fed with -----------------------------------------------------------------------------------------
@@ -119,16 +121,26 @@ weighed = exact
 # ---- the low-pass Q ----------------------------------------------------------------------------------------------
 
 
+def weight(y: Any, z: Any, p: Any) -> float:
+    """1 - exp(-g T), computed where g T changes: an exponential costs as much as the rest of the law."""
+    x = p.corner * y.elapsed
+    if x != z.weight_at:
+        z.weight_at = x
+        z.weight = 1.0 - math.exp(-x)
+    return z.weight
+
+
 def first_order(raw: float, y: Any, z: Any, p: Any) -> float:
     """The next estimate by Q = g/(s + g), N·m."""
-    return z.estimate + (1.0 - math.exp(-p.corner * y.elapsed)) * (raw - z.estimate)
+    share = weight(y, z, p)
+    return z.estimate + share * (raw - z.estimate)
 
 
 def second_order(raw: float, y: Any, z: Any, p: Any) -> float:
     """The next estimate by Q = g²/(s + g)², N·m: half the rejection, less noise, a larger stable corner."""
-    weight = 1.0 - math.exp(-p.corner * y.elapsed)
-    z.first += weight * (raw - z.first)
-    return z.estimate + weight * (z.first - z.estimate)
+    share = weight(y, z, p)
+    z.first += share * (raw - z.first)
+    return z.estimate + share * (z.first - z.estimate)
 
 
 ORDER = Choice(

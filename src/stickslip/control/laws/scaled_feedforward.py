@@ -46,6 +46,10 @@ class State(NamedTuple):
     known: Annotated[float, Learned("-", "", "1 once there is a scale")]
     disturbance: Annotated[float, Par("N·m", "d_A", "observed friction torque")]
     velocity: Annotated[float, Par("rad/s", "v", "velocity one sample ago")]
+    share: Annotated[float, Par("-", "", "1 - exp(-g_A T), by which the observer moves in a sample")]
+    share_at: Annotated[float, Par("-", "g_A T", "corner times sample time that it holds for")]
+    pace: Annotated[float, Par("-", "", "1 - exp(-gamma T), by which the scale moves in a sample")]
+    pace_at: Annotated[float, Par("-", "gamma T", "rate times sample time that it holds for")]
 
 
 def slides(y: Any, p: Any) -> float:
@@ -56,21 +60,33 @@ def slides(y: Any, p: Any) -> float:
     return 0.0
 
 
+def keep_shares(y: Any, z: Any, p: Any) -> None:
+    """Compute the two shares where their arguments change: exponentials cost as much as the rest of the law."""
+    x = p.corner * y.elapsed
+    if x != z.share_at:
+        z.share_at = x
+        z.share = 1.0 - math.exp(-x)
+    x = p.rate * y.elapsed
+    if x != z.pace_at:
+        z.pace_at = x
+        z.pace = 1.0 - math.exp(-x)
+
+
 def learn(y: Any, z: Any, p: Any) -> None:
     """Observe the friction; move the scale towards what this sample says of it."""
     raw = y.applied - p.inertia * (y.velocity - z.velocity) / y.elapsed
     z.velocity = y.velocity
-    z.disturbance += (1.0 - math.exp(-p.corner * y.elapsed)) * (raw - z.disturbance)
+    keep_shares(y, z, p)
+    z.disturbance += z.share * (raw - z.disturbance)
     if slides(y, p) != 0.0:
         expected = abs(friction_steady(y.reference_velocity, p.friction)) - p.sigma2 * abs(
             y.reference_velocity
         )
         if expected > 0.0:
             found = math.copysign(1.0, y.reference_velocity) * (z.disturbance - p.sigma2 * y.slow_velocity)
-            weight = 1.0 - math.exp(-p.rate * y.elapsed)
             off = found / expected - z.scale
-            z.scale = min(max(z.scale + weight * off, p.lowest), p.highest)
-            z.variance += weight * (min(off * off, p.highest * p.highest) - z.variance)
+            z.scale = min(max(z.scale + z.pace * off, p.lowest), p.highest)
+            z.variance += z.pace * (min(off * off, p.highest * p.highest) - z.variance)
 
 
 def sample(y: Any, z: Any, p: Any, u: Any) -> float:
