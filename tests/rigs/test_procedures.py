@@ -37,6 +37,7 @@ SHORT = {
     "attraction": {"cycles": "4"},
     "track": {"compensator": "feedforward", "model": "lugre"},
     "repeat": {"times": "2", "interval": "60", "bandwidth": "10", "damping": "0.85"},
+    "learn": {"times": "3"},
 }
 
 GREASED = {"stickslip": {"amplitude": "0.35"}, "attraction": {"mean": "0.3", "swing": "0.15"}}

@@ -9,7 +9,7 @@ Before the first run the condition of convergence is checked on the machine's re
 rate, Q the low-pass and T what the loop takes of a torque at the motor. Where it does not hold, nothing is learned.
 
 Writes the controller with what was learned. `stickslip export FILE --controller` exports it,
-`stickslip rig run track --set controller=FILE` runs it on a rig.
+`stickslip rig run track --set controller=FILE` runs it on a rig; `stickslip rig run learn` learns on the rig itself.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ __all__ = ["PROCEDURES", "procedure"]
 
 PROCEDURES = (
     "inertia", "resonance", "breakaway", "sliding", "presliding", "stickslip", "attraction", "cogging",
-    "standstill", "track", "repeat",
+    "standstill", "track", "repeat", "learn",
 )  # fmt: skip
 
 

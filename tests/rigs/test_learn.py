@@ -1,0 +1,52 @@
+"""The procedure learn: its repetitions become better, and what it saves runs as a controller."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from stickslip.errors import InputError
+from stickslip.rigs.procedures import procedure
+from stickslip.rigs.procedures.base import perform, planned
+from stickslip.rigs.procedures.learn import errors
+from stickslip.rigs.virtual import virtual_rig
+
+
+def learn(**options):
+    return procedure("learn").with_options({k: str(v) for k, v in options.items()})
+
+
+def test_repetitions_become_better_and_the_best_table_is_saved(tmp_path):
+    saved = tmp_path / "learned.toml"
+    result = perform(learn(times=5, save=saved), virtual_rig("thesis-dry"))
+    assert result.passed
+    assert [label for label, _, _ in result.segments] == [f"repetition {i}" for i in range(1, 6)]
+    each = errors(result.record, 10_000)
+    assert each[-1] < 0.7 * each[0]
+    track = procedure("track").with_options({"controller": str(saved), "reference": "high", "duration": "10"})
+    record = perform(track, virtual_rig("thesis-dry")).record
+    error = record["position_reference"] - record["position"]
+    assert math.sqrt(float(np.mean(error**2))) < 0.8 * each[0]
+
+
+def test_learning_that_makes_it_worse_ends():
+    result = perform(learn(times=6, corner=400, rate=1.9), virtual_rig("thesis-dry"))
+    each = errors(result.record, 10_000)
+    assert len(each) < 6
+    assert each[-1] > 1.5 * min(each)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"reference": "step", "duration": 0}, "does not end where it starts"),
+        ({"duration": 7.5}, "a duration of whole periods"),
+        ({"times": 1}, "times = 1 must be at least 2"),
+        ({"rate": 2}, "rate = 2 between 0 and 2"),
+    ],
+)
+def test_what_cannot_be_learned_is_refused(options, said):
+    with pytest.raises(InputError, match=said):
+        planned(learn(**options), virtual_rig("thesis-dry"))
