@@ -1,9 +1,7 @@
 """Sweeps: what varies, which cases, the data set after any interruption, and bad ones told before anything runs."""
 
 import gc
-import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -17,17 +15,11 @@ import pyarrow.parquet
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import ConfigError, InputError, UnknownName
-from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.model_file import write_model
-from stickslip.model import Model
+from stickslip.errors import InputError, UnknownName
 from stickslip.simulation.adaptive import engine as adaptive
-from stickslip.simulation.many import simd_batch
 from stickslip.sweep import block, dataset, execute, numbers, summary
 from stickslip.sweep.plan import load
-from stickslip.sweep.sample import Drawn, Spread
-
-SMALL = Path(__file__).with_name("small.toml")
+from support.sweeps import SMALL, table
 
 
 @pytest.fixture(scope="module")
@@ -40,80 +32,6 @@ def undisturbed(small, tmp_path_factory):
     folder = tmp_path_factory.mktemp("undisturbed")
     execute.run(small, folder, jobs=1)
     return table(folder)
-
-
-def table(folder):
-    found = pyarrow.dataset.dataset(
-        folder / "data", partitioning="hive", exclude_invalid_files=True
-    ).to_table()
-    return found.sort_by([("controller", "ascending"), ("case", "ascending")])
-
-
-# ---- cases -------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("method", ["sobol", "latin"])
-def test_blocks_are_parts_of_the_whole(method):
-    drawn = Drawn(method, (Spread("a", 1.0, 2.0), Spread("b", 0.1, 10.0, logarithmic=True)), 600, 5)
-    whole = drawn.block(0, 600)
-    assert np.array_equal(whole[256:512], drawn.block(256, 512))
-    assert whole.min(axis=0) == pytest.approx([1.0, 0.1], rel=0.03)
-    assert whole.max(axis=0) == pytest.approx([2.0, 10.0], rel=0.03)
-    # Even in the logarithm: half of the cases lie below 1.
-    assert np.mean(whole[:, 1] < 1.0) == pytest.approx(0.5, abs=0.01)
-
-
-def test_a_latin_hypercube_has_one_case_in_every_slice():
-    drawn = Drawn("latin", (Spread("a", 0.0, 1.0), Spread("b", 0.0, 1.0)), 50, 1)
-    for column in drawn.block(0, 50).T:
-        assert sorted(np.floor(column * 50).astype(int)) == list(range(50))
-
-
-def test_a_grid_has_every_point_with_every_other():
-    drawn = Drawn("grid", (Spread("a", 1.0, 3.0, points=3), Spread("b", 0.0, 0.0, values=(5.0, 7.0))), 6, 1)
-    assert drawn.block(0, 6).tolist() == [[1, 5], [1, 7], [2, 5], [2, 7], [3, 5], [3, 7]]
-    assert drawn.block(4, 6).tolist() == [[3, 5], [3, 7]]
-
-
-def test_a_nested_sweep_stays_within_the_level_that_it_drew():
-    drawn = Drawn("sobol", (Spread("a", 0.7, 1.3), Spread("b", 0.7, 1.3)), 512, 1, nested=True)
-    a, b, level = drawn.block(0, 512).T
-    assert np.all(np.maximum(abs(a - 1.0), abs(b - 1.0)) <= 0.3 * level + 1e-12)
-    assert np.mean(level < 0.25) == pytest.approx(0.25, abs=0.01)
-
-
-def test_a_model_is_drawn_with_its_intervals_and_correlation():
-    estimates = (
-        Estimate("fs", "N·m", "F_S", 0.3, 0.03, 0.3 * np.exp(-0.196), 0.3 * np.exp(0.196), True),
-        Estimate("inertia", "kg·m²", "J", 4e-4, 1e-5, 4e-4 * np.exp(-0.0196), 4e-4 * np.exp(0.0196), True),
-    )
-    drawn = Drawn("sobol", (), 4096, 1, estimates, ((1.0, 0.8), (0.8, 1.0)))
-    assert drawn.names == ("friction.fs", "axis.inertia")
-    logs = np.log(drawn.block(0, 4096) / [0.3, 4e-4])
-    assert logs.std(axis=0) == pytest.approx([0.1, 0.01], rel=0.02)
-    assert np.corrcoef(logs.T)[0, 1] == pytest.approx(0.8, abs=0.01)
-
-
-def test_a_sweep_says_which_estimates_of_its_model_it_leaves_out(tmp_path, capsys):
-    estimate = Estimate("fs", "N·m", "F_S", 0.335, 0.01, 0.32, 0.35, True)
-    found = Identification(
-        "commission",
-        Model("gms", k=[1e4, 5e3], alpha=[0.5, 0.5], fs=0.335, fc=0.285, vs=0.01, delta_s=2.0, sigma2=0.018, c=24.0),
-        (estimate, replace(estimate, name="breakaway.fs_positive")), np.eye(2), {},
-    )  # fmt: skip
-    write_model(tmp_path / "model.toml", found)
-    (tmp_path / "study.toml").write_text(
-        '[axis]\ninertia = 4e-4\n[friction.it]\nlaw = {model = "model.toml"}\n[references.s]\nkind = "sine"\n'
-        "amplitude = 0.01\nfrequency = 4.0\nduration = 0.02\nplacement = {bandwidth_hz = 20.0, damping = 1.0}\n"
-        '[controllers.PD]\nlinear = "PD"\n'
-    )
-    (tmp_path / "s.toml").write_text('study = "study.toml"\nmodel = "model.toml"\ncases = 2\ncheck = false\n')
-    assert load(tmp_path / "s.toml").drawn.names == ("friction.fs",)
-    assert main(["sweep", str(tmp_path / "s.toml"), "--out", str(tmp_path / "out"), "--no-report"]) == 0
-    assert (
-        "not varied, as the model's law has no such parameters: breakaway.fs_positive"
-        in capsys.readouterr().err
-    )
 
 
 # ---- numbers -----------------------------------------------------------------------------------------------
@@ -382,83 +300,7 @@ def test_a_sweep_is_run_again_from_its_manifest(tmp_path, capsys):
     assert "0 of 30 cases" in capsys.readouterr().err
 
 
-# ---- bad sweeps --------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("scale = [0.8, 1.2]", "scale = [1.2, 0.8]", "is empty; give .low, high."),
-        ("scale = [0.8, 1.2]", "scale = [1.2, 1.2]", "is empty"),
-        ("scale = [0.8, 1.2]", "scale = []", r"scale = \[\] must be two numbers, \[low, high\]"),
-        ("scale = [0.8, 1.2]", "scale = 1.2", r"scale = 1.2 must be two numbers"),
-        ("scale = [0.8, 1.2]", "scale = [1, 2, 3]", r"scale = \[1, 2, 3\] must be two numbers"),
-        ("scale = [0.8, 1.2]", "scale = [-0.8, 1.2]", "at the end of a range: .* must be greater than 0"),
-        ("scale = [0.8, 1.2]", "scale = [0.8, 1.2]\nrange = [1, 2]", "give one of scale"),
-        ("scale = [0.8, 1.2]", "values = [0.8, 1.2]", "belongs to a grid"),
-        ("scale = [0.8, 1.2]", "scal = [0.8, 1.2]", "give one of scale"),
-        ("scale = [0.8, 1.2]", 'scale = ["a", 1.2]', "must be a number"),
-        (
-            'friction.fs"]\nscale = [0.8',
-            'controller.gain"]\nrange = [-0.8',
-            "end of a range: .*gain = -0.8 must be at",
-        ),
-        ('"position_rms_rad"', '"position_rms"', "did you mean"),
-        ("friction.fs", "friction.fss", "no run has a number"),
-        ("cases = 600", "cases = 0", "at least 1"),
-        ("cases = 600", "cases = 2.5", "whole number"),
-        ("cases = 600", "cases = 1e12", "too many"),
-        ("cases = 600", 'cases = 600\nmethod = "random"', "is not known"),
-        ("cases = 600", 'method = "grid"', "points"),
-        ("../data/small_study.toml", "nowhere.toml", "no file"),
-        ('"PD", "FF-lugre"', '"PDD"', "is not known"),
-    ],
-)
-def test_bad_sweeps_are_told(tmp_path, old, new, message):
-    text = SMALL.read_text().replace("../data", str(SMALL.parents[1] / "data"))
-    assert old in text or old.startswith("..")
-    text = text.replace(old.replace("../data", str(SMALL.parents[1] / "data")), new)
-    path = tmp_path / "bad.toml"
-    path.write_text(text)
-    with pytest.raises(ConfigError, match=message):
-        load(path)
-
-
-def test_cases_of_a_grid_are_its_points(tmp_path, capsys):
-    text = SMALL.read_text().replace("../data", (SMALL.parents[1] / "data").as_posix())
-    text = text.replace("cases = 600", 'method = "grid"')
-    path = tmp_path / "grid.toml"
-    path.write_text(re.sub(r"(scale|range) = .*", r"\g<0>\npoints = 3", text))
-    assert main(["sweep", str(path), "--cases", "7"]) == 2
-    assert "--cases 7: " in (said := capsys.readouterr().err)
-    assert "is a grid, whose points make its 9 cases; change `points` or `values`" in said
-    assert main(["sweep", str(SMALL), "--cases", "0"]) == 2
-    assert "--cases 0 must be at least 1" in capsys.readouterr().err
-
-
-def test_a_model_of_another_law_than_the_studys_is_told(tmp_path):
-    estimate = Estimate("fc", "N·m", "F_C", 0.285, 0.01, 0.27, 0.30, True)
-    model = Model("coulomb", fc=0.285, sigma2=0.02)
-    write_model(tmp_path / "model.toml", Identification("axis", model, (estimate,), np.eye(1), {}))
-    study = (SMALL.parents[1] / "data" / "small_study.toml").as_posix()
-    for more in ("", '[tune."controller.gain"]\nrange = [0.5, 1.0]\n'):
-        (tmp_path / "s.toml").write_text(
-            f'study = "{study}"\nonly = ["FF-lugre", "nominal"]\nmodel = "model.toml"\ncases = 2\n{more}'
-        )
-        with pytest.raises(
-            ConfigError, match="holds law coulomb, and the friction of the runs is of law gms"
-        ):
-            load(tmp_path / "s.toml")
-
-
-@pytest.mark.parametrize("jobs", ["0", "-1"])
-def test_no_jobs_are_refused(tmp_path, capsys, jobs):
-    out = tmp_path / "out"
-    assert main(["sweep", str(SMALL), "--jobs", jobs, "--out", str(out)]) == 2
-    assert f"--jobs {jobs} must be at least 1; leave it out for one block per core" in capsys.readouterr().err
-    assert not out.exists()
-    assert main(["rerun", str(tmp_path), "--jobs", jobs]) == 2
-    assert f"--jobs {jobs} must be at least 1" in capsys.readouterr().err
+# ---- interruptions and the command ---------------------------------------------------------------------------
 
 
 def test_more_cases_than_the_disk_has_room_for(small, tmp_path):
@@ -506,70 +348,3 @@ def test_the_command_prints_and_draws(tmp_path, capsys):
     assert not (tmp_path / "figures" / "tornado-of-a-run-that-was.png").exists()
     assert (tmp_path / "figures" / "my-own.png").exists()
     assert main(["sweep", "no-such-sweep"]) == 2
-
-
-# ---- lanes ---------------------------------------------------------------------------------------------------
-
-
-def in_lanes(tmp_path, more=""):
-    """The small sweep in lanes, of few cases."""
-    text = SMALL.read_text().replace("../data", (SMALL.parents[1] / "data").as_posix())
-    text = text.replace("cases = 600", f'cases = 12\nintegrator = "lanes"\n{more}')
-    path = tmp_path / "simd_batch.toml"
-    path.write_text(text)
-    return path
-
-
-def test_lanes_are_within_a_percent_or_flagged(tmp_path):
-    sweep = load(in_lanes(tmp_path))
-    assert sweep.step == 1e-4
-    for run in range(len(sweep.runs)):
-        exact = block.compute(replace(sweep, step=0.0), run, 0)
-        for step, most in ((1e-4, 0.3), (5e-3, 1.0)):
-            fast = block.compute(replace(sweep, step=step), run, 0)
-            assert not any(fast.failures)
-            assert np.all(fast.flagged | ~block.differ(exact.metrics, fast.metrics, sweep.metrics))
-            assert np.mean(fast.flagged) <= most
-            assert not np.array_equal(fast.metrics, exact.metrics)
-        assert fast.flagged.any()  # of steps as long as 5 ms
-    assert sweep.fingerprint(0) != replace(sweep, step=0.0).fingerprint(0)
-
-
-def test_a_step_with_more_switches_than_were_followed_is_flagged(tmp_path, monkeypatch):
-    sweep = load(in_lanes(tmp_path, "check = false"))
-    assert not block.compute(sweep, 0, 0).flagged.any()
-
-    def run(many, *args, run=simd_batch.Lanes.run, **more):
-        return replace(run(many, *args, **more), unresolved=np.arange(12) % 3)
-
-    monkeypatch.setattr(simd_batch.Lanes, "run", run)
-    assert block.compute(sweep, 0, 0).flagged.tolist() == [False, True, True] * 4
-
-
-def test_a_run_that_lanes_refuse_is_told_of(tmp_path, capsys):
-    path, data = in_lanes(tmp_path), SMALL.parents[1] / "data"
-    study = (data / "small_study.toml").read_text().replace("motion.csv", (data / "motion.csv").as_posix())
-    (tmp_path / "study.toml").write_text(study.replace('"signed"', '"literal"'))
-    path.write_text(re.sub("study = .*", 'study = "study.toml"', path.read_text()))
-    assert main(["sweep", str(path), "--out", str(tmp_path / "out"), "--no-report"]) == 0
-    told = capsys.readouterr().err
-    assert "FF-lugre: integrator exact, not in lanes: no lanes: slip rule 'literal' needs its events" in told
-    run = json.loads((tmp_path / "out" / "manifest.json").read_text())["runs"][0]
-    assert run["integrator"] == "exact"
-    assert "needs its events" in run["because"]
-    assert set(table(tmp_path / "out")["integrator"].to_pylist()) == {"exact"}
-
-
-def test_a_missing_gpu_is_told_before_anything_runs(tmp_path, capsys):
-    path = in_lanes(tmp_path, 'device = "gpu"')
-    assert load(path).device == "gpu"  # Reading needs none: another machine may run it.
-    assert main(["sweep", str(path), "--out", str(tmp_path / "out")]) == 2
-    assert "looked for NVIDIA's driver" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-def test_what_lanes_do_not_measure_is_told(tmp_path):
-    path = in_lanes(tmp_path)
-    path.write_text(path.read_text().replace('"velocity_rms_rad_s"]', '"standstills"]'))
-    with pytest.raises(ConfigError, match="'standstills', which lanes do not measure"):
-        load(path)
