@@ -434,18 +434,9 @@ def exponential_less_one(x: float) -> float:
     return power * less_one(x, shifted) + (power - 1.0)
 
 
-_inner: dict[tuple[Any, ...], Any] = {}
-
-
 def compile_inner(function: Any) -> Any:
-    """Decorator of generated files: a function that entries call; one that several files hold is compiled once."""
-    code, known = function.__code__, function.__globals__
-    # By what it calls too: the same text may call another function in another file.
-    calls = tuple(id(known[name]) for name in code.co_names if name in known)
-    key = (code.co_code, repr(code.co_consts), code.co_names, code.co_varnames, code.co_argcount, calls)
-    if key not in _inner:
-        _inner[key] = numba.njit(function, error_model="numpy", **INNER)
-    return _inner[key]
+    """Decorator of generated files: a function that entries call."""
+    return numba.njit(function, error_model="numpy", **INNER)
 
 
 def compile_entry(name: str) -> Callable[[Any], Any]:
