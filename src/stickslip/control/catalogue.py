@@ -138,6 +138,14 @@ def bristle(belief: Belief) -> ControlBlock:
     return ControlBlock("lugre_observer", correction=1.0, **values)
 
 
+def dual(belief: Belief) -> ControlBlock:
+    """The dual observer, which learns the scale."""
+    names = ("sigma0", "sigma2", "fs", "fc", "vs", "delta_s")
+    values: dict[str, Any] = {name: belief.number(name) for name in names}
+    rate = integral_pace(belief) / belief.number("fs") ** 2
+    return ControlBlock("dual_observer", slope=0.5 * belief.pace, rate0=rate, **values)
+
+
 def layer(belief: Belief, torque: float) -> float:
     """rad/s: half width of a boundary layer in which that torque is a gain that a sample of delay leaves stable."""
     return torque * belief.sample_time / (0.5 * belief.inertia)
@@ -298,6 +306,9 @@ CATALOGUE: Mapping[str, Compensator] = {
     "lugre-observer": Compensator(
         "LuGre observer", BRISTLE, lambda b: {"observer": bristle(b)}, ("PD",),
         "it needs friction known to 3 %, or a disturbance observer without a model is better",
+    ),
+    "dual": Compensator(
+        "dual observer, LuGre with adapted scale", BRISTLE, lambda b: {"observer": dual(b)}, ("PID",)
     ),
     "gms-observer": Compensator(
         "GMS observer", ELEMENTS,
