@@ -10,7 +10,7 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation._case import COMPENSATOR_SCALE, PLANT_SCALE, STIFFNESS
-from stickslip.simulation._meter import COARSE, metrics
+from stickslip.simulation._metrics import COARSE, metrics
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.exact.kernel import AT_SIDES

@@ -8,7 +8,7 @@ extremes of the error from its slope, the 50 Hz high-pass by its convolution wit
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,6 @@ NEARLY = 0.9  # of it; between nodes that are lower no crest passes it
 STANDSTILL = 10e-3  # s, shortest standstill that counts
 MAX_WINDOW = 2e-3  # s
 LONG_WINDOW = 16e-3  # s, where only the metrics of COARSE are wanted
-SETTLED_FOR = 0.1  # of the run, without leaving the band again
 
 # ---- layout of the accumulator --------------------------------------------------------------------------------
 (
@@ -50,6 +49,19 @@ def new_meter(duration: float, settle_band: float, window: float = MAX_WINDOW) -
     return acc
 
 
+class Sums(NamedTuple):
+    """Integrals over a stretch: e, e², (de/dt)², T_m², (T_f - T_c)², T_m v, T_f v and T_c v."""
+
+    e: float
+    e2: float
+    ev2: float
+    tm2: float
+    df2: float
+    work: float
+    loss: float
+    compensation: float
+
+
 # ---- rows of the nodes: position error, velocity error, position, velocity, reference velocity, and the torques of
 # motor, friction and compensator
 ERROR, ERROR_RATE, AT, SPEED, REFERENCE_SPEED, MOTOR, FRICTION, COMPENSATING, SIGNALS = range(9)
@@ -62,63 +74,84 @@ def meter(acc: Any, turns: Any, t: float, h: float, nodes: Any) -> None:
     ``nodes`` has a row for each signal (see the names above) and five columns in time; ``turns`` (n, 2) receives
     time and position of every reversal, as long as it has room.
     """
-    second = t >= 0.5 * acc[DURATION] * (1.0 - 1e-12)
+    low, high = extremes(nodes, 0.25 * h)
+    motor = 0.0
+    for i in range(5):
+        motor = max(motor, abs(nodes[MOTOR, i]))
+    second = add(acc, t, h, sums(nodes), nodes[ERROR, 4])
+    reached(acc, second, low, high, peak(nodes, acc[V_MAX]), motor)
+    if acc[WINDOW] > MAX_WINDOW:
+        return
+    high_pass(acc, h, nodes, second)
+    reversals(acc, turns, t, h, nodes, second)
+    standstill(acc, t, h, nodes)
+    settling(acc, t, h, nodes)
+
+
+@kernel(exact=False, inline=True)
+def sums(nodes: Any) -> Sums:
+    """Integrals over a window of 90 (Boole's rule has that denominator), in the order of `Sums`."""
+    e = 0.0
     e2 = 0.0
     ev2 = 0.0
     tm2 = 0.0
     df2 = 0.0
-    mean = 0.0
     work = 0.0
     loss = 0.0
-    helped = 0.0
+    compensation = 0.0
     for i in range(5):
         w = 7.0 if i == 0 or i == 4 else (12.0 if i == 2 else 32.0)
+        e += w * nodes[ERROR, i]
         e2 += w * nodes[ERROR, i] * nodes[ERROR, i]
         ev2 += w * nodes[ERROR_RATE, i] * nodes[ERROR_RATE, i]
         tm2 += w * nodes[MOTOR, i] * nodes[MOTOR, i]
         df2 += (
             w * (nodes[FRICTION, i] - nodes[COMPENSATING, i]) * (nodes[FRICTION, i] - nodes[COMPENSATING, i])
         )
-        mean += w * nodes[ERROR, i]
         work += w * nodes[MOTOR, i] * nodes[SPEED, i]
         loss += w * nodes[FRICTION, i] * nodes[SPEED, i]
-        helped += w * nodes[COMPENSATING, i] * nodes[SPEED, i]
+        compensation += w * nodes[COMPENSATING, i] * nodes[SPEED, i]
+    return Sums(e, e2, ev2, tm2, df2, work, loss, compensation)
+
+
+@kernel(exact=False, inline=True)
+def add(acc: Any, t: float, h: float, total: Sums, end: float) -> bool:
+    """Add a stretch's integrals and its last error; returns whether it lies in the second half of the run."""
+    second = in_second_half(acc, t)
     scale = h / 90.0
-    acc[E2] += scale * e2
-    acc[EV2] += scale * ev2
-    acc[TM2] += scale * tm2
-    acc[DF2] += scale * df2
-    acc[WORK] += scale * work
-    acc[LOSS] += scale * loss
-    acc[COMPENSATION_WORK] += scale * helped
+    acc[E2] += scale * total.e2
+    acc[EV2] += scale * total.ev2
+    acc[TM2] += scale * total.tm2
+    acc[DF2] += scale * total.df2
+    acc[WORK] += scale * total.work
+    acc[LOSS] += scale * total.loss
+    acc[COMPENSATION_WORK] += scale * total.compensation
     if t >= 0.8 * acc[DURATION] * (1.0 - 1e-12):
-        acc[SS_E] += scale * mean
-    acc[E_END] = nodes[ERROR, 4]
-    low, high = extremes(nodes, 0.25 * h)
-    acc[E_MAX] = max(acc[E_MAX], -low, high)
-    acc[V_MAX] = max(acc[V_MAX], peak(nodes, acc[V_MAX]))
-    for i in range(5):
-        acc[TM_MAX] = max(acc[TM_MAX], abs(nodes[MOTOR, i]))
+        acc[SS_E] += scale * total.e
+    acc[E_END] = end
     if second:
-        acc[W2_E2] += scale * e2
-        acc[W2_EV2] += scale * ev2
-        acc[W2_TM2] += scale * tm2
+        acc[W2_E2] += scale * total.e2
+        acc[W2_EV2] += scale * total.ev2
+        acc[W2_TM2] += scale * total.tm2
+    return second
+
+
+@kernel(exact=False, inline=True)
+def reached(acc: Any, second: bool, low: float, high: float, speed: float, motor: float) -> None:
+    """Note the least and greatest error of a stretch, and the peaks of |v| and of the motor's torque."""
+    acc[E_MAX] = max(acc[E_MAX], -low, high)
+    acc[V_MAX] = max(acc[V_MAX], speed)
+    acc[TM_MAX] = max(acc[TM_MAX], motor)
+    if second:
         acc[W2_E_MAX] = max(acc[W2_E_MAX], -low, high)
         acc[W2_E_LOW] = min(acc[W2_E_LOW], low)
         acc[W2_E_HIGH] = max(acc[W2_E_HIGH], high)
-    if acc[WINDOW] > MAX_WINDOW:
-        return
-    high_pass(acc, h, nodes, second)
-    reversals(acc, turns, t, h, nodes, second)
-    standstill(acc, t, h, nodes)
-    band = acc[SETTLE_BAND]
-    if band > 0.0:
-        for i in range(5):
-            now = abs(nodes[ERROR, i])
-            if now > band:
-                acc[OUTSIDE_LAST] = t + 0.25 * h * i
-                if i < 4 and abs(nodes[ERROR, i + 1]) <= band:
-                    acc[OUTSIDE_LAST] += 0.25 * h * (now - band) / (now - abs(nodes[ERROR, i + 1]))
+
+
+@kernel(exact=False, inline=True)
+def in_second_half(acc: Any, t: float) -> bool:
+    """Whether a stretch that begins at t lies in the second half of the run."""
+    return t >= 0.5 * acc[DURATION] * (1.0 - 1e-12)
 
 
 @kernel(exact=False)
@@ -130,16 +163,20 @@ def extremes(nodes: Any, d: float) -> tuple[float, float]:
         low = min(low, nodes[ERROR, i])
         high = max(high, nodes[ERROR, i])
         if nodes[ERROR_RATE, i - 1] * nodes[ERROR_RATE, i] < 0.0:
-            x = nodes[ERROR_RATE, i - 1] / (nodes[ERROR_RATE, i - 1] - nodes[ERROR_RATE, i])
-            y = 1.0 - x
-            between = (
-                y * y * (1.0 + 2.0 * x) * nodes[ERROR, i - 1]
-                + x * x * (3.0 - 2.0 * x) * nodes[ERROR, i]
-                + x * y * d * (y * nodes[ERROR_RATE, i - 1] - x * nodes[ERROR_RATE, i])
-            )
+            between = summit(
+                nodes[ERROR, i - 1], nodes[ERROR_RATE, i - 1], nodes[ERROR, i], nodes[ERROR_RATE, i], d
+            )  # fmt: skip
             low = min(low, between)
             high = max(high, between)
     return low, high
+
+
+@kernel(exact=False, inline=True)
+def summit(y0: float, d0: float, y1: float, d1: float, d: float) -> float:
+    """The cubic through two values and slopes of opposite sign, d apart, where a straight slope vanishes."""
+    x = d0 / (d0 - d1)
+    y = 1.0 - x
+    return y * y * (1.0 + 2.0 * x) * y0 + x * x * (3.0 - 2.0 * x) * y1 + x * y * d * (y * d0 - x * d1)
 
 
 @kernel(exact=False)
@@ -238,9 +275,15 @@ def high_pass(acc: Any, h: float, nodes: Any, second: bool) -> None:
         w = 7.0 if i == 3 else (12.0 if i == 1 else 32.0)
         total += w * (nodes[SPEED, i + 1] - y) * (nodes[SPEED, i + 1] - y)
     acc[LOW_PASS] = y
-    acc[HP2] += h / 90.0 * total
+    add_high_pass(acc, h / 90.0 * total, second)
+
+
+@kernel(exact=False, inline=True)
+def add_high_pass(acc: Any, total: float, second: bool) -> None:
+    """Add an integral of the squared high-passed velocity."""
+    acc[HP2] += total
     if second:
-        acc[W2_HP2] += h / 90.0 * total
+        acc[W2_HP2] += total
 
 
 @kernel(exact=False)
@@ -257,28 +300,36 @@ def reversals(acc: Any, turns: Any, t: float, h: float, nodes: Any, second: bool
             f = nodes[SPEED, i - 1] / (nodes[SPEED, i - 1] - nodes[SPEED, i])
             acc[TURN_TIME] = t + 0.25 * h * (i - 1 + f)
             acc[TURN_POSITION] = nodes[AT, i - 1] + f * (nodes[AT, i] - nodes[AT, i - 1])
-        v = crest(nodes, i)
-        side = 0.0
-        if v > TRIGGER:
-            side = 1.0
-        elif v < -TRIGGER:
-            side = -1.0
-        if side != 0.0:
-            if side * acc[SIDE] < 0.0:
-                acc[REVERSALS] += 1.0
-                if second:
-                    acc[W2_REVERSALS] += 1.0
-                n = int(acc[TURN_COUNT])
-                if n < turns.shape[0]:
-                    turns[n, 0] = acc[TURN_TIME]
-                    turns[n, 1] = acc[TURN_POSITION]
-                    acc[TURN_COUNT] += 1.0
-            acc[SIDE] = side
-        if abs(nodes[REFERENCE_SPEED, i]) > TRIGGER:
-            side = 1.0 if nodes[REFERENCE_SPEED, i] > 0.0 else -1.0
-            if side * acc[REFERENCE_SIDE] < 0.0:
-                acc[REFERENCE_REVERSALS] += 1.0
-            acc[REFERENCE_SIDE] = side
+        confirm(acc, turns, crest(nodes, i), second)
+        follow_reference(acc, nodes[REFERENCE_SPEED, i])
+
+
+@kernel(exact=False, inline=True)
+def confirm(acc: Any, turns: Any, v: float, second: bool) -> None:
+    """Let a velocity beyond the trigger confirm the reversal that TURN_TIME remembers, if the side is another."""
+    if abs(v) <= TRIGGER:
+        return
+    side = 1.0 if v > 0.0 else -1.0
+    if side * acc[SIDE] < 0.0:
+        acc[REVERSALS] += 1.0
+        if second:
+            acc[W2_REVERSALS] += 1.0
+        n = int(acc[TURN_COUNT])
+        if n < turns.shape[0]:
+            turns[n, 0] = acc[TURN_TIME]
+            turns[n, 1] = acc[TURN_POSITION]
+            acc[TURN_COUNT] += 1.0
+    acc[SIDE] = side
+
+
+@kernel(exact=False, inline=True)
+def follow_reference(acc: Any, rate: float) -> None:
+    """Count the reversals of the reference, whose velocity this is."""
+    if abs(rate) > TRIGGER:
+        side = 1.0 if rate > 0.0 else -1.0
+        if side * acc[REFERENCE_SIDE] < 0.0:
+            acc[REFERENCE_REVERSALS] += 1.0
+        acc[REFERENCE_SIDE] = side
 
 
 @kernel(exact=False)
@@ -286,12 +337,30 @@ def standstill(acc: Any, t: float, h: float, nodes: Any) -> None:
     """Find standstills: |v| below the trigger for at least 10 ms while the reference moves."""
     for i in range(5):
         v = nodes[SPEED, i] if i == 0 else crest(nodes, i)
-        still = abs(v) < TRIGGER and abs(nodes[REFERENCE_SPEED, i]) > MOVING
-        now = t + 0.25 * h * i
-        if still and acc[STILL_SINCE] < 0.0:
-            acc[STILL_SINCE] = now
-        elif not still and acc[STILL_SINCE] >= 0.0:
-            close_standstill(acc, now)
+        rest_seen(acc, t + 0.25 * h * i, v, nodes[REFERENCE_SPEED, i])
+
+
+@kernel(exact=False, inline=True)
+def rest_seen(acc: Any, now: float, v: float, rate: float) -> None:
+    """Begin or end a standstill at a velocity and the reference's."""
+    still = abs(v) < TRIGGER and abs(rate) > MOVING
+    if still and acc[STILL_SINCE] < 0.0:
+        acc[STILL_SINCE] = now
+    elif not still and acc[STILL_SINCE] >= 0.0:
+        close_standstill(acc, now)
+
+
+@kernel(exact=False)
+def settling(acc: Any, t: float, h: float, nodes: Any) -> None:
+    """Note when the error was last outside the band in which it counts as settled."""
+    band = acc[SETTLE_BAND]
+    if band > 0.0:
+        for i in range(5):
+            now = abs(nodes[ERROR, i])
+            if now > band:
+                acc[OUTSIDE_LAST] = t + 0.25 * h * i
+                if i < 4 and abs(nodes[ERROR, i + 1]) <= band:
+                    acc[OUTSIDE_LAST] += 0.25 * h * (now - band) / (now - abs(nodes[ERROR, i + 1]))
 
 
 @kernel(exact=False)
@@ -303,99 +372,3 @@ def close_standstill(acc: Any, now: float) -> None:
             acc[STILL_COUNT] += 1.0
             acc[STILL_LONGEST] = max(acc[STILL_LONGEST], length)
         acc[STILL_SINCE] = -1.0
-
-
-# ---- reading the accumulator -----------------------------------------------------------------------------------
-
-
-def settle_band_of(reference: Any, duration: float) -> float:
-    """2 % of the way the reference goes, where it comes to rest before the end of the run; else 0. rad."""
-    start, late, end = reference.sample([0.0, 0.9 * duration, duration])
-    first = 0.0 if reference.kind.name == "step" else start[0]
-    travel = abs(end[0] - first)
-    at_rest = abs(end[0] - late[0]) <= 1e-3 * travel and abs(end[1]) * duration <= 1e-3 * travel
-    return 0.02 * travel if travel > 0.0 and at_rest else 0.0
-
-
-@kernel()
-def limit_cycle(turns: Any, duration: float) -> tuple[float, float]:
-    """Amplitude (rad) and period (s) of a limit cycle in the last 40 % of a run, or two NaN.
-
-    There is one where at least 5 periods have amplitudes and periods that spread (standard deviation over
-    mean) by less than 5 %. ``turns`` has time and position of the velocity's reversals, shape (n, 2), ascending.
-    """
-    first = 0
-    while first < turns.shape[0] and turns[first, 0] < 0.6 * duration:
-        first += 1
-    count = turns.shape[0] - first
-    if count < 11:
-        return math.nan, math.nan
-    found = (0.0, 0.0)
-    for kind in range(2):
-        # Periods from every second turn to the next, swings from one turn to the next.
-        apart = 2 if kind == 0 else 1
-        values = np.abs(turns[first + apart :, kind] - turns[first : turns.shape[0] - apart, kind])
-        mean = values.mean()
-        if not mean > 0.0 or values.std() >= 0.05 * mean:
-            return math.nan, math.nan
-        found = (mean, found[0])
-    return 0.5 * found[0], found[1]
-
-
-COARSE = (
-    "position_rms_rad", "position_peak_rad", "steady_state_error_rad", "end_error_rad", "velocity_rms_rad_s",
-    "velocity_peak_rad_s", "torque_rms_Nm", "torque_peak_Nm", "friction_residual_rms_Nm",
-    "second_half_position_rms_rad", "second_half_position_peak_rad", "second_half_position_span_rad",
-    "second_half_velocity_rms_rad_s", "second_half_torque_rms_Nm", "motor_work_J", "friction_loss_J",
-)  # fmt: skip
-"""Metrics that windows longer than MAX_WINDOW give as well."""
-
-
-def metrics(acc: Any, turns: Any) -> dict[str, float]:
-    """Read a finished accumulator: one number a metric, its unit in the name; NaN where there is none.
-
-    The definitions are in docs/metrics.md.
-    """
-    late = np.ascontiguousarray(turns[turns[:, 0] > 0.0])
-    amplitude, period = limit_cycle(late, acc[DURATION])
-    return {name: float(value) for name, value in columns(acc, amplitude, period).items()}
-
-
-def columns(acc: Any, amplitude: Any, period: Any) -> dict[str, Any]:
-    """The metrics of many finished accumulators, shape (..., SIZE), and of their limit cycles, shape (...)."""
-    duration = acc[..., DURATION]
-    half = 0.5 * duration
-    # For good: a limit cycle that happens to end inside the band has not settled.
-    settled = (acc[..., SETTLE_BAND] > 0.0) & (acc[..., OUTSIDE_LAST] <= (1.0 - SETTLED_FOR) * duration)
-    return {
-        "position_rms_rad": np.sqrt(acc[..., E2] / duration),
-        "position_peak_rad": acc[..., E_MAX],
-        "steady_state_error_rad": acc[..., SS_E] / (0.2 * duration),
-        "end_error_rad": acc[..., E_END],
-        "settling_s": np.where(settled, acc[..., OUTSIDE_LAST], math.nan),
-        "velocity_rms_rad_s": np.sqrt(acc[..., EV2] / duration),
-        "velocity_peak_rad_s": acc[..., V_MAX],
-        "torque_rms_Nm": np.sqrt(acc[..., TM2] / duration),
-        "torque_peak_Nm": acc[..., TM_MAX],
-        "friction_residual_rms_Nm": np.sqrt(acc[..., DF2] / duration),
-        "standstills": acc[..., STILL_COUNT],
-        "longest_standstill_s": acc[..., STILL_LONGEST],
-        "reversals_per_s": acc[..., REVERSALS] / duration,
-        "reversals_beyond_reference_per_s": (acc[..., REVERSALS] - acc[..., REFERENCE_REVERSALS]) / duration,
-        "velocity_above_50Hz_rms_rad_s": np.sqrt(acc[..., HP2] / duration),
-        "limit_cycle_amplitude_rad": amplitude,
-        "limit_cycle_period_s": period,
-        "second_half_position_rms_rad": np.sqrt(acc[..., W2_E2] / half),
-        "second_half_position_peak_rad": acc[..., W2_E_MAX],
-        "second_half_position_span_rad": acc[..., W2_E_HIGH] - acc[..., W2_E_LOW],
-        "second_half_velocity_rms_rad_s": np.sqrt(acc[..., W2_EV2] / half),
-        "second_half_torque_rms_Nm": np.sqrt(acc[..., W2_TM2] / half),
-        "second_half_velocity_above_50Hz_rms_rad_s": np.sqrt(acc[..., W2_HP2] / half),
-        "second_half_reversals_per_s": acc[..., W2_REVERSALS] / half,
-        "motor_work_J": acc[..., WORK],
-        "friction_loss_J": acc[..., LOSS],
-    }
-
-
-METRICS = tuple(columns(np.ones(SIZE), 0.0, 0.0))
-"""Names of the metrics."""

@@ -37,7 +37,7 @@ from stickslip.simulation._case import (
     lay_out,
     slip_rules,
 )
-from stickslip.simulation._meter import metrics
+from stickslip.simulation._metrics import metrics
 
 __all__ = ["INTEGRATORS", "Choice", "check_machine_run", "integrator_for", "prepare", "run_case", "simulate"]
 

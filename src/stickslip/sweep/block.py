@@ -13,7 +13,7 @@ from stickslip.errors import InputError, ParameterError, SimulationError
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.simulation import _case
-from stickslip.simulation._meter import metrics as read_meter
+from stickslip.simulation._metrics import metrics as read_meter
 from stickslip.simulation.accuracy import LOOSER, PERTURBATIONS
 from stickslip.simulation.closed_loop import REASONS, integrator_for, prepare
 from stickslip.simulation.machine.layout import lay_out_machine

@@ -15,7 +15,7 @@ from stickslip.config import Table, read_toml
 from stickslip.errors import ConfigError, InputError, suggestion
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import read_identified
-from stickslip.simulation._meter import METRICS
+from stickslip.simulation._metrics import METRICS
 from stickslip.simulation.many import simd_batch
 from stickslip.study import plan as studies
 from stickslip.study.plan import Study

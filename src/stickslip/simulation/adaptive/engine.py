@@ -46,8 +46,8 @@ from stickslip.simulation._meter import (
     close_standstill,
     meter,
     new_meter,
-    settle_band_of,
 )
+from stickslip.simulation._metrics import settle_band_of
 from stickslip.simulation.adaptive.hybrid import (
     COMPENSATION_TORQUE,
     EXTRA,

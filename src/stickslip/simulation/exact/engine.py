@@ -44,7 +44,8 @@ from stickslip.simulation._case import (
     StepBudget,
 )
 from stickslip.simulation._forcing import NO_CELLS, feedforward
-from stickslip.simulation._meter import SIZE, close_standstill, new_meter, settle_band_of
+from stickslip.simulation._meter import SIZE, close_standstill, new_meter
+from stickslip.simulation._metrics import settle_band_of
 from stickslip.simulation.exact import state as col
 from stickslip.simulation.exact.kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, LONGEST_STEP, solve
 from stickslip.spec import Bristle, Elements, Law, Option

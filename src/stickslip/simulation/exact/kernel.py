@@ -28,7 +28,8 @@ from stickslip.simulation.exact.bristle import bend
 from stickslip.simulation.exact.event_functions import weigh
 from stickslip.simulation.exact.events import find
 from stickslip.simulation.exact.flow import FLOW, Linear, kept_flow
-from stickslip.simulation.exact.output import measure, row_after, write_grid, write_rows
+from stickslip.simulation.exact.metering import measure
+from stickslip.simulation.exact.output import row_after, write_grid, write_rows
 from stickslip.simulation.exact.perturbation import perturbation
 from stickslip.simulation.exact.segment import (
     ERROR,

@@ -1,14 +1,12 @@
-"""Output of the exact integrator: rows, positions on the grid, and windows for the meter."""
+"""Output of the exact integrator: rows, and positions on the grid."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from stickslip.jit import kernel, pointer
 from stickslip.simulation._case import COLUMNS
-from stickslip.simulation._meter import MAX_WINDOW, WINDOW, meter
-from stickslip.simulation.exact.flow import UNMOVED, Linear, flow, free_motion, kept_flow, moved
+from stickslip.simulation.exact.flow import UNMOVED, Linear, flow, free_motion, kept_flow
 from stickslip.simulation.exact.segment import (
     FREE_POSITION,
     FREE_VELOCITY,
@@ -26,7 +24,6 @@ from stickslip.simulation.exact.state import (
     GRID_ROWS,
     GRID_WRITTEN,
     INTEGRAL,
-    JUMPED,
     LAG,
     POSITION,
     ROWS,
@@ -43,18 +40,6 @@ from stickslip.simulation.exact.state import (
 )
 
 ROW_SIZE = len(COLUMNS)
-SHORTEST_WINDOW = 1e-10
-"""Shorter segments are left out of the metrics (s)."""
-
-
-FINEST_NODES = 0.03
-"""Half a window in radians (or e-folds) of the free motion, that need not be undercut."""
-MOST_WINDOWS = 250_000
-"""Of a step, each of four nodes: half a second of work, in which nothing hears a wish to end."""
-UNSEEN = 1e-8
-"""Free motion slower than this (rad/s) adds nothing to a metric; the nodes need not follow it."""
-UNSEEN_COARSE = 1e-4
-"""The same where only coarse metrics are wanted: 1e-8 rad of the ringing in pre-sliding."""
 
 
 @kernel(exact=False, inline=True)
@@ -190,85 +175,3 @@ def row_after(parameters: Any, plan: Any, sides: Any, loop: Any, count: Any, row
     before = pointer(rows, last * ROW_SIZE)
     if abs(tm - before[5]) + abs(tf - before[6]) + abs(th - before[7]) > 1e-6:
         put_row(rows, count, loop[TIME], goal, rate, theta, v, tm, tf, th, 1.0)
-
-
-@kernel(exact=False, inline=True)
-def windows_for(rate: float, speed: float, h: float, unseen: float) -> float:
-    """Windows whose five nodes follow a free motion of that rate (1/s) and velocity (rad/s) over h, at least 1.
-
-    Boole's rule is wrong by about 2e-3 y^6 of the changing part for nodes y/2 of a radian apart.
-    """
-    y = 0.5 * h * abs(rate)
-    # Most segments are short; a root costs as much as the rest.
-    if speed < unseen or y <= FINEST_NODES or (y <= 1.0 and y * y * y * speed <= 1e-5):
-        return 1.0
-    return y / max(FINEST_NODES, min(1.0, 0.1 * (1e-2 / speed) ** (1.0 / 3.0)))
-
-
-@kernel(exact=False, inline=True)
-def windows_of(lin: Linear, segment: Any, h: float, longest: float) -> int:
-    """Windows, none longer than `longest`, in which the meter sees the first h of a segment."""
-    p = segment[FREE_POSITION]
-    q = segment[FREE_VELOCITY]
-    unseen = UNSEEN_COARSE if longest > MAX_WINDOW else UNSEEN
-    if lin.discriminant > 0.0:
-        rate = max(lin.frequency, lin.decay)
-        most = windows_for(rate, abs(q) + rate * abs(p), h, unseen)
-    else:
-        fast = -lin.decay - lin.frequency
-        slow = -lin.decay + lin.frequency
-        share = 0.5 / (lin.frequency + 1e-9)
-        most = max(
-            windows_for(fast, abs(fast * (q - slow * p)) * share, h, unseen),
-            windows_for(slow, abs(slow * (q - fast * p)) * share, h, unseen),
-        )
-    return math.ceil(min(max(most, h / longest), MOST_WINDOWS + 1.0) * (1.0 - 1e-9))
-
-
-@kernel(exact=False)
-def measure(
-    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, h: float, acc: Any,
-    turns: Any, nodes: Any,
-) -> bool:  # fmt: skip
-    """Hand the first h of the segment to the meter, in windows of five nodes; False where they are too many."""
-    if h < SHORTEST_WINDOW:
-        return True
-    windows = windows_of(lin, segment, h, acc[WINDOW])
-    if windows > MOST_WINDOWS:
-        return False
-    width = h / windows
-    c = cubic_of(segment)
-    m = flow(lin, 0.25 * width)
-    p = segment[FREE_POSITION]
-    q = segment[FREE_VELOCITY]
-    if loop[JUMPED] > 0.0:
-        fill(parameters, plan, cells, sides, loop, segment, 0.0, loop[POSITION], loop[VELOCITY], nodes, 4)
-        loop[JUMPED] = 0.0
-    for w in range(windows):
-        for j in range(8):
-            nodes[j, 0] = nodes[j, 4]
-        for k in range(1, 5):
-            x = (w + 0.25 * k) * width
-            p, q = free_motion(m, p, q)
-            theta, v = moved(c, UNMOVED, x, p, q)
-            fill(parameters, plan, cells, sides, loop, segment, x, theta, v, nodes, k)
-        meter(
-            acc, turns, loop[TIME] + w * width, width, nodes)  # fmt: skip
-    return True
-
-
-@kernel(exact=False)
-def fill(
-    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, x: float, theta: float, v: float,
-    nodes: Any, k: int,
-) -> None:  # fmt: skip
-    """Write one node of every signal that the meter reads."""
-    goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, loop, segment, x, theta, v)
-    nodes[0, k] = goal - theta
-    nodes[1, k] = rate - v
-    nodes[2, k] = theta
-    nodes[3, k] = v
-    nodes[4, k] = rate
-    nodes[5, k] = tm
-    nodes[6, k] = tf
-    nodes[7, k] = th

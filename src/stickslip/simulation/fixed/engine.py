@@ -48,12 +48,8 @@ from stickslip.simulation._case import (
     Side,
     surroundings,
 )
-from stickslip.simulation._meter import (
-    TURN_COUNT,
-    close_standstill,
-    new_meter,
-    settle_band_of,
-)
+from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter
+from stickslip.simulation._metrics import settle_band_of
 from stickslip.simulation.fixed.loop import (
     FRICTION,
     GATHERED,

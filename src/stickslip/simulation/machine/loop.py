@@ -30,10 +30,9 @@ from stickslip.simulation._meter import (
     TURN_COUNT,
     close_standstill,
     meter,
-    metrics,
     new_meter,
-    settle_band_of,
 )
+from stickslip.simulation._metrics import metrics, settle_band_of
 from stickslip.simulation._sampled import Sampled, compiled
 from stickslip.simulation.fixed.loop import NUDGE
 from stickslip.simulation.machine import step

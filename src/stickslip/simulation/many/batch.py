@@ -26,7 +26,8 @@ from stickslip.simulation._case import (
     Array,
     Case,
 )
-from stickslip.simulation._meter import COARSE, LONG_WINDOW, MAX_WINDOW, METRICS
+from stickslip.simulation._meter import LONG_WINDOW, MAX_WINDOW
+from stickslip.simulation._metrics import COARSE, METRICS, columns, settle_band_of
 from stickslip.simulation.exact import state as col
 from stickslip.simulation.exact.engine import TURNS, can_run
 from stickslip.simulation.exact.engine import prepare as prepare_one
@@ -92,8 +93,8 @@ class Batch:
         Parameters
         ----------
         metrics : sequence of str
-            Those wanted. Where `stickslip.simulation._meter.COARSE` has all of them, the meter takes longer windows,
-            several times faster; they then differ by up to 1e-3 of their value. None at all is the fastest.
+            Those wanted. Where `stickslip.simulation._metrics.COARSE` has all of them, nothing is counted, which is
+            a little faster. None at all is the fastest.
 
         Raises
         ------
@@ -105,7 +106,7 @@ class Batch:
                 raise UnknownName("metric", name, METRICS)
         n, duration = len(self), float(self.case.numbers[DURATION])
         coarse = all(name in COARSE for name in metrics)
-        band = _meter.settle_band_of(self.case.reference, duration)
+        band = settle_band_of(self.case.reference, duration)
         accs = np.tile(_meter.new_meter(duration, band, LONG_WINDOW if coarse else MAX_WINDOW), (n, 1))
         cycles, codes, ends = np.full((n, 2), np.nan), np.zeros(n, dtype=np.int64), np.empty((n, 3))
         nothing = np.zeros((0, 2))
@@ -114,7 +115,7 @@ class Batch:
             np.zeros(AT_SIDES + self.starts.shape[1]), nothing, np.zeros(1), accs,
             np.zeros((0 if coarse else TURNS, 2)), np.zeros((8, 5)), cycles, codes, ends, bool(metrics),
         )  # fmt: skip
-        found = _meter.columns(accs, cycles[:, 0], cycles[:, 1])
+        found = columns(accs, cycles[:, 0], cycles[:, 1])
         ran = codes == _case.DONE
         wanted = {name: np.where(ran, found[name], np.nan) for name in metrics}
         return Results(codes, ends[:, 0], ends[:, 1], ends[:, 2], wanted, np.zeros(n, dtype=np.int64))

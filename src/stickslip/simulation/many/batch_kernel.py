@@ -6,7 +6,8 @@ import math
 from typing import Any
 
 from stickslip.jit import call_value, kernel, pointer
-from stickslip.simulation._meter import TURN_COUNT, close_standstill, limit_cycle
+from stickslip.simulation._meter import TURN_COUNT, close_standstill
+from stickslip.simulation._metrics import limit_cycle
 from stickslip.simulation.exact.kernel import AT_LOOP, AT_SIDES, solve
 
 BISECTIONS = 200

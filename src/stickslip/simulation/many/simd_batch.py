@@ -55,7 +55,7 @@ METRICS = (
     "second_half_position_rms_rad", "second_half_position_peak_rad", "second_half_position_span_rad",
     "second_half_velocity_rms_rad_s", "second_half_torque_rms_Nm", "motor_work_J", "friction_loss_J",
 )  # fmt: skip
-"""Metrics that lanes give: those of `stickslip.simulation._meter.COARSE`."""
+"""Metrics that lanes give: those of `stickslip.simulation._metrics.COARSE`."""
 LIGHT = (
     "position_rms_rad",
     "position_peak_rad",

@@ -36,7 +36,8 @@ from stickslip.simulation._case import (
     Outcome,
     surroundings,
 )
-from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter, settle_band_of
+from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter
+from stickslip.simulation._metrics import settle_band_of
 from stickslip.simulation._sampled import Sampled, compiled, measured_position
 from stickslip.simulation.exact.engine import crosses_once, elements_of, modulations
 from stickslip.simulation.recorded_input.step import Plant

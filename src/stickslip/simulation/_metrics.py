@@ -1,0 +1,107 @@
+"""The metrics that the meter's accumulator holds at the end of a run."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from stickslip.jit import kernel
+from stickslip.simulation import _meter as at
+
+
+def settle_band_of(reference: Any, duration: float) -> float:
+    """2 % of the way the reference goes, where it comes to rest before the end of the run; else 0. rad."""
+    start, late, end = reference.sample([0.0, 0.9 * duration, duration])
+    first = 0.0 if reference.kind.name == "step" else start[0]
+    travel = abs(end[0] - first)
+    at_rest = abs(end[0] - late[0]) <= 1e-3 * travel and abs(end[1]) * duration <= 1e-3 * travel
+    return 0.02 * travel if travel > 0.0 and at_rest else 0.0
+
+
+@kernel()
+def limit_cycle(turns: Any, duration: float) -> tuple[float, float]:
+    """Amplitude (rad) and period (s) of a limit cycle in the last 40 % of a run, or two NaN.
+
+    There is one where at least 5 periods have amplitudes and periods that spread (standard deviation over
+    mean) by less than 5 %. ``turns`` has time and position of the velocity's reversals, shape (n, 2), ascending.
+    """
+    first = 0
+    while first < turns.shape[0] and turns[first, 0] < 0.6 * duration:
+        first += 1
+    count = turns.shape[0] - first
+    if count < 11:
+        return math.nan, math.nan
+    found = (0.0, 0.0)
+    for kind in range(2):
+        # Periods from every second turn to the next, swings from one turn to the next.
+        apart = 2 if kind == 0 else 1
+        values = np.abs(turns[first + apart :, kind] - turns[first : turns.shape[0] - apart, kind])
+        mean = values.mean()
+        if not mean > 0.0 or values.std() >= 0.05 * mean:
+            return math.nan, math.nan
+        found = (mean, found[0])
+    return 0.5 * found[0], found[1]
+
+
+SETTLED_FOR = 0.1
+"""Of the run, without leaving the band again."""
+COARSE = (
+    "position_rms_rad", "position_peak_rad", "steady_state_error_rad", "end_error_rad", "velocity_rms_rad_s",
+    "velocity_peak_rad_s", "torque_rms_Nm", "torque_peak_Nm", "friction_residual_rms_Nm",
+    "second_half_position_rms_rad", "second_half_position_peak_rad", "second_half_position_span_rad",
+    "second_half_velocity_rms_rad_s", "second_half_torque_rms_Nm", "motor_work_J", "friction_loss_J",
+)  # fmt: skip
+"""Metrics that windows longer than `_meter.MAX_WINDOW` give as well."""
+
+
+def metrics(acc: Any, turns: Any) -> dict[str, float]:
+    """Read a finished accumulator: one number a metric, its unit in the name; NaN where there is none.
+
+    The definitions are in docs/metrics.md.
+    """
+    late = np.ascontiguousarray(turns[turns[:, 0] > 0.0])
+    amplitude, period = limit_cycle(late, acc[at.DURATION])
+    return {name: float(value) for name, value in columns(acc, amplitude, period).items()}
+
+
+def columns(acc: Any, amplitude: Any, period: Any) -> dict[str, Any]:
+    """The metrics of many finished accumulators, shape (..., SIZE), and of their limit cycles, shape (...)."""
+    duration = acc[..., at.DURATION]
+    half = 0.5 * duration
+    # For good: a limit cycle that happens to end inside the band has not settled.
+    settled = (acc[..., at.SETTLE_BAND] > 0.0) & (acc[..., at.OUTSIDE_LAST] <= (1.0 - SETTLED_FOR) * duration)
+    return {
+        "position_rms_rad": np.sqrt(acc[..., at.E2] / duration),
+        "position_peak_rad": acc[..., at.E_MAX],
+        "steady_state_error_rad": acc[..., at.SS_E] / (0.2 * duration),
+        "end_error_rad": acc[..., at.E_END],
+        "settling_s": np.where(settled, acc[..., at.OUTSIDE_LAST], math.nan),
+        "velocity_rms_rad_s": np.sqrt(acc[..., at.EV2] / duration),
+        "velocity_peak_rad_s": acc[..., at.V_MAX],
+        "torque_rms_Nm": np.sqrt(acc[..., at.TM2] / duration),
+        "torque_peak_Nm": acc[..., at.TM_MAX],
+        "friction_residual_rms_Nm": np.sqrt(acc[..., at.DF2] / duration),
+        "standstills": acc[..., at.STILL_COUNT],
+        "longest_standstill_s": acc[..., at.STILL_LONGEST],
+        "reversals_per_s": acc[..., at.REVERSALS] / duration,
+        "reversals_beyond_reference_per_s": (acc[..., at.REVERSALS] - acc[..., at.REFERENCE_REVERSALS])
+        / duration,
+        "velocity_above_50Hz_rms_rad_s": np.sqrt(acc[..., at.HP2] / duration),
+        "limit_cycle_amplitude_rad": amplitude,
+        "limit_cycle_period_s": period,
+        "second_half_position_rms_rad": np.sqrt(acc[..., at.W2_E2] / half),
+        "second_half_position_peak_rad": acc[..., at.W2_E_MAX],
+        "second_half_position_span_rad": acc[..., at.W2_E_HIGH] - acc[..., at.W2_E_LOW],
+        "second_half_velocity_rms_rad_s": np.sqrt(acc[..., at.W2_EV2] / half),
+        "second_half_torque_rms_Nm": np.sqrt(acc[..., at.W2_TM2] / half),
+        "second_half_velocity_above_50Hz_rms_rad_s": np.sqrt(acc[..., at.W2_HP2] / half),
+        "second_half_reversals_per_s": acc[..., at.W2_REVERSALS] / half,
+        "motor_work_J": acc[..., at.WORK],
+        "friction_loss_J": acc[..., at.LOSS],
+    }
+
+
+METRICS = tuple(columns(np.ones(at.SIZE), 0.0, 0.0))
+"""Names of the metrics."""

@@ -1,0 +1,206 @@
+"""The motion over a segment of the exact integrator, handed to the meter in a few windows.
+
+What changes slowly is seen at five nodes a window; the ringing of the free motion enters the integrals in closed form
+(`exact.ringing`). Extremes, reversals and standstills are looked for at fine steps only in windows whose bounds leave
+room for one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from stickslip.jit import kernel
+from stickslip.simulation._case import KD, KP
+from stickslip.simulation._meter import (
+    AT,
+    ERROR,
+    ERROR_RATE,
+    FRICTION,
+    COMPENSATING,
+    LONG_WINDOW,
+    MOTOR,
+    SIGNALS,
+    SPEED,
+    REFERENCE_SPEED,
+)
+from stickslip.simulation.exact.flow import UNMOVED, Linear, flow, free_motion, moved, twice
+from stickslip.simulation.exact.output import signals
+from stickslip.simulation.exact.ringing import (
+    has_closed_form,
+    ringing,
+)
+from stickslip.simulation.exact.segment import (
+    FREE_POSITION,
+    FREE_VELOCITY,
+    GOAL_END,
+    LENGTH,
+    RATE_END,
+    cubic_of,
+)
+from stickslip.simulation.exact.state import (
+    DAMPING,
+    GOAL,
+    GOAL_RATE,
+    JUMPED,
+    POSITION,
+    SIDE_SIZE,
+    SIDES,
+    SPRING,
+    TIME,
+    VELOCITY,
+    WEIGHT,
+)
+from stickslip.simulation.exact.window import Shares, ringing_window, window
+
+LONGEST = 64e-3
+"""Longest window where the reference changes slowly, s."""
+SHORTEST_WINDOW = 1e-10
+"""Shorter segments are left out of the metrics (s)."""
+FINEST_NODES = 0.03
+"""Half a window in radians (or e-folds) of the free motion, that need not be undercut."""
+MOST_WINDOWS = 250_000
+"""Of a step, each of four nodes: half a second of work, in which nothing hears a wish to end."""
+UNSEEN = 1e-8
+"""Free motion slower than this (rad/s) adds nothing to a metric; the nodes need not follow it."""
+
+
+@kernel(exact=False, inline=True)
+def shares(parameters: Any, plan: Any, sides: Any) -> Shares:
+    """The shares of the loop as its modes are."""
+    spring = 0.0
+    damping = 0.0
+    if plan[SIDES] > 1:
+        spring = -sides[SIDE_SIZE + WEIGHT] * sides[SIDE_SIZE + SPRING]
+        damping = -sides[SIDE_SIZE + WEIGHT] * sides[SIDE_SIZE + DAMPING]
+    return Shares(
+        spring - parameters[KP], damping - parameters[KD], sides[SPRING], sides[DAMPING], spring, damping
+    )
+
+
+# ---- windows --------------------------------------------------------------------------------------------------
+
+
+@kernel(exact=False, inline=True)
+def windows_for(rate: float, speed: float, h: float) -> float:
+    """Windows whose five nodes follow a free motion of that rate (1/s) and velocity (rad/s) over h, at least 1.
+
+    Boole's rule is wrong by about 2e-3 y^6 of the changing part for nodes y/2 of a radian apart.
+    """
+    y = 0.5 * h * abs(rate)
+    # Most segments are short; a root costs as much as the rest.
+    if speed < UNSEEN or y <= FINEST_NODES or (y <= 1.0 and y * y * y * speed <= 1e-5):
+        return 1.0
+    return y / max(FINEST_NODES, min(1.0, 0.1 * (1e-2 / speed) ** (1.0 / 3.0)))
+
+
+@kernel(exact=False, inline=True)
+def windows_of(lin: Linear, segment: Any, h: float, longest: float) -> float:
+    """Windows, none longer than `longest`, whose nodes follow the first h of a segment."""
+    p = segment[FREE_POSITION]
+    q = segment[FREE_VELOCITY]
+    if lin.discriminant > 0.0:
+        rate = max(lin.frequency, lin.decay)
+        most = windows_for(rate, abs(q) + rate * abs(p), h)
+    else:
+        fast = -lin.decay - lin.frequency
+        slow = -lin.decay + lin.frequency
+        share = 0.5 / (lin.frequency + 1e-9)
+        most = max(
+            windows_for(fast, abs(fast * (q - slow * p)) * share, h),
+            windows_for(slow, abs(slow * (q - fast * p)) * share, h),
+        )
+    return min(max(most, h / longest), MOST_WINDOWS + 1.0) * (1.0 - 1e-9)
+
+
+@kernel(exact=False, inline=True)
+def slowly(loop: Any, segment: Any) -> bool:
+    """Whether the reference turns by less than 0.3 radian in a segment: its way leaves that of its mean velocity by a
+    twelfth of the angle's square."""
+    h = segment[LENGTH]
+    if h > LONGEST * 1.001:
+        return False
+    r0 = loop[GOAL_RATE]
+    r1 = segment[RATE_END]
+    off = segment[GOAL_END] - loop[GOAL] - 0.5 * h * (r0 + r1)
+    return abs(off) <= 0.0075 * h * max(abs(r0), abs(r1))
+
+
+@kernel(exact=False)
+def measure(
+    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, h: float, acc: Any,
+    turns: Any, nodes: Any,
+) -> bool:  # fmt: skip
+    """Hand the first h of the segment to the meter, in windows of five nodes; False where they are too many."""
+    if h < SHORTEST_WINDOW:
+        return True
+    longest = LONGEST if slowly(loop, segment) else LONG_WINDOW
+    windows = math.ceil(windows_of(lin, segment, h, longest))
+    fewest = math.ceil(h / longest * (1.0 - 1e-9))
+    rings = windows > fewest and has_closed_form(lin, h / fewest)
+    if rings:
+        windows = fewest
+    elif windows > MOST_WINDOWS:
+        return False
+    width = h / windows
+    c = cubic_of(segment)
+    m = flow(lin, 0.25 * width)
+    p = segment[FREE_POSITION]
+    v = segment[FREE_VELOCITY]
+    share = shares(parameters, plan, sides)
+    if loop[JUMPED] > 0.0:
+        fill(parameters, plan, cells, sides, loop, segment, 0.0, loop[POSITION], loop[VELOCITY], nodes, 4)
+        loop[JUMPED] = 0.0
+    for w in range(windows):
+        begin = w * width
+        for j in range(SIGNALS):
+            nodes[j, 0] = nodes[j, 4]
+        if rings:
+            shift(nodes, 0, share, -p, -v)
+            for k in range(1, 5):
+                x = begin + 0.25 * width * k
+                theta, speed = moved(c, UNMOVED, x, 0.0, 0.0)
+                fill(parameters, plan, cells, sides, loop, segment, x, theta, speed, nodes, k)
+            p0 = p
+            v0 = v
+            p, v = free_motion(twice(twice(m)), p0, v0)
+            ring = ringing(lin, width, p0, v0, p, v)
+            ringing_window(acc, turns, loop[TIME] + begin, width, nodes, lin, m, ring, share)
+            shift(nodes, 4, share, p, v)
+        else:
+            for k in range(1, 5):
+                x = begin + 0.25 * width * k
+                p, v = free_motion(m, p, v)
+                theta, speed = moved(c, UNMOVED, x, p, v)
+                fill(parameters, plan, cells, sides, loop, segment, x, theta, speed, nodes, k)
+            window(acc, turns, loop[TIME] + begin, width, nodes)
+    return True
+
+
+@kernel(exact=False)
+def fill(
+    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, x: float, theta: float, v: float,
+    nodes: Any, k: int,
+) -> None:  # fmt: skip
+    """Write one node of every signal that the meter reads."""
+    goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, loop, segment, x, theta, v)
+    nodes[ERROR, k] = goal - theta
+    nodes[ERROR_RATE, k] = rate - v
+    nodes[AT, k] = theta
+    nodes[SPEED, k] = v
+    nodes[REFERENCE_SPEED, k] = rate
+    nodes[MOTOR, k] = tm
+    nodes[FRICTION, k] = tf
+    nodes[COMPENSATING, k] = th
+
+
+@kernel(exact=False, inline=True)
+def shift(nodes: Any, k: int, share: Shares, p: float, v: float) -> None:
+    """Add a free motion to a node."""
+    nodes[ERROR, k] -= p
+    nodes[ERROR_RATE, k] -= v
+    nodes[AT, k] += p
+    nodes[SPEED, k] += v
+    nodes[MOTOR, k] += share.motor_p * p + share.motor_v * v
+    nodes[FRICTION, k] += share.friction_p * p + share.friction_v * v
+    nodes[COMPENSATING, k] += share.compensating_p * p + share.compensating_v * v

@@ -1,0 +1,225 @@
+"""One window of the meter: integrals, extremes, and what is counted, where five nodes show all of the motion or all but
+its ringing."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from stickslip.jit import kernel
+from stickslip.simulation._meter import (
+    E_MAX,
+    ERROR,
+    ERROR_RATE,
+    FRICTION,
+    COMPENSATING,
+    LOW_PASS,
+    MAX_WINDOW,
+    MOTOR,
+    SPEED,
+    TM_MAX,
+    V_MAX,
+    WINDOW,
+    Sums,
+    add,
+    add_high_pass,
+    extremes,
+    high_pass,
+    reached,
+    sums,
+)
+from stickslip.simulation.exact.flow import UNMOVED, Linear, Matrix, flow, free_motion
+from stickslip.simulation.exact.ringing import Ringing, at_nodes, high_passed, overlap, quartic
+from stickslip.simulation.exact.scan import NO_FREE, Free, bulge, calm, farther, passes, reach, scan
+
+TINY = 1e-300
+SMALL = 1e-6
+"""Part of a peak so far; ringing below it is not looked for in that peak."""
+A_RADIAN = 5.0
+"""Steps in which a radian of ringing is looked through that makes a peak; fewer where it is a part of one."""
+FINE = 0.5e-3
+"""Step in which reversals, standstills and settling are looked for, s."""
+STEPS = 12.0
+"""Fewest steps of a window that is looked through."""
+
+
+NONE = (0.0, 0.0, 0.0, 0.0, 0.0)
+NO_RINGING = Ringing(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, NONE, NONE, 0.0, 0.0, 0.0)
+
+
+class Shares(NamedTuple):
+    """What the free motion adds to the torques of motor, friction and compensator: by its position, N·m/rad, and by its
+    velocity, N·m·s/rad."""
+
+    motor_p: float
+    motor_v: float
+    friction_p: float
+    friction_v: float
+    compensating_p: float
+    compensating_v: float
+
+
+class Bulges(NamedTuple):
+    """How far error, velocity and motor torque leave straight lines between the nodes of a window."""
+
+    error: float
+    speed: float
+    motor: float
+
+
+@kernel(exact=False)
+def window(acc: Any, turns: Any, t: float, width: float, nodes: Any) -> None:
+    """Add a window whose nodes show all of the motion."""
+    low, high = extremes(nodes, 0.25 * width)
+    fine = acc[WINDOW] <= MAX_WINDOW
+    events = fine and not calm(acc, nodes, 0.0, 0.0)
+    second = add(acc, t, width, sums(nodes), nodes[ERROR, 4])
+    reached(acc, second, low, high, abs(nodes[SPEED, 4]), abs(nodes[MOTOR, 4]))
+    if events or reach(nodes, SPEED) > acc[V_MAX] or reach(nodes, MOTOR) > acc[TM_MAX]:
+        count = math.ceil(max(STEPS, width / FINE if events else 0.0))
+        scan(acc, turns, t, width, nodes, 0.0, 1.0, UNMOVED, NO_FREE, 0.0, 0.0, count, events)
+    if not fine:
+        return
+    if width <= MAX_WINDOW:
+        high_pass(acc, width, nodes, second)
+    else:
+        total, acc[LOW_PASS] = high_passed(quartic(nodes, SPEED), NO_RINGING, width, False, acc[LOW_PASS])
+        add_high_pass(acc, total, second)
+    if not events:
+        passes(acc, turns, t, t + width, nodes, nodes[SPEED, 0], nodes[SPEED, 4])
+
+
+@kernel(exact=False)
+def ringing_window(
+    acc: Any, turns: Any, t: float, width: float, nodes: Any, lin: Linear, m: Matrix, ring: Ringing, share: Shares
+) -> None:  # fmt: skip
+    """Add a window whose nodes show all but the ringing, which `m` carries over a quarter of it."""
+    fine = acc[WINDOW] <= MAX_WINDOW
+    events = False
+    if fine:
+        energy = ring.square * ring.p0 * ring.p0 + ring.q0 * ring.q0
+        events = not calm(acc, nodes, math.sqrt(energy / ring.square), math.sqrt(energy) / width)
+    second = add(acc, t, width, with_ringing(nodes, ring, share, width), nodes[ERROR, 4] - ring.p1)
+    look_through(acc, turns, t, width, nodes, lin, m, ring, share, events, second)
+    if fine:
+        passed, acc[LOW_PASS] = high_passed(quartic(nodes, SPEED), ring, width, True, acc[LOW_PASS])
+        add_high_pass(acc, passed, second)
+        if not events:
+            first, last = nodes[SPEED, 0] + ring.q0 / width, nodes[SPEED, 4] + ring.q1 / width
+            passes(acc, turns, t, t + width, nodes, first, last)
+
+
+@kernel(exact=False, inline=True)
+def look_through(
+    acc: Any, turns: Any, t: float, width: float, nodes: Any, lin: Linear, m: Matrix, ring: Ringing, share: Shares,
+    events: bool, second: bool,
+) -> None:  # fmt: skip
+    """Note the extremes of a window that rings: what is looked through is each quarter whose bounds lie beyond those so
+    far, or a short window as a whole.
+
+    The end comes first: where a signal grows, it leaves the quarters before it nothing.
+    """
+    v1 = ring.q1 / width
+    last = nodes[ERROR, 4] - ring.p1
+    motor = nodes[MOTOR, 4] + share.motor_p * ring.p1 + share.motor_v * v1
+    reached(acc, second, last, last, abs(nodes[SPEED, 4] + v1), abs(motor))
+    more = Bulges(bulge(nodes, ERROR), bulge(nodes, SPEED), bulge(nodes, MOTOR))
+    stiff = math.sqrt(lin.square)
+    p = ring.p0
+    v = ring.q0 / width
+    parts = 1 if width * stiff * A_RADIAN <= 2.0 * STEPS else 4
+    for k in range(parts):
+        shows = shown(acc, nodes, k, 4 // parts, more, stiff * p, v, stiff, share, events, second)
+        if shows >= 0.0:
+            long = width / parts
+            count = max(STEPS / parts, long / FINE if events else 0.0)
+            if shows > SMALL:
+                # A cubic between two steps misses a crest by the fourth power of their length.
+                count = max(count, long * stiff * A_RADIAN * math.sqrt(math.sqrt(min(shows, 1.0))))
+            steps = math.ceil(count)
+            free = Free(p, v, 2.0 * lin.decay, lin.square)
+            a_step = flow(lin, long / steps)
+            scan(
+                acc, turns, t, width, nodes, k / parts, 1.0 / parts, a_step, free, share.motor_p, share.motor_v, steps,
+                events,
+            )  # fmt: skip
+        if parts > 1:
+            p, v = free_motion(m, p, v)
+
+
+@kernel(exact=False, inline=True)
+def shown(
+    acc: Any, nodes: Any, k: int, quarters: int, more: Bulges, w: float, v: float, stiff: float, share: Shares,
+    events: bool, second: bool,
+) -> float:  # fmt: skip
+    """The greatest part that ringing has in a peak that some quarters of a window, from k on, may hold; -1 where they
+    hold none."""
+    # The energy of the ringing falls.
+    sway = math.sqrt(w * w + v * v)
+    swing = sway / stiff
+    pull = abs(share.motor_p) * swing + abs(share.motor_v) * sway
+    low = nodes[ERROR, k]
+    high = low
+    speed = abs(nodes[SPEED, k])
+    motor = abs(nodes[MOTOR, k])
+    for i in range(k + 1, k + quarters + 1):
+        low = min(low, nodes[ERROR, i])
+        high = max(high, nodes[ERROR, i])
+        speed = max(speed, abs(nodes[SPEED, i]))
+        motor = max(motor, abs(nodes[MOTOR, i]))
+    shows = 0.0 if events else -1.0
+    if farther(acc, second, low - more.error - swing, high + more.error + swing):
+        shows = max(shows, swing / (acc[E_MAX] + TINY))
+    if events or speed + more.speed + sway > acc[V_MAX]:
+        shows = max(shows, sway / (acc[V_MAX] + TINY))
+    if motor + more.motor + pull > acc[TM_MAX]:
+        shows = max(shows, pull / (acc[TM_MAX] + TINY))
+    return shows
+
+
+@kernel(exact=False, inline=True)
+def with_ringing(nodes: Any, ring: Ringing, share: Shares, width: float) -> Sums:
+    """The sums of a window, those of its nodes and of the ringing."""
+    s = sums(nodes)
+    of_p = at_nodes(ring.p_moments)
+    of_q = at_nodes(ring.q_moments)
+    inverse = 1.0 / width
+    mp = share.motor_p
+    mq = share.motor_v * inverse
+    fp = share.friction_p
+    fq = share.friction_v * inverse
+    hp = share.compensating_p
+    hq = share.compensating_v * inverse
+    v_p = overlap(nodes, SPEED, of_p)
+    v_q = overlap(nodes, SPEED, of_q)
+    m_p = overlap(nodes, MOTOR, of_p)
+    m_q = overlap(nodes, MOTOR, of_q)
+    f_p = overlap(nodes, FRICTION, of_p)
+    f_q = overlap(nodes, FRICTION, of_q)
+    h_p = overlap(nodes, COMPENSATING, of_p)
+    h_q = overlap(nodes, COMPENSATING, of_q)
+    rp = fp - hp
+    rq = fq - hq
+    ev2 = inverse * (ring.qq * inverse - 2.0 * overlap(nodes, ERROR_RATE, of_q))
+    tm2 = 2.0 * (mp * m_p + mq * m_q) + mean_square(ring, mp, mq)
+    df2 = 2.0 * (rp * (f_p - h_p) + rq * (f_q - h_q)) + mean_square(ring, rp, rq)
+    # A torque times the velocity: both have a part at the nodes and one that rings.
+    work = inverse * (m_q + mp * ring.pq + mq * ring.qq) + mp * v_p + mq * v_q
+    loss = inverse * (f_q + fp * ring.pq + fq * ring.qq) + fp * v_p + fq * v_q
+    compensation = inverse * (h_q + hp * ring.pq + hq * ring.qq) + hp * v_p + hq * v_q
+    return Sums(
+        s.e - 90.0 * ring.p_moments[0],
+        s.e2 + 90.0 * (ring.pp - 2.0 * overlap(nodes, ERROR, of_p)),
+        s.ev2 + 90.0 * ev2,
+        s.tm2 + 90.0 * tm2,
+        s.df2 + 90.0 * df2,
+        s.work + 90.0 * work,
+        s.loss + 90.0 * loss,
+        s.compensation + 90.0 * compensation,
+    )
+
+
+@kernel(exact=False, inline=True)
+def mean_square(ring: Ringing, p: float, q: float) -> float:
+    """Integral of the square of a sum of p and q."""
+    return p * p * ring.pp + 2.0 * p * q * ring.pq + q * q * ring.qq
