@@ -14,15 +14,15 @@ from stickslip.jit import kernel
 from stickslip.simulation._case import KD, KP
 from stickslip.simulation._meter import (
     AT,
+    COMPENSATING,
     ERROR,
     ERROR_RATE,
     FRICTION,
-    COMPENSATING,
     LONG_WINDOW,
     MOTOR,
+    REFERENCE_SPEED,
     SIGNALS,
     SPEED,
-    REFERENCE_SPEED,
 )
 from stickslip.simulation.exact.flow import UNMOVED, Linear, flow, free_motion, moved, twice
 from stickslip.simulation.exact.output import signals

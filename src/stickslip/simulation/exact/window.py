@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
 from stickslip.simulation._meter import (
+    COMPENSATING,
     E_MAX,
     ERROR,
     ERROR_RATE,
     FRICTION,
-    COMPENSATING,
     LOW_PASS,
     MAX_WINDOW,
     MOTOR,
