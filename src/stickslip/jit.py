@@ -23,6 +23,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numba
@@ -330,6 +331,10 @@ def _program(functions: Mapping[str, ast.FunctionDef], entries: Iterable[str]) -
     return "\n".join(lines)
 
 
+GENERATED = "stickslip._compiled"
+"""The package of generated modules"""
+
+
 def loaded(name: str, text: str) -> Any:
     """Import a generated module, written to a file so that its compiled code can be cached."""
     path = cache_folder() / f"{name}.py"
@@ -338,7 +343,10 @@ def loaded(name: str, text: str) -> Any:
         draft = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.tmp")
         draft.write_text(text)
         os.replace(draft, path)
-    spec = importlib.util.spec_from_file_location(f"stickslip._compiled.{name}", path)
+    # Cached code names the files of the functions that it calls: another process finds them in this package.
+    package = sys.modules.setdefault(GENERATED, ModuleType(GENERATED))
+    package.__path__ = [str(path.parent)]
+    spec = importlib.util.spec_from_file_location(f"{GENERATED}.{name}", path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
