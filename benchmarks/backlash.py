@@ -17,7 +17,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 from ordinary_logs import IMPERFECTIONS, MOTIONS, draw
-
 from stickslip.identify.doctor._view import View
 from stickslip.identify.doctor.play import backlash
 from stickslip.record import Record
