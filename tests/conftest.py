@@ -13,8 +13,25 @@ import pytest
 # What tests approve stays with them; set before anything is imported, so that other processes inherit it.
 os.environ["STICKSLIP_CONFIG"] = tempfile.mkdtemp(prefix="stickslip-tests-")
 
-ROOT = Path(__file__).parents[1]
+TESTS = Path(__file__).parent
+ROOT = TESTS.parent
 REFERENCE = Path(os.environ.get("STICKSLIP_REFERENCE", ROOT.parent / "shared" / "reference"))
+
+
+# Dearest first, by the processor's time: a file goes to one process as a whole, and the others wait for a long one that
+# comes last. The rest may stand in any order.
+LONGEST = (
+    "contract/test_declarations", "export/test_targets", "contract/test_control_laws", "export/test_c99",
+    "rigs/test_faults", "control/test_special_results", "commission/test_commission", "identify/test_doctor",
+    "cli/test_results", "control/test_control_loops", "identify/test_doctor_change", "contract/test_laws",
+    "sweep/test_sweep", "study/test_study", "study/test_effort", "test_readme",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The files that take longest begin first."""
+    places = {str(TESTS / f"{name}.py"): place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(str(item.path), len(LONGEST)))
 
 
 @pytest.fixture(scope="session")
