@@ -147,15 +147,24 @@ def stranger(numbers, counts, limit):
     )
 
 
-def along(machine, control):
-    """Its metrics along a sine that then stops for long."""
+def along(machine, control, phase=0.0):
+    """Its metrics along a sine that then stops for long; it starts by that part of a count off one."""
     t = np.arange(0.0, MOVES + 1e-9, 1e-2)
     w = 2.0 * math.pi * FREQUENCY
     position, velocity = AMPLITUDE * (1.0 - np.cos(w * t)), AMPLITUDE * w * np.sin(w * t)
     table = Reference(
         "table", time=[*t, MOVES + RESTS], position=[*position, position[-1]], velocity=[*velocity[:-1], 0.0, 0.0]
     )  # fmt: skip
-    return judged(simulate(machine, control, table, MOVES + RESTS, metered=False))
+    start = (phase * 2.0 * math.pi / machine.encoder.counts, 0.0)
+    return judged(simulate(machine, control, table, MOVES + RESTS, metered=False, initial=start))
+
+
+def usually(machine, control, phases=8):
+    """The medians over the phases of the encoder: where a loop comes to rest between two counts is chance."""
+    every = [along(machine, control, (k + 0.5) / phases) for k in range(phases)]
+    return {
+        name: float(np.median([m[name] for m in every])) for name in every[0] if every[0][name] is not None
+    }
 
 
 def calm(metrics, counts):
@@ -175,7 +184,7 @@ def test_a_stranger_whose_pid_hunts_is_told_what_to_switch_on(name):
     found = known(**numbers, off=1.04)
     advice = recommend(found, drive, axes=3, confirm=9, compensators=tuple(CATALOGUE))
     assert advice.instead is not None
-    given = along(machine, advice.instead.controller)
+    given = usually(machine, advice.instead.controller)
     assert calm(given, counts)
     belief = belief_of(found.model, drive, numbers["inertia"])
     bench = {}
