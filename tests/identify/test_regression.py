@@ -21,6 +21,7 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.smooth import Window, seen
 from stickslip.identify.regression.band_fit import Number
+from stickslip.identify.regression.band_system import inverse_of
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.identify.regression.orders import Harmonic
@@ -387,3 +388,14 @@ def test_a_long_series_is_seen_in_blocks_as_in_one_piece() -> None:
         rows = np.pad(series, reach, mode="edge")[at : at + 2 * reach + 1]
         assert whole[at] == pytest.approx(rows @ window.weights(0), rel=1e-9)
         assert slope[at] == pytest.approx(rows @ window.weights(1), rel=1e-6, abs=1e-6)
+
+
+def test_an_inverse_has_no_negative_variance_where_columns_are_tied() -> None:
+    """Columns that are one up to rounding, as an exact sine makes them."""
+    one = np.random.default_rng(4).standard_normal((60, 3))
+    columns = np.column_stack([one, one @ np.array([0.3, -0.2, 1.0]) + 1e-9 * one[:, 0]])
+    products = columns.T @ columns
+    for nudged in (products - 1e-12 * np.eye(4), products):
+        assert np.min(np.diag(inverse_of(nudged))) > 0.0
+    well = products + np.eye(4)
+    assert np.allclose(inverse_of(well) @ well, np.eye(4))

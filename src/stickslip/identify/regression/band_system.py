@@ -7,6 +7,7 @@ number is in its variance; so is a misfit that does not average out.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,6 +45,7 @@ HUNDREDTH = 2.326  # standard deviations that a normal number exceeds in one of 
 FEW = 4  # degrees of freedom, below which a variance refutes nothing
 SYSTEMATIC = 0.02  # of the misfit: what may not average out
 STIFF, LATE = 0.15, 0.2  # the same for inertia and skew, of an axis that is not stiff
+LEAST = 1e-14  # of the largest eigenvalue of products: below it there is rounding alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +62,13 @@ class Candidate:
 
 
 def inverse_of(matrix: Array) -> Array:
-    """Of a symmetric positive matrix."""
-    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+    """Of a symmetric positive matrix; what rounding made negative of it counts as hardly there."""
+    with contextlib.suppress(np.linalg.LinAlgError):
+        inverse: Array = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+        if np.min(np.diag(inverse)) > 0.0:
+            return inverse
+    sizes, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.asarray((vectors / np.maximum(sizes, LEAST * sizes[-1])) @ vectors.T, dtype=np.float64)
 
 
 def least_squares(columns: Array, target: Array) -> Array:
