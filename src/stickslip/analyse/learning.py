@@ -1,4 +1,4 @@
-"""Whether learning from repetition to repetition converges: |Q (1 - L T)| below 1 at every frequency.
+"""Whether learning from repetition to repetition converges: ``|Q (1 - L T)|`` below 1 at every frequency.
 
 The feedforward takes over the share L of the torque that the loop gave, through a low-pass Q without lag. T is the
 answer of that torque to a torque at the motor, in the sampled loop of the text that runs
@@ -46,7 +46,7 @@ class Convergence:
     Attributes
     ----------
     worst : float
-        Largest |Q (1 - L T)|: the factor by which a repetition leaves the learned torque off its limit, at most.
+        Largest ``|Q (1 - L T)|``: the factor by which a repetition leaves the learned torque off its limit, at most.
     frequency : float
         Where it is, Hz.
     rate : float

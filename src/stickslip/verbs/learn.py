@@ -159,7 +159,7 @@ def learn(
     Raises
     ------
     InputError
-        If |Q (1 - L T)| is not below 1 (`stickslip.analyse.learning`), so that learning diverges; in a line.
+        If ``|Q (1 - L T)|`` is not below 1 (`stickslip.analyse.learning`), so that learning diverges; in a line.
     SimulationError
         If a run diverges.
     """
