@@ -61,6 +61,8 @@ FINEST_NODES = 0.03
 """Half a window in radians (or e-folds) of the free motion, that need not be undercut."""
 MOST_WINDOWS = 250_000
 """Of a step, each of four nodes: half a second of work, in which nothing hears a wish to end."""
+MOST_RADIANS = 5e5
+"""Of ringing in a window, which may all be looked through for a peak: as long."""
 UNSEEN = 1e-8
 """Free motion slower than this (rad/s) adds nothing to a metric; the nodes need not follow it."""
 
@@ -140,6 +142,8 @@ def measure(
     rings = windows > fewest and has_closed_form(lin, h / fewest)
     if rings:
         windows = fewest
+        if h * math.sqrt(lin.square) > MOST_RADIANS * windows:
+            return False
     elif windows > MOST_WINDOWS:
         return False
     width = h / windows
