@@ -73,8 +73,8 @@ def test_settings_stand_beside_the_loops_own_laws():
         "friction_feedback",
         "pd",
     ]
-    assert recommending.feeds_inertia(loop)
-    assert not recommending.feeds_inertia(SampledController(LOOP, T))
+    assert loop.answers_to_acceleration
+    assert not SampledController(LOOP, T).answers_to_acceleration
 
 
 def test_the_tables_of_a_controller_are_that_controller(tmp_path):

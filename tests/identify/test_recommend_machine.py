@@ -143,8 +143,8 @@ def test_a_loop_feeds_the_inertia_where_its_torque_answers_to_the_acceleration()
         ({"feedforward": ControlBlock("inertia_feedforward", inertia=0.0, offset=0.1)}, False),
         ({"observer": ControlBlock("disturbance_observer", inertia=INERTIA, corner=400.0)}, False),
     ):
-        assert recommending.feeds_inertia(SampledController(pd, 1e-3, **more)) is feeds
+        assert SampledController(pd, 1e-3, **more).answers_to_acceleration is feeds
     own = ControlBlock(
         str(OWN), inertia=INERTIA, slope=62.8, torque=0.45, layer=0.5
     )  # a loop that feeds it itself
-    assert recommending.feeds_inertia(SampledController(own, 1e-3)) is True
+    assert SampledController(own, 1e-3).answers_to_acceleration is True

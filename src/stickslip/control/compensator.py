@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from stickslip.errors import ParameterError
 from stickslip.model import Model
@@ -89,6 +89,12 @@ class Compensator:
         names = ("lead", "deadband", "offset", "inertia_feedforward")
         set_here = [name for name in names if getattr(self, name) != 0.0]
         return (*set_here, *(["substeps"] if self.substeps != 1 else []))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data that says everything about it."""
+        numbers = ("gain", "filter_hz", "lead", "deadband", "offset", "inertia_feedforward", "substeps")
+        own = {name: getattr(self, name) for name in numbers}
+        return {"kind": self.name, **own, **self.model.as_dict()}
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from stickslip.control.compensator import Compensator
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import ParameterError
+
+if TYPE_CHECKING:
+    from stickslip.control_spec import ControlLaw
+    from stickslip.model import Model
 
 __all__ = ["Controller", "highest_corner"]
 
@@ -92,3 +98,50 @@ class Controller:
             raise ParameterError(
                 f"controller: {name} needs a sampled controller; give a sample_time greater than 0"
             )
+
+    # ---- as a `SampledController` says it ------------------------------------------------------------------
+
+    @property
+    def frictions(self) -> dict[str, Model]:
+        """The friction laws that it holds, by what a record calls them."""
+        return {"compensator": self.compensator.model} if self.compensator else {}
+
+    @property
+    def control_laws(self) -> tuple[ControlLaw, ...]:
+        """The control laws that its user chose: none, these are gains."""
+        return ()
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether a friction law in it acts on what is measured."""
+        return self.compensator is not None and self.compensator.velocity == "measured"
+
+    @property
+    def answers_to_acceleration(self) -> bool:
+        """Whether the torque depends on the reference's acceleration alone."""
+        return self.compensator is not None and self.compensator.inertia_feedforward != 0.0
+
+    def holding(self, change: Callable[[Model], Model]) -> Controller:
+        """The controller whose friction law is what `change` makes of it."""
+        if self.compensator is None:
+            return self
+        return replace(self, compensator=replace(self.compensator, model=change(self.compensator.model)))
+
+    def values(self) -> dict[str, float]:
+        """The gains of its linear part by name."""
+        return dict(self.gains._asdict())
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data that says everything about it."""
+        return {
+            **self.described(),
+            "sample_time": self.sample_time,
+            "torque_limit": self.torque_limit,
+            "encoder_counts": self.encoder_counts,
+            "velocity_filter": self.velocity_filter,
+        }
+
+    def described(self) -> dict[str, Any]:
+        """What a record says of it."""
+        compensator = self.compensator
+        return {"gains": self.values(), **({"compensator": compensator.as_dict()} if compensator else {})}

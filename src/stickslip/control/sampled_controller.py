@@ -13,7 +13,7 @@ from typing import Any, cast
 from stickslip.control.block import ControlBlock, fields_in, state_fields_in, within
 from stickslip.control.composition import MEMORY, Settings, functions_with
 from stickslip.control.continuous import Continuous, continuous_form, refuse_windup
-from stickslip.control_spec import PLACES
+from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.errors import ParameterError, suggestion
 from stickslip.model import Model
 from stickslip.spec import Field, Learned, Surroundings, fields_of, packed
@@ -228,6 +228,21 @@ class SampledController:
         """The memory of the composition at the start."""
         return SimpleNamespace(**{f.name: 0.0 for f in MEMORY})
 
+    @functools.cached_property
+    def frictions(self) -> dict[str, Model]:
+        """The friction laws that its laws hold, by the names of their parts."""
+        return {part: block.friction for part, block in self.blocks.items() if block.friction}
+
+    @property
+    def control_laws(self) -> tuple[ControlLaw, ...]:
+        """The control laws that it is made of."""
+        return tuple(block.law for block in self.blocks.values())
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether a friction law in it acts on what is measured."""
+        return any(b.law.place == "observer" and b.friction for b in self.blocks.values())
+
     def holding(self, change: Callable[[Model], Model]) -> SampledController:
         """The controller whose friction laws are what `change` makes of them."""
         places: dict[str, list[ControlBlock]] = {place: [] for place in PLACES}
@@ -305,6 +320,10 @@ class SampledController:
             "torque_limit": self.torque_limit,
             "encoder_counts": self.encoder_counts,
         }
+
+    def described(self) -> dict[str, Any]:
+        """What a record says of it."""
+        return {"controller": self.as_dict()}
 
 
 def _listed(blocks: Blocks) -> list[ControlBlock]:

@@ -15,7 +15,7 @@ from stickslip.errors import InputError
 from stickslip.record import Record
 from stickslip.spec import Law
 from stickslip.study.plan import Study, load, load_run
-from stickslip.study.planned_run import PlannedRun, frictions_of
+from stickslip.study.planned_run import PlannedRun
 
 __all__ = ["bibliography", "cited_by", "citing"]
 
@@ -128,7 +128,7 @@ def _of_study(study: Study) -> Iterator[str]:
 def _of_runs(runs: Sequence[PlannedRun]) -> Iterator[str]:
     for run in runs:
         yield from _of_law(run.axis.friction.law)
-        for model in frictions_of(run.control):
+        for model in run.control.frictions.values():
             yield from _of_law(model.law)
         yield from INTEGRATORS.get(run.numerics.integrator, ())
 

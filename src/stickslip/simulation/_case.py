@@ -6,12 +6,11 @@ Kernels share the columns of the rows they write, the codes they end with, and t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.control.compensator import Compensator
 from stickslip.control.composed import continuous_of
 from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
@@ -30,9 +29,6 @@ __all__ = [
     "Outcome",
     "Side",
     "StepBudget",
-    "controller_told",
-    "feeds_back",
-    "held_in",
     "lay_out",
     "ruled",
     "ruled_in",
@@ -66,22 +62,6 @@ NO_COMPENSATOR, FROM_REFERENCE, FROM_MEASUREMENT = 0.0, 1.0, 2.0
 
 STORM_EVENTS, STORM_TIME = 4000, 5e-3
 """More switches than this within this time (s) end a run."""
-
-
-def controller_told(controller: Controller | SampledController) -> dict[str, Any]:
-    """What a record says of a controller."""
-    if isinstance(controller, SampledController):
-        return {"controller": controller.as_dict()}
-    return {"gains": controller.gains._asdict(), **_compensator_told(controller.compensator)}
-
-
-def _compensator_told(compensator: Compensator | None) -> dict[str, Any]:
-    """The same of a compensator; nothing where there is none."""
-    if compensator is None:
-        return {}
-    numbers = ("gain", "filter_hz", "lead", "deadband", "offset", "inertia_feedforward", "substeps")
-    own = {name: getattr(compensator, name) for name in numbers}
-    return {"compensator": {"kind": compensator.name, **own, **compensator.model.as_dict()}}
 
 
 @dataclass(frozen=True)
@@ -217,28 +197,7 @@ def ruled_in(
     controller: Controller | SampledController, slip_rule: str | None
 ) -> Controller | SampledController:
     """The controller whose friction laws are under a run's slip rule, as `ruled` has it."""
-    if slip_rule is None:
-        return controller
-    if isinstance(controller, SampledController):
-        return controller.holding(lambda model: ruled(model, slip_rule))
-    compensator = controller.compensator
-    if compensator is None:
-        return controller
-    return replace(controller, compensator=replace(compensator, model=ruled(compensator.model, slip_rule)))
-
-
-def held_in(controller: Controller | SampledController) -> dict[str, Model | None]:
-    """The friction laws in a controller, by what a record calls them."""
-    if isinstance(controller, SampledController):
-        return {part: block.friction for part, block in controller.blocks.items() if block.friction}
-    return {"compensator": controller.compensator and controller.compensator.model}
-
-
-def feeds_back(controller: Controller | SampledController) -> bool:
-    """Whether a friction law in the controller acts on what is measured."""
-    if isinstance(controller, SampledController):
-        return any(b.law.place == "observer" and b.friction for b in controller.blocks.values())
-    return controller.compensator is not None and controller.compensator.velocity == "measured"
+    return controller if slip_rule is None else controller.holding(lambda model: ruled(model, slip_rule))
 
 
 class StepBudget(NamedTuple):

@@ -32,8 +32,6 @@ from stickslip.simulation._case import (
     UNITS,
     Case,
     Outcome,
-    controller_told,
-    held_in,
     lay_out,
     slip_rules,
 )
@@ -346,7 +344,7 @@ def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
         "what": "simulation",
         "version": stickslip.__version__,
         **how,
-        "slip_rules": slip_rules(friction=plant, **held_in(controller)),
+        "slip_rules": slip_rules(friction=plant, **controller.frictions),
         "tolerance": float(case.numbers[_case.TOLERANCE]),
         "duration": float(case.numbers[_case.DURATION]),
         "ended": outcome.time,
@@ -354,7 +352,7 @@ def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
         "friction": plant.as_dict(),
         "reference": case.reference.as_dict(),
         "counts": outcome.counts,
-        **controller_told(controller),
+        **controller.described(),
     }
     if case.numbers[_case.METERED] and outcome.code == _case.DONE:
         meta["metrics"] = {k: float(v) for k, v in metrics(outcome.meter, outcome.turns).items()}

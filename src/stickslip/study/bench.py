@@ -26,7 +26,7 @@ from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.study import build, files
 from stickslip.study.bench_metrics import judged
-from stickslip.study.planned_run import control_laws_of, described, frictions_of
+from stickslip.study.planned_run import described
 from stickslip.study.provenance import engine_hash, source_hash
 
 __all__ = ["BENCH", "COUNTS", "BenchResult", "BenchRun", "is_bench", "planned", "read_bench", "run_bench"]
@@ -145,7 +145,7 @@ def hash_of(machine: Machine) -> str:
 
 def hash_of_control(control: SampledController) -> str:
     """Of a controller, and of the text of its laws."""
-    laws = [*(m.law for m in frictions_of(control)), *control_laws_of(control)]
+    laws = [*(m.law for m in control.frictions.values()), *control.control_laws]
     return hashed([control.as_dict(), [source_hash(law.Params.__module__) for law in laws]])
 
 

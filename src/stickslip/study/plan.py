@@ -16,7 +16,7 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.study import build
 from stickslip.study.build import Numerics, Placement
-from stickslip.study.planned_run import FAMILIES, OWN, PlannedRun, frictions_of
+from stickslip.study.planned_run import FAMILIES, OWN, PlannedRun
 from stickslip.study.result import Run
 
 __all__ = [
@@ -210,7 +210,7 @@ def _axis(table: Table, files: Mapping[str, Any]) -> RigidAxis | Machine:
 def named_rule(rule: str | None, axis: RigidAxis | Machine, control: Controller | SampledController) -> str:
     """The rule by which a run's name calls it: what its file gives; where it gives none, "own" if one of its laws
     brings another one than the default."""
-    kept = {m.law.option_of("slip_rule") for m in (axis.friction, *frictions_of(control))} - {""}
+    kept = {m.law.option_of("slip_rule") for m in (axis.friction, *control.frictions.values())} - {""}
     return rule or (OWN if kept - {SLIP_RULES[0]} else SLIP_RULES[0])
 
 

@@ -12,18 +12,17 @@ from typing import Any
 
 from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
-from stickslip.control_spec import ControlLaw
 from stickslip.errors import ConfigError, InputError, SimulationError
 from stickslip.machines.machine import Machine
 from stickslip.machines.numbers import machine_numbers
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.model import Reference
 from stickslip.record import Record
 from stickslip.simulation.closed_loop import check_machine_run, integrator_for, prepare, run_case, simulate
 from stickslip.study.build import Numerics
 from stickslip.study.provenance import engine_hash, source_hash
 
-__all__ = ["OWN", "Executed", "PlannedRun", "control_laws_of", "described", "frictions_of"]
+__all__ = ["OWN", "Executed", "PlannedRun", "described"]
 
 OWN = "own"
 """What stands for the slip rule in the name of a run whose laws keep rules of their own."""
@@ -80,21 +79,17 @@ class PlannedRun:
 
     def content(self) -> dict[str, Any]:
         """What the fingerprint is made of."""
-        laws = [self.axis.friction.law, *(m.law for m in frictions_of(self.control))]
+        laws = [self.axis.friction.law, *(m.law for m in self.control.frictions.values())]
         return {
             "slip_rule": self.slip_rule,
             "inertia": self.axis.inertia,
             "friction": self.axis.friction.as_dict(),
             **({"machine": described(self.axis)} if isinstance(self.axis, Machine) else {}),
-            **(
-                {"controller": self.control.as_dict()}
-                if isinstance(self.control, SampledController)
-                else _control_content(self.control)
-            ),
+            "controller": self.control.as_dict(),
             "reference": self.motion.as_dict(),
             "duration": self.duration,
             "numerics": asdict(self.numerics),
-            "laws": [source_hash(law.Params.__module__) for law in (*laws, *control_laws_of(self.control))],
+            "laws": [source_hash(law.Params.__module__) for law in (*laws, *self.control.control_laws)],
             "engine": engine_hash(),
         }
 
@@ -152,39 +147,3 @@ def described(machine: Machine) -> dict[str, Any]:
     return {**machine_numbers(machine), **machine.as_dict(), "sample_time": machine.sample_time,
             "converters": repr((machine.amplifier, machine.sensor, machine.cogging, machine.contact.ripple)),
             "models": laws}  # fmt: skip
-
-
-def frictions_of(control: Controller | SampledController) -> list[Model]:
-    """The friction laws that a controller holds."""
-    if isinstance(control, SampledController):
-        return [block.friction for block in control.blocks.values() if block.friction]
-    return [control.compensator.model] if control.compensator else []
-
-
-def control_laws_of(control: Controller | SampledController) -> list[ControlLaw]:
-    """The control laws that a controller is made of."""
-    blocks = control.blocks.values() if isinstance(control, SampledController) else ()
-    return [block.law for block in blocks]
-
-
-def _control_content(control: Controller) -> dict[str, Any]:
-    """What determines the numbers of a controller with gains and a compensator."""
-    compensator = control.compensator
-    sampled = [compensator.lead, compensator.deadband] if compensator and compensator.sampled else []
-    if compensator and (compensator.offset or compensator.inertia_feedforward):
-        sampled += [compensator.offset, compensator.inertia_feedforward]
-    if compensator and compensator.substeps != 1:
-        sampled += ["substeps", compensator.substeps]
-    filtered = [control.velocity_filter] if control.velocity_filter else []
-    return {
-        "gains": control.gains._asdict(),
-        "compensator": compensator
-        and [
-            compensator.name,
-            compensator.gain,
-            compensator.filter_hz,
-            compensator.model.as_dict(),
-            *sampled,
-        ],
-        "control": [control.torque_limit, control.sample_time, control.encoder_counts, *filtered],
-    }

@@ -149,7 +149,7 @@ def checked(
 
     perturbed(np.arange(len(flagged)), 1.0)
     unmoved = np.flatnonzero(~flagged)
-    if unmoved.size and _case.feeds_back(planned.control):
+    if unmoved.size and planned.control.feeds_back:
         # It acts on the motion itself, which may turn where the tolerance does not see it, wrong steps or not.
         flagged[unmoved] = differs(unmoved, again(unmoved, TIGHTER[0]), SURE)
     for times in TIGHTER:

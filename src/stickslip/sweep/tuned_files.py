@@ -7,7 +7,6 @@ import json
 import os
 from pathlib import Path
 
-from stickslip.control.sampled_controller import SampledController
 from stickslip.study.files import unwritable
 from stickslip.sweep.plan import Sweep
 from stickslip.sweep.tune import Tuned
@@ -45,5 +44,4 @@ def tuned_gains(tuned: Tuned) -> dict[str, float]:
     """The linear gains of the chosen setting, for the drive; of a controller made of control laws all its numbers."""
     from stickslip.sweep.numbers import varied
 
-    control = varied(tuned.run, dict(zip(tuned.names, tuned.after.tolist()))).control
-    return control.values() if isinstance(control, SampledController) else control.gains._asdict()
+    return varied(tuned.run, dict(zip(tuned.names, tuned.after.tolist()))).control.values()

@@ -16,8 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.control.controller import Controller
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.monte_carlo import sliding_torque, with_values
@@ -201,7 +199,7 @@ def recommend(
         axes = confirm = 0  # Nothing of the friction would be drawn.
     laws = laws_of(cautious(found))
     offset = float(found.axis.get("offset", 0.0) or 0.0)
-    fed = float(j) if feed_inertia and not feeds_inertia(linear) else 0.0
+    fed = float(j) if feed_inertia and not linear.answers_to_acceleration else 0.0
     settings = [replace(setting, offset=offset) for setting in settings_of(laws, drive, fed)]
     # Each with the linear controller alone; then leads, the guard and the gains beyond.
     more = (axes + 1) * (len(LEADS) + 1 + len(BEYOND)) + (confirm + 1) * (3 + len(BEYOND))
@@ -244,20 +242,10 @@ def recommend(
         *notes_on(found, chosen, candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine),
     ]  # fmt: skip
     return Recommendation(
-        chosen, laws[chosen.setting.law] if chosen else None, numbers_of(linear),
+        chosen, laws[chosen.setting.law] if chosen else None, linear.values(),
         first.moving["position_rms_rad"], margin, unsafe_gain, tuple(candidates), len(bench.plants),
         tuple(notes), drive, rung, float(j), beside, hunts,
     )  # fmt: skip
-
-
-def feeds_inertia(loop: Controller | SampledController) -> bool:
-    """Whether the loop feeds the inertia forward itself."""
-    return isinstance(loop, SampledController) and loop.answers_to_acceleration
-
-
-def numbers_of(loop: Controller | SampledController) -> dict[str, float]:
-    """Gains of a linear controller; of one made of control laws the parameters of all of them."""
-    return loop.values() if isinstance(loop, SampledController) else dict(loop.gains._asdict())
 
 
 def with_motion(found: Identified, drive: Drive) -> Drive:

@@ -23,7 +23,7 @@ from stickslip.model import Reference
 from stickslip.record import Record
 from stickslip.simulation._case import COLUMNS as OF_AXES
 from stickslip.simulation._case import UNITS as OF_AXES_UNITS
-from stickslip.simulation._case import controller_told, held_in, ruled, ruled_in, slip_rules
+from stickslip.simulation._case import ruled, ruled_in, slip_rules
 from stickslip.simulation._meter import (
     MAX_WINDOW,
     SIGNALS,
@@ -137,7 +137,7 @@ def sampled_on(
     if isinstance(controller, Controller):
         controller = _filtered_as(controller, machine)
     own = replace(ruled_in(controller, slip_rule), sample_time=machine.sample_time)
-    return compiled(own), {**controller_told(own), "laws": held_in(own)}
+    return compiled(own), {**own.described(), "laws": own.frictions}
 
 
 def _filtered_as(controller: Controller, machine: Machine) -> Controller:
