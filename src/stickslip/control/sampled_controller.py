@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import linecache
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from stickslip.control.block import ControlBlock, fields_in, state_fields_in, within
+from stickslip.control.calls import calls_of
 from stickslip.control.composition import MEMORY, Settings, functions_with
 from stickslip.control.continuous import Continuous, continuous_form, refuse_windup
 from stickslip.control_spec import PLACES, ControlLaw
@@ -142,7 +142,7 @@ class SampledController:
     @functools.cached_property
     def functions(self) -> dict[str, Callable[..., float]]:
         """The functions of `stickslip.control.composition` with its laws in their places."""
-        return functions_with(_written(self.blocks))
+        return functions_with(calls_of(self.blocks))
 
     @functools.cached_property
     def continuous(self) -> Continuous:
@@ -360,51 +360,3 @@ def _at(whole: Any, path: Sequence[str]) -> Any:
     for name in path:
         whole = getattr(whole, name)
     return whole
-
-
-# ---- the functions that call the laws -----------------------------------------------------------------------------
-
-SUMS = {
-    "estimate": ("estimator", "sample", "Velocity by the estimator, rad/s."),
-    "feedforwards": ("feedforward", "sample", "Torque of the feedforwards, N·m."),
-    "accelerations": (
-        "feedforward", "accelerating", "The part of the feedforwards that accelerates the nominal inertia, N·m.",
-    ),
-    "observers": ("observer", "sample", "Torque of the observers, N·m."),
-    "loops": ("loop", "sample", "Torque of the control loop, N·m."),
-}  # fmt: skip
-
-
-def _written(blocks: Mapping[str, ControlBlock]) -> dict[str, Callable[..., float]]:
-    """The functions of `SUMS` and `left_over` of these laws."""
-    lines: list[str] = []
-    scope: dict[str, Any] = {}
-    for name, (place, function, about) in SUMS.items():
-        parts = [
-            part
-            for part, block in blocks.items()
-            if block.law.place == place and getattr(block.law, function) is not None
-        ]
-        calls = [f"{part}_{function}(m, z.{part}, p.{part}, u)" for part in parts]
-        # One call a line: languages that pass structures by value have no other place for it.
-        lines += [
-            f"def {name}(m, z, p, u):",
-            f'    """{about}"""',
-            f"    torque = {calls[0] if calls else '0.0'}",
-        ]
-        lines += [*(f"    torque += {call}" for call in calls[1:]), "    return torque", ""]
-        scope |= {f"{part}_{function}": blocks[part].function(function) for part in parts}
-    able = [part for part, block in blocks.items() if block.law.take_over]
-    scope |= {f"{part}_take_over": blocks[part].function("take_over") for part in able}
-    lines += [
-        "def left_over(missing, m, z, p, u):",
-        '    """What they cannot take over of a missing torque, N·m."""',
-    ]
-    lines += [f"    missing = {part}_take_over(missing, m, z.{part}, p.{part}, u)" for part in able]
-    lines += ["    return missing", ""]
-    text = "\n".join(lines)
-    # The translation reads a function's text, as it does that of a file.
-    file = f"<controller of {', '.join(f'{part}: {block.law.name}' for part, block in blocks.items())}>"
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-    exec(compile(text, file, "exec"), scope)
-    return {name: scope[name] for name in (*SUMS, "left_over")}
