@@ -68,12 +68,15 @@ def test_whatever_the_numbers_depend_on_asks_anew(made: list[str]) -> None:
     assert regress([trial], AXIS).numbers["fc"].value > 2.9 * first.numbers["fc"].value
 
 
-def test_doctor_and_identification_of_the_command_line_share_theirs(made: list[str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", [["--inverse"], ["--law", "coulomb"]])
+def test_doctor_and_identification_of_the_command_line_share_theirs(
+    how: list[str], made: list[str], tmp_path: Path
+) -> None:
     trial = record()
     assert trial.drive is not None
     table = np.column_stack([trial.time, trial.position, trial.drive])
     log = tmp_path / "log.csv"
     head = "time [s],position [rad],torque [N·m]"
     np.savetxt(log, table, delimiter=",", header=head, comments="", encoding="utf-8")
-    assert main(["identify", str(log), "--inverse", "--no-report", "--out", str(tmp_path / "out")]) == 0
+    assert main(["identify", str(log), *how, "--no-report", "--out", str(tmp_path / "out")]) == 0
     assert made == ["record"]

@@ -22,7 +22,7 @@ from stickslip.identify.fit.axis_start import feasible
 from stickslip.identify.fit.parallel import mapped
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.observer.innovations import BAND, FIRST, Criterion, robust_std
-from stickslip.identify.observer.observer import Prepared, prepare
+from stickslip.identify.observer.observer import Motion, Prepared, prepare
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
@@ -115,21 +115,31 @@ def foreseen(
     # Weighed for all as by the law that lacks least where it was fitted.
     criterion, u = min(found.values(), key=lambda f: robust_std(replace(f[0], whitening=FIRST).white(f[1])))
     weights = criterion.adapted(u)
-    return [
-        foreseen_by(law, *found[law.name], weights, held, abs(inverse.coulomb)) if law.name in found
-        else failed(law, failures[law.name])
-        for law in laws
-    ]  # fmt: skip
+    seen = [motion_of(t) for t in held]
+
+    def judge(law: Law) -> Candidate:
+        if law.name not in found:
+            return failed(law, failures[law.name])
+        return foreseen_by(law, *found[law.name], weights, held, seen, abs(inverse.coulomb))
+
+    return mapped(judge, laws)
 
 
 def foreseen_by(
-    law: Law, criterion: Criterion, u: Array, weights: Criterion, held: Sequence[Trial], friction: float
+    law: Law,
+    criterion: Criterion,
+    u: Array,
+    weights: Criterion,
+    held: Sequence[Trial],
+    motions: Sequence[Motion],
+    friction: float,
 ) -> Candidate:
     """What one law, fitted, lacks on the held-out data, with the weights common to all."""
     inertia = criterion.vector.named(u)["inertia"]
     own = replace(weights, law=law, vector=criterion.vector, mechanics=criterion.mechanics)
     squares = np.concatenate([
-        lacking(own, prepare(motion_of(t), law, inertia, friction, min(BAND, 0.1 / t.period)), u, t) for t in held
+        lacking(own, prepare(m, law, inertia, friction, min(BAND, 0.1 / t.period)), u, t)
+        for t, m in zip(held, motions, strict=True)
     ])  # fmt: skip
     if squares.size < BLOCKS:
         raise InputError("the part held out is too short to judge laws on")

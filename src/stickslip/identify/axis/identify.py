@@ -176,7 +176,9 @@ def looked_at(
     per_direction: bool, regress: Regress,
 ) -> tuple[Evidence, list[str]]:  # fmt: skip
     """What the regressions tell, the torque of every record moved to where it acted; and what is to be said."""
-    sliding, notes = regressed(trials, axis, skew, extras.harmonic_period, regress)
+    # A turn is what the regression takes where no period is given: so the doctor has asked before.
+    period = None if extras.harmonic_period == Extras().harmonic_period else extras.harmonic_period
+    sliding, notes = regressed(trials, axis, skew, period, regress)
     trials, validation = aligned(trials, sliding), aligned(validation, sliding)
     inverse, more = first_look(trials, axis, extras, per_direction)
     unchecked = sliding is None and all(t.drive is not None for t in trials)

@@ -28,6 +28,7 @@ import numpy as np
 
 from stickslip.identify.fit.jackknife import leave_blocks_out
 from stickslip.identify.fit.noise import white_std
+from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.trial import Trial
 from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
@@ -253,8 +254,6 @@ def means(trial: Trial, columns: Array, length: int, delay: int) -> Means:
 
 def with_intervals(x: Array, u: Array, time: Array, velocity_noise: float) -> tuple[Array, Array]:
     """Gains and the half-widths of their 95 % intervals, each of shape (4,)."""
-    from scipy import special
-
     kd, count = GAINS.index("kd"), len(GAINS)
     scale = scales(x)
     values = solved(x, u)
@@ -262,7 +261,7 @@ def with_intervals(x: Array, u: Array, time: Array, velocity_noise: float) -> tu
     spread = leave_blocks_out(x / scale, u - x @ values, blocks, 1e-9 * u.size * np.eye(count + 1))
     freedom = [max(spread.freedom(row) - 1.0, 1.0) for row in np.eye(count + 1)]
     std = np.sqrt(np.diag(spread.covariance)) / scale
-    half: Array = special.stdtrit(np.array(freedom), 0.975) * std
+    half: Array = np.array([student_quantile(n) for n in freedom]) * std
     # Without the noise of the velocity in the normal equations they would be these (``fuller1987``).
     normal = (x / scale).T @ (x / scale) / u.size
     own = own_variance(x, kd)

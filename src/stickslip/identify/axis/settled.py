@@ -8,19 +8,21 @@ as far as the intervals and physics allow it.
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.estimate import Estimate
+from stickslip.identify.fit.bounded import bounded_solution
 from stickslip.identify.fit.uncertainty import RATIO, SHARE
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.model import Model
+from stickslip.simulation.prescribed.steady import Steady
 
 __all__ = ["ALIKE", "settled"]
 
@@ -55,15 +57,18 @@ class Settling:
         inverse = self.inverse
         return inverse.matrix[:, inverse.names.index(PLAIN.get(name, name))]
 
+    @cached_property
+    def steady(self) -> Steady:
+        """The law at the velocities of the record."""
+        return Steady(self.model.law, self.inverse.velocity, np.sign(self.inverse.velocity))
+
     def curve(self, values: Mapping[str, float]) -> Array:
         """What friction's curve has beside level and slope, N·m (N), shape (n,)."""
         law = self.model.law
-        assert law.steady is not None
         own = {f.name for f in law.fields}
         p = self.model.parameters._replace(**{k: v for k, v in values.items() if k in own})
         v = self.inverse.velocity
-        steady = np.array([law.steady(float(x), p) for x in v])
-        return steady - values["fc"] * np.sign(v) - values["sigma2"] * v
+        return self.steady.torque(np.array(law.pack(p))) - values["fc"] * np.sign(v) - values["sigma2"] * v
 
     def solved(
         self, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], level: bool,
@@ -76,9 +81,8 @@ class Settling:
         out, torque = dict(values), self.inverse.torque
         names, free = [n for n in (*PLAIN, *GRAVITY) if n in out], list(bounds)
         columns = np.column_stack([self.column(n) for n in free]) if free else np.zeros((torque.size, 0))
-        size = np.linalg.norm(columns, axis=0)
-        size = np.where(size > 0.0, size, 1.0)
-        low, high = (size * np.array([bounds[n][k] for n in free]) for k in (0, 1))
+        low, high = (np.array([bounds[n][k] for n in free]) for k in (0, 1))
+        high = np.maximum(high, np.nextafter(low, np.inf))
         held = [n for n in free if tie > 0.0 and n in (halves or {})]
         pull = tie * float(np.linalg.norm(torque)) / np.array([(halves or {})[n] for n in held])
         ties = pull[:, None] * np.array([[float(n == m) for m in free] for n in held]).reshape(
@@ -90,7 +94,7 @@ class Settling:
             target = torque - known - (self.curve(out) if bent and not level else 0.0)
             if free:
                 target = np.concatenate([target, pull * np.array([values[n] for n in held])])
-                found = bounded(np.vstack([columns, ties]) / size, target, low, high) / size
+                found = bounded_solution(np.vstack([columns, ties]), target, low, high)
                 out |= dict(zip(free, found.tolist(), strict=True))
         if level and "fs" in out:
             out["fs"] = out["fc"]
@@ -143,13 +147,6 @@ class Settling:
             else:
                 high = tie
         return best
-
-
-def bounded(columns: Array, target: Array, low: Array, high: Array) -> Array:
-    """Least squares within bounds."""
-    optimize: Any = importlib.import_module("scipy.optimize")  # it carries no types
-    found = optimize.lsq_linear(columns, target, (low, np.maximum(high, np.nextafter(low, np.inf))))
-    return np.asarray(found.x, dtype=np.float64)
 
 
 def settled(

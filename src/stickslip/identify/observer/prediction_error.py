@@ -38,6 +38,7 @@ from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parallel import mapped
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.fit.sample_rate_limit import of_slow_motion, unseen_refused
+from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.fit.uncertainty import interval_of, verdict_on
 from stickslip.identify.observer.innovations import BAND, Criterion, MakeMechanics, student_weight
 from stickslip.identify.observer.observer import EXACT, GRASP, ROUGH, Motion, Prepared, prepare
@@ -278,8 +279,6 @@ def estimates_of(
 
     `slow` names what only slow motion tells.
     """
-    from scipy import special
-
     values = vector.values(u)
     change = vector.jacobian(u)
     out: list[Estimate] = []
@@ -289,7 +288,7 @@ def estimates_of(
         std = math.sqrt(variance) if variance >= 0.0 else math.inf
         std *= CAUTION if p.name in slow else 1.0
         dof = max(spread.freedom(change[k]) - 1.0, 1.0)
-        width = float(special.stdtrit(dof, 0.975))
+        width = student_quantile(dof)
         low, high = interval_of(p, float(values[k]), width * std, None)
         scale = signed_scale.get(p.name, math.nan) if isinstance(signed_scale, Mapping) else signed_scale
         why = verdict_on(p, float(values[k]), low, high, Noise(1.0, "residual", dof), scale)

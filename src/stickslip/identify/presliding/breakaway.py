@@ -7,7 +7,6 @@ while the torque rises, only the first break of a ramp counts: what breaks later
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
+from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.sliding.levels import slope_of
 from stickslip.record import Record, encoder_step
 
@@ -225,12 +225,6 @@ def count_notes(records: Sequence[Record], threshold: float) -> list[str]:
     ]
 
 
-def student(dof: int) -> float:
-    """97.5 % quantile of Student's distribution."""
-    special: Any = importlib.import_module("scipy.special")
-    return float(special.stdtrit(dof, 0.975))
-
-
 def mean_estimate(name: str, values: Array, systematic: float = 0.0) -> Estimate:
     """A mean with its Student interval, and half an interval (N·m) that repeats do not show; none below 0."""
     mean = float(np.mean(values))
@@ -239,7 +233,7 @@ def mean_estimate(name: str, values: Array, systematic: float = 0.0) -> Estimate
             name, "N·m", "F_S", max(mean, 0.0), math.nan, 0.0, math.inf, False, "one break-away has no spread"
         )
     std = float(np.std(values, ddof=1)) / math.sqrt(values.size)
-    half = math.hypot(student(values.size - 1) * std, systematic)
+    half = math.hypot(student_quantile(values.size - 1) * std, systematic)
     low, high = max(mean - half, 0.0), max(mean + half, 0.0)
     why = "" if high <= 2.0 * low else "the break-aways scatter too much for their number"
     if not mean > 0.0:
@@ -266,7 +260,7 @@ def rate_effect(breaks: Sequence[Break]) -> Estimate | None:
     if dof < 1:
         return None
     std = math.sqrt(float(np.sum((matrix @ solved - values) ** 2)) / dof * float(inverse[0, 0]))
-    half = student(dof) * std
+    half = student_quantile(dof) * std
     value = float(solved[0])
     why = "" if half <= 0.05 * float(np.mean(values)) else "the break-aways scatter too much for their number"
     return Estimate("rate_effect", "N·m", "dF_S", value, std, value - half, value + half, not why, why)
