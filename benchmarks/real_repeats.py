@@ -170,7 +170,8 @@ def identified(task: tuple[str, ServoAxis, list[Trial], int, bool]) -> Part:
             for n in NAMES.keys() & found.keys():
                 value, low, high = found[n]
                 size = max(abs(value), level if n == "offset" else 0.0)
-                part.own[n] = (value, low, high, not regression.doubt and high - low <= 0.5 * size)
+                doubt = regression.doubt or (n == "fc" and regression.level_doubt)
+                part.own[n] = (value, low, high, not doubt and high - low <= 0.5 * size)
         else:
             result = identify_axis([trial], axis)
             part.law = result.model.law.name

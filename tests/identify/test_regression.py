@@ -358,6 +358,21 @@ def test_friction_is_not_believed_where_the_axis_does_not_follow(logs: Any) -> N
     assert calm.doubt == ""
 
 
+def test_a_level_that_friction_has_not_fallen_to_is_not_identified(logs: Any) -> None:
+    """A sine no faster than twice the Stribeck velocity: viscous friction is a fortieth of the level."""
+    slow = logs.draw(230005, "held", 1000, "p-pi", "sine", "clean")
+    found = regress_axis([trial(slow)], AXIS)
+    assert abs(found.numbers["fc"].value / slow.truth["fc"] - 1.0) > 0.1
+    low, high = found.interval("fc")
+    assert low < slow.truth["fc"] < high < 2.0 * low
+    assert found.level_doubt.startswith("extrapolated")
+    level = identify_axis([trial(slow)], AXIS, ["coulomb"])["fc"]
+    assert not level.identified
+    assert level.verdict == found.level_doubt
+    fast = regress_axis([trial(logs.draw(4, "held", 1000, "p-pi", "production", "clean"))], AXIS)
+    assert fast.level_doubt == ""
+
+
 def test_a_harmonic_that_no_row_resolves_explains_nothing() -> None:
     """Fast rows damp it to 0 throughout."""
     residual = np.random.default_rng(1).standard_normal(50)

@@ -158,7 +158,7 @@ def agreed(
         if e.name not in sliding or e.name not in parameters:
             continue
         size = scale.get(e.name, math.nan)
-        own = told(e, parameters[e.name], *sliding[e.name], size)
+        own = seen(told(e, parameters[e.name], *sliding[e.name], size), found)
         apart = abs(e.value - own.value) > math.hypot(e.upper - e.lower, own.upper - own.lower) / 2.0
         if fine and not apart:
             # Its intervals are narrow, and hold where the torque acted as simulations take it.
@@ -168,12 +168,12 @@ def agreed(
             doubts = DOUBT.format(name=e.name, other=f"{e.value:.4g}", own=f"{own.value:.4g} {e.unit}")
         if stands:
             own, said = held_together(own, plain_value(e.name, inverse), parameters[e.name], size)
-            notes += said
+            own, notes = seen(own, found), [*notes, *said]
         taken[e.name] = own
     if doubts:
         # Where both disagree on what both can tell, neither value nor interval of the fine one is to be trusted.
         taken |= {
-            e.name: told(e, parameters[e.name], *sliding[e.name], scale.get(e.name, math.nan))
+            e.name: seen(told(e, parameters[e.name], *sliding[e.name], scale.get(e.name, math.nan)), found)
             for e in estimates if taken.get(e.name) is e
         }  # fmt: skip
         notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
@@ -201,6 +201,13 @@ def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale
     value, low, high = (min(max(x, least), p.par.upper) for x in (value, low, high))
     why = verdict_on(p, value, low, high, Noise(1.0, "residual", math.inf), scale)
     return replace(e, value=value, std=std, lower=low, upper=high, identified=not why, verdict=why)
+
+
+def seen(e: Estimate, found: Regression) -> Estimate:
+    """The estimate, not identified where it is a level that certain sliding does not reach."""
+    if e.name != "fc" or not e.identified or not found.level_doubt:
+        return e
+    return replace(e, identified=False, verdict=found.level_doubt)
 
 
 PLAIN = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}

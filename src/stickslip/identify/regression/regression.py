@@ -22,6 +22,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.fit.smooth import Window, seen
+from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.band_fit import BandFit, Number, fit_band
 from stickslip.identify.regression.orders import candidate_orders, goes_round, shown_orders
 from stickslip.identify.regression.sliding_rows import (
@@ -61,6 +62,12 @@ GIVEN = 0.05
 REBUILT, SHORT, MARGIN = -0.15, 0.6, 2.5
 """Friction this far below the level, in parts of it, is still being rebuilt after a reversal; the part of the rows that
 may be left out for that; and how much farther they are left out."""
+LEVEL, EXCLUDED = 0.05, 0.05
+"""Half-width, in parts of Fc, up to which it is told in any case; probability of a fall up to which none is there."""
+LEVEL_UNTOLD = (
+    "extrapolated: friction may still fall at the highest recorded speeds, and viscous friction is not told apart "
+    "from it"
+)
 BACKGROUND = 12
 """Lowest orders of a torque over the position that is small, but may be there."""
 QUANTILE = 1.96
@@ -130,6 +137,19 @@ class Regression:
             f"the axis does not follow its torque as one inertia does: what its acceleration needs is unsure to "
             f"{unsure / max(level, 1e-300):.2g} of Fc"
         )
+
+    @property
+    def level_doubt(self) -> str:
+        """Why the level that friction falls to with velocity is not told; empty where it is.
+
+        Where a fall is not excluded and viscous friction not told apart from its end, level and slope are one number at
+        the highest speeds: the level is extrapolated, however narrow half of its value would seem.
+        """
+        level, (low, high) = self.numbers["fc"], self.interval("sigma2")
+        sure = QUANTILE * level.std <= LEVEL * abs(level.value)
+        if sure or self.falls <= EXCLUDED or 0.0 < high <= RATIO * low:
+            return ""
+        return LEVEL_UNTOLD
 
     @property
     def fall_shown(self) -> float:
