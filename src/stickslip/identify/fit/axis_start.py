@@ -244,7 +244,9 @@ def steady_values(model: Model, v: Array, curve: Array, names: Sequence[str]) ->
             [(steady.torque(np.array(law.pack(p))) - curve) / size, TIE / v.size * (u - first)]
         )
 
-    best = descend(residuals, first, vector.lower, vector.upper, iterations=30, tolerance=1e-8)
+    best = descend(
+        residuals, first, vector.lower, vector.upper, iterations=30, tolerance=1e-8, jacobian_there=False
+    )
     p = feasible(law, vector.law_parameters(best.u))
     return {} if p is None else {name: getattr(p, name) for name in names}
 

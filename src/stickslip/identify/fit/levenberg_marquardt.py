@@ -98,6 +98,7 @@ def descend(
     tolerance: float = 1e-15,
     difference: float = STEP,
     each: Each = map,
+    jacobian_there: bool = True,
 ) -> Optimum:
     """The minimum that is reached from `start`.
 
@@ -116,6 +117,8 @@ def descend(
         Of coordinates, for the Jacobian; relative above 1.
     each : callable
         Computes the columns of a Jacobian; `map`, or `stickslip.identify.fit.parallel.mapped`.
+    jacobian_there : bool
+        Whether the Jacobian is taken once more at the minimum; else it is that of one step before.
 
     Returns
     -------
@@ -156,7 +159,7 @@ def descend(
         u, r, cost, known = step.u, step.residuals, step.cost, False
         if gain <= tolerance * cost or cost == 0.0:
             break
-    if free and not known:
+    if free and not known and jacobian_there:
         jacobian[:, free] = central_differences(residuals, u, free, lower, upper, difference, each)
         evaluations += 2 * len(free)
     return Optimum(u, cost, r, jacobian, evaluations)
@@ -273,7 +276,14 @@ def search(
         if math.isfinite(cost_of(residuals(inside))):
             found.append(
                 descend(
-                    residuals, inside, lower, upper, iterations=rough, tolerance=1e-6, difference=difference
+                    residuals,
+                    inside,
+                    lower,
+                    upper,
+                    iterations=rough,
+                    tolerance=1e-6,
+                    difference=difference,
+                    jacobian_there=False,
                 )
             )
     if not found:

@@ -174,6 +174,7 @@ class Profile:
                 found = descend(
                     self.residuals, begin, self.lower, self.upper,
                     held=(self.i,), iterations=100, tolerance=1e-9, difference=self.difference,
+                    jacobian_there=False,
                 )  # fmt: skip
             except InputError:  # not finite there
                 continue

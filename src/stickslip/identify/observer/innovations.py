@@ -142,11 +142,11 @@ class Criterion:
         """A descent that stands at u."""
         return Secants(self.residuals, u, self.vector.lower, self.vector.upper, difference=DIFFERENCE)
 
-    def descend(self, u: Array, iterations: int, tolerance: float) -> Optimum:
+    def descend(self, u: Array, iterations: int, tolerance: float, jacobian_there: bool = True) -> Optimum:
         """The minimum reached from u."""
         return descend(
             self.residuals, u, self.vector.lower, self.vector.upper, iterations=iterations, tolerance=tolerance,
-            difference=DIFFERENCE, each=mapped,
+            difference=DIFFERENCE, each=mapped, jacobian_there=jacobian_there,
         )  # fmt: skip
 
     def adapted(self, u: Array) -> Criterion:

@@ -176,7 +176,9 @@ def prediction_error(
     optimum = None
     for left in reversed(range(rounds)):
         criterion = criterion.adapted(u)
-        optimum = criterion.descend(u, 12, TOLERANCE if left == 0 else 10.0 * TOLERANCE)
+        optimum = criterion.descend(
+            u, 12, TOLERANCE if left == 0 else 10.0 * TOLERANCE, jacobian_there=left == 0
+        )
         u = optimum.u
     assert optimum is not None
     spread = spread_of(criterion, optimum)
@@ -186,7 +188,7 @@ def prediction_error(
         replace(criterion, records=observed(grasp=GRASP, rounding=ROUGH)),
         replace(criterion, records=observed(speed=SLOWER, rounding=ROUGH)),
     ]
-    moved = mapped(lambda c: c.adapted(u).descend(u, 6, 10.0 * TOLERANCE).u - u, others)
+    moved = mapped(lambda c: c.adapted(u).descend(u, 6, 10.0 * TOLERANCE, jacobian_there=False).u - u, others)
     beside = sum((np.outer(d, d) for d in moved), np.zeros_like(perturbed))
     accepted, named = feasible(law, vector.law_parameters(u)), vector.named(u)
     assert accepted is not None
