@@ -19,7 +19,7 @@ from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
-from stickslip.identify.fit.uncertainty import verdict_on
+from stickslip.identify.fit.uncertainty import RATIO, verdict_on
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import QUANTILE, Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
@@ -37,6 +37,7 @@ __all__ = [
     "on_timing",
     "regressed",
     "sliding_values",
+    "with_level",
 ]
 
 ALIGNED = 0.1
@@ -158,7 +159,7 @@ def agreed(
         if e.name not in sliding or e.name not in parameters:
             continue
         size = scale.get(e.name, math.nan)
-        own = seen(told(e, parameters[e.name], *sliding[e.name], size), found)
+        own = told(e, parameters[e.name], *sliding[e.name], size)
         apart = abs(e.value - own.value) > math.hypot(e.upper - e.lower, own.upper - own.lower) / 2.0
         if fine and not apart:
             # Its intervals are narrow, and hold where the torque acted as simulations take it.
@@ -168,12 +169,12 @@ def agreed(
             doubts = DOUBT.format(name=e.name, other=f"{e.value:.4g}", own=f"{own.value:.4g} {e.unit}")
         if stands:
             own, said = held_together(own, plain_value(e.name, inverse), parameters[e.name], size)
-            own, notes = seen(own, found), [*notes, *said]
+            notes += said
         taken[e.name] = own
     if doubts:
         # Where both disagree on what both can tell, neither value nor interval of the fine one is to be trusted.
         taken |= {
-            e.name: seen(told(e, parameters[e.name], *sliding[e.name], scale.get(e.name, math.nan)), found)
+            e.name: told(e, parameters[e.name], *sliding[e.name], scale.get(e.name, math.nan))
             for e in estimates if taken.get(e.name) is e
         }  # fmt: skip
         notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
@@ -203,11 +204,15 @@ def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale
     return replace(e, value=value, std=std, lower=low, upper=high, identified=not why, verdict=why)
 
 
-def seen(e: Estimate, found: Regression) -> Estimate:
-    """The estimate, not identified where it is a level that certain sliding does not reach."""
-    if e.name != "fc" or not e.identified or not found.level_doubt:
-        return e
-    return replace(e, identified=False, verdict=found.level_doubt)
+def with_level(estimates: Iterable[Estimate], found: Regression) -> tuple[Estimate, ...]:
+    """The estimates, the level of certain sliding not identified where it is extrapolated; values stay."""
+    low, high = found.interval("fc")
+    # Where sliding hardly tells it, it is the prediction error's.
+    doubt = found.level_doubt if high <= RATIO * low else ""
+    return tuple(
+        replace(e, identified=False, verdict=doubt) if doubt and e.name == "fc" and e.identified else e
+        for e in estimates
+    )
 
 
 PLAIN = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}

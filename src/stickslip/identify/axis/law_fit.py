@@ -18,6 +18,7 @@ from stickslip.identify.axis.agreed import (
     agreed,
     as_good,
     held_against,
+    with_level,
 )
 from stickslip.identify.axis.choice import (
     Candidate,
@@ -122,6 +123,7 @@ def by_sliding(
     u = vector.coordinates(vector.named(vector.start) | {e.name: e.value for e in estimates})
     estimates = evident(estimates, vector, u, trials, axis)
     estimates, more = settled(estimates, model, inverse, believed=as_good(inverse, sliding, ALIKE))
+    estimates = with_level(estimates, sliding)
     u = vector.coordinates(vector.named(u) | {e.name: e.value for e in estimates})
     found = with_values(trials, axis, law, vector, u, extras)
     shown = [replace(e, unit=axis.unit(e.unit)) for e in estimates]
@@ -178,6 +180,7 @@ def predicted(
         believed = as_good(inverse, sliding, ALIKE)
         estimates, more = settled(estimates, result.model, inverse, believed=believed)
         said = [*said, *more]
+    estimates = with_level(estimates, sliding) if sliding is not None else estimates
     u = result.vector.coordinates(result.vector.named(u) | {e.name: e.value for e in estimates})
     fitted = with_values(trials, axis, law, result.vector, u, options["extras"])
     estimates = tuple(replace(e, unit=axis.unit(e.unit)) for e in estimates)
