@@ -10,9 +10,9 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.monte_carlo import WIDEST
 from stickslip.identify.presliding.attraction import largest_without_overshoot
-from stickslip.identify.presliding.breakaway import student
 from stickslip.model import Model
 from stickslip.record import Record
 
@@ -146,7 +146,7 @@ def with_stiffness(found: Identification, record: Record, resolution: float) -> 
     slopes = np.array(slopes_after_reversals(record["motor_torque"], record["position"]))
     std = float(np.std(slopes, ddof=1)) / math.sqrt(slopes.size) if slopes.size > 1 else math.nan
     moved = FIRST * float(np.ptp(record["motor_torque"])) / total
-    half = student(slopes.size - 1) * std if slopes.size > 1 else math.inf
+    half = student_quantile(slopes.size - 1) * std if slopes.size > 1 else math.inf
     half = math.hypot(half, total * resolution / moved / math.sqrt(max(slopes.size, 1)))
     good = total - half > 0.0 and half < 0.33 * total
     why = "" if good else "the slopes after the reversals scatter too much"

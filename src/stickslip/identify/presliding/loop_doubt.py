@@ -17,8 +17,8 @@ import numpy as np
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.noise import quantile
 from stickslip.identify.fit.profile import inverse_information
+from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.fit.uncertainty import RATIO, SHARE, Fit
-from stickslip.identify.presliding.breakaway import student
 from stickslip.identify.presliding.hysteresis import Loop, Rows, correlation_lags, fit_loop
 from stickslip.record import encoder_step
 
@@ -63,7 +63,7 @@ def doubted(
     off = np.array([x - here for x in others if x is not None])
     if off.size:
         spread = np.sqrt(np.mean(np.vstack([off, 0.0 * here]) ** 2, axis=0))
-        parts.append(student(max(len(off), FEWEST)) * spread)
+        parts.append(student_quantile(max(len(off), FEWEST)) * spread)
     moved = [refitted(x, found, cycles[0], frozen, options) for x in shifted(loop)]
     parts.append(np.max([np.abs(x - here) for x in moved if x is not None] or [0.0 * here], axis=0))
     dithered = [refitted(x, found, cycles[0], frozen, options) for x in within_counts(loop)]
