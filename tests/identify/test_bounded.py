@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import optimize
 
-from stickslip.identify.fit.bounded import bounded_solution
+from stickslip.identify.fit.bounded import within_bounds
 
 
 def drawn(seed: int, n: int, m: int, alike: bool):
@@ -25,7 +25,7 @@ def drawn(seed: int, n: int, m: int, alike: bool):
 @given(seed=st.integers(0, 10**6), n=st.integers(7, 40), m=st.integers(1, 6), alike=st.booleans())
 def test_the_least_squares_within_bounds_are_those_of_scipy(seed: int, n: int, m: int, alike: bool):
     columns, target, lower, upper = drawn(seed, n, m, alike)
-    found = bounded_solution(columns, target, lower, upper)
+    found = within_bounds(columns, target, lower, upper)
     expected = optimize.lsq_linear(columns, target, (lower, upper), method="bvls", tol=1e-14)
     assert np.all((lower <= found) & (found <= upper))
     misfit = float(np.sum((columns @ found - target) ** 2))
@@ -37,5 +37,5 @@ def test_the_least_squares_within_bounds_are_those_of_scipy(seed: int, n: int, m
 def test_bounds_that_leave_no_room_hold():
     columns, target = np.eye(3), np.array([1.0, 2.0, 3.0])
     lower = np.array([0.5, 2.5, -1.0])
-    found = bounded_solution(columns, target, lower, np.nextafter(lower, np.inf))
+    found = within_bounds(columns, target, lower, np.nextafter(lower, np.inf))
     assert found == pytest.approx(lower)

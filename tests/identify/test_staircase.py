@@ -7,7 +7,7 @@ import pytest
 
 from stickslip import Model, Record
 from stickslip.identify.estimate import Identification
-from stickslip.identify.fit.bounded import bounded_solution
+from stickslip.identify.fit.multistart import bounded_solution
 from stickslip.identify.sliding.curve import identify_sliding
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.identify.sliding.segments import segments_of, sliding_points

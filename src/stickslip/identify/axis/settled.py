@@ -18,7 +18,7 @@ import numpy as np
 
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.estimate import Estimate
-from stickslip.identify.fit.bounded import bounded_solution
+from stickslip.identify.fit.bounded import within_bounds
 from stickslip.identify.fit.uncertainty import RATIO, SHARE
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.model import Model
@@ -94,7 +94,7 @@ class Settling:
             target = torque - known - (self.curve(out) if bent and not level else 0.0)
             if free:
                 target = np.concatenate([target, pull * np.array([values[n] for n in held])])
-                found = bounded_solution(np.vstack([columns, ties]), target, low, high)
+                found = within_bounds(np.vstack([columns, ties]), target, low, high)
                 out |= dict(zip(free, found.tolist(), strict=True))
         if level and "fs" in out:
             out["fs"] = out["fc"]

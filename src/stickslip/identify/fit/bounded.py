@@ -1,4 +1,4 @@
-"""Linear least squares within bounds, whose module of SciPy takes longer to import than a whole axis to regress."""
+"""Linear least squares within bounds, of few columns far from collinear: SciPy's takes longer to import than to solve."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["bounded_solution"]
+__all__ = ["within_bounds"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
@@ -17,7 +17,7 @@ FLAT = 1e-12
 """Of the largest product of a column and the target: a slope this small draws nothing away from a bound."""
 
 
-def bounded_solution(columns: Array, target: Array, lower: Array, upper: Array) -> Array:
+def within_bounds(columns: Array, target: Array, lower: Array, upper: Array) -> Array:
     """Least squares within bounds by an active set (Stark and Parker 1995), `ITERATIONS` changes of it at most.
 
     Parameters

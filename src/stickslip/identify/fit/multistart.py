@@ -7,19 +7,23 @@ Which parameters are linear is found by trying, so that it holds for any law.
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from stickslip.identify.fit.bounded import bounded_solution
 from stickslip.identify.fit.parameter_vector import Vector
 
-__all__ = ["linear_parameters", "separable_starts"]
+__all__ = ["bounded_solution", "linear_parameters", "separable_starts"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Values = Callable[[Array], Array]
+
+ITERATIONS = 100
+"""Of the linear part of a start: its active set changes once in each. (The reflective method of SciPy halves a step
+without end where rounding lets none succeed.) A start that takes more is as far as it then is; the search goes on."""
 
 
 def linear_parameters(model: Values, values: Array, candidates: Sequence[int]) -> list[int]:
@@ -89,3 +93,25 @@ def separable_starts(
         if all(math.isfinite(x) for x in drawn):
             out.append(vector.coordinates(dict(zip(vector.names, drawn.tolist(), strict=True))))
     return np.array(out)
+
+
+def bounded_solution(columns: Array, target: Array, lower: Array, upper: Array) -> Array:
+    """Least squares within bounds by an active set (Stark and Parker 1995), `ITERATIONS` changes of it at most.
+
+    Parameters
+    ----------
+    columns : array, shape (n, m)
+    target : array, shape (n,)
+    lower, upper : array, shape (m,)
+
+    Returns
+    -------
+    array, shape (m,)
+        Inside the bounds; the best so far where the iterations did not suffice.
+    """
+    optimize: Any = importlib.import_module("scipy.optimize")  # it carries no types
+    scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    solved = optimize.lsq_linear(
+        columns / scale, target, (lower * scale, upper * scale), method="bvls", max_iter=ITERATIONS
+    )
+    return np.clip(solved.x / scale, lower, upper)
