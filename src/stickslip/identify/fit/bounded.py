@@ -1,4 +1,4 @@
-"""Linear least squares within bounds, of few columns far from collinear: SciPy's takes longer to import than to solve."""
+"""Least squares within bounds, of few columns that are not collinear: SciPy's takes longer to import than to solve."""
 
 from __future__ import annotations
 
@@ -41,13 +41,19 @@ def within_bounds(columns: Array, target: Array, lower: Array, upper: Array) -> 
     x: Array = np.asarray(np.clip(first, low, high), dtype=np.float64)
     free = (low < first) & (first < high)
     flat = FLAT * float(np.max(np.abs(a.T @ b), initial=0.0))
+    stuck, let_go = np.zeros(x.size, dtype=np.bool_), -1
     for _ in range(ITERATIONS):
+        before = x
         x, free = descended(a, b, x, free, low, high)
+        # One that rounding sends back to its bound at once stays there until another moves.
+        stuck &= bool(np.array_equal(x, before))
+        stuck[let_go] |= let_go >= 0 and not free[let_go]
         slope = a.T @ (b - a @ x)
-        drawn = ~free & np.where(slope > 0.0, x < high, x > low) & (np.abs(slope) > flat)
+        drawn = ~free & ~stuck & np.where(slope > 0.0, x < high, x > low) & (np.abs(slope) > flat)
         if not np.any(drawn):
             break
-        free[int(np.argmax(np.where(drawn, np.abs(slope), -1.0)))] = True
+        let_go = int(np.argmax(np.where(drawn, np.abs(slope), -1.0)))
+        free[let_go] = True
     return np.clip(x / size, lower, upper)
 
 
