@@ -6,23 +6,52 @@ import os
 import subprocess
 import sys
 
-TEXTS = """
 from stickslip.jit import loaded
 
-SHARED = "@compile_inner\\ndef _half(v):\\n    return 0.5 * v\\n"
-HEAD = "from stickslip.jit import compile_entry, compile_inner\\n"
-ENTRY = "@compile_entry('steady')\\ndef steady(v, p):\\n    return _half(v) + {}\\n"
-for name, number in {which}:
-    print(loaded(name, HEAD + SHARED + ENTRY.format(number)).steady.address != 0)
+HEAD = "from stickslip.jit import compile_entry, compile_inner\n"
+INNER = "@compile_inner\ndef {}(v):\n    return {}\n"
+ENTRY = "@compile_entry('steady')\ndef steady(v, p):\n    return {}\n"
+READER = """
+import sys
+from stickslip.jit import loaded
+for name, text in {files}:
+    print(loaded(name, text).steady.ctypes(3.0, None))
+print("stickslip._compiled.first" in sys.modules)
 """
 
 
+def shared(number):
+    """A file of two functions that every number's file holds, and an entry of its own."""
+    inner = INNER.format("_half", "0.5 * v") + INNER.format("_part", "_half(v) + 1.0")
+    return HEAD + inner + ENTRY.format(f"_part(v) * {number}")
+
+
 def test_code_that_shares_a_function_with_another_file_is_read_alone(tmp_path):
-    """The function is compiled once, for the first file; the second one's code names that file."""
+    """The function is compiled once, for the first file; the second one's code is read without that file."""
     surroundings = {**os.environ, "STICKSLIP_CACHE": str(tmp_path)}
-    for which in ((("first", 1.0), ("second", 2.0)), (("second", 2.0),)):
-        code = TEXTS.replace("{which}", repr(which))
-        line = [sys.executable, "-c", code]
+    files = [("first", shared(2.0)), ("second", shared(4.0))]
+    for which, printed in ((files, ["5.0", "10.0", "True"]), (files[1:], ["10.0", "False"])):
+        line = [sys.executable, "-c", READER.format(files=which)]
         done = subprocess.run(line, env=surroundings, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr[-500:]
-        assert done.stdout.split() == ["True"] * len(which)
+        assert done.stdout.split() == printed
+    (kept,) = tmp_path.iterdir()
+    assert len(list(kept.rglob("*.nbc"))) == len(files)
+
+
+def test_one_text_of_a_function_calls_what_stands_in_its_own_file():
+    """Files whose functions read alike, but for one that another calls: each computes its own."""
+    middle, entry = INNER.format("_part", "_half(v) + 1.0"), ENTRY.format("_part(v)")
+    results = {}
+    for factor in (0.5, 0.25, 0.5, -0.0, 0.0):
+        text = HEAD + INNER.format("_half", f"{factor} * v") + middle + entry
+        module = loaded(f"half_{str(factor).replace('.', '_').replace('-', 'm')}", text)
+        results[factor] = module.steady.ctypes(2.0, None)
+        assert results[factor] == factor * 2.0 + 1.0
+    assert len(results) == 3
+
+
+def test_functions_of_one_text_are_compiled_once():
+    one, other = loaded("once", shared(8.0)), loaded("twice", shared(16.0))
+    assert one._part is other._part
+    assert one._half is other._half

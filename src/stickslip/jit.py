@@ -23,7 +23,6 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numba
@@ -331,10 +330,6 @@ def _program(functions: Mapping[str, ast.FunctionDef], entries: Iterable[str]) -
     return "\n".join(lines)
 
 
-GENERATED = "stickslip._compiled"
-"""The package of generated modules"""
-
-
 def loaded(name: str, text: str) -> Any:
     """Import a generated module, written to a file so that its compiled code can be cached."""
     path = cache_folder() / f"{name}.py"
@@ -343,10 +338,7 @@ def loaded(name: str, text: str) -> Any:
         draft = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.tmp")
         draft.write_text(text)
         os.replace(draft, path)
-    # Cached code names the files of the functions that it calls: another process finds them in this package.
-    package = sys.modules.setdefault(GENERATED, ModuleType(GENERATED))
-    package.__path__ = [str(path.parent)]
-    spec = importlib.util.spec_from_file_location(f"{GENERATED}.{name}", path)
+    spec = importlib.util.spec_from_file_location(f"stickslip._compiled.{name}", path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -442,9 +434,24 @@ def exponential_less_one(x: float) -> float:
     return power * less_one(x, shifted) + (power - 1.0)
 
 
+_inner: dict[str, Any] = {}
+
+
 def compile_inner(function: Any) -> Any:
-    """Decorator of generated files: a function that entries call."""
-    return numba.njit(function, error_model="numpy", **INNER)
+    """Decorator of generated files: a function that entries call; one that several files hold is compiled once."""
+    code, known = function.__code__, function.__globals__
+    # By what it calls too, which stands above it: the same text may call another function in another file.
+    calls = [
+        called.py_func.__qualname__ for name in code.co_names if hasattr(called := known.get(name), "py_func")
+    ]
+    content = (code.co_code, code.co_consts, code.co_names, code.co_varnames, code.co_argcount, calls)
+    name = f"{function.__name__}_{hashlib.sha256(repr(content).encode()).hexdigest()[:16]}"
+    if name not in _inner:
+        # What the disk keeps of an entry names the functions that it calls by module and name: this module is there in
+        # every process, a file of another law is not.
+        function.__module__, function.__qualname__ = __name__, name
+        _inner[name] = numba.njit(function, error_model="numpy", **INNER)
+    return _inner[name]
 
 
 def compile_entry(name: str) -> Callable[[Any], Any]:
