@@ -93,6 +93,7 @@ def test_pages_have_an_example_or_a_picture(page: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long  # CI runs the page where it builds the documentation
 def test_the_tutorial_does_what_it_says(tmp_path: Path) -> None:
     """As it is run when the documentation is built, in a folder of its own."""
     command = [sys.executable, str(DOCS / "_ext" / "sessions.py"), str(DOCS / "tutorial.md"), str(tmp_path)]
@@ -102,6 +103,7 @@ def test_the_tutorial_does_what_it_says(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long  # CI runs the page where it builds the documentation
 def test_the_page_on_the_library_does_what_it_says(tmp_path: Path) -> None:
     page = DOCS / "howto" / "library.md"
     command = [sys.executable, str(DOCS / "_ext" / "sessions.py"), str(page), str(tmp_path)]

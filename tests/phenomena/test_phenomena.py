@@ -26,6 +26,7 @@ def script(name: str) -> ModuleType:
 
 
 @pytest.mark.slow
+@pytest.mark.long  # CI runs the scripts where it builds the documentation
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_every_script_draws(name: str, tmp_path: Path) -> None:
     script(name).main(tmp_path / name)
