@@ -109,9 +109,11 @@ class Places:
 
 
 def least_squares(matrix: Array, right: Array) -> Array:
-    """Values of the columns, by an orthogonal factor."""
-    q, r = np.linalg.qr(matrix)
-    return np.asarray(np.linalg.solve(r, q.T @ right), dtype=np.float64)
+    """Values of the columns, by an orthogonal factor, which is not formed: the right side is turned along with them."""
+    r = np.linalg.qr(np.column_stack([matrix, right]), mode="r")
+    count = matrix.shape[1]
+    turned = r[:count, count] if right.ndim == 1 else r[:count, count:]
+    return np.asarray(np.linalg.solve(r[:count, :count], turned), dtype=np.float64)
 
 
 def places_of(record: Record, torque: str) -> tuple[Places, bool]:
