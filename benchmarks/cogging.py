@@ -106,7 +106,8 @@ def recorded(plant: Machine, degrees: float | None = None) -> tuple[Record, tupl
     record = perform(replace(procedure, degrees=degrees or procedure.degrees), rig).record
     places = places_of(record, "motor_torque")[0]
     time = places.time + record.time[0]
-    torque = np.interp(time, *np.array(rig.seen).T) * changed(plant, record, time)
+    seen, level = np.array(rig.seen).T
+    torque: Values = changed(plant, record, time) * np.asarray(np.interp(time, seen, level), dtype=np.float64)
     forward, backward = (abs(float(np.mean(torque[places.direction == d]))) for d in (1.0, -1.0))
     return record, (0.5 * (forward + backward), 0.5 * (forward - backward))
 

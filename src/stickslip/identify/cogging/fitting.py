@@ -84,9 +84,10 @@ def _weighted(
     noise = places.torque - matrix @ values - beside @ values[2 : 2 + beside.shape[1]]
     seen = Noise.of(places, noise, [n for _, n in terms]).whitened(np.column_stack([matrix, places.torque]))
     every = np.concatenate(seen)
-    r = np.linalg.qr(every, mode="r")
+    r: Array = np.asarray(np.linalg.qr(every, mode="r"))
     values = np.asarray(np.linalg.solve(r[:-1, :-1], r[:-1, -1]), dtype=np.float64)
-    inverse, misfit = np.linalg.inv(r[:-1, :-1]), np.zeros(values.size)
+    inverse = np.asarray(np.linalg.inv(r[:-1, :-1]), dtype=np.float64)
+    misfit = np.zeros(values.size)
     for own in seen:
         left = own[:, -1] - own[:, :-1] @ values
         misfit += (own[:, :-1].T @ left) ** 2 / np.maximum(np.sum(own[:, :-1] ** 2, axis=0), 1e-300)

@@ -110,9 +110,9 @@ class Places:
 
 def least_squares(matrix: Array, right: Array) -> Array:
     """Values of the columns, by an orthogonal factor, which is not formed: the right side is turned along with them."""
-    r = np.linalg.qr(np.column_stack([matrix, right]), mode="r")
-    count = matrix.shape[1]
-    turned = r[:count, count] if right.ndim == 1 else r[:count, count:]
+    r: Array = np.asarray(np.linalg.qr(np.column_stack([matrix, right]), mode="r"))
+    count: int = matrix.shape[1]
+    turned: Array = r[:count, count] if right.ndim == 1 else r[:count, count:]
     return np.asarray(np.linalg.solve(r[:count, :count], turned), dtype=np.float64)
 
 

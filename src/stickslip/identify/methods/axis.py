@@ -12,6 +12,7 @@ from stickslip.identify.axis.output import Extras
 from stickslip.identify.axis.over_angle import over_angle
 from stickslip.identify.axis.plain import inverse_identification
 from stickslip.identify.estimate import Identification
+from stickslip.identify.methods._play import with_dead_travel
 from stickslip.identify.methods._trials import driven, trials_of
 from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.regression.inverse import inverse_dynamics
@@ -27,8 +28,14 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     axis, trials = trials_of(records, options)
     count = len(trials) - options.held_out
     skew = skew_of(trials[:count], options)
-    if not options.position_map:
-        return identified(axis, trials, count, skew, options)
+    mapped = with_map if options.position_map else identified
+    return with_dead_travel(mapped(axis, trials, count, skew, options), trials[:count], axis)
+
+
+def with_map(
+    axis: ServoAxis, trials: Sequence[Trial], count: int, skew: float | None, options: Options
+) -> Identification:
+    """The axis and what its torque over the angle is, from the first so many trials."""
     try:
         over = over_angle(trials[:count], axis, skew, options.regress)
     except InputError as error:
