@@ -34,6 +34,13 @@ def positive_everywhere(curve: Callable[[float, Any], float], p: Any, scale: flo
     return ""
 
 
+def decay(x: float) -> float:
+    """exp(-x) of x >= 0: where it is 0 in double precision it is not computed, as underflow takes twice its time."""
+    if x > 746.0:
+        return 0.0
+    return math.exp(-x)
+
+
 # ---- eq. 2.10 ------------------------------------------------------------------------------------------------
 
 
@@ -64,8 +71,8 @@ def stribeck(v: float, p: Any) -> float:
     """s(v) = F_C + (F_S - F_C) exp(-|v/v_s|^delta_s), N·m; thesis eq. 2.10."""
     x = abs(v / p.vs)
     if p.delta_s == 2.0:
-        return p.fc + (p.fs - p.fc) * math.exp(-x * x)
-    return p.fc + (p.fs - p.fc) * math.exp(-(x**p.delta_s))
+        return p.fc + (p.fs - p.fc) * decay(x * x)
+    return p.fc + (p.fs - p.fc) * decay(x**p.delta_s)
 
 
 def rising(p: Any) -> str:

@@ -17,12 +17,15 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.laws._curve import decay
 from stickslip.spec import Law
 from stickslip.subset import law_layouts, lower
 
 __all__ = ["Numbers", "Refused", "body", "source"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+DECAY = f"_{decay.__name__}"
+"""Name that `lower` gives the exponential of the sliding curves."""
 INLINED = frozenset(
     {
         "trial", "reached", "give", "held_by", "gap_ahead", "accept", "swap", "finish", "first_event", "gap_of",
@@ -170,6 +173,8 @@ def curve_lines(side: int, curve: Curve, numbers: Numbers) -> list[str]:
     names = {name: name if name == f"curve_{side}" else f"{name}_{side}" for name in functions}
     lines: list[str] = []
     for name, tree in functions.items():
+        if name == DECAY:
+            tree.body = tree.body[-1:]  # all lanes take both branches: nothing is spared by the first
         rewritten = _Reader(curve, names, numbers).visit(tree)
         rewritten.name = names[name]
         lines += ["@compile_inlined", ast.unparse(ast.fix_missing_locations(rewritten))]
