@@ -131,6 +131,9 @@ STRANGERS = {
     "belt drive": (
         {"inertia": 5e-3, "sigma0": 8e3, "fs": 2.2, "fc": 1.9, "vs": 0.05, "sigma2": 0.1}, 131_072.0, 8.0, 12.0
     ),
+    "worm gear": (
+        {"inertia": 2e-3, "sigma0": 1.2e4, "fs": 1.3, "fc": 0.9, "vs": 0.03, "sigma2": 0.2}, 262_144.0, 8.0, 6.0
+    ),
 }  # fmt: skip
 AMPLITUDE, FREQUENCY, MOVES, RESTS = 0.1, 0.5, 4.0, 20.0
 

@@ -17,6 +17,7 @@ from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
 from stickslip.identify.motion import HOLD, Motion, sinusoid
 from stickslip.identify.setting.plant import Plant, arrays_of, stand_at
+from stickslip.identify.setting.swings import above, repeats, reversals, turns
 from stickslip.jit import kernel
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
@@ -265,11 +266,14 @@ class Trial:
 
     def restless(self, swing: float) -> tuple[float, float]:
         """Swings per second by more than `swing`, rad: beyond those of the reference in all, and at rest behind it."""
-        last = self.position.size - round(0.5 * HOLD / self.sample_time)
         beyond = turns(self.position, swing) - turns(self.reference, swing)
-        return beyond / (self.position.size * self.sample_time), turns(self.position[last:], swing) / (
-            0.5 * HOLD
-        )
+        resting = turns(self.late, swing) / (0.5 * HOLD)
+        return beyond / (self.position.size * self.sample_time), resting
+
+    @property
+    def late(self) -> Array:
+        """The positions of the second half of the rest behind the motion, rad."""
+        return self.position[-round(0.5 * HOLD / self.sample_time) :]
 
     def swing(self, drive: Drive) -> float:
         """What a swing has at least to be one: counts, or a part of this trial's error, rad."""
@@ -336,35 +340,6 @@ def follow(
     return path.shape[0]
 
 
-def reversals(velocity: Array, trigger: float) -> int:
-    """Changes of sign between velocities beyond a trigger."""
-    sides = np.sign(velocity[np.abs(velocity) > trigger])
-    return int(np.sum(sides[1:] != sides[:-1]))
-
-
-@kernel()
-def turns(position: Any, swing: float) -> int:
-    """Turning points after which the position goes back by more than a swing."""
-    count, side = 0, 0
-    low = high = position[0]
-    for x in position:
-        if side >= 0 and x < high - swing:
-            count += 1 if side > 0 else 0
-            side, low = -1, x
-        elif side <= 0 and x > low + swing:
-            count += 1 if side < 0 else 0
-            side, high = 1, x
-        high, low = max(high, x), min(low, x)
-    return count
-
-
-def above(velocity: Array, corner: float, sample_time: float) -> float:
-    """RMS of what is faster than a corner, Hz, by the spectrum of the whole motion."""
-    spectrum = np.fft.rfft(velocity)
-    fast = np.fft.rfftfreq(velocity.size, sample_time) > corner
-    return math.sqrt(2.0 * float(np.sum(np.abs(spectrum[fast]) ** 2))) / velocity.size
-
-
 def rings(plant: RigidAxis, linear: Controller | SampledController, drive: Drive, alone: Trial | str) -> str:
     """Where the linear controller alone oscillates on an axis, "at rest" or "in motion"; empty where it is calm.
 
@@ -396,7 +371,7 @@ def dangers(before: Trial, after: Trial, drive: Drive, feedforward: bool = False
     """
     swing = before.swing(drive)
     (was, rested), (now, resting) = before.restless(swing), after.restless(swing)
-    if resting > rested + BUSY and not feedforward:
+    if resting > rested + BUSY and repeats(after.late, swing) and not feedforward:
         yield AT_REST
     if now > max(was, 0.0) + BUSY + BOUNCES * drive.stops:
         yield "oscillates in motion"

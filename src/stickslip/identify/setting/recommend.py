@@ -235,7 +235,7 @@ def recommend(
     if compensators:
         belief = belief_of(found.model, drive, float(j))
         beside = tried_beside(compensators, belief, bench, others, fed, offset)
-        hunts = limit_cycle(chosen.setting.on(linear, laws[chosen.setting.law]), bench) if chosen else ""
+        hunts = limit_cycle(chosen.setting.on(linear, laws[chosen.setting.law]), bench, 0) if chosen else ""
     account.end()
     notes = [
         *axes_left_out(bench, others, found), *lag_of(first, drive),
