@@ -45,6 +45,21 @@ def test_fields_become_elements():
     assert "_scale(total, p)" in text
 
 
+def supplied(z, v):
+    raise NotImplementedError
+
+
+def tries(v, z):
+    return supplied(z, 2.0 * v) + z.x
+
+
+def test_what_is_given_is_called_and_not_translated():
+    for translate, field in ((lower, "z[0]"), (named, "z.x")):
+        functions = translate({"tries": tries}, LAYOUTS, ["supplied"])
+        assert list(functions) == ["tries"]
+        assert ast.unparse(functions["tries"].body[0]) == f"return _supplied(z, 2.0 * v) + {field}"
+
+
 def test_translation_computes_the_same():
     text = "\n".join(ast.unparse(f) for f in lower({"good": good}, LAYOUTS).values())
     scope = {"math": math}

@@ -48,6 +48,7 @@ __all__ = [
     "call_switch",
     "call_value",
     "compiled_guarded",
+    "compiled_kernels",
     "compiled_lanes",
     "compiled_law",
     "compiled_notice",
@@ -84,9 +85,9 @@ INNER: dict[str, Any] = {"no_cpython_wrapper": True, **NO_ADDRESS}
 
 
 def _kernel_files() -> tuple[Path, ...]:
-    """The files that kernels are made of: the engines, and what begins with _ among machines and rigs."""
+    """The files that kernels are made of: the engines, what begins with _ among machines and rigs, the translation."""
     package = Path(__file__).parent
-    found = (package.glob(f"{part}.py") for part in ("simulation/**/*", "machines/_*", "rigs/_*"))
+    found = (package.glob(f"{part}.py") for part in ("subset", "simulation/**/*", "machines/_*", "rigs/_*"))
     return (Path(__file__), *sorted(file for files in found for file in files))
 
 
@@ -158,6 +159,32 @@ def kernel(*, exact: bool = True, inline: bool = False) -> Callable[[Any], Any]:
         )
 
     return decorate
+
+
+def compiled_kernels(
+    name: str, entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout],
+    given: Mapping[str, str] | None = None, inline: Iterable[str] = (),
+) -> Any:  # fmt: skip
+    """Functions of the scalar subset for kernels to call, compiled as kernels are; structures are addresses.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    entries, layouts : mapping
+        As `stickslip.subset.lower` takes them.
+    given : mapping
+        Kernels that the text calls: name to the module that has it.
+    inline : iterable of str
+        Entries whose machine code goes into every caller.
+    """
+    given = given or {}
+    lines = ["import math", "from stickslip.jit import kernel"]
+    lines += [f"from {module} import {each} as _{each}" for each, module in given.items()]
+    for each, function in lower(entries, layouts, given).items():
+        lines += [f"@kernel(inline={each in set(inline)})", ast.unparse(function)]
+    text = "\n".join(lines) + "\n"
+    return loaded(f"{name}_{hashlib.sha256(text.encode()).hexdigest()[:16]}", text)
 
 
 # ---- calls through addresses ------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ import inspect
 import math
 import textwrap
 import types
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -116,7 +116,7 @@ def law_layouts(law: Law) -> dict[str, Layout]:
 
 
 def lower(
-    entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout]
+    entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout], given: Collection[str] = ()
 ) -> dict[str, ast.FunctionDef]:
     """Translate functions and everything they call into functions on flat arrays.
 
@@ -126,6 +126,8 @@ def lower(
         Name in the result to function.
     layouts : mapping
         Argument name to layout, for the structured arguments.
+    given : collection of str
+        Functions that whoever runs the text supplies; they are called by their name with an underscore before it.
 
     Returns
     -------
@@ -138,14 +140,14 @@ def lower(
         With file, line and what to write instead.
     """
     done: dict[str, ast.FunctionDef] = {}
-    names = _Names()
+    names = _Names(frozenset(given))
     for name, function in entries.items():
         _translate(names.of(name, _Target(function)), _Target(function), layouts, done, names, (), flat=True)
     return done
 
 
 def named(
-    entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout]
+    entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout], given: Collection[str] = ()
 ) -> dict[str, ast.FunctionDef]:
     """Check functions and everything they call, and keep their fields by name (``p.k[i]``).
 
@@ -154,7 +156,7 @@ def named(
     languages.
     """
     done: dict[str, ast.FunctionDef] = {}
-    names = _Names()
+    names = _Names(frozenset(given))
     for name, function in entries.items():
         _translate(names.of(name, _Target(function)), _Target(function), layouts, done, names, (), flat=False)
     return done
@@ -187,8 +189,10 @@ class _Target:
 
 @dataclass
 class _Names:
-    """One name per function translated: files may use the same name for different functions."""
+    """One name per function translated: files may use the same name for different functions. Those of functions that
+    are given are not translated."""
 
+    given: frozenset[str]
     taken: dict[str, Any] = field(default_factory=dict[str, Any])
 
     def of(self, wanted: str, target: _Target) -> str:
@@ -421,6 +425,10 @@ class _Translator(ast.NodeTransformer):
         if name in BUILTINS:
             node.args = [self.visit(a) for a in node.args]
             return node
+        if name in self.names.given:
+            return ast.copy_location(
+                ast.Call(ast.Name(f"_{name}", ast.Load()), [self.whole(a) for a in node.args], []), node
+            )
         function = self.scope.get(name)
         if not isinstance(function, types.FunctionType) or function is negative:
             known = [n for n, v in self.scope.items() if isinstance(v, types.FunctionType)]
@@ -467,6 +475,11 @@ class _Translator(ast.NodeTransformer):
                 raise self.refuse(node, "this call", f"give the argument {formal} another name")
             bases[name] = view.base
         return out
+
+    def whole(self, node: ast.expr) -> ast.expr:
+        """An argument of a function that is given: a structure as a whole, or a number."""
+        view = self.view(node)
+        return self.visit(node) if view is None else ast.copy_location(ast.Name(view.base, ast.Load()), node)
 
     def positive(self, node: ast.expr) -> ast.expr:
         """`p` of `negative(p)`: a callee of its own reads it."""

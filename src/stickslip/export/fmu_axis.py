@@ -1,23 +1,27 @@
 """FMI 2.0 and 3.0 co-simulation: an axis with friction, J dv/dt = torque - friction torque.
 
 The input is the torque, held over a step; outputs are position, velocity and friction torque. Each step is cut into
-equal parts of at most ``max_step``, and each part is the two-stage L-stable SDIRK of
-`stickslip.simulation.recorded_input.simulation`: at equal steps the unit moves as its
-`drive_axis` does (tested).
+equal parts of at most ``max_step``, and each part is a step of `stickslip.simulation.recorded_input.step`, printed in C
+from the same text that the package's own engines compile: at equal steps the unit moves as `drive_axis` does (tested).
 """
 
 from __future__ import annotations
 
+import ast
+import inspect
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.export._c import Dialect, functions
 from stickslip.export._fmu import Variable, contents_of, law_variables, numbered, surroundings_read, units_of
 from stickslip.export._fmu_run import played
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import render
+from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Setting, Target, settings_of
+from stickslip.subset import named
 
 __all__ = ["BOUND", "MAX_STEP", "TARGET", "Driven", "driven", "inertia_of"]
 
@@ -50,14 +54,14 @@ def variables_of(job: Job) -> list[Variable]:
         [
             Variable("torque", "torque", "input", "N.m", "Torque of the drive, held over a step", 0.0),
             *around,
-            Variable("position", "position", "output", "rad", "Angle of the axis"),
-            Variable("velocity", "velocity", "output", "rad/s", "Angular velocity of the axis"),
+            Variable("position", "motion.position", "output", "rad", "Angle of the axis"),
+            Variable("velocity", "motion.velocity", "output", "rad/s", "Angular velocity of the axis"),
             Variable(
                 "friction_torque", "friction_torque", "output", "N.m", "Positive against positive velocity"
             ),
             Variable(
                 "inertia",
-                "inertia",
+                "axis.inertia",
                 "parameter",
                 "kg.m2",
                 "Moment of inertia",
@@ -86,6 +90,7 @@ def write(job: Job) -> Export:
         slope=None,
         inertia=repr(inertia_of(job)),
         max_step=repr(MAX_STEP),
+        **step_code(job.name),
     )
     readme = render(
         "fmu_axis_readme.md.j2",
@@ -97,6 +102,70 @@ def write(job: Job) -> Export:
         **about_steps(job.model, SUBSTEPS, held=True),
     )
     return Export({**files, "golden.csv": as_csv(driven(job)), "README.md": readme}, notes)
+
+
+# ---- the step in C ------------------------------------------------------------------------------------------------
+
+
+STRUCTURES = {
+    "c": "contact", "n": "numbers", "a": "motion", "r": "search", "first": "search", "second": "search"
+}  # fmt: skip
+"""Types of the step's arguments."""
+ABOUT = {
+    "n": "What a step reads of the axis.",
+    "a": "Motion of the axis.",
+    "r": "The search for a velocity.",
+}
+
+
+def step_code(name: str) -> dict[str, Any]:
+    """Functions and structures of `stickslip.simulation.recorded_input.step` for the template."""
+    from stickslip.simulation import root
+    from stickslip.simulation.recorded_input import contact, step
+
+    entries = {"_ready": root.ready, "_step_on": step.step_on}
+    trees = named(entries, step.LAYOUTS, contact.GIVEN)
+    declared = {f"_{each}": declaration(getattr(contact, each).py_func) for each in contact.GIVEN}
+    dialect = Dialect(f"{name}_axis", False, STRUCTURES)
+    written = [f for f in functions({**declared, **trees}, dialect, ()) if f[0] in trees]
+    text = "\n".join(line for _, _, lines in written for line in lines)
+    return {
+        "rounding": step.ROUNDING,
+        "least": step.LEAST,
+        "functions": [{"about": ascii_only(first_line(doc)), "lines": lines} for _, doc, lines in written],
+        "structures": [
+            {"name": STRUCTURES[a], "about": about, "fields": fields_read(trees, a, step.LAYOUTS[a].scalars)}
+            for a, about in ABOUT.items()
+        ],
+        "extremes": [each for each in ("min", "max") if f"{dialect.prefix}_{each}(" in text],
+    }
+
+
+def declaration(function: Callable[..., Any]) -> ast.FunctionDef:
+    """What calls of a function that C has of its own must know: its arguments, whether it returns a number."""
+    given = list(inspect.signature(function).parameters)
+    lines = ["c.written = 0.0"] if given[0] == "c" else []
+    if inspect.signature(function).return_annotation != "None":
+        lines.append("return " + " + ".join(["0.0", *given[1:]]))
+    text = f"def _{function.__name__}({', '.join(given)}):\n" + "".join(f"    {line}\n" for line in lines)
+    found = ast.parse(text).body[0]
+    assert isinstance(found, ast.FunctionDef)
+    return found
+
+
+def fields_read(trees: Mapping[str, ast.FunctionDef], argument: str, fields: tuple[str, ...]) -> list[str]:
+    """The fields of a structure that the functions use, in its order."""
+    names = [a for a, kind in STRUCTURES.items() if kind == STRUCTURES[argument]]
+    used = {
+        node.attr
+        for tree in trees.values()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in names
+    }
+    return [field for field in fields if field in used]
+
+
+# ---- its motion -----------------------------------------------------------------------------------------------------
 
 
 def driven(job: Job, count: int = 400, step: float = 1e-3, seed: int = 1) -> Driven:

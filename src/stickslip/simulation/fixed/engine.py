@@ -43,6 +43,7 @@ from stickslip.simulation._case import (
     TOO_STIFF,
     VELOCITY_0,
     VELOCITY_LIMIT,
+    Array,
     Case,
     Outcome,
     Side,
@@ -73,6 +74,8 @@ from stickslip.simulation.fixed.output import (
     write,
 )
 from stickslip.simulation.fixed.step import GROWTH, LANDING, advance
+from stickslip.simulation.root import ROOT
+from stickslip.simulation.root import compiled as root
 from stickslip.spec import Surroundings
 from stickslip.waiting import Reached, watched
 
@@ -80,6 +83,8 @@ __all__ = ["can_run", "run"]
 
 RESOLVED = 2.0
 """dt * slope / J up to which the trapezoid runs; omega dt = 2 after `contact_slope` of a spring."""
+ROUNDING = 1e-14
+"""To which a velocity is solved (relative above 1 rad/s), and an event met (N·m, rad/s)."""
 RINGING = 0.25
 """omega dt of the steps that resolve a motion near rest which a longer, damped one would lose."""
 NOW, CAP, ASKED = range(3)
@@ -171,7 +176,16 @@ def loop_of(case: Case, dt: float) -> Loop:
         np.zeros(size),
         np.zeros(size),
         np.zeros((8, 5)),
+        searches(n[INERTIA]),
     )
+
+
+def searches(inertia: float) -> Array:
+    """What the root finder keeps for a stage's velocity, and for the time of an event in a step."""
+    out = np.zeros((2, len(ROOT.scalars)))
+    root.ready(out[0], inertia, ROUNDING, 1.0, 1.0)
+    root.ready(out[1], 1.0, ROUNDING, 1.0, 0.0)
+    return out
 
 
 def contact_slope(side: Side, dt: float) -> float:

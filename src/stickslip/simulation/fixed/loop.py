@@ -61,6 +61,7 @@ class Loop(NamedTuple):
     middle: Any
     base: Any
     nodes: Any
+    searches: Any
 
 
 @kernel()

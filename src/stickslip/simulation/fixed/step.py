@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stickslip.jit import kernel
+from stickslip.jit import kernel, pointer
 from stickslip.simulation._case import (
     FILTER,
     FROM_MEASUREMENT,
@@ -59,9 +59,13 @@ from stickslip.simulation.fixed.loop import (
     step_compensator,
     step_plant,
 )
+from stickslip.simulation.root import MOST, ROOT, SOLVED
+from stickslip.simulation.root import compiled as root
 
 GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
-VELOCITY_ROUNDING = 1e-14  # rad/s, relative above 1 rad/s
+SEARCH = len(ROOT.scalars)
+X, PHASE = ROOT.scalars.index("x"), ROOT.scalars.index("phase")
+begin, begin_beyond, improve = root.begin, root.begin_beyond, root.improve
 FINE = 0.1  # of the sliding curve's velocity scale, by which the velocity near rest may change in a step
 APPROACH = 0.9  # of the time to the zero of a steep compensator's velocity, in which it is approached
 UNSEEN = 0.003  # of the travel up to break-away, which a damped step near rest may hide
@@ -112,55 +116,29 @@ def close(loop: Loop, a: Any, b: Any, h: float, v1: float, side: float, w: float
 
 
 @kernel()
-def guess(a: float, fa: float, b: float, fb: float, count: int) -> float:
-    """A point between a and b, where f changes sign: the secant's, every fourth time the middle."""
-    x = a - fa * (b - a) / (fb - fa)
-    if count % 4 == 3 or not min(a, b) < x < max(a, b):
-        x = 0.5 * (a + b)
-    return x
-
-
-@kernel()
 def solve(loop: Loop, a: Any, b: Any, h: float, side: float, w: float) -> bool:
     """Find the end velocity of a stage from a, and complete b; False if there is none.
 
     Of several solutions the first one is taken in the direction in which the net torque at the present
     velocity drives: the others lie beyond a repelling one, where the torque falls steeply with the velocity.
     """
-    inertia, v = loop.numbers[INERTIA], a[VELOCITY]
+    inertia, v, r = loop.numbers[INERTIA], a[VELOCITY], pointer(loop.searches, 0)
     known = inertia * v + h * (1.0 - w) * (a[MOTOR] - a[FRICTION])
-    enough = inertia * VELOCITY_ROUNDING
-    low = v
-    f_low = inertia * low - known - h * w * close(loop, a, b, h, low, side, w)
-    if abs(f_low) <= enough * max(1.0, abs(low)):
-        return True
-    stride = -f_low / inertia
-    high, f_high = low, f_low
-    for _ in range(60):
-        high = low + stride
-        f_high = inertia * high - known - h * w * close(loop, a, b, h, high, side, w)
-        if not math.isfinite(f_high):
-            return False
-        if f_high * f_low <= 0.0:
-            break
-        low, f_low = high, f_high
-        stride *= 2.0
-    if f_high * f_low > 0.0:
-        return False
-    for i in range(200):
-        if abs(f_high) <= enough * max(1.0, abs(high)):
-            return True
-        x = guess(low, f_low, high, f_high, i)
-        f = inertia * x - known - h * w * close(loop, a, b, h, x, side, w)
-        # Illinois: the end that stays halves its weight, so that both ends approach the root.
-        if f * f_high < 0.0:
-            low, f_low = high, f_high
-        else:
-            f_low *= 0.5
-        high, f_high = x, f
-        if abs(high - low) <= VELOCITY_ROUNDING * max(1e-3, abs(high)):
-            return True
+    begin(r, v)
+    for _ in range(MOST):
+        f = inertia * r[X] - known - h * w * close(loop, a, b, h, r[X], side, w)
+        if improve(r, f) == 0.0:
+            return math.isfinite(f)
     return False
+
+
+@kernel()
+def crossing(loop: Loop, f_low: float, h: float, f_high: float) -> Any:
+    """Begin to look for the time within a step at which an event happens: from f_low at its begin to f_high at h."""
+    r = pointer(loop.searches, SEARCH)
+    begin_beyond(r, 0.0, f_low, h)
+    improve(r, f_high)
+    return r
 
 
 # ---- one step ---------------------------------------------------------------------------------------------
@@ -245,25 +223,19 @@ def rest_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> float:
     side = departure(loop, b)
     if side == 0.0:
         return h
-    low, high = 0.0, h
-    f_low, f_high = side * drive(loop, a, side), side * drive(loop, b, side)
-    if f_low >= 0.0:  # both sides repel from the begin: only the direction was open
+    before, after = side * drive(loop, a, side), side * drive(loop, b, side)
+    if before >= 0.0:  # both sides repel from the begin: only the direction was open
         copy(a, b)
         leave(loop, b, side)
         return 0.0
-    x = high
-    for i in range(60):
-        x = guess(low, f_low, high, f_high, i)
-        rest_for(loop, a, b, t, x)
-        f = side * drive(loop, b, side)
-        if f < 0.0:
-            low, f_low, f_high = x, f, 0.5 * f_high
-        else:
-            high, f_high, f_low = x, f, 0.5 * f_low
-        if abs(f) <= 1e-14 or high - low <= 1e-13 * h:
+    r = crossing(loop, before, h, after)
+    for _ in range(MOST):
+        if r[PHASE] == SOLVED:
             break
+        rest_for(loop, a, b, t, r[X])
+        improve(r, side * drive(loop, b, side))
     leave(loop, b, side)
-    return x
+    return r[X]
 
 
 @kernel()
@@ -287,26 +259,19 @@ def gather(loop: Loop, a: Any, b: Any, t: float, h: float, before: float) -> flo
 def band_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, bool]:
     """Rest in the band over h, or until the gathered momentum leaves it; the time taken, and whether it left."""
     before = unbalanced(loop, a)
-    f_high = gather(loop, a, b, t, h, before)
-    if f_high <= 0.0:
+    after = gather(loop, a, b, t, h, before)
+    if after <= 0.0:
         return h, False
-    low, high = 0.0, h
-    f_low = min(abs(a[GATHERED]) - loop.numbers[PLANT_BAND], 0.0)
-    x = high
-    for i in range(60):
-        x = guess(low, f_low, high, f_high, i)
-        f = gather(loop, a, b, t, x, before)
-        if f < 0.0:
-            low, f_low, f_high = x, f, 0.5 * f_high
-        else:
-            high, f_high, f_low = x, f, 0.5 * f_low
-        if abs(f) <= VELOCITY_ROUNDING or high - low <= 1e-13 * h:
+    r = crossing(loop, min(abs(a[GATHERED]) - loop.numbers[PLANT_BAND], 0.0), h, after)
+    for _ in range(MOST):
+        if r[PHASE] == SOLVED:
             break
+        improve(r, gather(loop, a, b, t, r[X], before))
     side = sign(b[GATHERED])
     b[VELOCITY], b[GATHERED] = side * loop.numbers[PLANT_BAND], 0.0
     set_motor(loop, b)
     leave(loop, b, side)
-    return x, True
+    return r[X], True
 
 
 @kernel()
@@ -354,20 +319,15 @@ def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, 
         if band > 0.0:
             enter_band(loop, b, side)
         return (h, False) if band == 0.0 else (0.0, True)
-    low, high, f_low, f_high = 0.0, h, side * a[VELOCITY] - band, side * b[VELOCITY] - band
-    x = h
-    for i in range(60):
-        x = guess(low, f_low, high, f_high, i)
-        look_ahead(loop, a, t, x)
-        if not solve(loop, a, b, x, jumping, 0.5):
-            return -1.0, False
-        f = side * b[VELOCITY] - band
-        if f > 0.0:
-            low, f_low, f_high = x, f, 0.5 * f_high
-        else:
-            high, f_high, f_low = x, f, 0.5 * f_low
-        if abs(f) <= VELOCITY_ROUNDING or high - low <= 1e-13 * h:
+    r = crossing(loop, side * a[VELOCITY] - band, h, side * b[VELOCITY] - band)
+    for _ in range(MOST):
+        if r[PHASE] == SOLVED:
             break
+        look_ahead(loop, a, t, r[X])
+        if not solve(loop, a, b, r[X], jumping, 0.5):
+            return -1.0, False
+        improve(r, side * b[VELOCITY] - band)
+    x = r[X]
     if loop.steep and x > LANDING * h:
         x *= APPROACH
         look_ahead(loop, a, t, x)

@@ -13,6 +13,7 @@ from stickslip.machines.drivetrain import INPUTS, StateSpace
 from stickslip.machines.machine import Machine
 from stickslip.simulation.machine import step
 from stickslip.simulation.machine.step import plant_of, sample
+from stickslip.simulation.root import compiled as root
 from stickslip.spec import Surroundings
 
 __all__ = ["CHANNELS", "Laid", "lay_out_machine", "look", "run", "wait"]
@@ -65,7 +66,7 @@ def lay_out_machine(machine: Machine, substeps: int = 0) -> Laid:
     numbers = numbers_of(machine, parts, states, places, damped)
     memory = np.zeros(step.HEAD + 2 * places["size"] + 2 * max(states, 1))
     memory[step.WARMTH] = machine.contact.heat.ambient
-    memory[step.SLOPE] = 1.0
+    root.ready(memory[step.SEARCH : step.HEAD], 1.0, step.UNBALANCE, step.LEAST, 1.0)
     memory[step.HEAD + places["size"] : step.HEAD + places["size"] + states] = state[:states]
     return Laid(
         numbers, flat(matrix.ravel()), memory, flat(model.law.pack(model.parameters)),

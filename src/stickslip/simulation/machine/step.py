@@ -18,6 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.jit import call_holding, call_step, kernel, pointer
+from stickslip.simulation.root import MOST, ROOT
+from stickslip.simulation.root import compiled as root
 
 # ---- numbers of a machine, fixed ----------------------------------------------------------------------------
 (
@@ -33,13 +35,17 @@ IN_MOTOR, IN_COG, IN_BEARING, IN_FIRST, IN_LAST, INPUTS = range(6)
 
 # ---- what changes ---------------------------------------------------------------------------------------------
 (
-    TICK, PENDING, TRIPPED, WARMTH, FRICTION, SLOPE, BEARING_NOW, PAUSED, POWER, FACTOR, HEAD,
-) = range(11)  # fmt: skip
-# From HEAD on: the linear state (SIZE), the law's state (STATES), the law's trial state, a work vector (SIZE).
+    TICK, PENDING, TRIPPED, WARMTH, FRICTION, BEARING_NOW, PAUSED, SEARCH,
+) = range(8)  # fmt: skip
+HEAD = SEARCH + len(ROOT.scalars)
+# From SEARCH on what the root finder keeps; from HEAD on: the linear state (SIZE), the law's state (STATES), the law's
+# trial state, a work vector (SIZE).
 
 OVERSPEED = 33792.0  # 8400h of CiA 402: velocity speed controller
-UNBALANCE = 1e-8  # rad/s, relative above 0.1 rad/s; the torque takes it up, 1e-8 N·m
-FINEST = 1e-12  # rad/s, below which a velocity is none
+UNBALANCE, LEAST = 1e-8, 0.1  # relative, above 0.1 rad/s; the torque takes it up, 1e-8 N·m
+FLATTEST, STEEPEST = 0.1, 1e6  # of the unbalance's rise with the velocity, for the next guess
+X, INVERSE = ROOT.scalars.index("x"), ROOT.scalars.index("inverse")
+begin, begin_beyond, improve = root.begin, root.begin_beyond, root.improve
 
 
 class Plant(NamedTuple):
@@ -120,12 +126,10 @@ def solve(plant: Plant, v0: float, free: float, gain: float, h: float, z: int, t
     """The velocity v = free - gain F(v) at the end of a sub-step; ``trial`` holds the law's state, FRICTION the torque.
 
     The first guess is exact where the torque is linear in v with the slope that it had in the last sub-step, as in a
-    sticking or a sliding contact; then a secant; then `near_rest` and `bracketed`. A law that holds at rest stays
-    while it can.
+    sticking or a sliding contact. A law that holds at rest stays while it can.
     """
     memory = plant.memory
-    slope = memory[SLOPE]
-    v = (free - gain * memory[FRICTION] - (slope - 1.0) * v0) / slope
+    r = pointer(memory, SEARCH)
     if plant.holding != 0:
         side = 1.0 if free > 0.0 else -1.0
         held = call_holding(plant.holding, side, pointer(memory, z), plant.parameters, plant.surroundings)
@@ -133,68 +137,15 @@ def solve(plant: Plant, v0: float, free: float, gain: float, h: float, z: int, t
             torque_after(plant, 0.0, 0.0, h, z, trial)
             memory[FRICTION] = free / gain if gain > 0.0 else 0.0
             return 0.0
-        v = free - side * gain * held
-    if memory[POWER] > 0.0 and memory[POWER] < 0.9:
-        return near_rest(plant, v0, free, gain, h, z, trial)
-    f = unbalance(plant, v0, free, gain, h, z, trial, v)
-    if enough(f, v):
-        return v
-    w = v - f / slope
-    g = unbalance(plant, v0, free, gain, h, z, trial, w)
-    if w != v:
-        memory[SLOPE] = min(max((g - f) / (w - v), 0.1), 1e6)
-    if enough(g, w):
-        return w
-    if abs(w) < 0.1 and plant.holding == 0:
-        return near_rest(plant, v0, free, gain, h, z, trial)
-    return bracketed(plant, v0, free, gain, h, z, trial, v, f, w, g)
-
-
-@kernel()
-def near_rest(plant: Plant, v0: float, free: float, gain: float, h: float, z: int, trial: int) -> float:
-    """The root where the torque rises like a power of the velocity: |v|^0.38 of thesis Table 10 has no slope at rest.
-
-    What exceeds the unbalance at rest is taken as FACTOR |v|^POWER, both kept from sub-step to sub-step.
-    """
-    memory = plant.memory
-    rest = unbalance(plant, v0, free, gain, h, z, trial, 0.0)
-    if enough(rest, 0.0):
-        return 0.0
-    side = -1.0 if rest > 0.0 else 1.0
-    needed = abs(rest)
-    power = memory[POWER] if memory[POWER] > 0.0 else 1.0
-    factor = memory[FACTOR] if memory[FACTOR] > 0.0 else memory[SLOPE]
-    x = (needed / factor) ** (1.0 / power)
-    low, high = 0.0, math.inf
-    last_x, last_rise = 0.0, 0.0
-    for _ in range(12):
-        f = unbalance(plant, v0, free, gain, h, z, trial, side * x)
-        rise = side * (f - rest)
-        if not rise > 0.0:
+        begin_beyond(r, 0.0, side * gain * held - free, free - side * gain * held)
+    else:
+        slope = 1.0 / r[INVERSE]
+        begin(r, (free - gain * memory[FRICTION] - (slope - 1.0) * v0) / slope)
+    for _ in range(MOST):
+        if improve(r, unbalance(plant, v0, free, gain, h, z, trial, r[X])) == 0.0:
             break
-        if last_x > 0.0 and last_x != x and last_rise != rise:
-            power = min(max(math.log(rise / last_rise) / math.log(x / last_x), 0.2), 2.0)
-        memory[POWER], memory[FACTOR] = power, rise / x**power
-        if enough(f, x):
-            return side * x
-        if rise > needed:
-            high = x
-        else:
-            low = x
-        last_x, last_rise = x, rise
-        x *= (needed / rise) ** (1.0 / power)
-        if not low < x < high:
-            x = 0.5 * (low + high) if math.isfinite(high) else 4.0 * low
-    memory[POWER] = 0.0
-    first = unbalance(plant, v0, free, gain, h, z, trial, side * high if math.isfinite(high) else side)
-    end = high if math.isfinite(high) else 1.0
-    return bracketed(plant, v0, free, gain, h, z, trial, 0.0, rest, side * end, first)
-
-
-@kernel(inline=True)
-def enough(f: float, v: float) -> bool:
-    """Whether an unbalance is none: what it would make of the position is far below every sensor."""
-    return abs(f) <= UNBALANCE * (0.1 + abs(v)) or not math.isfinite(f)
+    r[INVERSE] = min(max(r[INVERSE], 1.0 / STEEPEST), 1.0 / FLATTEST)
+    return r[X]
 
 
 @kernel(inline=True)
@@ -205,56 +156,6 @@ def unbalance(
     begin = v if plant.numbers[DAMPED] != 0.0 else v0
     plant.memory[FRICTION] = torque_after(plant, begin, v, h, z, trial)
     return v - free + gain * plant.memory[FRICTION]
-
-
-@kernel()
-def bracketed(
-    plant: Plant, v0: float, free: float, gain: float, h: float, z: int, trial: int, v: float, f: float,
-    w: float, g: float,
-) -> float:  # fmt: skip
-    """The root between velocities of opposite unbalance, which are sought first.
-
-    Regula falsi (Illinois), on the logarithm of the velocity where the ends lie far apart: a viscous term like
-    |v|^0.38 (thesis Table 10) has an infinite slope at rest.
-    """
-    stride = w - v if w != v else 1e-6
-    for _ in range(60):
-        if f * g <= 0.0 or not math.isfinite(g):
-            break
-        if abs(g) > abs(f):
-            v, f, w, g = w, g, v, f
-            stride = -stride
-        stride *= 2.0
-        v, f = w, g
-        w += math.copysign(max(abs(stride), abs(g)), -g)
-        g = unbalance(plant, v0, free, gain, h, z, trial, w)
-    if v * w < 0.0:
-        middle = unbalance(plant, v0, free, gain, h, z, trial, 0.0)
-        if enough(middle, 0.0):
-            return 0.0
-        if middle * g < 0.0:
-            v, f = 0.0, middle
-        else:
-            w, g = 0.0, middle
-    x = w
-    for count in range(80):
-        near, far = min(abs(v), abs(w)), max(abs(v), abs(w))
-        share = f / (f - g)
-        if far > 8.0 * near and far > FINEST:
-            near = max(near, FINEST)
-            low, high = math.log(max(abs(v), FINEST)), math.log(max(abs(w), FINEST))
-            x = math.copysign(math.exp(low + (high - low) * (0.5 if count % 3 == 2 else share)), v + w)
-        else:
-            x = v + (w - v) * (0.5 if count % 3 == 2 else share)
-        y = unbalance(plant, v0, free, gain, h, z, trial, x)
-        if enough(y, x) or abs(w - v) <= UNBALANCE * (1e-3 + abs(x)):
-            break
-        if y * g < 0.0:
-            v, f = w, g
-        else:
-            f *= 0.5
-        w, g = x, y
-    return x
 
 
 @kernel()

@@ -8,16 +8,21 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulation.recorded_input.step import (
+from stickslip.simulation.recorded_input.contact import (
     BACK_EMF,
     BACKLASH,
     DRIVE_GAIN,
+    HOLDS,
     INERTIA,
     LOSS,
     PUSH,
+    SCALED_BY_LOAD,
     Plant,
-    advance,
+    load_of,
+    share,
 )
+from stickslip.simulation.recorded_input.step import LEAST, MOTION, ROUNDING, two_stages
+from stickslip.simulation.root import ROOT, compiled
 
 # ---- the drive's numbers ----------------------------------------------------------------------------------
 (
@@ -25,6 +30,9 @@ from stickslip.simulation.recorded_input.step import (
     START_VELOCITY, COUNT, SLACK, FORGETS, DRIVE,
 ) = range(18)  # fmt: skip
 HELD, LINEAR, FEEDBACK = 0.0, 1.0, 2.0  # KIND
+SEARCH, MOVES = len(ROOT.scalars), len(MOTION.scalars)
+APPLIED = 4  # place in the surroundings
+ready = compiled.ready
 SPEED_LIMIT = 1e9  # rad/s, beyond which a simulation has diverged
 
 # ---- columns of the signals and of the result -------------------------------------------------------------
@@ -99,6 +107,15 @@ def slope(c: Any, signals: Any, k: int, dt: float) -> float:
     return c[SIGNAL_GAIN] * (signals[k + 1, SIGNAL] - signals[k, SIGNAL]) / dt
 
 
+@kernel(inline=True)
+def advance(c: Plant, drive: float, rate: float, h: float) -> None:
+    """Move the axis on by h under the torque of the drive at standstill, `drive` at the begin and rising at `rate`."""
+    n, q, u = c.numbers, c.motion[0], c.surroundings
+    u[0], u[1], u[APPLIED] = q, load_of(n, q, c.motion[1], drive), drive + n[PUSH]
+    factor = share(n, q) * (u[1] if n[SCALED_BY_LOAD] != 0.0 else 1.0)
+    two_stages(c, n, c.motion, c.first, c.second, u[APPLIED], rate, h, factor)
+
+
 @kernel()
 def follow(
     numbers: Any, step: int, holding: int, parameters: Any, surroundings: Any, start: Any, c: Any, signals: Any,
@@ -107,13 +124,15 @@ def follow(
     """Simulate over the record's times; returns how many rows of `out` were reached with finite numbers."""
     n = numbers
     states, trial, base = start.copy(), start.copy(), start.copy()
-    slopes = np.full(2, n[INERTIA])
-    z = pointer(states, 0)
+    searches, state, m = np.zeros((2, SEARCH)), np.zeros(MOVES), np.zeros(MEMORY)
+    n[HOLDS] = 1.0 if holding != 0 else 0.0
     plant = Plant(
-        pointer(numbers, 0), step, holding, pointer(parameters, 0), pointer(surroundings, 0), pointer(base, 0),
-        pointer(trial, 0), pointer(slopes, 0), start.size,
+        step, holding, pointer(parameters, 0), pointer(surroundings, 0), pointer(states, 0), pointer(base, 0),
+        pointer(trial, 0), start.size, pointer(numbers, 0), pointer(state, 0), pointer(searches, 0),
+        pointer(searches, SEARCH),
     )  # fmt: skip
-    state, m = np.zeros(2), np.zeros(MEMORY)
+    ready(plant.first, n[INERTIA], ROUNDING, LEAST, 1.0)
+    ready(plant.second, n[INERTIA], ROUNDING, LEAST, 1.0)
     state[0], state[1] = c[START_POSITION], c[START_VELOCITY]
     y = state[0]
     rows = signals.shape[0]
@@ -150,7 +169,7 @@ def follow(
             gain = n[DRIVE_GAIN] * signals[k, SUPPLY]
             n[PUSH] = push + damping * goal + disturbance[k]
             for i in range(substeps):
-                advance(plant, state, z, gain * (u + rate * h * i), gain * rate, h)
+                advance(plant, gain * (u + rate * h * i), gain * rate, h)
                 y = seen(n, y, state[0])
         moved = (y if n[BACKLASH] > 0.0 else state[0]) - first if k < rows - 1 else goal * dt
         out[k, OUT_CORRECTION] = pulled + damping * (goal - moved / dt)
@@ -161,7 +180,7 @@ def follow(
         if not (math.isfinite(state[0]) and abs(state[1]) < SPEED_LIMIT):
             return k + 1
     # The arrays are used here so that they outlive their addresses.
-    return rows if states.size + trial.size + base.size + slopes.size >= 0 else 0
+    return rows if states.size + trial.size + base.size + searches.size + state.size >= 0 else 0
 
 
 @kernel()

@@ -8,6 +8,7 @@ written so, and axes with backlash, a pendulum or harmonics, are left to `record
 
 from __future__ import annotations
 
+import functools
 import math
 import threading
 from collections.abc import Sequence
@@ -17,10 +18,13 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import compiled_lanes, flat
+from stickslip.simulation import root
 from stickslip.simulation.many.simd_source import body
 from stickslip.simulation.recorded_input import simd_batch
 from stickslip.simulation.recorded_input.branchless import Assumption, Name, NotStraight, Trace, traced
 from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, reads_load
+from stickslip.simulation.recorded_input.step import LEAST
+from stickslip.simulation.root import ROOT
 from stickslip.spec import Law, Surroundings
 from stickslip.subset import law_layouts, lower
 
@@ -34,10 +38,12 @@ LONGEST = 0.5
 """Part of a record beyond which its longest segment, `Segments.longest`, is too long for lanes to be worth it."""
 INLINED = frozenset(
     {
-        "start", "improve", "first_stage", "second_stage", "take_other_rise", "accept", "beyond", "pull", "look_back",
+        "start", "look", "first_stage", "second_stage", "take_other_rise", "accept", "beyond", "pull", "look_back",
     }
 )  # fmt: skip
 """Functions that run for all lanes at once."""
+KEPT = {"x": "X", "last": "LAST", "f_last": "F_LAST", "other": "OTHER", "phase": "PHASE", "inverse": "RISE"}
+"""What the root finder keeps of every lane, and in which row."""
 
 
 # ---- the program -----------------------------------------------------------------------------------------------
@@ -95,7 +101,23 @@ def source(law: Law, trace: Trace) -> str:
     text += written(law, "step", {"v0": Name("v"), "v1": Name("v"), "dt": Name("h")}, "law", "v, h", trace)
     if law.holding is not None:
         text += written(law, "holding", {"direction": Name("direction")}, "withstood", "direction", trace)
-    return "\n".join([*text, *functions]) + "\n"
+    return "\n".join([*text, *root_finder(), *functions]) + "\n"
+
+
+@functools.cache
+def root_finder() -> tuple[str, ...]:
+    """The lines of `stickslip.simulation.root.improve`. What is written without branches rises like no power."""
+    given = {"enough": Name("enough"), "rounding": Name("rounding"), "least": LEAST}
+    start = [Name(KEPT[f].lower()) if f in KEPT else given.get(f, 0.0) for f in ROOT.scalars]
+    arrays: dict[Any, Any] = {("r", i): value for i, value in enumerate(start)}
+    trace = Trace(())
+    functions = lower({"_improve_": root.improve}, {"r": ROOT})
+    result = traced(functions, "_improve_", {"r": "r", "f": Name("f")}, arrays, trace)
+    lines = [f"{row.lower()} = w[{row} * LANES + lane]" for row in KEPT.values()]
+    lines += trace.lines
+    lines += [f"w[{row} * LANES + lane] = {arrays['r', ROOT.scalars.index(f)]}" for f, row in KEPT.items()]
+    head = "def searched(w, lane, f, enough, rounding):"
+    return ("@compile_inlined", head, *(f"    {line}" for line in [*lines, f"return {result}"]))
 
 
 def written(

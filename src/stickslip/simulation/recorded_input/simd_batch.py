@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import pointer, select
-from stickslip.simulation.recorded_input.simd_names import HOLDS, LANES, STATES, law, withstood
+from stickslip.simulation.recorded_input.simd_names import HOLDS, LANES, STATES, law, searched, withstood
 
 GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
-MOST = 200  # iterations of a stage
+MOST = 200  # evaluations of a stage
 
 # ---- entries of n ----------------------------------------------------------------------------------------------
 (
@@ -30,16 +30,16 @@ MOST = 200  # iterations of a stage
 SIGNAL, SEEN, NEXT, DAMPING, GOAL, FIRM, DISTURBANCE, GOES_ON, PERIOD, SIGNALS = range(10)
 # ---- rows of w behind the signals: the axis, the stage that is solved, and its iteration ---------------------------
 (
-    POSITION, VELOCITY, BEHIND, FIRST, PULLED, DAMPED, LOSS, TORQUE, LOAD, FACTOR, BEGIN, X, F, LAST, F_LAST, OTHER,
-    PHASE, RISE, OTHER_RISE, STEP, STATE,
-) = range(SIGNALS, SIGNALS + 21)  # fmt: skip
+    POSITION, VELOCITY, BEHIND, FIRST, PULLED, DAMPED, LOSS, TORQUE, LOAD, FACTOR, BEGIN, X, LAST, F_LAST, OTHER, PHASE,
+    RISE, OTHER_RISE, STEP, STATE,
+) = range(SIGNALS, SIGNALS + 20)  # fmt: skip
 BASE = STATE + STATES
 TRIAL = BASE + STATES
 ROWS = TRIAL + STATES
-GUESSED, LEADS_ON, NARROWS, SOLVED = 0.0, 1.0, 2.0, 3.0  # PHASE
+GUESSED, LEADS_ON, SOLVED = 0.0, 1.0, 3.0  # PHASE, as in `stickslip.simulation.root`
 
 
-# ---- a stage of backward Euler: root of the unbalance ------------------------------------------------------------
+# ---- a stage of backward Euler, solved by `stickslip.simulation.root` in all lanes -------------------------------
 
 
 def start(w: Any, lane: int, n: Any, p: Any) -> None:
@@ -61,51 +61,14 @@ def start(w: Any, lane: int, n: Any, p: Any) -> None:
         w[PHASE * LANES + lane] = select(rests, SOLVED, LEADS_ON)
 
 
-def improve(w: Any, lane: int, n: Any, p: Any) -> bool:
-    """The unbalance at ``X``, and the next velocity; whether that is worth another look.
-
-    Away from the velocity guessed until the sign changes, by secants that lead at least as far again, at most ten
-    times; then between the two by secants, and the middle where they do not help.
-    """
+def look(w: Any, lane: int, n: Any, p: Any) -> bool:
+    """The unbalance at ``X``, and the next velocity; whether that is worth another look."""
     h = GAMMA * w[STEP * LANES + lane]
     x = w[X * LANES + lane]
-    phase = w[PHASE * LANES + lane]
-    last = w[LAST * LANES + lane]
-    f_last = w[F_LAST * LANES + lane]
     torque = w[FACTOR * LANES + lane] * law(w, lane, x, h, p)
     applied = w[TORQUE * LANES + lane] - w[LOSS * LANES + lane] * x - n[OFFSET] - torque
     f = n[INERTIA] * (x - w[BEGIN * LANES + lane]) - h * applied
-    first = phase == GUESSED
-    crossed = (f * f_last <= 0.0) & (phase > GUESSED)
-    other = select(crossed, last, w[OTHER * LANES + lane])
-    size = select(abs(x) > 1e-2, abs(x), 1e-2)
-    fine = (abs(f) <= n[INERTIA] * n[ROUNDING] * size) | (f - f != 0.0)
-    close = (abs(x - other) <= n[ROUNDING] * size) & (phase > GUESSED) & (crossed | (phase == NARROWS))
-    open_ = phase < SOLVED
-    done = fine | close
-    # ---- where the line through the last two leads; its slope is kept as its inverse: divisions take long ----
-    run = x - last
-    inverse = run / (f - f_last)
-    inverse = select(first, w[RISE * LANES + lane], inverse)
-    step = -f * inverse
-    secant = x + step
-    low = select(x < other, x, other)
-    high = select(x < other, other, x)
-    helps = (low < secant) & (secant < high) & (abs(f) <= 0.5 * abs(f_last))
-    narrower = select(helps, secant, 0.5 * (x + other))
-    onwards = (step * run > 0.0) & (1.1 * abs(step) < 10.0 * abs(run))
-    farther = select(first, secant, x + select(onwards, 1.1 * step, 10.0 * run))
-    narrows = crossed | (phase == NARROWS)
-    # ---- what stays of it ----
-    goes_on = open_ & (done == False)  # noqa: E712 (`not` would be a branch)
-    w[X * LANES + lane] = select(goes_on, select(narrows, narrower, farther), x)
-    w[LAST * LANES + lane] = select(goes_on, x, last)
-    w[F_LAST * LANES + lane] = select(goes_on, f, f_last)
-    w[OTHER * LANES + lane] = other
-    w[PHASE * LANES + lane] = select(goes_on, select(narrows, NARROWS, LEADS_ON), SOLVED)
-    kept = open_ & done & (inverse > 0.0) & (inverse < 1e300)
-    w[RISE * LANES + lane] = select(kept, inverse, w[RISE * LANES + lane])
-    return goes_on
+    return searched(w, lane, f, n[INERTIA] * n[ROUNDING], n[ROUNDING]) > 0.0
 
 
 def solve(w: Any, n: Any, p: Any, count: int) -> None:
@@ -115,7 +78,7 @@ def solve(w: Any, n: Any, p: Any, count: int) -> None:
     for _ in range(MOST):
         left = 0
         for lane in range(count):
-            left += improve(w, lane, n, p)
+            left += look(w, lane, n, p)
         if left == 0:
             break
 

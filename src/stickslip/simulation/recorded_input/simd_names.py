@@ -24,3 +24,8 @@ def law(w: Any, lane: int, v: float, h: float, p: Any) -> float:
 def withstood(w: Any, lane: int, direction: float, p: Any) -> float:
     """Torque that the contact withstands at rest, N·m."""
     raise NotImplementedError
+
+
+def searched(w: Any, lane: int, f: float, enough: float, rounding: float) -> float:
+    """`stickslip.simulation.root.improve`: take f at ``X``; 1 where it is to be evaluated again."""
+    raise NotImplementedError

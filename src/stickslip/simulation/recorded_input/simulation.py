@@ -19,8 +19,8 @@ import numpy as np
 from stickslip.errors import InputError, ParameterError, UnknownName
 from stickslip.jit import compiled_law, flat
 from stickslip.model import Model
+from stickslip.simulation.recorded_input import contact as plant
 from stickslip.simulation.recorded_input import loop as loop
-from stickslip.simulation.recorded_input import step as plant
 from stickslip.spec import Law, Surroundings
 from stickslip.subset import law_layouts, lower
 

@@ -40,7 +40,7 @@ from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter
 from stickslip.simulation._metrics import settle_band_of
 from stickslip.simulation._sampled import Sampled, compiled, measured_position
 from stickslip.simulation.exact.engine import crosses_once, elements_of, modulations
-from stickslip.simulation.recorded_input.step import Plant
+from stickslip.simulation.recorded_input.contact import Plant
 from stickslip.simulation.sampled.axis import axis_of, general_axis
 from stickslip.simulation.sampled.general import Contact, act_on, contact_of, hold, plant_of, step_on
 from stickslip.simulation.sampled.modes import creep, friction, rest, sign

@@ -1,4 +1,4 @@
-"""The sampled engine's way across a sample for any law: the implicit step of `driven.step`, under error control.
+"""The sampled engine's way across a sample for any law: steps of `recorded_input.step`, under error control.
 
 The step knows of a law no more than its ``step``. Where it would be wrong by more than its share of the tolerance it is
 shortened, so that stick and slip are cut where they happen. A law that jumps at zero velocity (or at the edge of its
@@ -14,8 +14,10 @@ import numpy as np
 
 from stickslip.jit import call_holding, call_step, kernel, pointer
 from stickslip.simulation._case import INERTIA, PLANT_BAND, Case, surroundings
-from stickslip.simulation.recorded_input import step as driven
-from stickslip.simulation.recorded_input.step import GAMMA, Plant, two_stages
+from stickslip.simulation.recorded_input import contact as driven
+from stickslip.simulation.recorded_input.contact import Plant, keep
+from stickslip.simulation.recorded_input.step import GAMMA, LEAST, MOTION, ROUNDING, two_stages
+from stickslip.simulation.root import ROOT, compiled
 from stickslip.simulation.sampled.rates import HOLDS, STEPS
 
 __all__ = ["Contact", "act_on", "contact_of", "hold", "plant_of", "step_on"]
@@ -28,6 +30,8 @@ GROWS, SHRINKS, SAFE, SHORT = 4.0, 0.15, 0.9, 0.8
 """Of a step: what the next one may be longer, or this one shorter; the reserve in its length; and of the time to
 rest, in which the axis is brought near it."""
 TINY = 1e-300
+ready = compiled.ready
+SEARCH, MOVES, INVERSE = len(ROOT.scalars), len(MOTION.scalars), ROOT.scalars.index("inverse")
 AROUND, TIME, APPLIED = 0, 3, 4
 """Places in the surroundings."""
 
@@ -45,7 +49,8 @@ class Contact(NamedTuple):
     kept: Any
     base: Any
     trial: Any
-    slopes: Any
+    motion: Any
+    searches: Any
 
 
 def contact_of(case: Case) -> Contact:
@@ -53,36 +58,34 @@ def contact_of(case: Case) -> Contact:
     n, side = case.numbers, case.plant
     numbers = np.zeros(driven.FOURIER)
     numbers[driven.INERTIA] = n[INERTIA]
-    numbers[driven.PERIOD] = 1.0
+    numbers[driven.HOLDS] = float(side.pointers.holding != 0)
     states = side.state.size
     return Contact(
         side.pointers.step, side.pointers.holding, float(n[PLANT_BAND]), numbers, side.parameters, surroundings(n),
-        side.state.copy(), np.zeros(states), np.zeros(states), np.zeros(states), np.full(2, n[INERTIA]),
+        side.state.copy(), np.zeros(states), np.zeros(states), np.zeros(states), np.zeros(MOVES),
+        np.zeros((2, SEARCH)),
     )  # fmt: skip
 
 
 @kernel(exact=False)
 def plant_of(c: Contact) -> Plant:
-    """The addresses of the contact's arrays."""
-    return Plant(
-        pointer(c.numbers, 0), c.step, c.holding, pointer(c.parameters, 0), pointer(c.around, 0), pointer(c.base, 0),
-        pointer(c.trial, 0), pointer(c.slopes, 0), c.state.size,
+    """The addresses of the contact's arrays, its root finders ready."""
+    plant = Plant(
+        c.step, c.holding, pointer(c.parameters, 0), pointer(c.around, 0), pointer(c.state, 0), pointer(c.base, 0),
+        pointer(c.trial, 0), c.state.size, pointer(c.numbers, 0), pointer(c.motion, 0), pointer(c.searches, 0),
+        pointer(c.searches, SEARCH),
     )  # fmt: skip
+    ready(plant.first, plant.numbers[driven.INERTIA], ROUNDING, LEAST, 1.0)
+    ready(plant.second, plant.numbers[driven.INERTIA], ROUNDING, LEAST, 1.0)
+    return plant
 
 
 @kernel(exact=False)
-def torque_at(plant: Plant, state: Any, v0: float, v1: float, h: float) -> float:
+def torque_at(plant: Plant, v0: float, v1: float, h: float) -> float:
     """Torque after a piece of h from v0 to v1; ``trial`` holds the law's state then."""
     for i in range(plant.states):
-        plant.trial[i] = state[i]
+        plant.trial[i] = plant.state[i]
     return call_step(plant.step, v0, v1, h, plant.trial, plant.parameters, plant.surroundings)
-
-
-@kernel(exact=False)
-def keep(plant: Plant, state: Any) -> None:
-    """The trial state becomes the law's."""
-    for i in range(plant.states):
-        state[i] = plant.trial[i]
 
 
 @kernel(exact=False)
@@ -96,11 +99,10 @@ def act_on(axis: Any, z: Any, c: Contact, plant: Plant, t: float) -> None:
     """The torque on the axis is another one now: its acceleration, and whether a contact lets go."""
     u = plant.surroundings
     u[AROUND], u[TIME], u[APPLIED] = z.position, t, z.torque
-    state = pointer(c.state, 0)
     if z.mode == HOLDS:
         hold(axis, z, c, plant, t, 0.0)
     else:
-        z.held = torque_at(plant, state, z.velocity, z.velocity, 0.0)
+        z.held = torque_at(plant, z.velocity, z.velocity, 0.0)
         z.acceleration = (z.torque - z.held) / axis.inertia
 
 
@@ -109,9 +111,8 @@ def hold(axis: Any, z: Any, c: Contact, plant: Plant, t: float, left: float) -> 
     """Rest for `left` at most, or let go; returns the time taken. In a band (Karnopp's) momentum gathers meanwhile."""
     u = plant.surroundings
     u[AROUND], u[TIME], u[APPLIED] = z.position, t, z.torque
-    state = pointer(c.state, 0)
     push = 1.0 if z.torque > 0.0 else -1.0
-    held = call_holding(c.holding, push, state, plant.parameters, u)
+    held = call_holding(c.holding, push, plant.state, plant.parameters, u)
     excess = z.torque - push * min(abs(z.torque), held)
     taken, leaves = left, excess != 0.0
     if c.band > 0.0:
@@ -127,13 +128,13 @@ def hold(axis: Any, z: Any, c: Contact, plant: Plant, t: float, left: float) -> 
     z.velocity = z.acceleration = 0.0
     z.held = z.torque - excess
     if taken > 0.0:
-        torque_at(plant, state, 0.0, 0.0, taken)
-        keep(plant, state)
+        torque_at(plant, 0.0, 0.0, taken)
+        keep(plant)
     if leaves:
         z.mode, z.direction = STEPS, push
         z.velocity = push * c.band
         edge = edge_of(c, push)
-        z.held = torque_at(plant, state, edge, edge, 0.0)
+        z.held = torque_at(plant, edge, edge, 0.0)
         z.acceleration = (z.torque - z.held) / axis.inertia
         z.next = min(z.next, 1e-2 * axis.sample_time)
         z.events += 1
@@ -147,7 +148,7 @@ def landing(axis: Any, z: Any, c: Contact, plant: Plant, h: float) -> tuple[floa
     From the accelerations now and there; ``trial`` holds the law's state there.
     """
     edge = edge_of(c, z.direction)
-    there = (z.torque - torque_at(plant, pointer(c.state, 0), z.velocity, edge, h)) / axis.inertia
+    there = (z.torque - torque_at(plant, z.velocity, edge, h)) / axis.inertia
     slows = -0.5 * z.direction * (z.acceleration + there)
     return abs(z.velocity - z.direction * c.band) / slows if slows > 0.0 else math.inf, there - z.acceleration
 
@@ -155,7 +156,7 @@ def landing(axis: Any, z: Any, c: Contact, plant: Plant, h: float) -> tuple[floa
 @kernel(exact=False)
 def land(axis: Any, z: Any, c: Contact, plant: Plant, h: float, bend: float) -> float:
     """Come to rest after h, which is returned; ``trial`` is of `landing`."""
-    keep(plant, pointer(c.state, 0))
+    keep(plant)
     z.position += 0.5 * h * (z.velocity + z.direction * c.band) - h * h * bend / 12.0
     z.goal, z.mode, z.events = z.direction * c.band, HOLDS, z.events + 1
     z.velocity, z.acceleration, z.held = 0.0, 0.0, z.torque
@@ -165,7 +166,7 @@ def land(axis: Any, z: Any, c: Contact, plant: Plant, h: float, bend: float) -> 
 @kernel(exact=False)
 def step_on(axis: Any, z: Any, c: Contact, plant: Plant, t: float, left: float) -> float:
     """One step of a moving axis, at most `left` s long; returns the time taken."""
-    state, kept = pointer(c.state, 0), pointer(c.kept, 0)
+    state, kept, moving = plant.state, pointer(c.kept, 0), plant.motion
     u, q, v = plant.surroundings, z.position, z.velocity
     if c.holding != 0 and v != 0.0:
         z.direction = math.copysign(1.0, v)
@@ -178,7 +179,9 @@ def step_on(axis: Any, z: Any, c: Contact, plant: Plant, t: float, left: float) 
     u[APPLIED] = z.torque
     while True:
         u[AROUND], u[TIME] = q + 0.5 * h * (v + 0.5 * h * z.acceleration), t + 0.5 * h
-        middle, position, end = two_stages(plant, state, q, v, z.torque, 0.0, h, 1.0)
+        moving[0], moving[1] = q, v
+        two_stages(plant, plant.numbers, moving, plant.first, plant.second, z.torque, 0.0, h, 1.0)
+        position, end, middle = moving[0], moving[1], moving[2]
         wrong, last = error_of(axis, z, plant, h, middle, end)
         below = c.holding != 0 and min(z.direction * middle, z.direction * end) <= c.band
         if (not below and wrong <= axis.local) or (h <= least and (not below or v == 0.0)):
@@ -217,5 +220,5 @@ def error_of(axis: Any, z: Any, plant: Plant, h: float, middle: float, end: floa
     last = (end - v - (1.0 - GAMMA) * h * first) / (GAMMA * h)
     bend = 2.0 * ((last - first) / (1.0 - GAMMA) - (first - z.acceleration) / GAMMA)
     changes = max(h * abs(last - z.acceleration), axis.sample_time * abs(bend))
-    pulled = 1.0 if plant.states > 0 else min(1.0, axis.inertia / plant.slopes[1])
+    pulled = 1.0 if plant.states > 0 else min(1.0, axis.inertia * plant.second[INVERSE])
     return THIRD * h * changes * pulled, last
