@@ -131,8 +131,8 @@ def follow(
         pointer(trial, 0), start.size, pointer(numbers, 0), pointer(state, 0), pointer(searches, 0),
         pointer(searches, SEARCH),
     )  # fmt: skip
-    ready(plant.first, n[INERTIA], ROUNDING, LEAST, 1.0)
-    ready(plant.second, n[INERTIA], ROUNDING, LEAST, 1.0)
+    ready(plant.first, n[INERTIA], ROUNDING, LEAST, 1.0 - n[HOLDS])
+    ready(plant.second, n[INERTIA], ROUNDING, LEAST, 1.0 - n[HOLDS])
     state[0], state[1] = c[START_POSITION], c[START_VELOCITY]
     y = state[0]
     rows = signals.shape[0]

@@ -75,8 +75,9 @@ def plant_of(c: Contact) -> Plant:
         pointer(c.trial, 0), c.state.size, pointer(c.numbers, 0), pointer(c.motion, 0), pointer(c.searches, 0),
         pointer(c.searches, SEARCH),
     )  # fmt: skip
-    ready(plant.first, plant.numbers[driven.INERTIA], ROUNDING, LEAST, 1.0)
-    ready(plant.second, plant.numbers[driven.INERTIA], ROUNDING, LEAST, 1.0)
+    sharp = 1.0 - plant.numbers[driven.HOLDS]
+    ready(plant.first, plant.numbers[driven.INERTIA], ROUNDING, LEAST, sharp)
+    ready(plant.second, plant.numbers[driven.INERTIA], ROUNDING, LEAST, sharp)
     return plant
 
 
