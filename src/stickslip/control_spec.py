@@ -18,6 +18,8 @@ Argument order, everywhere: signals of the loop ``y``, state ``z``, parameters `
                                          estimator the corner of its low-pass, rad/s; a sentence where these
                                          parameters have none
 ``placed(inertia, bandwidth, damping)``  parameters that place the poles of the loop without friction, by name
+``deviations(z, p, sample_time)``        standard deviations of what was learned by the names of the states, as far as
+                                         the state tells them
 =======================================  ===========================================================
 
 ``sample``, ``take_over`` and ``accelerating`` are written in the scalar subset (`stickslip.subset`). ``y`` has the
@@ -107,7 +109,7 @@ class ControlLaw(Configurable):
         Parameters for an axis of 3.8623e-4 kg·m² at 1 kHz, for documentation and the contract tests.
     State : type or None
         As ``Params``, for the internal state. Everything is 0 at the start.
-    take_over, accelerating, check, delay, continuous, placed : callable or None
+    take_over, accelerating, check, delay, continuous, placed, deviations : callable or None
     linear : bool
         Superposition holds while the torque is within its limit. A declaration: the contract tests try it.
     holds_friction : bool
@@ -139,6 +141,7 @@ class ControlLaw(Configurable):
     delay: Callable[[Any, float], float] | None = None
     continuous: Callable[[Any], Any] | None = None
     placed: Callable[[float, float, float], Mapping[str, float]] | None = None
+    deviations: Callable[[Any, Any, float], Mapping[str, float]] | None = None
     linear: bool = False
     holds_friction: bool = False
     integrates: bool = False

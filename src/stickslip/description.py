@@ -15,6 +15,7 @@ __all__ = [
     "Choice",
     "Elements",
     "Field",
+    "Kept",
     "Learned",
     "Memory",
     "Mode",
@@ -80,6 +81,10 @@ class Memory(Mode):
 
 class Learned(Par):
     """A state that was learnt: it outlives a power cycle. Its arguments are those of `Par`."""
+
+
+class Kept(Learned):
+    """A learnt state that says nothing of the machine by itself. Its arguments are those of `Par`."""
 
 
 class Surroundings(NamedTuple):

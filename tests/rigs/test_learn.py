@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
@@ -29,6 +30,23 @@ def test_repetitions_become_better_and_the_best_table_is_saved(tmp_path):
     record = perform(track, virtual_rig("thesis-dry")).record
     error = record["position_reference"] - record["position"]
     assert math.sqrt(float(np.mean(error**2))) < 0.8 * each[0]
+
+
+def test_what_was_saved_is_replaced_by_the_same_learning_only(tmp_path):
+    saved = tmp_path / "learned.toml"
+    perform(learn(times=2, duration=10, save=saved), virtual_rig("thesis-dry"))
+    kept = tomllib.loads(saved.read_text())
+    assert 0.0 < kept["uncertainty"]["table"] < 0.1
+    planned(learn(save=saved), virtual_rig("thesis-dry"))
+    for options, rig, said in (
+        ({"reference": "low", "duration": 5}, "thesis-dry", "with other reference"),
+        ({}, "thesis-grease", "with other machine"),
+    ):
+        with pytest.raises(InputError, match=said):
+            planned(learn(save=saved, **options), virtual_rig(rig))
+    saved.write_text("[controller]\n")
+    with pytest.raises(InputError, match="holds nothing that was learned, and is not overwritten"):
+        planned(learn(save=saved), virtual_rig("thesis-dry"))
 
 
 def test_learning_that_makes_it_worse_ends():

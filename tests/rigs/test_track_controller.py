@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shutil
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import ParameterError
+from stickslip.errors import InputError, ParameterError
 from stickslip.record import Record
 from stickslip.rigs.procedures import procedure
 from stickslip.rigs.procedures.base import perform
@@ -53,6 +54,24 @@ def test_a_file_says_what_the_options_say(file):
     by_file, by_options = tracked(controller=file(FILE)), tracked()
     for name in ("position", "torque_command", "compensation_torque"):
         assert by_file[name] == pytest.approx(by_options[name], abs=2e-9), name
+
+
+def test_what_is_learned_is_kept_from_run_to_run(tmp_path):
+    path = tmp_path / "learned.toml"
+    options = {"compensator": "scale-dob", "reference": "high", "duration": "3", "learned": str(path)}
+    first = tracked(**options)
+    kept = tomllib.loads(path.read_text())
+    name = "feedforward_scale"
+    assert kept["learned"][name] == first.meta["learned"][name]["value"] != 1.0
+    assert kept["uncertainty"][name] == first.meta["learned"][name]["uncertainty"] > 0.0
+    assert any(c["text"].startswith("friction over that of the law") for c in first.meta["checks"])
+    path.write_text(path.read_text().replace(f"{name} = 0.9", f"{name} = 0.5", 1))
+    begun = tracked(**{**options, "duration": "0.2"})  # it has not slid far by then
+    assert begun.meta["learned"][name]["value"] < 0.8
+    with pytest.raises(InputError, match="was learned with other laws"):
+        tracked(**{**options, "compensator": "rls-dob"})
+    with pytest.raises(InputError, match="no law of this controller learns"):
+        tracked(**{**options, "compensator": "dob"})
 
 
 def test_an_observer_tracks_closer_and_the_plan_names_the_file(file):

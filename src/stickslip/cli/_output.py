@@ -85,6 +85,15 @@ def print_metrics(metrics: Mapping[str, float]) -> None:
         print(f"{name:<44}{'none' if math.isnan(value) else f'{value:.6g}':>14}")
 
 
+def print_learned(meta: Mapping[str, Any]) -> None:
+    """What the controller of a run has learned, a line a value."""
+    if not meta.get("learned"):
+        return
+    from stickslip.control.learned import told
+
+    print(*told(meta), sep="\n")
+
+
 def print_accuracy(meta: Mapping[str, Any]) -> None:
     """What a checked run says of its error; nothing where it was not checked."""
     found = meta.get("accuracy")

@@ -81,6 +81,7 @@ def run(args: argparse.Namespace) -> int:
         _output.print_json({**executed.record.meta, "record": str(out), "failure": executed.failure})
     else:
         _output.print_metrics(executed.metrics)
+        _output.print_learned(executed.record.meta)
         _output.print_accuracy(executed.record.meta)
         _output.print_integrator(executed.record.meta)
         print(f"record: {out} ({len(executed.record)} rows)")

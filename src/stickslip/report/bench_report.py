@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import base64
 import math
+from collections import Counter
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from stickslip.control.catalogue import CATALOGUE
+from stickslip.control.learned import told
 from stickslip.report.page import filled, replaced
-from stickslip.study.bench import BenchResult
+from stickslip.study.bench import BenchResult, BenchRun
 from stickslip.study.bench_decision import CONDITIONS, LATE, USUAL, Choice, Standing, choices, standings
 
 __all__ = ["dots", "write_bench_report"]
@@ -45,6 +47,7 @@ def write_bench_report(result: BenchResult) -> Path:
                 "rows": [
                     row(s, means.get((name, s.label), math.nan), delayed.get((name, s.label))) for s in own
                 ],
+                "learned": learned_on(name, result.runs),
             }
         )  # fmt: skip
     html = filled(
@@ -53,6 +56,17 @@ def write_bench_report(result: BenchResult) -> Path:
         conditions=list(CONDITIONS), choices=table_of(choices(result.runs)), machines=machines,
     )  # fmt: skip
     return replaced(result.folder / "report.html", html)
+
+
+def learned_on(machine: str, runs: Sequence[BenchRun]) -> list[dict[str, str]]:
+    """What was learned on a machine at the end of the reference along which most was: a row for every run."""
+    own = [r for r in runs if r.machine == machine and r.learned]
+    along = Counter(r.reference for r in own).most_common(1)
+    return [
+        {"run": r.key.partition("/")[2], "lines": "; ".join(told({"learned": r.learned}))}
+        for r in own
+        if r.reference == along[0][0]
+    ]
 
 
 def table_of(found: Sequence[Choice]) -> list[dict[str, Any]]:

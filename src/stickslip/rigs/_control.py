@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ import numpy as np
 from stickslip.control.composed import composed_of
 from stickslip.control.composition import MEMORY
 from stickslip.control.controller import Controller
+from stickslip.control.learned import after
 from stickslip.control.linear import Gains
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
@@ -27,9 +29,11 @@ __all__ = [
     "UNITS",
     "Control",
     "addresses",
+    "begin_learned",
     "control_of",
     "decide",
     "decide_at",
+    "end_learned",
     "finished",
     "nothing_at",
 ]
@@ -112,6 +116,28 @@ def control_of(
         np.array(Surroundings()),
         NAMES.index("others"),
     )
+
+
+def begin_learned(control: Control, controller: Any, learned: Mapping[str, Any] | None) -> None:
+    """Let a controller begin with what it has learned before."""
+    if isinstance(controller, SampledController) and learned:
+        control.state[:] = flat(controller.packed_state(controller.state(learned)))
+
+
+def end_learned(
+    control: Control,
+    controller: Any,
+    learned: dict[str, Any] | None,
+    sample_time: float,
+    meta: dict[str, Any],
+) -> None:
+    """`learned` gets what a controller has learned as it keeps it, a record's `meta` what there is to say of it."""
+    if not isinstance(controller, SampledController):
+        return
+    if learned is not None:
+        learned.update(controller.learned(controller.unpacked_state(control.state.tolist())))
+    if found := after(controller, control.state, sample_time):
+        meta["learned"] = found
 
 
 _compiled: dict[Any, int] = {}

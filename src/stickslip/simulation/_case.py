@@ -150,6 +150,8 @@ class Outcome:
         `stickslip.simulation._meter`'s accumulator and turning points; untouched where the case is not metered.
     counts : mapping
         steps, rejected, events.
+    control : array or None
+        The state in which a sampled controller was left.
     """
 
     rows: Array
@@ -158,6 +160,7 @@ class Outcome:
     meter: Array
     turns: Array
     counts: dict[str, int]
+    control: Array | None = None
 
 
 def surroundings(numbers: Array) -> Array:

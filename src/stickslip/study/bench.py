@@ -11,7 +11,7 @@ import json
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +79,8 @@ class Bench:
 
 @dataclass(frozen=True)
 class BenchRun:
-    """One run of the bench, done or to be done; `metrics` are those of `stickslip.study.bench_metrics`."""
+    """One run of the bench, done or to be done; `metrics` are those of `stickslip.study.bench_metrics`,
+    `learned` what the record of its end says (`stickslip.control.learned`)."""
 
     machine: str
     change: str
@@ -88,6 +89,7 @@ class BenchRun:
     compensator: str
     metrics: Mapping[str, float | None]
     failure: str = ""
+    learned: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @property
     def key(self) -> str:
@@ -313,7 +315,12 @@ def run_bench(
         finally:
             pool.shutdown(cancel_futures=True)
     runs = [
-        replace(p.run, metrics=done[p.run.key]["metrics"], failure=done[p.run.key]["failure"])
+        replace(
+            p.run,
+            metrics=done[p.run.key]["metrics"],
+            failure=done[p.run.key]["failure"],
+            learned=done[p.run.key].get("learned", {}),
+        )
         for p in everything
         if p.run.key in done
     ]
@@ -341,4 +348,5 @@ def executed(p: Planned) -> dict[str, Any]:
         )
     except SimulationError as error:
         return {"metrics": {}, "failure": str(error)}
-    return {"metrics": judged(record, p.event if p.event < p.duration else 0.0), "failure": ""}
+    metrics = judged(record, p.event if p.event < p.duration else 0.0)
+    return {"metrics": metrics, "failure": "", "learned": record.meta.get("learned", {})}

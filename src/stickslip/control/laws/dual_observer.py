@@ -19,7 +19,7 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw
 from stickslip.laws._curve import CURVE
 from stickslip.laws._curve import stribeck as sliding
-from stickslip.spec import Choice, Learned, Option, Par
+from stickslip.spec import Choice, Kept, Learned, Option, Par
 
 __all__ = ["CONTROL_LAW"]
 
@@ -59,7 +59,7 @@ class State(NamedTuple):
     ]
     damping: Annotated[float, Learned("N·m·s/rad", "sigma_1", "micro-viscous damping")]
     viscous: Annotated[float, Learned("N·m·s/rad", "sigma_2", "viscous friction")]
-    known: Annotated[float, Learned("-", "", "1 once there are factors")]
+    known: Annotated[float, Kept("-", "", "1 once there are factors")]
 
 
 def reference(y: Any) -> float:

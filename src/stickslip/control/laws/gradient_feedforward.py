@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.control_spec import ControlLaw, friction
-from stickslip.spec import Learned, Par
+from stickslip.spec import Kept, Learned, Par
 
 __all__ = ["CONTROL_LAW"]
 
@@ -27,7 +27,7 @@ class State(NamedTuple):
     """Internal state."""
 
     learnt: Annotated[float, Learned("-", "g", "gain")]
-    known: Annotated[float, Learned("-", "", "1 once there is a gain")]
+    known: Annotated[float, Kept("-", "", "1 once there is a gain")]
 
 
 def sample(y: Any, z: Any, p: Any, u: Any) -> float:

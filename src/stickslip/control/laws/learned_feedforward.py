@@ -12,7 +12,7 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.control_spec import REST, ControlLaw
-from stickslip.spec import Learned, Par
+from stickslip.spec import Kept, Learned, Par
 
 __all__ = ["CONTROL_LAW"]
 
@@ -44,7 +44,7 @@ class State(NamedTuple):
     down_sum: Annotated[tuple[float, ...], Par("N·m", "", "the same, backward")]
     up_count: Annotated[tuple[float, ...], Par("-", "", "samples in that sum, forward")]
     down_count: Annotated[tuple[float, ...], Par("-", "", "the same, backward")]
-    known: Annotated[float, Learned("-", "", "1 once there is a map")]
+    known: Annotated[float, Kept("-", "", "1 once there is a map")]
     bin: Annotated[float, Par("-", "", "bin of the last sample")]
     side: Annotated[float, Par("-", "", "direction of the last sample: 1, -1, or 0 where it taught nothing")]
     passed: Annotated[float, Par("-", "k", "samples of motion since the repetition began")]

@@ -12,9 +12,12 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.control_spec import ControlLaw, friction
-from stickslip.spec import Learned, Par
+from stickslip.spec import Kept, Learned, Par
 
 __all__ = ["CONTROL_LAW"]
+
+FULL = 0.999
+"""Of the largest trace: a covariance that has been cut back tells nothing."""
 
 
 class Params(NamedTuple):
@@ -56,14 +59,14 @@ class State(NamedTuple):
     coulomb: Annotated[float, Learned("N·m", "F_C", "Coulomb torque")]
     viscous: Annotated[float, Learned("N·m", "", "viscous torque at the speed v_0")]
     offset: Annotated[float, Learned("N·m", "", "torque that does not depend on the direction")]
-    p11: Annotated[float, Learned("-", "P_11", "covariance of the Coulomb torque")]
-    p12: Annotated[float, Learned("-", "P_12", "of Coulomb and viscous torque")]
-    p13: Annotated[float, Learned("-", "P_13", "of Coulomb torque and offset")]
-    p22: Annotated[float, Learned("-", "P_22", "of the viscous torque")]
-    p23: Annotated[float, Learned("-", "P_23", "of viscous torque and offset")]
-    p33: Annotated[float, Learned("-", "P_33", "of the offset")]
-    variance: Annotated[float, Learned("N²·m²", "", "mean square of the torque left over")]
-    known: Annotated[float, Learned("-", "", "1 once there are values")]
+    p11: Annotated[float, Kept("-", "P_11", "covariance of the Coulomb torque")]
+    p12: Annotated[float, Kept("-", "P_12", "of Coulomb and viscous torque")]
+    p13: Annotated[float, Kept("-", "P_13", "of Coulomb torque and offset")]
+    p22: Annotated[float, Kept("-", "P_22", "of the viscous torque")]
+    p23: Annotated[float, Kept("-", "P_23", "of viscous torque and offset")]
+    p33: Annotated[float, Kept("-", "P_33", "of the offset")]
+    variance: Annotated[float, Kept("N²·m²", "", "mean square of the torque left over")]
+    known: Annotated[float, Kept("-", "", "1 once there are values")]
     disturbance: Annotated[float, Par("N·m", "d_A", "observed friction torque")]
     direction: Annotated[float, Par("-", "", "direction through the low-pass")]
     pace: Annotated[float, Par("-", "", "velocity over v_0 through the low-pass")]
@@ -153,6 +156,24 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     return given
 
 
+def deviations(z: Any, p: Any, sample_time: float) -> dict[str, float]:
+    """By the covariance, where it and the values are within their bounds: of white noise that has passed the low-pass.
+
+    Neighbouring residuals are alike; the weights of old ones are in P once, and squared in the error.
+    """
+    if z.variance <= 0.0 or z.p11 + z.p22 + z.p33 >= FULL * p.trace:
+        return {}
+    alike = math.exp(-p.corner * sample_time)
+    one = z.variance * (1.0 + alike) / (1.0 - alike) / (1.0 + p.forgetting)
+    most = p.most_offset * p.fc
+    own = (
+        ("coulomb", z.p11, p.lowest * p.fc < z.coulomb < p.highest * p.fc),
+        ("viscous", z.p22, 0.0 < z.viscous < p.most_viscous * p.sigma2 * p.speed),
+        ("offset", z.p33, -most < z.offset < most),
+    )
+    return {name: math.sqrt(one * max(p_ii, 0.0)) for name, p_ii, within in own if within}
+
+
 CONTROL_LAW = ControlLaw(
     "least_squares_feedforward", Params, sample, "feedforward",
     title="Feedforward with recursive least squares",
@@ -166,4 +187,5 @@ CONTROL_LAW = ControlLaw(
     State=State,
     holds_friction=True,
     adapts=True,
+    deviations=deviations,
 )  # fmt: skip

@@ -11,7 +11,7 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.control_spec import ControlLaw
-from stickslip.spec import Learned, Par
+from stickslip.spec import Kept, Learned, Par
 
 __all__ = ["CONTROL_LAW"]
 
@@ -44,7 +44,7 @@ class State(NamedTuple):
     inertia: Annotated[float, Learned("kg·m²", "m", "inertia")]
     level: Annotated[float, Learned("N·m", "k_0", "level of the switching torque")]
     rise: Annotated[float, Learned("N·m·s/rad", "k_1", "its rise with speed")]
-    known: Annotated[float, Learned("-", "", "1 once there is an inertia")]
+    known: Annotated[float, Kept("-", "", "1 once there is an inertia")]
 
 
 def sample(y: Any, z: Any, p: Any, u: Any) -> float:

@@ -12,7 +12,7 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.control_spec import ControlLaw, friction, friction_steady
-from stickslip.spec import Learned, Par
+from stickslip.spec import Kept, Learned, Par
 
 __all__ = ["CONTROL_LAW"]
 
@@ -42,8 +42,8 @@ class State(NamedTuple):
     """Internal state."""
 
     scale: Annotated[float, Learned("-", "theta", "friction over that of the law")]
-    variance: Annotated[float, Learned("-", "", "mean square of what the scale is off in a sample")]
-    known: Annotated[float, Learned("-", "", "1 once there is a scale")]
+    variance: Annotated[float, Kept("-", "", "mean square of what the scale is off in a sample")]
+    known: Annotated[float, Kept("-", "", "1 once there is a scale")]
     disturbance: Annotated[float, Par("N·m", "d_A", "observed friction torque")]
     velocity: Annotated[float, Par("rad/s", "v", "velocity one sample ago")]
     share: Annotated[float, Par("-", "", "1 - exp(-g_A T), by which the observer moves in a sample")]
@@ -102,6 +102,15 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     return given
 
 
+def deviations(z: Any, p: Any, sample_time: float) -> dict[str, float]:
+    """Of a scale within its bounds: a low-pass of what samples say, whose white noise has passed the observer's."""
+    if z.variance <= 0.0 or not p.lowest < z.scale < p.highest:
+        return {}
+    stays, alike = math.exp(-p.rate * sample_time), math.exp(-p.corner * sample_time)
+    left = (1.0 - stays) / (1.0 + stays) * (1.0 + stays * alike) / (1.0 - stays * alike)
+    return {"scale": math.sqrt(z.variance * left)}
+
+
 def check(p: Any) -> str:
     """The bounds of the scale hold 1, where it starts."""
     if not p.lowest <= 1.0 <= p.highest:
@@ -120,6 +129,7 @@ CONTROL_LAW = ControlLaw(
     },
     State=State,
     check=check,
+    deviations=deviations,
     holds_friction=True,
     adapts=True,
 )  # fmt: skip

@@ -22,7 +22,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, RigError, suggestion
 from stickslip.record import Record
-from stickslip.rigs._control import COLUMNS, UNITS
+from stickslip.rigs._control import COLUMNS, UNITS, begin_learned, end_learned
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.realtime import Account
 from stickslip.rigs.rig import Rig
@@ -111,7 +111,8 @@ class Step:
     """A segment of the loop.
 
     ``setpoints`` are those of its samples, ``keep`` says whether the record holds it (every ``average`` samples as
-    their mean), ``pause`` is a rest before it (s), ``travel`` ends it early.
+    their mean), ``pause`` is a rest before it (s), ``travel`` ends it early; ``learned`` is what the controller's laws
+    have learned before, and afterwards what they have learned since.
     """
 
     setpoints: Array
@@ -121,6 +122,7 @@ class Step:
     pause: float = 0.0
     travel: float = math.inf
     label: str = ""
+    learned: dict[str, Any] | None = None
 
 
 Steps = Generator[Step, Array, None]
@@ -354,7 +356,7 @@ def _run(
                 rig, path=path, meta=meta, without_watchdog=without_watchdog, realtime=realtime
             ) as loop:
                 while True:
-                    rows = _one(loop, step, kept, progress)
+                    rows = _one(loop, step, kept, meta, progress)
                     step = steps.send(rows)
                     if not single and step.pause > 0.0:
                         break
@@ -362,14 +364,15 @@ def _run(
         return kept, loop.account() if loop is not None and paced else None
 
 
-def _one(loop: Loop, step: Step, kept: list[tuple[str, Array]], progress: Any) -> Array:
+def _one(loop: Loop, step: Step, kept: list[tuple[str, Array]], meta: Any, progress: Any) -> Array:
     if step.label and progress is not None:
         progress(step.label)
-    if step.controller is not None:
-        loop.prepare(step.controller)
+    control = loop.prepare(step.controller)
+    begin_learned(control, step.controller, step.learned)
     if step.pause > 0.0:
         loop.pause(step.pause)
     rows = loop.run(step.setpoints, step.controller, travel=step.travel)
+    end_learned(control, step.controller, step.learned, loop.rig.sample_time, meta)
     if step.keep:
         kept.append((step.label, averaged(rows, step.average)))
     return rows

@@ -11,6 +11,7 @@ import numpy as np
 
 from stickslip.control.block import ControlBlock
 from stickslip.control.composed import composed_of
+from stickslip.control.learned import refuse_others, write_table
 from stickslip.control.learning import low_pass, relearned
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control.written import tables_of
@@ -18,7 +19,7 @@ from stickslip.errors import InputError
 from stickslip.record import Record
 from stickslip.rigs._control import COLUMNS
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Step, Steps
-from stickslip.rigs.procedures.track import Track
+from stickslip.rigs.procedures.track import Track, machine_in
 from stickslip.rigs.rig import Rig, setpoints
 from stickslip.simulation._sampled import FEEDFORWARD, compiled, replay_memory
 from stickslip.spec import Surroundings
@@ -38,7 +39,8 @@ class Learn(Track):
     """Options of `track`, with a reference that returns to its start; ``times`` repetitions, of whose torque the share
     ``rate`` is taken over each time through a low-pass without lag of the ``corner`` (Hz; 0: the bandwidth), given
     ``advance`` samples earlier. ``save`` is the TOML file to which the controller with the best table is written, for
-    `track` with ``controller``.
+    `track` with ``controller``; one that is there is replaced only where the same was learned on the same machine. Its
+    ``uncertainty`` is by how much another repetition would have changed the table, N·m RMS.
 
     No model of the rig is asked for, so that the condition of convergence is not checked beforehand
     (`stickslip learn` does on a simulation): a repetition whose error is half as large again as the least ends it.
@@ -65,6 +67,10 @@ class Learn(Track):
                 f"learn: reference = {self.reference} does not end where it starts; give low or high, and a duration "
                 "of whole periods"
             )
+        if self.learned:
+            raise InputError(f"learn: learned = {self.learned} belongs to `track`; give save")
+        if self.save:
+            refuse_others(Path(self.save), self.origin(rig))
         if self.times < 2 or not 0.0 < self.rate < 2.0:
             raise InputError(
                 f"learn: times = {self.times} must be at least 2, rate = {self.rate:g} between 0 and 2"
@@ -82,7 +88,7 @@ class Learn(Track):
         path = np.column_stack([float(rows[-1, POSITION]) + motion[:, 0], motion[:, 1:]])
         own = replace(composed_of(self.made(rig)), sample_time=rig.sample_time)
         weights, table = low_pass(self.corner or self.bandwidth, rig.sample_time), np.zeros(len(path))
-        least, best = math.inf, own
+        least, best, uncertainty = math.inf, own, math.nan
         for i in range(1, self.times + 1):
             controller = with_table(own, table)
             wanted = setpoints(
@@ -94,14 +100,23 @@ class Learn(Track):
             )  # every repetition starts from rest without torque, as the first does
             rows = yield Step(wanted, controller, keep=True, pause=rest, label=f"repetition {i}")
             error = rms(path[: len(rows), 0] - rows[:, POSITION])
-            if error < least:
+            before, better = table, error < least
+            if better:
                 least, best = error, controller
             if error > GROWN * least or len(rows) < len(path):
                 break
             taken = rows[:, TORQUE] - ahead_of(controller, rows[:, POSITION], path)
             table = relearned(table, taken, self.rate, self.advance, weights, own.torque_limit)
+            if better:
+                uncertainty = rms(table - before)
         if self.save:
-            write(Path(self.save), best, self.inertia)
+            content = {"axis": {"inertia": self.inertia}, **tables_of(best)}
+            told = {"origin": self.origin(rig), "uncertainty": {"table": uncertainty}}
+            write_table(Path(self.save), {**content, **told})
+
+    def origin(self, rig: Rig) -> dict[str, str]:
+        """What says whose table it is."""
+        return {"machine": machine_in(rig.name), "procedure": self.name, "reference": self.reference}
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
         """Whether the error fell."""
@@ -138,23 +153,6 @@ def errors(record: Record, samples: int) -> list[float]:
 def rms(error: Array) -> float:
     """Root mean square."""
     return math.sqrt(float(np.mean(error**2)))
-
-
-def write(path: Path, controller: SampledController, inertia: float) -> None:
-    """The controller as `stickslip.control.files` reads it.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
-    import tomli_w
-
-    content = {"axis": {"inertia": inertia}, **tables_of(controller)}
-    try:
-        path.write_text(tomli_w.dumps(content), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"save = {path} cannot be written ({error.strerror}); give another path") from None
 
 
 PROCEDURE = Learn

@@ -15,8 +15,10 @@ from stickslip.config import read_toml
 from stickslip.control import catalogue
 from stickslip.control.belief import believed
 from stickslip.control.compensator import COMPENSATORS
+from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
+from stickslip.control.learned import read_learned, told, write_learned
 from stickslip.control.linear import LINEAR, Gains, place
 from stickslip.control.recommended import read_recommended
 from stickslip.control.sampled_controller import SampledController
@@ -58,11 +60,12 @@ class Track(Procedure):
     recommended.toml of `stickslip rig commission` (of this machine) or `stickslip recommend`, and none of it given
     beside it; or one of the catalogue (`stickslip.control.catalogue`: dob, ff-dob, ...), whose numbers follow from
     ``inertia``, ``bandwidth`` and the ``model`` (the machine's LuGre law, where none is given). ``substeps`` divide the
-    law's step over a sample, whichever compensator it is. What a file knows of the
-    angle (``[angle]``) is compensated as well. Instead of all of it ``controller`` may be a TOML file with a table
-    ``[controller]`` that is made of control laws (`stickslip.control.files`; ``friction`` in it may name a model of the
-    machine); ``inertia`` is that of the axis where the file has no ``[axis]``. ``duration`` in s (0: the reference's
-    own).
+    law's step over a sample, whichever compensator it is. What a file knows of the angle (``[angle]``) is compensated
+    as well. Instead of all of it ``controller`` may be a TOML file with a table ``[controller]`` that is made of
+    control laws (`stickslip.control.files`; ``friction`` in it may name a model of the machine); ``inertia`` is that of
+    the axis where the file has no ``[axis]``. ``learned`` is the TOML file in which what the laws learn is kept from
+    run to run, with its uncertainty: it is read where it is there, which only that of this machine and of these laws
+    may be, and written at the end. ``duration`` in s (0: the reference's own).
     """
 
     name: ClassVar[str] = "track"
@@ -84,6 +87,7 @@ class Track(Procedure):
     offset: float = 0.0
     inertia_feedforward: float = 0.0
     substeps: int = 1
+    learned: str = ""
     duration: float = 0.0
     wait: float = 1.0
 
@@ -236,7 +240,7 @@ class Track(Procedure):
     def plan(self, rig: Rig) -> Plan:
         """The reference."""
         samples = self.samples(rig)
-        self.made(rig)
+        self.learned_before(self.made(rig), rig)
         words = f"{self.linear} {self.bandwidth:g} Hz"
         if self.controller:
             words = f"by the controller of {self.controller}"
@@ -265,7 +269,26 @@ class Track(Procedure):
             torque=self.angle().torque(position),
             closed=1.0,
         )
-        yield Step(sent, self.made(rig), keep=True, label=self.reference)
+        controller = self.made(rig)
+        learned = self.learned_before(controller, rig)
+        yield Step(sent, controller, keep=True, label=self.reference, learned=learned)
+        if self.learned:
+            write_learned(Path(self.learned), composed_of(controller), learned, machine_in(rig.name))
+
+    def learned_before(self, controller: Controller | SampledController, rig: Rig) -> dict[str, Any]:
+        """What the file ``learned`` holds; nothing where there is none yet.
+
+        Raises
+        ------
+        InputError
+            If it is of another machine or other laws, or these learn nothing.
+        """
+        if not self.learned:
+            return {}
+        own = composed_of(controller)
+        if not own.learned(own.state()):
+            raise InputError(f"learned = {self.learned}: no law of this controller learns; leave it out")
+        return read_learned(Path(self.learned), own, machine_in(rig.name))
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
         """The error and the torque's saturation; both are what is looked for, so that neither fails."""
@@ -277,6 +300,7 @@ class Track(Procedure):
                 "tracking", True,
                 f"error {rms:.4g} rad RMS, {worst:.4g} at most; torque at its limit {100 * cut:.3g} %",
             ),
+            *(Check("learned", True, line) for line in told(record.meta)),
         )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 import stickslip
 from stickslip.control.controller import Controller
+from stickslip.control.learned import after
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import Divergence, InputError
 from stickslip.jit import call_profile, call_sample, compiled_profile, flat, kernel, pointer
@@ -86,7 +87,8 @@ def simulate_machine(
     Returns
     -------
     Record
-        ``meta["machine"]`` says which machine ran, and what was switched off; there is no energy balance.
+        ``meta["machine"]`` says which machine ran, and what was switched off; ``meta["learned"]`` what the controller
+        has learned (`stickslip.control.learned`); there is no energy balance.
     """
     own = replace(
         machine, contact=replace(machine.contact, friction=ruled(machine.contact.friction, slip_rule))
@@ -104,6 +106,8 @@ def simulate_machine(
         "friction": own.contact.friction.as_dict(), "machine": machine.as_dict(), "reference": reference.as_dict(),
         "sample_time": machine.sample_time, "counts": {"samples": runs[0].samples, "substeps": substeps_taken}, **told,
     }  # fmt: skip
+    if learned := after(controller, runs[0].state, machine.sample_time):
+        meta["learned"] = learned
     if len(runs) == 2:
         apart = np.abs(runs[0].rows[:, 3] - runs[1].rows[:, 3])
         meta["accuracy"] = {"error_rad": float(np.max(apart, initial=0.0))}
@@ -187,9 +191,10 @@ class _Ran:
     """What a run left."""
 
     def __init__(
-        self, laid: Laid, rows: Array, meter: Array, turns: Array, samples: int, code: int, ended: float
-    ):
-        self.laid, self.rows, self.meter, self.turns = laid, rows, meter, turns
+        self, laid: Laid, rows: Array, meter: Array, turns: Array, samples: int, code: int, ended: float,
+        state: Array,
+    ):  # fmt: skip
+        self.laid, self.rows, self.meter, self.turns, self.state = laid, rows, meter, turns, state
         self.samples, self.code, self.ended = samples, code, ended
 
 
@@ -223,7 +228,16 @@ def _run(
         samples, places, measured, rows, accumulator, turns, counts,
     )  # fmt: skip
     done = int(counts[0])
-    return _Ran(laid, rows[: int(counts[1])], accumulator, turns, done, int(code), done * machine.sample_time)
+    return _Ran(
+        laid,
+        rows[: int(counts[1])],
+        accumulator,
+        turns,
+        done,
+        int(code),
+        done * machine.sample_time,
+        own.state,
+    )
 
 
 def start_at(laid: Laid, initial: tuple[float, float]) -> None:

@@ -135,8 +135,9 @@ def run(case: Case) -> Outcome:
     )  # fmt: skip
     found = {name: int(state[0][name]) for name in ("steps", "rejected", "events")}
     return Outcome(
-        rows, int(code), float(clock[NOW]), accumulator, turns[: int(accumulator[TURN_COUNT])], found
-    )
+        rows, int(code), float(clock[NOW]), accumulator, turns[: int(accumulator[TURN_COUNT])], found,
+        control.sampled.state,
+    )  # fmt: skip
 
 
 # ---- laying a case out -------------------------------------------------------------------------------------------

@@ -1,0 +1,199 @@
+"""What the laws of a controller have learned: values with their uncertainty, for people, records and files.
+
+A file keeps them with the power off. It says of which machine and laws they are, and is neither read nor overwritten
+by others.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+from stickslip.config import read_toml
+from stickslip.control.composed import composed_of
+from stickslip.control.sampled_controller import SampledController
+from stickslip.errors import InputError
+from stickslip.spec import Kept, Learned
+
+__all__ = [
+    "WIDTH",
+    "LearnedValue",
+    "after",
+    "learned_values",
+    "plain",
+    "read_learned",
+    "refuse_others",
+    "told",
+    "write_learned",
+    "write_table",
+]
+
+WIDTH = 1.96
+"""Standard deviations of half an interval that holds 95 of 100 times."""
+SILENT = "no uncertainty told"
+
+
+@dataclass(frozen=True)
+class LearnedValue:
+    """A value that a law has learned.
+
+    Attributes
+    ----------
+    name : str
+        Its whole name in the controller.
+    meaning, unit : str
+    value : float or list of float
+    uncertainty : float or None
+        Half the interval that holds 95 of 100 times, in the value's unit; None where the law has no covariance, has
+        learned nothing yet, or where the value is at its bound. It is that of noise: what the law itself gets wrong is
+        not in it.
+    """
+
+    name: str
+    meaning: str
+    unit: str
+    value: float | list[float]
+    uncertainty: float | None
+
+    @property
+    def text(self) -> str:
+        """In a line."""
+        if isinstance(self.value, list):
+            low, high = min(self.value), max(self.value)
+            shown = f"{len(self.value)} values from {low:.4g} to {high:.4g}"
+        else:
+            shown = f"{self.value:.4g}"
+        unit = "" if self.unit == "-" else f" {self.unit}"
+        if self.uncertainty is None:
+            return f"{self.meaning} ({self.name}) = {shown}{unit}; {SILENT}"
+        return f"{self.meaning} ({self.name}) = {shown} ± {self.uncertainty:.2g}{unit}"
+
+
+def learned_values(
+    controller: SampledController, z: SimpleNamespace, sample_time: float = 0.0
+) -> tuple[LearnedValue, ...]:
+    """What a controller's laws have learned in the state `z`.
+
+    Parameters
+    ----------
+    controller : SampledController
+    z : SimpleNamespace
+        As its method ``state`` gives it.
+    sample_time : float
+        At which it ran, s; 0 for its own.
+    """
+    values, period = controller.learned(z), sample_time or controller.sample_time
+    spread = {
+        f"{part}_{name}": deviation
+        for part, block in controller.blocks.items()
+        if block.law.deviations is not None
+        for name, deviation in block.law.deviations(getattr(z, part), block.parameters, period).items()
+    }
+    return tuple(
+        LearnedValue(
+            f.name, f.par.meaning, f.par.unit, values[f.name],
+            WIDTH * spread[f.name] if f.name in spread else None,
+        )
+        for f in controller.state_fields
+        if isinstance(f.par, Learned) and not isinstance(f.par, Kept)
+    )  # fmt: skip
+
+
+def plain(values: Sequence[LearnedValue]) -> dict[str, dict[str, Any]]:
+    """What a record says of them by name: meaning, unit, value, uncertainty (None: not told)."""
+    return {
+        v.name: {"meaning": v.meaning, "unit": v.unit, "value": v.value, "uncertainty": v.uncertainty}
+        for v in values
+    }
+
+
+def told(meta: Mapping[str, Any]) -> list[str]:
+    """A line for each learned value in a record's meta."""
+    return [LearnedValue(name, **v).text for name, v in meta.get("learned", {}).items()]
+
+
+def after(controller: Any, state: Any, sample_time: float) -> dict[str, dict[str, Any]]:
+    """What `plain` says of a controller of any kind after a run that has left this flat `state`."""
+    own = composed_of(controller)
+    if not any(isinstance(f.par, Learned) for f in own.state_fields):
+        return {}
+    return plain(learned_values(own, own.unpacked_state(state.tolist()), sample_time))
+
+
+# ---- files ---------------------------------------------------------------------------------------------------------
+
+
+def origin_of(controller: SampledController, machine: str) -> dict[str, str]:
+    """What says whose learned values they are: the machine, and a hash of the laws with all their parameters."""
+    content = {part: block.as_dict() for part, block in controller.blocks.items()}
+    text = json.dumps(content, sort_keys=True, default=str)
+    return {"machine": machine, "laws": hashlib.sha256(text.encode()).hexdigest()}
+
+
+def write_learned(
+    path: Path, controller: SampledController, learned: Mapping[str, Any], machine: str
+) -> None:
+    """Keep what a controller has `learned` (as its method of that name gives it) on a machine.
+
+    Raises
+    ------
+    InputError
+        If the file is another's, or cannot be written.
+    """
+    origin = origin_of(controller, machine)
+    refuse_others(path, origin)
+    shown = learned_values(controller, controller.state(learned))
+    uncertain = {v.name: v.uncertainty for v in shown if v.uncertainty is not None}
+    write_table(path, {"origin": origin, "learned": dict(learned), "uncertainty": uncertain})
+
+
+def read_learned(path: Path, controller: SampledController, machine: str) -> dict[str, Any]:
+    """What `write_learned` has kept, for the method ``state`` of the controller; nothing where there is no file.
+
+    Raises
+    ------
+    InputError
+        If the file is another's.
+    """
+    refuse_others(path, origin_of(controller, machine))
+    if not path.exists():
+        return {}
+    return dict(read_toml(path).table("learned").values)
+
+
+def refuse_others(path: Path, origin: Mapping[str, str]) -> None:
+    """Refuse a file that is there and is not of the same origin.
+
+    Raises
+    ------
+    InputError
+    """
+    if not path.exists():
+        return
+    found = read_toml(path).values.get("origin")
+    kept = cast("dict[str, Any]", found) if isinstance(found, dict) else {}
+    for name, own in origin.items():
+        if kept.get(name) != own:
+            what = f"was learned with other {name}" if name in kept else "holds nothing that was learned"
+            raise InputError(f"{path} {what}, and is not overwritten; give another path")
+
+
+def write_table(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a TOML file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    import tomli_w
+
+    try:
+        path.write_text(tomli_w.dumps(content), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); give another path") from None
