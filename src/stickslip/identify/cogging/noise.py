@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.cogging.rows import Places
+from stickslip.identify.fit.student import student_quantile
 
-__all__ = ["Noise", "excess", "long_strokes", "memory"]
+__all__ = ["Noise", "excess", "long_strokes", "memory", "widened"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Integers = np.ndarray[Any, np.dtype[np.intp]]
@@ -32,6 +33,7 @@ UNEVEN = 4.0
 """Ratio of a stroke's steps, between tenths, up to which it shows it."""
 BAND = 24
 """Bins on each side over which a density is averaged, at least; a quarter of the bin's number where that is more."""
+NORMAL = 1.96
 BESIDE = 2
 """Bins on each side of a fitted order, from which the fit has taken noise."""
 
@@ -134,4 +136,15 @@ def excess(misfit: Array, orders: Array, strokes: int) -> Array:
         if 2 * strokes > own.size:
             parts = own.size / 2.0
             out[own] = max(1.0, float(np.sum(misfit[own])) / parts / (2 * strokes - own.size))
+    return out
+
+
+def widened(misfit: Array, orders: Array, strokes: int) -> Array:
+    """What standard deviations are greater by: few strokes tell what they differ by only roughly (Student)."""
+    out = np.sqrt(excess(misfit, orders, strokes))
+    for n in np.unique(orders[orders > 0.0]):
+        own = np.flatnonzero(orders == n)
+        freedom = 2 * strokes - own.size
+        if freedom > 0 and np.any(out[own] > 1.0):
+            out[own] *= student_quantile(freedom) / NORMAL
     return out

@@ -90,15 +90,19 @@ class Places:
         """What the mean over `width` leaves of a wave of this order, shape (n,)."""
         return np.sinc(order * self.width / (2.0 * math.pi))
 
-    def motion(self, orders: Sequence[float]) -> Array:
-        """Velocity and acceleration without their noise: running mean and waves of these orders, shape (n, 2)."""
+    def motion(self, orders: Sequence[float], late: float = 0.0) -> Array:
+        """Velocity and acceleration without their noise: running mean and waves of these orders, shape (n, 2).
+
+        `late`: s before each place, at which the waves are taken.
+        """
         out = np.column_stack([self.velocity, np.zeros(len(self))])
         edges = np.flatnonzero(np.diff(self.stroke) != 0) + 1
         for rows in np.split(np.arange(len(self)), edges):
             if rows.size > 2 * (2 * len(orders) + 1):
-                angles = np.outer(self.angle[rows], orders)
-                waves = np.column_stack([np.ones(rows.size), np.cos(angles), np.sin(angles)])
-                out[rows] += waves @ least_squares(waves, self.swing[rows])
+                seen = waves_of(self.angle[rows], orders)
+                sizes = least_squares(seen, self.swing[rows])
+                then = self.angle[rows] - late * self.velocity[rows]
+                out[rows] += (seen if late == 0.0 else waves_of(then, orders)) @ sizes
         return out
 
     @property
@@ -106,6 +110,12 @@ class Places:
         """Median angle between neighbours of a stroke, rad."""
         steps = np.abs(np.diff(self.angle))[np.diff(self.stroke) == 0]
         return float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else math.inf
+
+
+def waves_of(angle: Array, orders: Sequence[float]) -> Array:
+    """Ones, then cosines and sines of these orders, shape (n, 2 k + 1)."""
+    angles = np.outer(angle, orders)
+    return np.column_stack([np.ones(angle.size), np.cos(angles), np.sin(angles)])
 
 
 def least_squares(matrix: Array, right: Array) -> Array:
