@@ -121,6 +121,19 @@ def test_a_curve_of_friction_over_three_speeds_hides_no_order():
     assert said == pytest.approx(0.09, abs=0.001)
 
 
+def test_friction_beside_the_contact_does_not_ripple():
+    """What ripples changes by more with the speed than all of friction, and bearings grow with it."""
+    contact = {0.2: 0.05, 0.3: 0.06, 0.6: 0.03}
+    records = [
+        rotation(lambda q, s, f=f, v=v: (f * (1.0 + 0.1 * np.cos(3 * q)) + 0.05 + 0.04 * v) * s, speed=v, noise=5e-4)
+        for v, f in contact.items()
+    ]  # fmt: skip
+    own = identify_cogging(records)["odd[3]"]
+    true = 0.1 * np.mean(list(contact.values()))
+    assert own.lower < true < own.upper
+    assert own.std < 1e-3 * true
+
+
 def test_means_over_an_angle_are_taken_into_account():
     """A cell is a 1/8192 of a turn, an eighth of a period of order 1100: its mean is 2.9 % smaller."""
     record = rotation(lambda q, s: 0.1 * np.cos(1100.0 * q) + FRICTION * s, speed=0.1, turns=1.1, period=5e-4)

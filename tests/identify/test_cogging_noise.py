@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from stickslip.identify.cogging import identify_cogging
-from stickslip.identify.cogging.noise import Noise, density_of, excess
+from stickslip.identify.cogging.noise import Noise, density_of, excess, widened
 from stickslip.identify.cogging.rows import Places
 from stickslip.record import Record
 
@@ -84,3 +86,24 @@ def test_what_strokes_differ_by_makes_intervals_wider():
     orders = np.array([0.0, 0.0, 5.0, 5.0])
     assert excess(np.array([1.0, 1.0, 3.0, 3.0]), orders, 4).tolist() == [1.0, 1.0, 1.0, 1.0]
     assert excess(np.array([1.0, 1.0, 30.0, 30.0]), orders, 4)[2] == pytest.approx(10.0)
+
+
+def test_few_strokes_tell_only_roughly_what_they_differ_by():
+    """4 strokes leave 6 differences to two waves: Student's quantile of 6 is 2.447, not 1.96."""
+    orders = np.array([0.0, 0.0, 5.0, 5.0])
+    assert widened(np.array([1.0, 1.0, 3.0, 3.0]), orders, 4).tolist() == [1.0, 1.0, 1.0, 1.0]
+    wide = widened(np.array([1.0, 1.0, 30.0, 30.0]), orders, 4)
+    assert wide[2] == pytest.approx(math.sqrt(10.0) * 2.447 / 1.96, rel=1e-3)
+
+
+def test_the_motion_is_that_of_when_the_torque_acted():
+    n = 2000
+    angle, zeros = np.linspace(0.0, TURN, n), np.zeros(n)
+    swing = np.column_stack([0.1 * np.cos(5.0 * angle), -0.2 * np.sin(5.0 * angle)])
+    places = Places(
+        angle, zeros, zeros + 1.0, zeros + 0.5, zeros, np.zeros(n, dtype=np.intp), zeros, zeros, swing
+    )
+    velocity, acceleration = places.motion([5.0], late=0.01).T
+    before = 5.0 * (angle - 0.5 * 0.01)
+    assert velocity == pytest.approx(0.5 + 0.1 * np.cos(before), abs=1e-9)
+    assert acceleration == pytest.approx(-0.2 * np.sin(before), abs=1e-9)

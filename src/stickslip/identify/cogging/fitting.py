@@ -162,7 +162,9 @@ def _laid(places: Places, terms: Sequence[Term], moving: Sequence[str], values: 
     if np.any(ripple):
         more["ripple_level"] = ripple @ pairs
     if np.any(ripple) and "curve" in moving:
-        more["ripple_speed"] = _apart(places) * (matrix[:, first:] @ np.where(_odd(terms), pairs, 0.0))
+        more["ripple_speed"] = _apart(places) * (
+            (matrix[:, first:] - ripple) @ np.where(_odd(terms), pairs, 0.0)
+        )
     return Laid(np.column_stack([matrix[:, :first], *more.values(), matrix[:, first:]]), own, more)
 
 
