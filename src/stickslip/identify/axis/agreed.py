@@ -35,6 +35,7 @@ __all__ = [
     "as_good",
     "held_against",
     "on_timing",
+    "on_width",
     "regressed",
     "sliding_values",
     "with_level",
@@ -108,6 +109,16 @@ def on_timing(found: Regression | None) -> list[str]:
     return [
         f"The torque acted {1e3 * abs(value):.3g} ms (±{1e3 * half:.2g}) {where} its row on average, {abs(share):.2g} "
         f"of a row: {kind}; this is allowed for."
+    ]
+
+
+def on_width(found: Regression | None) -> list[str]:
+    """That motor and load do not move as one in the shortest windows, in a sentence; nothing where they do."""
+    if found is None or found.widened == 1.0:
+        return []
+    return [
+        f"Faster than {found.bands[0].corner:.2g} Hz the axis does not move as one inertia (play that opens while it "
+        f"slides, a train that rings): inertia and friction are those of slower motion."
     ]
 
 

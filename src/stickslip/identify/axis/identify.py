@@ -21,6 +21,7 @@ from stickslip.identify.axis.agreed import (
     TOLD_BY_SLIDING,
     aligned,
     on_timing,
+    on_width,
     regressed,
 )
 from stickslip.identify.axis.choice import (
@@ -182,7 +183,7 @@ def looked_at(
     trials, validation = aligned(trials, sliding), aligned(validation, sliding)
     inverse, more = first_look(trials, axis, extras, per_direction)
     unchecked = sliding is None and all(t.drive is not None for t in trials)
-    said = [*(on_timing(sliding) if skew is None else []), *notes, *more]
+    said = [*(on_timing(sliding) if skew is None else []), *on_width(sliding), *notes, *more]
     return Evidence(trials, validation, axis, inverse, sliding, unchecked), said
 
 

@@ -45,6 +45,7 @@ HUNDREDTH = 2.326  # standard deviations that a normal number exceeds in one of 
 FEW = 4  # degrees of freedom, below which a variance refutes nothing
 SYSTEMATIC = 0.02  # of the misfit: what may not average out
 STIFF, LATE = 0.15, 0.2  # the same for inertia and skew, of an axis that is not stiff
+DAMPED_AWAY = 1e-100  # norm of a column
 LEAST = 1e-14  # of the largest eigenvalue of products: below it there is rounding alone
 
 
@@ -164,7 +165,8 @@ class System:
         small, self.std = small_columns(records, self.fc, background)
         columns = np.column_stack([plain, falling[:, self.levels], small])
         scale = np.linalg.norm(columns, axis=0)
-        self.scale = np.where(scale > 0.0, scale, 1.0)
+        # A wave that the window damps away is 0: the square of what is left of it would be.
+        self.scale = np.where(scale > DAMPED_AWAY, scale, 1.0)
         self.columns = columns / self.scale
         self.products = self.columns.T @ self.columns
         self.small: Places = np.arange(columns.shape[1] - small.shape[1], columns.shape[1])

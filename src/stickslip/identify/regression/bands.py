@@ -1,0 +1,213 @@
+"""A record seen in several bands of frequencies, from rows of certain sliding: which rows, which widths, which orders.
+
+The narrowest window is the one that noise allows; where motor and load do not move as one in it (play that opens while
+the motor slides, a train that rings), the narrowest in which they do.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identify.fit.smooth import Window, seen
+from stickslip.identify.regression.band_fit import BandFit, fit_band
+from stickslip.identify.regression.orders import candidate_orders, goes_round, shown_orders
+from stickslip.identify.regression.sliding_rows import FEWEST, Signals, SlidingRows, sliding_rows
+from stickslip.identify.regression.strokes import stacked
+from stickslip.machines.servo import ServoAxis
+
+__all__ = ["Bands", "calmed", "follows", "in_bands"]
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+BANDS = (1.0, 1.6, 2.6)
+"""Widths of the windows, in that of the narrowest which noise allows."""
+ROUGH, WIDER = 0.05, (1.6, 2.6, 4.1, 6.6, 10.0)
+"""Misfit in the first band, in parts of Fc, from which on wider windows are tried; how much wider. What play does to a
+sum of motor and load falls with the square of the width."""
+LEVELS = 18
+"""Stribeck velocities that are averaged over, from `SLOWEST` to `FASTEST` of the highest speed."""
+SLOWEST, FASTEST = 1e-3, 3.0
+LOOKED, CLEAR = 0.04, 0.5
+"""s over which a skew is looked for at a glance; part of the misfit without one that it must leave at most."""
+USUALLY = 2.0
+"""Standard deviations of the usual skew that need no inertia above 0 to be believed."""
+REBUILT, SHORT, MARGIN = -0.15, 0.6, 2.5
+"""Friction this far below the level, in parts of it, is still being rebuilt after a reversal; the part of the rows that
+may be left out for that; and how much farther they are left out."""
+BACKGROUND = 12
+"""Lowest orders of a torque over the position that is small, but may be there."""
+QUANTILE = 1.96
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """One record in several bands.
+
+    Attributes
+    ----------
+    fits : tuple of BandFit
+        From the widest band of frequencies to the narrowest.
+    rows : tuple of SlidingRows
+        Of the widest.
+    orders : tuple of float
+        Cycles a radian (m) of the torque over the position that were found there.
+    widened : float
+        Times that the windows are wider than noise asks.
+    """
+
+    fits: tuple[BandFit, ...]
+    rows: tuple[SlidingRows, ...]
+    orders: tuple[float, ...]
+    widened: float = 1.0
+
+
+def rough(band: BandFit) -> bool:
+    """Whether a band leaves so much that motor and load may not move as one there."""
+    return band.misfit > ROUGH * abs(band.numbers["fc"].value)
+
+
+def calmed(found: Bands, signals: Sequence[Signals], width: float, *ask: Any) -> Bands:
+    """What was found; where its first band is rough, what the narrowest windows show that are not, if they tell
+    as much.
+
+    Play that opens while the motor slides (the drive brakes, the load runs ahead, meets the other flank and rebounds)
+    moves the load against the motor by no more than the play: seen through a window, the torque of that falls with
+    the square of its width, that of inertia and friction does not.
+    """
+    for wider in WIDER if rough(found.fits[0]) else ():
+        try:
+            other = in_bands(signals, wider * width, *ask)
+        except InputError:
+            break
+        if len(other.fits) < 2:
+            break
+        if not rough(other.fits[0]):
+            return replace(other, widened=wider) if tells_as_much(other.fits[0], found.fits[0]) else found
+    return found
+
+
+def tells_as_much(band: BandFit, other: BandFit) -> bool:
+    """Whether inertia and the level of friction are as sure in a band as in the other."""
+    return all(band.numbers[n].std <= other.numbers[n].std for n in ("inertia", "fc"))
+
+
+def in_bands(
+    signals: Sequence[Signals], width: float, axis: ServoAxis, options: Mapping[str, Any], harmonics: bool,
+    period: float | None,
+) -> Bands:  # fmt: skip
+    """Fits from the widest band of frequencies to the narrowest."""
+    bands: list[BandFit] = []
+    widest: list[SlidingRows] = []
+    chosen: dict[str, Any] = {}
+    lacking = InputError("no band of the record slides long enough in one direction")
+    for factor in BANDS:
+        try:
+            if not bands:
+                known = options["skew"]
+                start = clear_skew(signals, factor * width) if known is None else known
+                widest, levels = rows_of(signals, factor * width, start)
+                own = {**options, "start": start}
+                chosen = {
+                    "start": start,
+                    **(orders_in(widest, levels, axis, period, own) if harmonics else {}),
+                }
+                rows = widest
+            else:
+                rows, levels = rows_of(signals, factor * width, bands[0].numbers["skew"].value)
+            bands.append(fit_band(rows, levels, **{**options, **chosen}))
+        except InputError as error:
+            lacking = error
+    if not bands:
+        raise lacking
+    return Bands(tuple(bands), tuple(widest), tuple(chosen.get("orders", [])))
+
+
+def follows(band: BandFit, rows: Sequence[SlidingRows], size: float) -> bool:
+    """Whether a fit's skew may be one: a small one, or one with an inertia above 0."""
+    inertia, skew = band.numbers["inertia"], band.numbers["skew"]
+    return abs(skew.value) <= USUALLY * size or inertia.value > QUANTILE * inertia.std
+
+
+def orders_in(
+    rows: Sequence[SlidingRows], levels: Sequence[float], axis: ServoAxis, period: float | None,
+    options: Mapping[str, Any],
+) -> dict[str, Any]:  # fmt: skip
+    """Orders of a torque over the position that show, and the lowest others, which may be there but are small."""
+    skew = fit_band(rows, levels, **options).numbers["skew"].value
+    candidates = candidate_orders(rows, axis.motion == "rotary", period)
+    candidates = candidates[axis.gravity == "pendulum" :]  # the first is a pendulum's own
+    shown = shown_orders(rows, skew, candidates)
+    return {
+        "orders": shown, "background": [o for o in candidates[:BACKGROUND] if o not in shown],
+        "blurred": not goes_round(rows, axis.motion == "rotary", period),
+    }  # fmt: skip
+
+
+def clear_skew(signals: Sequence[Signals], width: float) -> float:
+    """A skew of some rows that shows at a glance, s; 0 where none does: where the search begins."""
+    rows = [sliding_rows(s, Window(width, s.period)) for s in signals]
+    reach = math.ceil(LOOKED / max(s.period for s in signals))
+    left = np.zeros(2 * reach + 1)
+    for r in rows:
+        size = np.linalg.norm(r.fixed, axis=0)
+        basis, _ = np.linalg.qr(r.fixed / np.where(size > 0.0, size, 1.0))
+        (drive,) = seen(r.signals.drive, r.window.weights(0))
+        for k in range(-reach, reach + 1):
+            torque = drive[np.clip(r.places + k, 0, drive.size - 1)] - r.signals.loss * r.speed
+            told = basis.T @ torque
+            left[k + reach] += float(torque @ torque - told @ told)
+    best = int(np.argmin(left))
+    if best in (0, 2 * reach) or left[best] > CLEAR * left[reach]:
+        return 0.0
+    return (best - reach) * rows[0].signals.period
+
+
+def rows_of(signals: Sequence[Signals], width: float, skew: float) -> tuple[list[SlidingRows], list[float]]:
+    """Rows seen through one window, without those where friction is still being rebuilt; and the vs tried."""
+    windows = [Window(width, s.period) for s in signals]
+    first = [sliding_rows(s, w) for s, w in zip(signals, windows, strict=True)]
+    speed = np.abs(stacked(first, "speed"))
+    top = float(np.max(speed))
+    levels = np.geomspace(max(float(np.min(speed)), SLOWEST * top), FASTEST * top, LEVELS).tolist()
+    way = rebuilding_way(first, skew)
+    rows = [r.falling_at(levels).farther(way) for r in first]
+    rows = [r for r in rows if r.time.size >= FEWEST]
+    if not rows:
+        raise InputError("friction is rebuilt over the whole of every stroke; record longer strokes")
+    return rows, levels
+
+
+def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:
+    """Way after a reversal or stop over which friction is still being built up again, rad (m).
+
+    Pre-sliding, play and wind-up all leave friction below its level there, whatever their law.
+    """
+    fixed, gone = stacked(records, "fixed"), stacked(records, "gone")
+    torque = np.concatenate([r.torque(skew) for r in records])
+    middle = float(np.median(gone))
+    far = gone >= middle
+    values = np.linalg.lstsq(fixed[far], torque[far], rcond=1e-9)[0]
+    level = float(values[2])
+    if level <= 0.0 or middle <= 0.0:
+        return 0.0
+    lacking = (torque - fixed @ values) * fixed[:, 2] / level
+    edges = np.geomspace(max(float(gone.min()), 1e-9 * middle), middle, 25)
+    last = 0.0
+    for low, high in itertools.pairwise(edges.tolist()):
+        inside = (gone >= low) & (gone < high)
+        if np.count_nonzero(inside) >= 3 and np.median(lacking[inside]) < REBUILT:
+            last = high
+    # Both directions must be left.
+    most = [
+        float(np.quantile(gone[fixed[:, 2] * side > 0.0], SHORT))
+        for side in (-1.0, 1.0)
+        if np.any(fixed[:, 2] * side > 0.0)
+    ]
+    return min(MARGIN * last, *most)
