@@ -108,6 +108,15 @@ def test_long_windows_give_the_same_metrics(compensator):
         assert np.max(np.abs(coarse.metrics[name] - fine.metrics[name])) < 1e-3 * scale, name
 
 
+@pytest.mark.parametrize("compensator", [None, Feedback(LAWS["gms"])])
+def test_metrics_leave_every_bit_of_the_motion(compensator):
+    many = loops(9, compensator)
+    bare = many.run(())
+    for metered in (many.run(COARSE), many.run()):
+        assert np.array_equal(metered.position, bare.position)
+        assert np.array_equal(metered.velocity, bare.velocity)
+
+
 def test_a_batch_gives_the_same_again_and_in_any_cut():
     many, name = loops(9), "position_rms_rad"
     whole = many.run([name]).metrics[name]

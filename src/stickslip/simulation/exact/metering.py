@@ -8,10 +8,10 @@ room for one.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
-from stickslip.simulation._case import KD, KP
+from stickslip.simulation._case import KD, KP, KR
 from stickslip.simulation._meter import (
     AT,
     COMPENSATING,
@@ -24,8 +24,17 @@ from stickslip.simulation._meter import (
     SIGNALS,
     SPEED,
 )
-from stickslip.simulation.exact.flow import UNMOVED, Linear, flow, free_motion, moved, twice
-from stickslip.simulation.exact.output import signals
+from stickslip.simulation.exact.flow import (
+    UNMOVED,
+    Cubic,
+    Linear,
+    flow,
+    free_motion,
+    moved,
+    twice,
+    upper_terms,
+)
+from stickslip.simulation.exact.output import torques_at
 from stickslip.simulation.exact.ringing import (
     has_closed_form,
     ringing,
@@ -48,8 +57,10 @@ from stickslip.simulation.exact.state import (
     SIDES,
     SPRING,
     TIME,
+    UNSEEN,
     VELOCITY,
     WEIGHT,
+    command,
 )
 from stickslip.simulation.exact.window import Shares, ringing_window, window
 
@@ -63,7 +74,7 @@ MOST_WINDOWS = 250_000
 """Of a step, each of four nodes: half a second of work, in which nothing hears a wish to end."""
 MOST_RADIANS = 5e5
 """Of ringing in a window, which may all be looked through for a peak: as long."""
-UNSEEN = 1e-8
+DIED_OUT = 1e-8
 """Free motion slower than this (rad/s) adds nothing to a metric; the nodes need not follow it."""
 
 
@@ -80,6 +91,37 @@ def shares(parameters: Any, plan: Any, sides: Any) -> Shares:
     )
 
 
+class Way(NamedTuple):
+    """The reference over a segment: a cubic where the corrector takes it as one."""
+
+    even: bool
+    cubic: Cubic
+
+
+@kernel(exact=False, inline=True)
+def way_of(loop: Any, segment: Any) -> Way:
+    """How the nodes of a segment get the reference.
+
+    Where `exact.step.look_ahead` leaves out its middle, a cubic misses it by a small part of the tolerance.
+    """
+    g2, g3 = upper_terms(
+        loop[GOAL], loop[GOAL_RATE], segment[GOAL_END], segment[RATE_END], 1.0 / segment[LENGTH]
+    )  # fmt: skip
+    return Way(loop[UNSEEN] > 0.0, (loop[GOAL], loop[GOAL_RATE], g2, g3))
+
+
+@kernel(exact=False, inline=True)
+def commanded(
+    parameters: Any, plan: Any, cells: Any, loop: Any, way: Way, x: float
+) -> tuple[float, float, float]:  # fmt: skip
+    """Torque commanded by time alone, and the reference's position and velocity, at x inside the segment."""
+    if way.even:
+        goal, rate = moved(way.cubic, UNMOVED, x, 0.0, 0.0)
+        return parameters[KP] * goal + parameters[KR] * rate, goal, rate
+    r, _, goal, rate = command(parameters, plan, cells, loop, loop[TIME] + x)
+    return r, goal, rate
+
+
 # ---- windows --------------------------------------------------------------------------------------------------
 
 
@@ -91,7 +133,7 @@ def windows_for(rate: float, speed: float, h: float) -> float:
     """
     y = 0.5 * h * abs(rate)
     # Most segments are short; a root costs as much as the rest.
-    if speed < UNSEEN or y <= FINEST_NODES or (y <= 1.0 and y * y * y * speed <= 1e-5):
+    if speed < DIED_OUT or y <= FINEST_NODES or (y <= 1.0 and y * y * y * speed <= 1e-5):
         return 1.0
     return y / max(FINEST_NODES, min(1.0, 0.1 * (1e-2 / speed) ** (1.0 / 3.0)))
 
@@ -152,8 +194,11 @@ def measure(
     p = segment[FREE_POSITION]
     v = segment[FREE_VELOCITY]
     share = shares(parameters, plan, sides)
+    way = way_of(loop, segment)
     if loop[JUMPED] > 0.0:
-        fill(parameters, plan, cells, sides, loop, segment, 0.0, loop[POSITION], loop[VELOCITY], nodes, 4)
+        fill(
+            parameters, plan, cells, sides, loop, segment, way, 0.0, loop[POSITION], loop[VELOCITY], nodes, 4
+        )
         loop[JUMPED] = 0.0
     for w in range(windows):
         begin = w * width
@@ -164,7 +209,7 @@ def measure(
             for k in range(1, 5):
                 x = begin + 0.25 * width * k
                 theta, speed = moved(c, UNMOVED, x, 0.0, 0.0)
-                fill(parameters, plan, cells, sides, loop, segment, x, theta, speed, nodes, k)
+                fill(parameters, plan, cells, sides, loop, segment, way, x, theta, speed, nodes, k)
             p0 = p
             v0 = v
             p, v = free_motion(twice(twice(m)), p0, v0)
@@ -176,18 +221,19 @@ def measure(
                 x = begin + 0.25 * width * k
                 p, v = free_motion(m, p, v)
                 theta, speed = moved(c, UNMOVED, x, p, v)
-                fill(parameters, plan, cells, sides, loop, segment, x, theta, speed, nodes, k)
+                fill(parameters, plan, cells, sides, loop, segment, way, x, theta, speed, nodes, k)
             window(acc, turns, loop[TIME] + begin, width, nodes)
     return True
 
 
 @kernel(exact=False)
 def fill(
-    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, x: float, theta: float, v: float,
-    nodes: Any, k: int,
+    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, way: Way, x: float, theta: float,
+    v: float, nodes: Any, k: int,
 ) -> None:  # fmt: skip
     """Write one node of every signal that the meter reads."""
-    goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, loop, segment, x, theta, v)
+    r, goal, rate = commanded(parameters, plan, cells, loop, way, x)
+    tm, tf, th = torques_at(parameters, plan, sides, loop, segment, x, r, goal, rate, theta, v)
     nodes[ERROR, k] = goal - theta
     nodes[ERROR_RATE, k] = rate - v
     nodes[AT, k] = theta

@@ -116,11 +116,20 @@ def signals(
 ) -> tuple[float, float, float, float, float]:  # fmt: skip
     """Reference position and velocity; motor, friction and compensating torque at x inside the segment."""
     r, _, goal, rate = command(parameters, plan, cells, loop, loop[TIME] + x)
+    tm, tf, th = torques_at(parameters, plan, sides, loop, segment, x, r, goal, rate, theta, v)
+    return goal, rate, tm, tf, th
+
+
+@kernel(exact=False, inline=True)
+def torques_at(
+    parameters: Any, plan: Any, sides: Any, loop: Any, segment: Any, x: float, r: float, goal: float, rate: float,
+    theta: float, v: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Motor, friction and compensating torque at x inside the segment, where the reference is known."""
     s0 = slip_torque_at(sides, segment, 0, x)
     s1 = slip_torque_at(sides, segment, 1, x) if plan[SIDES] > 1 else 0.0
     integral = integral_at(parameters, loop, segment, x)
-    tm, tf, th = torques(parameters, plan, sides, loop, r, goal, rate, integral, theta, v, s0, s1)
-    return goal, rate, tm, tf, th
+    return torques(parameters, plan, sides, loop, r, goal, rate, integral, theta, v, s0, s1)
 
 
 @kernel(exact=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
@@ -9,6 +10,7 @@ from stickslip.simulation._meter import (
     AT,
     E_MAX,
     ERROR,
+    ERROR_RATE,
     LAST_VELOCITY,
     MOTOR,
     MOVING,
@@ -16,9 +18,11 @@ from stickslip.simulation._meter import (
     REFERENCE_SPEED,
     SETTLE_BAND,
     SPEED,
+    TM_MAX,
     TRIGGER,
     TURN_POSITION,
     TURN_TIME,
+    V_MAX,
     W2_E_HIGH,
     W2_E_LOW,
     confirm,
@@ -42,6 +46,16 @@ class Free(NamedTuple):
 
 
 NO_FREE = Free(0.0, 0.0, 0.0, 0.0)
+
+
+class Farthest(NamedTuple):
+    """What may be farther than before in a window: error, velocity, motor torque; and whether something is counted."""
+
+    error: bool
+    speed: bool
+    motor: bool
+    events: bool
+
 
 # ---- bounds ---------------------------------------------------------------------------------------------------
 
@@ -138,99 +152,172 @@ def touch(acc: Any, t: float, position: float, v: float) -> None:
 # ---- a look at fine steps -------------------------------------------------------------------------------------
 
 
-@kernel(exact=False)
-def scan(
+@kernel(exact=False, inline=True)
+def looked_through(
     acc: Any, turns: Any, t: float, width: float, nodes: Any, first: float, part: float, m: Matrix, free: Free,
-    motor_p: float, motor_v: float, count: int, events: bool,
+    motor_p: float, motor_v: float, count: int, may: Farthest, second: bool,
 ) -> None:  # fmt: skip
-    """Note the extremes over a `part` of a window that begins at its fraction `first`, in `count` steps over each of
-    which `m` carries the free motion; counts reversals and standstills on the way if `events`."""
-    error = quartic(nodes, ERROR)
-    speed = quartic(nodes, SPEED)
-    reference = quartic(nodes, REFERENCE_SPEED)
-    torque = quartic(nodes, MOTOR)
-    place = quartic(nodes, AT)
-    second = in_second_half(acc, t)
+    """Note what a `part` of a window that begins at its fraction `first` may hold, in `count` steps over each of which
+    `m` carries the free motion: only signals that may be farther than before are looked at."""
+    if may.error:
+        low, high = summits(
+            quartic(nodes, ERROR), quartic(nodes, ERROR_RATE), width, first, part, m, free, -1.0, 0.0, count
+        )  # fmt: skip
+        reached(acc, second, low, high, 0.0, 0.0)
+    if may.speed:
+        speed = quartic(nodes, SPEED)
+        low, high = summits(speed, slopes(speed, width), width, first, part, m, free, 0.0, 1.0, count)
+        acc[V_MAX] = max(acc[V_MAX], -low, high)
+    if may.motor:
+        torque = quartic(nodes, MOTOR)
+        low, high = summits(
+            torque, slopes(torque, width), width, first, part, m, free, motor_p, motor_v, count
+        )  # fmt: skip
+        acc[TM_MAX] = max(acc[TM_MAX], -low, high)
+    if may.events and creeps(acc, nodes, free):
+        turns_while_creeping(acc, t, width, nodes, first, part, m, free, count)
+    elif may.events:
+        count_events(acc, turns, t, width, nodes, first, part, m, free, count, second)
+
+
+@kernel(exact=False)
+def summits(
+    values: Five, rates: Five, width: float, first: float, part: float, m: Matrix, free: Free, of_p: float, of_v: float,
+    count: int,
+) -> tuple[float, float]:  # fmt: skip
+    """Least and greatest of a signal over a part of a window: its quartic, whose rate (1/s) is another, and what the
+    free motion adds by its position and by its velocity."""
     step = part / count
     d = width * step
     p = free.position
     q = free.velocity
-    e0 = value(error, first) - p
-    v0 = value(speed, first) + q
-    free_rise = -free.damping * q - free.square * p
-    a0 = slope(speed, first) / width + free_rise
-    g0 = value(reference, first) - v0
-    low = e0
-    high = e0
-    fastest = abs(v0)
-    push0 = value(torque, first) + motor_p * p + motor_v * q
-    rise0 = slope(torque, first) / width + motor_p * q + motor_v * free_rise
-    strongest = abs(push0)
-    if events:
-        touch(acc, t + width * first, value(place, first) + p, v0)
-        rest_seen(acc, t + width * first, v0, value(reference, first))
+    y0 = value(values, first) + of_p * p + of_v * q
+    d0 = value(rates, first) + of_p * q - of_v * (free.damping * q + free.square * p)
+    low = y0
+    high = y0
     for i in range(1, count + 1):
         s = first + step * i
-        p0 = p
         p, q = free_motion(m, p, q)
-        e = value(error, s) - p
-        v = value(speed, s) + q
-        free_rise = -free.damping * q - free.square * p
-        a = slope(speed, s) / width + free_rise
-        rate = value(reference, s)
-        g = rate - v
-        low = min(low, e)
-        high = max(high, e)
-        if g0 * g < 0.0:
-            top = summit(e0, g0, e, g, d)
+        y = value(values, s) + of_p * p + of_v * q
+        rate = value(rates, s) + of_p * q - of_v * (free.damping * q + free.square * p)
+        low = min(low, y)
+        high = max(high, y)
+        if d0 * rate < 0.0:
+            top = summit(y0, d0, y, rate, d)
             low = min(low, top)
             high = max(high, top)
-        crest = v
-        if a0 * a < 0.0:
-            top = summit(v0, a0, v, a, d)
-            fastest = max(fastest, abs(top))
-            if abs(top) > max(abs(v), abs(v0)):
-                crest = top
-        fastest = max(fastest, abs(v))
-        push = value(torque, s) + motor_p * p + motor_v * q
-        rise = slope(torque, s) / width + motor_p * q + motor_v * free_rise
-        strongest = max(strongest, abs(push))
-        if rise0 * rise < 0.0:
-            strongest = max(strongest, abs(summit(push0, rise0, push, rise, d)))
-        if events:
-            now = t + width * s
-            if v0 * v <= 0.0 and v0 != v:
-                f = v0 / (v0 - v)
-                at0 = value(place, s - step) + p0
-                acc[TURN_TIME] = now + d * (f - 1.0)
-                acc[TURN_POSITION] = at0 + f * (value(place, s) + p - at0)
-            confirm(acc, turns, crest, second)
-            follow_reference(acc, rate)
-            rest_seen(acc, now, crest, rate)
-            leave_band(acc, now, d, e0, e)
-        e0 = e
-        v0 = v
-        a0 = a
-        g0 = g
-        push0 = push
-        rise0 = rise
-    if events:
-        acc[LAST_VELOCITY] = v0
-    reached(acc, second, low, high, fastest, strongest)
+        y0 = y
+        d0 = rate
+    return low, high
 
 
 @kernel(exact=False, inline=True)
-def slope(c: Five, s: float) -> float:
-    """Slope of a quartic at s."""
-    return c[1] + s * (2.0 * c[2] + s * (3.0 * c[3] + s * 4.0 * c[4]))
+def creeps(acc: Any, nodes: Any, free: Free) -> bool:
+    """Whether the velocity stays below the trigger in a window, while the reference moves: the last zero of the
+    velocity is all that happens."""
+    if acc[SETTLE_BAND] > 0.0:
+        return False
+    slowest, fastest = bounds(nodes, REFERENCE_SPEED)
+    if slowest <= MOVING and fastest >= -MOVING:
+        return False
+    sway = math.sqrt(free.square * free.position * free.position + free.velocity * free.velocity)
+    return reach(nodes, SPEED) + sway < TRIGGER
+
+
+@kernel(exact=False)
+def turns_while_creeping(
+    acc: Any, t: float, width: float, nodes: Any, first: float, part: float, m: Matrix, free: Free, count: int
+) -> None:  # fmt: skip
+    """Note the last zero of the velocity over a part of a window that `creeps`."""
+    speed = quartic(nodes, SPEED)
+    step = part / count
+    p = free.position
+    q = free.velocity
+    v0 = value(speed, first) + q
+    place = quartic(nodes, AT)
+    touch(acc, t + width * first, value(place, first) + p, v0)
+    rest_seen(acc, t + width * first, v0, nodes[REFERENCE_SPEED, 0])
+    follow_reference(acc, nodes[REFERENCE_SPEED, 4])
+    last = 0
+    f = 0.0
+    at0 = 0.0
+    at1 = 0.0
+    for i in range(1, count + 1):
+        p0 = p
+        p, q = free_motion(m, p, q)
+        v = value(speed, first + step * i) + q
+        if v0 * v <= 0.0 and v0 != v:
+            last = i
+            f = v0 / (v0 - v)
+            at0 = p0
+            at1 = p
+        v0 = v
+    if last > 0:
+        s = first + step * last
+        at0 += value(place, s - step)
+        acc[TURN_TIME] = t + width * (s + step * (f - 1.0))
+        acc[TURN_POSITION] = at0 + f * (value(place, s) + at1 - at0)
+    acc[LAST_VELOCITY] = v0
+
+
+@kernel(exact=False)
+def count_events(
+    acc: Any, turns: Any, t: float, width: float, nodes: Any, first: float, part: float, m: Matrix, free: Free,
+    count: int, second: bool,
+) -> None:  # fmt: skip
+    """Count reversals and standstills over a part of a window, and note where the error leaves its band."""
+    speed = quartic(nodes, SPEED)
+    rises = slopes(speed, width)
+    reference = quartic(nodes, REFERENCE_SPEED)
+    step = part / count
+    d = width * step
+    p = free.position
+    q = free.velocity
+    v0 = value(speed, first) + q
+    a0 = value(rises, first) - free.damping * q - free.square * p
+    touch(acc, t + width * first, value(quartic(nodes, AT), first) + p, v0)
+    rest_seen(acc, t + width * first, v0, value(reference, first))
+    for i in range(1, count + 1):
+        s = first + step * i
+        now = t + width * s
+        p0 = p
+        p, q = free_motion(m, p, q)
+        v = value(speed, s) + q
+        a = value(rises, s) - free.damping * q - free.square * p
+        rate = value(reference, s)
+        crest = v
+        if a0 * a < 0.0:
+            top = summit(v0, a0, v, a, d)
+            if abs(top) > max(abs(v), abs(v0)):
+                crest = top
+        if v0 * v <= 0.0 and v0 != v:
+            f = v0 / (v0 - v)
+            place = quartic(nodes, AT)
+            at0 = value(place, s - step) + p0
+            acc[TURN_TIME] = now + d * (f - 1.0)
+            acc[TURN_POSITION] = at0 + f * (value(place, s) + p - at0)
+        confirm(acc, turns, crest, second)
+        follow_reference(acc, rate)
+        rest_seen(acc, now, crest, rate)
+        if acc[SETTLE_BAND] > 0.0:
+            error = quartic(nodes, ERROR)
+            leave_band(acc, now, d, value(error, s - step) - p0, value(error, s) - p)
+        v0 = v
+        a0 = a
+    acc[LAST_VELOCITY] = v0
+
+
+@kernel(exact=False, inline=True)
+def slopes(c: Five, width: float) -> Five:
+    """The rate of a quartic over a window of `width` s."""
+    inverse = 1.0 / width
+    return inverse * c[1], inverse * 2.0 * c[2], inverse * 3.0 * c[3], inverse * 4.0 * c[4], 0.0
 
 
 @kernel(exact=False, inline=True)
 def leave_band(acc: Any, now: float, d: float, before: float, error: float) -> None:
     """Note when the error was last outside the band in which it counts as settled."""
     band = acc[SETTLE_BAND]
-    if band <= 0.0:
-        return
     if abs(error) > band:
         acc[OUTSIDE_LAST] = now
     elif abs(before) > band:

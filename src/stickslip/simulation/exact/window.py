@@ -30,7 +30,17 @@ from stickslip.simulation._meter import (
 )
 from stickslip.simulation.exact.flow import UNMOVED, Linear, Matrix, flow, free_motion
 from stickslip.simulation.exact.ringing import Ringing, at_nodes, high_passed, overlap, quartic
-from stickslip.simulation.exact.scan import NO_FREE, Free, bulge, calm, farther, passes, reach, scan
+from stickslip.simulation.exact.scan import (
+    NO_FREE,
+    Farthest,
+    Free,
+    bulge,
+    calm,
+    farther,
+    looked_through,
+    passes,
+    reach,
+)
 
 TINY = 1e-300
 SMALL = 1e-6
@@ -75,9 +85,12 @@ def window(acc: Any, turns: Any, t: float, width: float, nodes: Any) -> None:
     events = fine and not calm(acc, nodes, 0.0, 0.0)
     second = add(acc, t, width, sums(nodes), nodes[ERROR, 4])
     reached(acc, second, low, high, abs(nodes[SPEED, 4]), abs(nodes[MOTOR, 4]))
-    if events or reach(nodes, SPEED) > acc[V_MAX] or reach(nodes, MOTOR) > acc[TM_MAX]:
+    may = Farthest(
+        False, reach(nodes, SPEED) > acc[V_MAX], reach(nodes, MOTOR) > acc[TM_MAX], events
+    )  # fmt: skip
+    if may.speed or may.motor or events:
         count = math.ceil(max(STEPS, width / FINE if events else 0.0))
-        scan(acc, turns, t, width, nodes, 0.0, 1.0, UNMOVED, NO_FREE, 0.0, 0.0, count, events)
+        looked_through(acc, turns, t, width, nodes, 0.0, 1.0, UNMOVED, NO_FREE, 0.0, 0.0, count, may, second)
     if not fine:
         return
     if width <= MAX_WINDOW:
@@ -129,7 +142,7 @@ def look_through(
     v = ring.q0 / width
     parts = 1 if width * stiff * A_RADIAN <= 2.0 * STEPS else 4
     for k in range(parts):
-        shows = shown(acc, nodes, k, 4 // parts, more, stiff * p, v, stiff, share, events, second)
+        shows, may = shown(acc, nodes, k, 4 // parts, more, stiff * p, v, stiff, share, events, second)
         if shows >= 0.0:
             long = width / parts
             count = max(STEPS / parts, long / FINE if events else 0.0)
@@ -139,9 +152,9 @@ def look_through(
             steps = math.ceil(count)
             free = Free(p, v, 2.0 * lin.decay, lin.square)
             a_step = flow(lin, long / steps)
-            scan(
+            looked_through(
                 acc, turns, t, width, nodes, k / parts, 1.0 / parts, a_step, free, share.motor_p, share.motor_v, steps,
-                events,
+                may, second,
             )  # fmt: skip
         if parts > 1:
             p, v = free_motion(m, p, v)
@@ -151,9 +164,9 @@ def look_through(
 def shown(
     acc: Any, nodes: Any, k: int, quarters: int, more: Bulges, w: float, v: float, stiff: float, share: Shares,
     events: bool, second: bool,
-) -> float:  # fmt: skip
-    """The greatest part that ringing has in a peak that some quarters of a window, from k on, may hold; -1 where they
-    hold none."""
+) -> tuple[float, Farthest]:  # fmt: skip
+    """The greatest part that ringing has in a peak that some quarters of a window, from k on, may hold, -1 where they
+    hold none; and which peaks they may hold."""
     # The energy of the ringing falls.
     sway = math.sqrt(w * w + v * v)
     swing = sway / stiff
@@ -168,13 +181,19 @@ def shown(
         speed = max(speed, abs(nodes[SPEED, i]))
         motor = max(motor, abs(nodes[MOTOR, i]))
     shows = 0.0 if events else -1.0
-    if farther(acc, second, low - more.error - swing, high + more.error + swing):
+    may = Farthest(
+        farther(acc, second, low - more.error - swing, high + more.error + swing),
+        speed + more.speed + sway > acc[V_MAX],
+        motor + more.motor + pull > acc[TM_MAX],
+        events,
+    )
+    if may.error:
         shows = max(shows, swing / (acc[E_MAX] + TINY))
-    if events or speed + more.speed + sway > acc[V_MAX]:
+    if may.speed or events:
         shows = max(shows, sway / (acc[V_MAX] + TINY))
-    if motor + more.motor + pull > acc[TM_MAX]:
+    if may.motor:
         shows = max(shows, pull / (acc[TM_MAX] + TINY))
-    return shows
+    return shows, may
 
 
 @kernel(exact=False, inline=True)
