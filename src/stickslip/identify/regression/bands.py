@@ -31,6 +31,8 @@ BANDS = (1.0, 1.6, 2.6)
 ROUGH, WIDER = 0.05, (1.6, 2.6, 4.1, 6.6, 10.0)
 """Misfit in the first band, in parts of Fc, from which on wider windows are tried; how much wider. What play does to a
 sum of motor and load falls with the square of the width."""
+FALLS = 0.5
+"""Part of the first band's misfit that the last may leave, for still wider windows to be worth a look."""
 LEVELS = 18
 """Stribeck velocities that are averaged over, from `SLOWEST` to `FASTEST` of the highest speed."""
 SLOWEST, FASTEST = 1e-3, 3.0
@@ -81,7 +83,7 @@ def calmed(found: Bands, signals: Sequence[Signals], width: float, *ask: Any) ->
     moves the load against the motor by no more than the play: seen through a window, the torque of that falls with
     the square of its width, that of inertia and friction does not.
     """
-    for wider in WIDER if rough(found.fits[0]) else ():
+    for wider in worth_a_look(found):
         try:
             other = in_bands(signals, wider * width, *ask)
         except InputError:
@@ -91,6 +93,16 @@ def calmed(found: Bands, signals: Sequence[Signals], width: float, *ask: Any) ->
         if not rough(other.fits[0]):
             return replace(other, widened=wider) if tells_as_much(other.fits[0], found.fits[0]) else found
     return found
+
+
+def worth_a_look(found: Bands) -> tuple[float, ...]:
+    """Of the wider windows, those in which the bands at hand do not say already that as much is left."""
+    fits = found.fits
+    if not rough(fits[0]):
+        return ()
+    known = {wider for wider, fit in zip(BANDS[1:], fits[1:], strict=False) if rough(fit)}
+    falls = not known or fits[-1].misfit <= FALLS * fits[0].misfit
+    return tuple(w for w in WIDER if w not in known and (falls or w in BANDS))
 
 
 def tells_as_much(band: BandFit, other: BandFit) -> bool:
