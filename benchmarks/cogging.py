@@ -6,9 +6,9 @@ For each machine: slow rotations on its rig, `identify_cogging`, error and corre
 the odd part (ripple) over a turn; speed ripple and tracking error at a constant speed without and with the map found;
 and over the seeds, how many of the 95 % intervals hold the truth. `--none 50`: how many of so many machines without
 cogging and ripple, of each kind in turn (as it is, rigid, with four times the noise, with a sixteenth of the encoder's
-counts), are said to have some. `--coverage 50`: intervals alone, on so many machines a
-seed each, whose phases the seed draws and whose friction drifts and warms up; half the travel and no choice of the
-number of orders, so that a machine takes seconds. `--first 5015`: seeds from there on, for runs in pieces.
+counts), are said to have some. `--coverage 50`: intervals alone, on so many machines a seed each, whose phases the seed
+draws and whose friction drifts and warms up; half the travel and no choice of the number of orders, so that a machine
+takes seconds. `--first 5015`: seeds from there on, for runs in pieces.
 """
 
 from __future__ import annotations
