@@ -15,8 +15,8 @@ import numpy as np
 
 from stickslip.jit import kernel
 from stickslip.model import Model
-from stickslip.simulation._case import FROM_MEASUREMENT, FROM_REFERENCE, KI, SOURCE, Case
 from stickslip.simulation._forcing import CELL_SIZE
+from stickslip.simulation.case_arrays import FROM_MEASUREMENT, FROM_REFERENCE, KI, SOURCE, Case
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.exact.kernel import LONGEST_STEP, SAFETY, solve
 

@@ -31,7 +31,7 @@ import closed_loop
 import jax_step
 from baseline import FC, FS, Baseline, compiled_baseline
 from stickslip.control.controller import Controller
-from stickslip.simulation._case import Case
+from stickslip.simulation.case_arrays import Case
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.many import batch, simd_batch

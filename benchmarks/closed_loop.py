@@ -39,7 +39,7 @@ from stickslip.jit import kernel
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation import _forcing
-from stickslip.simulation._case import lay_out
+from stickslip.simulation.case_arrays import lay_out
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.exact import engine as exact
 

@@ -35,7 +35,7 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Harmonics
 from stickslip.machines.position_map import PositionMap
 from stickslip.record import Record
-from stickslip.rigs._control import Control
+from stickslip.rigs.loop_sample import Control
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.cogging import Cogging
 from stickslip.rigs.virtual import VirtualRig

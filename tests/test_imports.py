@@ -58,6 +58,31 @@ def imports() -> dict[str, set[str]]:
     return parts
 
 
+def private(module: str) -> str:
+    """The room that keeps a module to itself; empty where the module is for everybody."""
+    parts = module.split(".")
+    hidden = [i for i, name in enumerate(parts) if name.startswith("_") and not name.startswith("__")]
+    return ".".join(parts[: hidden[0]]) if hidden else ""
+
+
+def taken_from_other_rooms() -> list[str]:
+    """What imports a module of a leading underscore from outside the folder that it lies in."""
+    found: list[str] = []
+    for file in ROOT.rglob("*.py"):
+        mine = ".".join(("stickslip", *file.relative_to(ROOT).parent.parts))
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = named(node)
+            if isinstance(node, ast.ImportFrom) and node.module:
+                names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            rooms = {
+                private(name)
+                for name in names
+                if (ROOT / "/".join(name.split(".")[1:])).with_suffix(".py").is_file()
+            }
+            found += [f"{file}: {room}" for room in rooms - {""} if not f"{mine}.".startswith(f"{room}.")]
+    return found
+
+
 def circle(found: dict[str, set[str]]) -> str:
     """The parts that import each other in a circle; empty where there is none."""
     try:
@@ -77,3 +102,9 @@ def test_what_is_imported_by_name_is_seen() -> None:
     assert {"laws", "references"} <= found["plugins"]
     assert "rigs" not in found["plugins"]
     assert named(ast.parse('import_module(f"stickslip.rigs.{x}")', mode="eval").body) == ["stickslip.rigs."]
+
+
+def test_a_leading_underscore_means_private() -> None:
+    assert taken_from_other_rooms() == []
+    assert private("stickslip.laws._symmetry.SYMMETRY") == "stickslip.laws"
+    assert private("stickslip.laws.gms") == private("stickslip.__main__") == ""

@@ -85,9 +85,9 @@ INNER: dict[str, Any] = {"no_cpython_wrapper": True, **NO_ADDRESS}
 
 
 def _kernel_files() -> tuple[Path, ...]:
-    """The files that kernels are made of: the engines, what begins with _ among machines and rigs, the translation."""
+    """The files that kernels are made of, and those whose constants they hold: all of the rooms that have kernels."""
     package = Path(__file__).parent
-    found = (package.glob(f"{part}.py") for part in ("subset", "simulation/**/*", "machines/_*", "rigs/_*"))
+    found = (package.glob(f"{room}/**/*.py") for room in ("simulation", "machines", "rigs"))
     return (Path(__file__), *sorted(file for files in found for file in files))
 
 

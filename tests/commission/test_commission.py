@@ -40,8 +40,8 @@ from stickslip.record import Record
 from stickslip.report.identified import Source, write_identification
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.narrower_limits import limited
-from stickslip.rigs.procedures._moves import holder, move
 from stickslip.rigs.procedures.base import Check, CheckFailed, perform
+from stickslip.rigs.procedures.moves import holder, move
 from stickslip.rigs.procedures.sliding import Sliding
 from stickslip.rigs.procedures.track import RECOMMENDED, Track
 from stickslip.rigs.rig import setpoints

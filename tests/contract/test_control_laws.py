@@ -11,7 +11,7 @@ from stickslip.contract.control_laws import CHECKS, continuous, examine, specime
 from stickslip.control.linear import Compensation
 from stickslip.control.registry import control_law, control_law_names
 from stickslip.control_spec import ControlLaw
-from stickslip.simulation._sampled import compiled, replay
+from stickslip.simulation.compiled_controller import compiled, replay
 from stickslip.spec import Par, Surroundings
 
 ALL = {

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stickslip.simulation._sampled import compiled, replay
+from stickslip.simulation.compiled_controller import compiled, replay
 from stickslip.spec import Surroundings
 from support.golden_rows import ROWS
 

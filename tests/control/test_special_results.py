@@ -17,7 +17,7 @@ from stickslip.identify.setting.plant import arrays_of
 from stickslip.machines.contact import Bearings, Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
-from stickslip.rigs._control import COLUMNS, control_of
+from stickslip.rigs.loop_sample import COLUMNS, control_of
 from stickslip.rigs.rig import setpoints
 from stickslip.simulation.machine.layout import look
 from stickslip.spec import Surroundings

@@ -22,7 +22,7 @@ from stickslip.export.job import Job
 from stickslip.jit import call_sample, call_step, compiled_step, flat, kernel, pointer
 from stickslip.laws import LAWS as BUILT_IN
 from stickslip.model import Model
-from stickslip.simulation._sampled import compiled
+from stickslip.simulation.compiled_controller import compiled
 from stickslip.spec import Surroundings
 from support.laws import label, registered, variants
 from support.sampled_text import Memory, sampled_by, settings

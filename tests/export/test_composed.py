@@ -15,8 +15,8 @@ from stickslip.control.registry import control_law, control_law_names
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import UnknownName
 from stickslip.export import CONTROLLER_TARGETS, controller_target
-from stickslip.export._controllers import golden_samples
 from stickslip.export._fmu_run import played
+from stickslip.export.controllers import golden_samples
 from stickslip.export.st_controller import GIVEN
 from stickslip.model import Model
 from support.structured_text import Program

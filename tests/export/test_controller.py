@@ -19,7 +19,7 @@ from stickslip.export import controller_target
 from stickslip.export._step_error import step_errors
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
-from stickslip.rigs._control import control_of
+from stickslip.rigs.loop_sample import control_of
 from stickslip.rigs.rig import Limits
 from stickslip.simulation.closed_loop import simulate
 from stickslip.spec import Surroundings

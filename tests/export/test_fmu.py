@@ -22,7 +22,7 @@ from stickslip.export.job import Job
 from stickslip.jit import compiled_law
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulation import _case
+from stickslip.simulation import case_arrays
 from stickslip.simulation.closed_loop import simulate
 from support.laws import farthest
 
@@ -177,7 +177,7 @@ def test_a_closed_loop_with_the_unit_as_friction_is_the_packages_own(law, versio
         pointers = compiled_law(each)
         return pointers._replace(step=contact.address) if each.name == law else pointers
 
-    monkeypatch.setattr(_case, "compiled_law", compiled)
+    monkeypatch.setattr(case_arrays, "compiled_law", compiled)
     with_unit = simulate(axis, control, wanted, 0.15, **run)
     assert contact.calls > 1000
     np.testing.assert_array_equal(with_unit.time, own.time)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from stickslip.errors import InputError
 from stickslip.export import target_named
-from stickslip.export._nearest import COULOMB, STATIC, STRIBECK, Curve, carried, nearest
 from stickslip.export.job import CannotCarry, Job
+from stickslip.export.nearest import COULOMB, STATIC, STRIBECK, Curve, carried, nearest
 from stickslip.model import Model
 from support.laws import farthest, label, registered
 

@@ -13,8 +13,8 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
-from stickslip.rigs._control import COLUMNS
 from stickslip.rigs.loop import Loop
+from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.rig import setpoints
 from support.axis_rig import FRICTION, AxisRig
 

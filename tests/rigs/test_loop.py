@@ -16,8 +16,8 @@ from stickslip.control.linear import pd, pid
 from stickslip.errors import InputError, Interrupted, LimitCrossed, RigError
 from stickslip.readers import read
 from stickslip.record import Record
-from stickslip.rigs._control import COLUMNS
 from stickslip.rigs.loop import Loop
+from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.narrower_limits import limited
 from stickslip.rigs.rig import Limits, Measurement, Setpoint, setpoints
 from support.axis_rig import FRICTION, LIMITS, AxisRig

@@ -17,7 +17,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
 from stickslip.model import Model
 from stickslip.rigs import safety
-from stickslip.rigs._control import COLUMNS, NAMES, control_of, decide, finished
+from stickslip.rigs.loop_sample import COLUMNS, NAMES, control_of, decide, finished
 from stickslip.rigs.rig import Limits, Measurement, Setpoint
 from stickslip.rigs.safety import REASONS, RUNNING, STOPPED, guarded_by
 from stickslip.spec import Surroundings

@@ -9,12 +9,12 @@ from stickslip.control.linear import Gains, place
 from stickslip.errors import InputError, UnknownName
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulation._case import COMPENSATOR_SCALE, PLANT_SCALE, STIFFNESS
-from stickslip.simulation._metrics import COARSE, metrics
+from stickslip.simulation.case_arrays import COMPENSATOR_SCALE, PLANT_SCALE, STIFFNESS
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.exact.kernel import AT_SIDES
 from stickslip.simulation.many import batch
+from stickslip.simulation.metrics import COARSE, metrics
 
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
 LAWS = {

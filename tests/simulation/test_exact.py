@@ -16,8 +16,8 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation import _forcing as forcing
 from stickslip.simulation import _meter as meter
-from stickslip.simulation._case import DIVERGED, DONE, Case, Outcome, lay_out
 from stickslip.simulation.adaptive import engine as adaptive
+from stickslip.simulation.case_arrays import DIVERGED, DONE, Case, Outcome, lay_out
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.exact import engine as exact
 from stickslip.spec import Bristle

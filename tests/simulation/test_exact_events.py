@@ -10,8 +10,8 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
-from stickslip.simulation._case import lay_out
 from stickslip.simulation.adaptive import engine as adaptive
+from stickslip.simulation.case_arrays import lay_out
 from stickslip.simulation.exact import engine as exact
 from support.thesis_loops import CASES, PARAMETERS, PLANT
 

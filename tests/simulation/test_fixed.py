@@ -17,9 +17,9 @@ from stickslip.errors import ParameterError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation import _meter as meter
-from stickslip.simulation._case import DIVERGED, DONE, NOT_FINITE, lay_out
-from stickslip.simulation._sampled import measured_position
 from stickslip.simulation.adaptive import engine as adaptive
+from stickslip.simulation.case_arrays import DIVERGED, DONE, NOT_FINITE, lay_out
+from stickslip.simulation.compiled_controller import measured_position
 from stickslip.simulation.fixed import engine as fixed
 from stickslip.simulation.sampled import engine as sampled
 from support.sampled_text import Memory, design_filter, low_passed

@@ -9,7 +9,7 @@ import pytest
 
 from stickslip.model import Reference
 from stickslip.simulation._meter import HIGH_PASS, close_standstill, meter, new_meter
-from stickslip.simulation._metrics import limit_cycle, metrics, settle_band_of
+from stickslip.simulation.metrics import limit_cycle, metrics, settle_band_of
 
 
 def measured(duration, x, v, xd=None, vd=None, tm=None, band=0.0, h=1e-3):

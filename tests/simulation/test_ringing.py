@@ -14,14 +14,14 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.simulation._case import DONE, MAX_STEP
 from stickslip.simulation._meter import HIGH_PASS
-from stickslip.simulation._metrics import metrics
+from stickslip.simulation.case_arrays import DONE, MAX_STEP
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.exact import ringing as closed
 from stickslip.simulation.exact.flow import flow, linear
 from stickslip.simulation.exact.state import FIRST_STEPS
+from stickslip.simulation.metrics import metrics
 
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
 GMS = Model("gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, **CURVE)

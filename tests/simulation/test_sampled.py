@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 import stickslip as ss
 from stickslip import plugins
 from stickslip.errors import Divergence, InputError
-from stickslip.simulation._case import DONE
+from stickslip.simulation.case_arrays import DONE
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.sampled import engine as sampled
 

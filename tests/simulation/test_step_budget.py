@@ -6,8 +6,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError, StepFailure
-from stickslip.simulation._case import TOO_STIFF, StepBudget
 from stickslip.simulation.adaptive import engine as adaptive
+from stickslip.simulation.case_arrays import TOO_STIFF, StepBudget
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
 

@@ -10,8 +10,8 @@ import pytest
 
 import stickslip as ss
 from stickslip import waiting
-from stickslip.simulation._case import DONE, TOO_STIFF
 from stickslip.simulation.adaptive import engine as adaptive
+from stickslip.simulation.case_arrays import DONE, TOO_STIFF
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.fixed import engine as fixed

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from stickslip.machines.files import machine
-from stickslip.rigs._control import COLUMNS, Control
+from stickslip.rigs.loop_sample import COLUMNS, Control
 from stickslip.rigs.rig import Capabilities, Limits, Measurement
 from stickslip.rigs.virtual import VirtualRig
 

@@ -32,8 +32,8 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
 from stickslip.record import Record, encoder_step
-from stickslip.rigs.procedures._moves import ROOM
 from stickslip.rigs.procedures.base import Plan, perform
+from stickslip.rigs.procedures.moves import ROOM
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
 from stickslip.rigs.virtual import VirtualRig

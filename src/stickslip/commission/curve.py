@@ -18,7 +18,7 @@ from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.identify.sliding.segments import Segment, constant_velocity_segments
 from stickslip.model import Model
 from stickslip.record import Record
-from stickslip.rigs.procedures._resting import RESTING, resting
+from stickslip.rigs.procedures.resting import RESTING, resting
 from stickslip.simulation.prescribed.steady import Steady
 
 __all__ = ["Slid", "fitted_curve", "moving"]

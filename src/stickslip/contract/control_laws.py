@@ -25,7 +25,7 @@ from stickslip.errors import LawError
 from stickslip.export import c99_controller
 from stickslip.export.golden import random_motion
 from stickslip.model import Model
-from stickslip.simulation._sampled import Sampled, compiled, replay
+from stickslip.simulation.compiled_controller import Sampled, compiled, replay
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import lower
 

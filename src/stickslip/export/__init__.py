@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from stickslip.errors import UnknownName
 
 if TYPE_CHECKING:
-    from stickslip.export._controllers import ControllerTarget
+    from stickslip.export.controllers import ControllerTarget
     from stickslip.export.target import Target
 
 __all__ = ["CONTROLLER_TARGETS", "TARGETS", "controller_target", "target_named"]

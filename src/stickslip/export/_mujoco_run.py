@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.export._nearest import Curve
+from stickslip.export.nearest import Curve
 from stickslip.model import Model, Reference
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from stickslip.export._nearest import Curve, Form
+from stickslip.export.nearest import Curve, Form
 from stickslip.spec import Law, Par, Surroundings
 
 __all__ = ["TABLE", "between_points", "stiffness", "table_form"]

@@ -6,9 +6,9 @@ from typing import Any
 
 from stickslip.control.sampled_controller import SampledController
 from stickslip.export import c99_controller
-from stickslip.export._controllers import STILL, ControllerTarget, head_of
 from stickslip.export._text import render
 from stickslip.export.arduino import tried
+from stickslip.export.controllers import STILL, ControllerTarget, head_of
 from stickslip.export.job import Export
 from stickslip.spec import Surroundings
 

@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 from stickslip.errors import InputError, ParameterError
-from stickslip.export._nearest import COULOMB, STRIBECK, Curve, Nearest, carried
 from stickslip.export._text import render
 from stickslip.export.job import CannotCarry, Check, Export, Job
+from stickslip.export.nearest import COULOMB, STRIBECK, Curve, Nearest, carried
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 

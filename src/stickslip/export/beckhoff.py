@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError, UnknownName
-from stickslip.export._nearest import Curve, Form, Nearest, carried
 from stickslip.export._points import stiffness, table_form
 from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
+from stickslip.export.nearest import Curve, Form, Nearest, carried
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 

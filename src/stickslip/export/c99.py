@@ -21,7 +21,6 @@ import numpy as np
 
 from stickslip.export._analysis import Facts, analyse, merged
 from stickslip.export._c import Dialect, functions, head, safe
-from stickslip.export._nearest import read_by
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import (
@@ -34,6 +33,7 @@ from stickslip.export.golden import (
     room_beside_jumps,
 )
 from stickslip.export.job import Check, Export, Job, counts_in
+from stickslip.export.nearest import read_by
 from stickslip.export.target import Target
 from stickslip.spec import Field, Law, Surroundings
 from stickslip.subset import law_layouts, named

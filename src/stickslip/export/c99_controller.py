@@ -16,16 +16,6 @@ from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.sampled_controller import SampledController
 from stickslip.export._analysis import Facts, analyse
 from stickslip.export._c import Dialect, functions, head, safe
-from stickslip.export._controllers import (
-    STILL,
-    ControllerTarget,
-    checked_name,
-    counts_of,
-    golden_samples,
-    head_of,
-    settings_of,
-    trees_of,
-)
 from stickslip.export._step_error import PARTS, about_steps
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.c99 import (
@@ -37,6 +27,16 @@ from stickslip.export.c99 import (
     initial,
     scale_of,
     structure,
+)
+from stickslip.export.controllers import (
+    STILL,
+    ControllerTarget,
+    checked_name,
+    counts_of,
+    golden_samples,
+    head_of,
+    settings_of,
+    trees_of,
 )
 from stickslip.export.golden import Samples, as_csv
 from stickslip.export.job import Check, Export

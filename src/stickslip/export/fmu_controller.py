@@ -14,15 +14,6 @@ import numpy as np
 
 from stickslip.control.sampled_controller import SampledController
 from stickslip.export import c99, c99_controller
-from stickslip.export._controllers import (
-    STILL,
-    ControllerTarget,
-    counts_of,
-    golden_samples,
-    head_of,
-    settings_of,
-    trees_of,
-)
 from stickslip.export._fmu import (
     SURROUNDINGS,
     Contents,
@@ -34,6 +25,15 @@ from stickslip.export._fmu import (
 )
 from stickslip.export._fmu_run import played
 from stickslip.export._text import render
+from stickslip.export.controllers import (
+    STILL,
+    ControllerTarget,
+    counts_of,
+    golden_samples,
+    head_of,
+    settings_of,
+    trees_of,
+)
 from stickslip.export.golden import Samples, as_csv, sampled_torques
 from stickslip.export.job import Check, Export
 from stickslip.spec import Surroundings

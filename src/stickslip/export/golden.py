@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.export._nearest import surroundings_of
+from stickslip.export.nearest import surroundings_of
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 

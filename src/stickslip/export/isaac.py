@@ -10,9 +10,9 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from stickslip.export._nearest import COULOMB, STATIC, carried
 from stickslip.export._text import render
 from stickslip.export.job import Export, Job
+from stickslip.export.nearest import COULOMB, STATIC, carried
 from stickslip.export.target import Setting, Target, settings_of
 
 __all__ = ["TARGET", "write"]

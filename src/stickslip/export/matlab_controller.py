@@ -8,7 +8,9 @@ from typing import Any
 
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.sampled_controller import SampledController
-from stickslip.export._controllers import (
+from stickslip.export._matlab import functions, local, safe, with_helpers
+from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export.controllers import (
     STILL,
     ControllerTarget,
     counts_of,
@@ -17,8 +19,6 @@ from stickslip.export._controllers import (
     settings_of,
     trees_of,
 )
-from stickslip.export._matlab import functions, local, safe, with_helpers
-from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import Samples
 from stickslip.export.job import Export
 from stickslip.export.matlab import BOUND, in_octave

@@ -16,9 +16,9 @@ from xml.etree import ElementTree
 from stickslip.errors import InputError
 from stickslip.export._mujoco_read import Part, joint_named, parts
 from stickslip.export._mujoco_run import drift, pulled, spring
-from stickslip.export._nearest import COULOMB, Curve, Form, Nearest, bristle_of, carried, fit_stribeck
 from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
+from stickslip.export.nearest import COULOMB, Curve, Form, Nearest, bristle_of, carried, fit_stribeck
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 from stickslip.spec import Surroundings

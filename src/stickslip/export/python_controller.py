@@ -9,7 +9,8 @@ from typing import Any
 
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.sampled_controller import SampledController
-from stickslip.export._controllers import (
+from stickslip.export._text import render
+from stickslip.export.controllers import (
     STILL,
     ControllerTarget,
     counts_of,
@@ -18,7 +19,6 @@ from stickslip.export._controllers import (
     settings_of,
     trees_of,
 )
-from stickslip.export._text import render
 from stickslip.export.golden import as_csv
 from stickslip.export.job import Check, Export
 from stickslip.export.python import alone, constant, count_by_constant, indent_docstring

@@ -7,7 +7,11 @@ from typing import Any
 
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.sampled_controller import SampledController
-from stickslip.export._controllers import (
+from stickslip.export._hoist import hoisted
+from stickslip.export._st import Names, functions, number
+from stickslip.export._st_names import RESERVED, named_in_st
+from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export.controllers import (
     STILL,
     ControllerTarget,
     checked_name,
@@ -17,10 +21,6 @@ from stickslip.export._controllers import (
     settings_of,
     trees_of,
 )
-from stickslip.export._hoist import hoisted
-from stickslip.export._st import Names, functions, number
-from stickslip.export._st_names import RESERVED, named_in_st
-from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import as_csv
 from stickslip.export.job import Export
 from stickslip.export.st import NOTE

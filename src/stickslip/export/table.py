@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.export._nearest import Curve, Nearest, carried
 from stickslip.export._points import table_form
 from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
+from stickslip.export.nearest import Curve, Nearest, carried
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 

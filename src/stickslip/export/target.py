@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from stickslip.errors import InputError, UnknownName
-from stickslip.export._nearest import Form
 from stickslip.export.job import Check, Export, Job
+from stickslip.export.nearest import Form
 
 __all__ = ["Setting", "Target", "settings_of"]
 

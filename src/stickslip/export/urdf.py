@@ -13,9 +13,9 @@ from typing import Any
 from xml.etree import ElementTree
 
 from stickslip.errors import InputError
-from stickslip.export._nearest import COULOMB, carried
 from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
+from stickslip.export.nearest import COULOMB, carried
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 

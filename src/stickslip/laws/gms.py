@@ -2,7 +2,7 @@
 
 Stick: dF_i/dt = k_i v, until the load reaches alpha_i s(v). Slip: dF_i/dt = C (alpha_i sign(v) - F_i/s(v)),
 until v passes through zero. F = sum F_i + sigma2 v. Thesis eqs. 2.16 to 2.19 (Tables 1 and 5), Lampaert et al.
-2003, Al-Bender et al. 2005. The rule from stick to slip is `stickslip.laws._stick`.
+2003, Al-Bender et al. 2005. The rule from stick to slip is `stickslip.laws.slip_rule`.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.laws._curve import CURVE, extremes
-from stickslip.laws._curve import stribeck as sliding
-from stickslip.laws._curve import stribeck_scale as sliding_scale
-from stickslip.laws._stick import SLIP_RULE
-from stickslip.laws._stick import signed as load_of
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
+from stickslip.laws.sliding_curve import CURVE, extremes
+from stickslip.laws.sliding_curve import stribeck as sliding
+from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
+from stickslip.laws.slip_rule import SLIP_RULE
+from stickslip.laws.slip_rule import signed as load_of
 from stickslip.spec import Elements, Law, Mode, Par
 
 __all__ = ["LAW"]

@@ -15,12 +15,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.laws._curve import CURVE, extremes
-from stickslip.laws._curve import stribeck as sliding
-from stickslip.laws._curve import stribeck_scale as sliding_scale
 from stickslip.laws._direction import direction_ends, direction_of
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
+from stickslip.laws.sliding_curve import CURVE, extremes
+from stickslip.laws.sliding_curve import stribeck as sliding
+from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
 from stickslip.spec import Law, Mode, Par
 
 __all__ = ["LAW"]

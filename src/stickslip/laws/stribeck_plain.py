@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from stickslip.laws._curve import CURVE
-from stickslip.laws._curve import stribeck as sliding
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
+from stickslip.laws.sliding_curve import CURVE
+from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.spec import Law
 
 __all__ = ["LAW"]

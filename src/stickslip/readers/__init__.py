@@ -3,7 +3,7 @@
 To add a format, write its file (recognise, read, FORMAT) and add its name to that tuple in `reading.py`.
 """
 
-from stickslip.readers._convert import Drive
+from stickslip.readers.convert import Drive
 from stickslip.readers.reading import FORMATS, open_table, read
 
 __all__ = ["FORMATS", "Drive", "open_table", "read"]

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from stickslip.errors import InputError, suggestion
 from stickslip.finding import Finding
 from stickslip.readers._names import ALIASES, KINDS, ROLES, Name, role_of
-from stickslip.readers._table import Column, Table
 from stickslip.readers._units import parse_unit, spellings
+from stickslip.readers.table_columns import Column, Table
 
 __all__ = ["Choice", "choose", "parse_mapping"]
 

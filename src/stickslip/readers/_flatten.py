@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.readers._table import Column, Table
+from stickslip.readers.table_columns import Column, Table
 
 __all__ = ["as_numbers", "table_of"]
 

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from stickslip.readers._names import role_of
-from stickslip.readers._table import Array, Column
 from stickslip.readers._units import parse_unit
+from stickslip.readers.table_columns import Array, Column
 
 __all__ = ["columns", "constants", "groups"]
 

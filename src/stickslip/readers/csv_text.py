@@ -16,8 +16,8 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers import _scope
-from stickslip.readers._table import Array, Column, Format, Table
 from stickslip.readers._units import parse_unit
+from stickslip.readers.table_columns import Array, Column, Format, Table
 
 __all__ = ["FORMAT", "cell"]
 

@@ -9,11 +9,11 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.readers._convert import LINEAR
 from stickslip.readers._flatten import table_of
 from stickslip.readers._names import ALIASES, KINDS
-from stickslip.readers._table import Column, Table
 from stickslip.readers._units import SI, parse_unit
+from stickslip.readers.convert import LINEAR
+from stickslip.readers.table_columns import Column, Table
 
 __all__ = ["digest_of", "table_in_memory", "table_of_signals"]
 

@@ -14,7 +14,7 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers import _mat_check, hdf5
 from stickslip.readers._flatten import table_of
-from stickslip.readers._table import Format, Table
+from stickslip.readers.table_columns import Format, Table
 
 __all__ = ["FORMAT"]
 

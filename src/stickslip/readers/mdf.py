@@ -14,7 +14,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.readers import _guard
 from stickslip.readers._extra import needed
-from stickslip.readers._table import Column, Format, Table
+from stickslip.readers.table_columns import Column, Format, Table
 
 __all__ = ["FORMAT"]
 

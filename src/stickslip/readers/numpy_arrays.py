@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.readers._flatten import table_of
-from stickslip.readers._table import Format, Table
+from stickslip.readers.table_columns import Format, Table
 
 __all__ = ["FORMAT"]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.readers._table import Column, Format, Table
+from stickslip.readers.table_columns import Column, Format, Table
 
 __all__ = ["FORMAT"]
 

@@ -21,8 +21,8 @@ from stickslip.config import read_toml
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers._choose import parse_mapping
-from stickslip.readers._convert import Drive
-from stickslip.readers._table import Table
+from stickslip.readers.convert import Drive
+from stickslip.readers.table_columns import Table
 from stickslip.record import Record
 
 __all__ = [

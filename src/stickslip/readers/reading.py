@@ -16,8 +16,8 @@ from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.readers import profiles
 from stickslip.readers._choose import Choice, choose, parse_mapping
-from stickslip.readers._convert import Drive, convert, times_of
-from stickslip.readers._table import Column, Format, Table
+from stickslip.readers.convert import Drive, convert, times_of
+from stickslip.readers.table_columns import Column, Format, Table
 from stickslip.record import Record
 
 __all__ = ["FORMATS", "formats", "joined", "open_table", "read", "record_of"]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import cast
 
 from stickslip._stream_file import MAGIC
-from stickslip.readers._table import Column, Format, Table
+from stickslip.readers.table_columns import Column, Format, Table
 from stickslip.record import Record
 
 __all__ = ["FORMAT"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.rigs._control import Control, decide, finished
+from stickslip.rigs.loop_sample import Control, decide, finished
 from stickslip.simulation.machine.step import plant_of, sample
 
 __all__ = ["run_block"]

@@ -25,10 +25,10 @@ from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, Interrupted, RigError
 from stickslip.record import Record
 from stickslip.rigs import safety
-from stickslip.rigs._control import COLUMNS, NAMES, REASON, STATE, UNITS, Control, control_of
 from stickslip.rigs.budget import BUDGET, Budget
 from stickslip.rigs.declared import FIELDS, answer, blamed, checked
 from stickslip.rigs.interrupts import Signals
+from stickslip.rigs.loop_sample import COLUMNS, NAMES, REASON, STATE, UNITS, Control, control_of
 from stickslip.rigs.realtime import TIMES, Account, Pace, soft_real_time
 from stickslip.rigs.rig import BlockRig, Limits, Measurement, Rig, Setpoint, insist_on_setpoints, setpoints
 from stickslip.rigs.safety import ASKED, RUNNING, STOPPED, STOPPING, Bounds, Safety
@@ -205,7 +205,7 @@ class Loop:
         Returns
         -------
         array, shape (m, columns)
-            The rows of `stickslip.rigs._control.COLUMNS`, m <= n.
+            The rows of `stickslip.rigs.loop_sample.COLUMNS`, m <= n.
 
         Raises
         ------

@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.errors import InputError, suggestion
-from stickslip.rigs._control import Control
+from stickslip.rigs.loop_sample import Control
 from stickslip.rigs.rig import BlockRig, Capabilities, Limits, Measurement, Rig
 
 __all__ = ["LIMITS", "Limited", "limited"]

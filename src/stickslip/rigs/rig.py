@@ -4,7 +4,7 @@ The loop (`stickslip.rigs.loop`) drives any `Rig`; procedures are written agains
 
     measured = rig.open()
     for every sample:
-        torque = control and safety(measured, setpoint)      # `stickslip.rigs._control.decide`, compiled
+        torque = control and safety(measured, setpoint)      # `stickslip.rigs.loop_sample.decide`, compiled
         measured = rig.exchange(torque)                      # acts for one sample time, then measures
 
 A rig whose plant is compiled may also be a `BlockRig`, which runs these lines for many samples in one compiled loop;
@@ -24,7 +24,7 @@ from stickslip.errors import InputError, ParameterError
 
 if TYPE_CHECKING:
     from stickslip.config import Table
-    from stickslip.rigs._control import Control
+    from stickslip.rigs.loop_sample import Control
 
 __all__ = [
     "BlockRig",
@@ -285,7 +285,7 @@ class BlockRig(Rig, Protocol):
         In a compiled loop, for every sample k: ``torque = decide(control, setpoints[k], rows[k])``, advance the plant
         by a sample with that torque, write what is then measured to ``control.measured`` (the order of `Measurement`),
         and leave the loop after the sample for which `finished(control)` is true. `decide` and `finished` are kernels
-        of `stickslip.rigs._control`.
+        of `stickslip.rigs.loop_sample`.
         """
         ...
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stickslip.rigs._control import COLUMNS, ROW, SETPOINT, Control, addresses, decide_at, nothing_at
+from stickslip.rigs.loop_sample import COLUMNS, ROW, SETPOINT, Control, addresses, decide_at, nothing_at
 from stickslip.rigs.rig import Measurement, Setpoint
 
 __all__ = ["Step"]

@@ -16,8 +16,8 @@ from stickslip.config import Table
 from stickslip.errors import InputError
 from stickslip.machines.files import machine
 from stickslip.machines.machine import IMPERFECTIONS, Machine
-from stickslip.rigs._control import Control
 from stickslip.rigs._virtual import run_block
+from stickslip.rigs.loop_sample import Control
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
 from stickslip.simulation.machine import step as place
 from stickslip.simulation.machine.layout import lay_out_machine, look, run, wait

@@ -16,7 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.jit import call_profile, call_step, kernel, pointer
-from stickslip.simulation._case import Array, Case
+from stickslip.simulation.case_arrays import Array, Case
 
 __all__ = ["CELL_SIZE", "NO_CELLS", "feedforward"]
 

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.simulation._case import DONE, PERTURBATION, POSITION_0, TOLERANCE, Case, Outcome
 from stickslip.simulation.adaptive import engine as adaptive
+from stickslip.simulation.case_arrays import DONE, PERTURBATION, POSITION_0, TOLERANCE, Case, Outcome
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.sampled import engine as sampled
 

@@ -27,8 +27,8 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.record import Record
-from stickslip.simulation import _case
-from stickslip.simulation._case import (
+from stickslip.simulation import case_arrays
+from stickslip.simulation.case_arrays import (
     COLUMNS,
     UNITS,
     Case,
@@ -36,7 +36,7 @@ from stickslip.simulation._case import (
     lay_out,
     slip_rules,
 )
-from stickslip.simulation._metrics import metrics
+from stickslip.simulation.metrics import metrics
 
 __all__ = ["INTEGRATORS", "Choice", "check_machine_run", "integrator_for", "prepare", "run_case", "simulate"]
 
@@ -51,19 +51,19 @@ SHORTEST = 1e-9
 """s, of a run: one-sided limits are taken a thousandth of it beside kinks and ends."""
 
 REASONS: dict[int, tuple[type[SimulationError], str]] = {
-    _case.DIVERGED: (Divergence, "position or velocity left every reasonable bound"),
-    _case.NOT_FINITE: (Divergence, "the state is no longer a number"),
-    _case.STORM: (
+    case_arrays.DIVERGED: (Divergence, "position or velocity left every reasonable bound"),
+    case_arrays.NOT_FINITE: (Divergence, "the state is no longer a number"),
+    case_arrays.STORM: (
         EventStorm,
-        f"more than {_case.STORM_EVENTS} switches within {_case.STORM_TIME * 1e3:g} ms",
+        f"more than {case_arrays.STORM_EVENTS} switches within {case_arrays.STORM_TIME * 1e3:g} ms",
     ),
-    _case.NO_STEP: (StepFailure, "no step that meets the tolerance was found"),
-    _case.ROWS_FULL: (StepFailure, "the record is full"),
-    _case.TOO_STIFF: (
+    case_arrays.NO_STEP: (StepFailure, "no step that meets the tolerance was found"),
+    case_arrays.ROWS_FULL: (StepFailure, "the record is full"),
+    case_arrays.TOO_STIFF: (
         StepFailure,
         "far more steps than a motion of its length takes",
     ),
-    _case.TOO_FAST: (
+    case_arrays.TOO_FAST: (
         StepFailure,
         "a part of the motion is so fast that its metrics take more than a million nodes of a single step; lower "
         "the controller's gains or bandwidth, or raise the inertia",
@@ -105,8 +105,8 @@ def simulate(
     time_step : float
         Longest step of the fixed integrator, s; it runs controllers in continuous time.
     slip_rule : {"signed", "literal"}, optional
-        The rule from stick to slip of every law in the loop that has one (`stickslip.laws._stick`), in place of its own
-        choice; left out, each law keeps the rule that it was made with.
+        The rule from stick to slip of every law in the loop that has one (`stickslip.laws.slip_rule`), in place of its
+        own choice; left out, each law keeps the rule that it was made with.
     output : float or array
         Spacing of the record's time grid, s, or its times.
     initial : tuple of float
@@ -170,7 +170,7 @@ def run_case(
     """
     name, run, refused = integrator_for(case, integrator)
     if name == "fixed":
-        _insist_on_steps("time_step", time_step, float(case.numbers[_case.DURATION]))
+        _insist_on_steps("time_step", time_step, float(case.numbers[case_arrays.DURATION]))
     outcome: Outcome = run(case, time_step) if name == "fixed" else run(case)
     how: dict[str, Any] = {"integrator": name, "slip_rule": slip_rule}
     if refused:
@@ -179,20 +179,20 @@ def run_case(
         why := importlib.import_module("stickslip.simulation.sampled.engine").cannot_locate(case)
     ):
         how["general_step"] = why
-    if check and name != "fixed" and outcome.code == _case.DONE:
+    if check and name != "fixed" and outcome.code == case_arrays.DONE:
         found = importlib.import_module("stickslip.simulation.accuracy").estimate(case, name)
         how["accuracy"] = {
             "error_rad": found.error, "well_conditioned": found.well_conditioned,
             "start_rad": found.start, "depends_on_start": found.depends_on_start,
         }  # fmt: skip
-    elif start and name == "exact" and outcome.code == _case.DONE:
+    elif start and name == "exact" and outcome.code == case_arrays.DONE:
         accuracy = importlib.import_module("stickslip.simulation.accuracy")
         apart = accuracy.start_apart(case, name)
         how["accuracy"] = {"start_rad": apart, "depends_on_start": accuracy.branches(apart)}
     record = _record(case, outcome, how)
-    if outcome.code != _case.DONE:
+    if outcome.code != case_arrays.DONE:
         kind, why = REASONS[outcome.code]
-        if outcome.code == _case.TOO_STIFF:
+        if outcome.code == case_arrays.TOO_STIFF:
             why += _in_numbers(case, outcome)
         raise kind(f"the run ended at {outcome.time:.6g} s: {why}", outcome.time, record)
     return record
@@ -201,9 +201,9 @@ def run_case(
 def _in_numbers(case: Case, outcome: Outcome) -> str:
     """What a run that took too many steps would have taken, and what to do."""
     steps = outcome.counts["steps"]
-    duration = float(case.numbers[_case.DURATION])
+    duration = float(case.numbers[case_arrays.DURATION])
     whole = f"some {steps * duration / outcome.time:.2g}" if outcome.time > 0.0 else "no number of them"
-    other = ", or use the fixed integrator" if case.numbers[_case.SAMPLE_TIME] == 0.0 else ""
+    other = ", or use the fixed integrator" if case.numbers[case_arrays.SAMPLE_TIME] == 0.0 else ""
     return (
         f", {steps:,} so far; at this pace {duration:g} s take {whole}: friction is too stiff for the inertia, or the "
         f"reference too fast; check them, give a shorter duration{other}"
@@ -348,8 +348,8 @@ def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
         "version": stickslip.__version__,
         **how,
         "slip_rules": slip_rules(friction=plant, **controller.frictions),
-        "tolerance": float(case.numbers[_case.TOLERANCE]),
-        "duration": float(case.numbers[_case.DURATION]),
+        "tolerance": float(case.numbers[case_arrays.TOLERANCE]),
+        "duration": float(case.numbers[case_arrays.DURATION]),
         "ended": outcome.time,
         "inertia": case.axis.inertia,
         "friction": plant.as_dict(),
@@ -361,7 +361,7 @@ def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
         learned := after(controller, outcome.control, controller.sample_time)
     ):
         meta["learned"] = learned
-    if case.numbers[_case.METERED] and outcome.code == _case.DONE:
+    if case.numbers[case_arrays.METERED] and outcome.code == case_arrays.DONE:
         meta["metrics"] = {k: float(v) for k, v in metrics(outcome.meter, outcome.turns).items()}
         meta["energy"] = _energy(case, columns, meta["metrics"])
     channels = {name: columns[i] for i, name in enumerate(COLUMNS) if name != "time"}
@@ -371,7 +371,7 @@ def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:
 def _energy(case: Case, columns: Any, found: dict[str, float]) -> dict[str, float]:
     """Motor work = friction loss + change of kinetic energy + residual, J."""
     last = columns[COLUMNS.index("velocity"), -1] if columns.shape[1] else 0.0
-    first = case.numbers[_case.VELOCITY_0]
+    first = case.numbers[case_arrays.VELOCITY_0]
     kinetic = 0.5 * case.axis.inertia * float(last * last - first * first)
     work, loss = found["motor_work_J"], found["friction_loss_J"]
     return {"motor_work": work, "friction_loss": loss, "kinetic": kinetic, "residual": work - loss - kinetic}

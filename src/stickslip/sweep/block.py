@@ -12,14 +12,14 @@ import numpy as np
 from stickslip.errors import InputError, ParameterError, SimulationError
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.simulation import _case
-from stickslip.simulation._metrics import metrics as read_meter
+from stickslip.simulation import case_arrays
 from stickslip.simulation.accuracy import LOOSER, PERTURBATIONS
 from stickslip.simulation.closed_loop import REASONS, integrator_for, prepare
 from stickslip.simulation.machine.layout import lay_out_machine
 from stickslip.simulation.machine.loop import simulate_machine
 from stickslip.simulation.machine.step import SUBSTEPS
 from stickslip.simulation.many import batch, simd_batch
+from stickslip.simulation.metrics import metrics as read_meter
 from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.numbers import as_columns, varied
 from stickslip.sweep.plan import BLOCK, Sweep
@@ -107,7 +107,7 @@ def doubtful(many: simd_batch.Lanes, sweep: Sweep, found: Measured) -> np.ndarra
     """Which cases in lanes differ at twice the step."""
     wide = simd_batch.prepare(many.case, many.varied, LONGER * sweep.step)
     again = _read(wide.run(sweep.metrics, device=sweep.device), sweep.metrics, "lanes")
-    duration = float(many.case.numbers[_case.DURATION])
+    duration = float(many.case.numbers[case_arrays.DURATION])
     ends = np.array([a != b for a, b in zip(found.failures, again.failures)], dtype=np.bool_)
     return differ(found.metrics, again.metrics, sweep.metrics, duration, SURE_OF_STEPS) | ends
 
@@ -207,7 +207,7 @@ def measured(
         ]
         found = np.array([row for row, *_ in rows]).reshape(n, len(metrics))
         return Measured(found, [why for _, why, _ in rows], [name for *_, name in rows])
-    many.parameters[:, _case.PERTURBATION] = perturbation
+    many.parameters[:, case_arrays.PERTURBATION] = perturbation
     return _read(many.run(metrics), metrics, "exact")
 
 
@@ -246,10 +246,10 @@ def as_lanes(planned: PlannedRun, values: Mapping[str, Array], step: float) -> s
 
 
 def _reason(code: int, time: float) -> str:
-    return "" if code == _case.DONE else f"ended at {time:.6g} s: {REASONS[code][1]}"
+    return "" if code == case_arrays.DONE else f"ended at {time:.6g} s: {REASONS[code][1]}"
 
 
-def _laid_out(planned: PlannedRun) -> _case.Case:
+def _laid_out(planned: PlannedRun) -> case_arrays.Case:
     n = planned.numerics
     assert isinstance(planned.axis, RigidAxis)
     return prepare(
@@ -288,12 +288,12 @@ def _alone(
     step = run.numerics.time_step
     # Only the exact integrator reads the perturbation: without more the others would agree with themselves.
     if name == "exact":
-        case.numbers[_case.PERTURBATION] = perturbation
+        case.numbers[case_arrays.PERTURBATION] = perturbation
     elif perturbation != 0.0:
-        case.numbers[_case.TOLERANCE] *= LOOSER.get(name, 1.0)
+        case.numbers[case_arrays.TOLERANCE] *= LOOSER.get(name, 1.0)
         step *= LONGER
     outcome = integrate(case, step) if name == "fixed" else integrate(case)
-    if outcome.code != _case.DONE:
+    if outcome.code != case_arrays.DONE:
         return none, _reason(outcome.code, outcome.time), name
     found = read_meter(outcome.meter, outcome.turns)
     return [found[name] for name in metrics], "", name

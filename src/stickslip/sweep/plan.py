@@ -15,8 +15,8 @@ from stickslip.config import Table, read_toml
 from stickslip.errors import ConfigError, InputError, suggestion
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import read_identified
-from stickslip.simulation._metrics import METRICS
 from stickslip.simulation.many import simd_batch
+from stickslip.simulation.metrics import METRICS
 from stickslip.study import plan as studies
 from stickslip.study.plan import Study
 from stickslip.study.planned_run import PlannedRun

@@ -9,9 +9,9 @@ from typing import Any, cast
 from stickslip.config import Table
 from stickslip.control.recommended import Recommended, recommended_in
 from stickslip.control.sampled_controller import SampledController
-from stickslip.export._controllers import depends_on, given_by
-from stickslip.export._nearest import read_by
+from stickslip.export.controllers import depends_on, given_by
 from stickslip.export.job import Job
+from stickslip.export.nearest import read_by
 from stickslip.export.target import Target
 from stickslip.machines.angle import AngleMap
 

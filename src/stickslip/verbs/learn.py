@@ -26,8 +26,8 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.record import Record
-from stickslip.simulation._sampled import FEEDFORWARD, compiled, replay_memory
 from stickslip.simulation.closed_loop import simulate
+from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, replay_memory
 from stickslip.spec import Surroundings
 from stickslip.study.files import prepared_folder, unwritable
 

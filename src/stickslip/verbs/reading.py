@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding
 from stickslip.readers import profiles
-from stickslip.readers._convert import Drive
-from stickslip.readers._table import Table
+from stickslip.readers.convert import Drive
 from stickslip.readers.cut import Cut, cut, parse_rows, unwrapped
 from stickslip.readers.in_memory import digest_of, table_in_memory, table_of_signals
 from stickslip.readers.reading import joined, open_table, record_of, with_source
+from stickslip.readers.table_columns import Table
 from stickslip.record import Record
 from stickslip.verbs.kinds import require
 

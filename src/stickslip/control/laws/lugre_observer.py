@@ -12,8 +12,8 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.control_spec import ControlLaw
-from stickslip.laws._curve import CURVE
-from stickslip.laws._curve import stribeck as sliding
+from stickslip.laws.sliding_curve import CURVE
+from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.spec import Par
 
 __all__ = ["CONTROL_LAW"]

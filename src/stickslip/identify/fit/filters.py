@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.simulation._biquads import zero_phase
+from stickslip.simulation.biquads import zero_phase
 
 __all__ = ["ZeroPhase", "cross_spectrum", "decimated", "low_pass", "spectrum"]
 

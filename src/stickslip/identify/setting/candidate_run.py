@@ -21,7 +21,7 @@ from stickslip.identify.setting.swings import above, repeats, reversals, turns
 from stickslip.jit import kernel
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.rigs._control import COLUMNS, Control, control_of, decide, finished
+from stickslip.rigs.loop_sample import COLUMNS, Control, control_of, decide, finished
 from stickslip.rigs.rig import Limits, setpoints
 from stickslip.simulation.machine import step as places
 from stickslip.simulation.machine.layout import look

@@ -18,7 +18,7 @@ from stickslip.errors import InputError
 from stickslip.identify.sliding.levels import Stretch, level_runs, slope_of, stretches
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.record import Record, encoder_step
-from stickslip.rigs.procedures._resting import RESTING, resting
+from stickslip.rigs.procedures.resting import RESTING, resting
 
 __all__ = ["Dropped", "Segment", "constant_velocity_segments", "segments_of", "sliding_points", "slope_of"]
 

@@ -13,8 +13,8 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.record import Record
-from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, samples, speed_up
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.procedures.moves import ROOM, brake, holder, now, samples, speed_up
 from stickslip.rigs.rig import Rig, setpoints
 
 __all__ = ["PROCEDURE", "Attraction"]

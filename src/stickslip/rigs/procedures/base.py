@@ -22,8 +22,8 @@ from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, RigError, suggestion
 from stickslip.record import Record
-from stickslip.rigs._control import COLUMNS, UNITS, begin_learned, end_learned
 from stickslip.rigs.loop import Loop
+from stickslip.rigs.loop_sample import COLUMNS, UNITS, begin_learned, end_learned
 from stickslip.rigs.realtime import Account
 from stickslip.rigs.rig import Rig
 
@@ -126,7 +126,7 @@ class Step:
 
 
 Steps = Generator[Step, Array, None]
-"""Steps, each answered by the rows that were recorded (`stickslip.rigs._control.COLUMNS`)."""
+"""Steps, each answered by the rows that were recorded (`stickslip.rigs.loop_sample.COLUMNS`)."""
 
 
 @dataclass(frozen=True)

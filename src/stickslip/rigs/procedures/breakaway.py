@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.record import Record
-from stickslip.rigs.procedures._moves import ROOM, holder, move, now, samples
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.procedures.moves import ROOM, holder, move, now, samples
 from stickslip.rigs.rig import Rig, setpoints
 
 __all__ = ["PROCEDURE", "Breakaway"]

@@ -19,8 +19,9 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.errors import RigError
 from stickslip.record import Record
-from stickslip.rigs._control import COLUMNS
-from stickslip.rigs.procedures._moves import (
+from stickslip.rigs.loop_sample import COLUMNS
+from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.procedures.moves import (
     ROOM,
     brake,
     holder,
@@ -30,7 +31,6 @@ from stickslip.rigs.procedures._moves import (
     speed_up,
     uniform,
 )
-from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.rig import Rig, setpoints
 
 __all__ = ["PROCEDURE", "Inertia"]

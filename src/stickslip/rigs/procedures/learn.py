@@ -17,11 +17,11 @@ from stickslip.control.sampled_controller import SampledController
 from stickslip.control.written import tables_of
 from stickslip.errors import InputError
 from stickslip.record import Record
-from stickslip.rigs._control import COLUMNS
+from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Step, Steps
 from stickslip.rigs.procedures.track import Track, machine_in
 from stickslip.rigs.rig import Rig, setpoints
-from stickslip.simulation._sampled import FEEDFORWARD, compiled, replay_memory
+from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, replay_memory
 from stickslip.spec import Surroundings
 
 __all__ = ["PROCEDURE", "Learn"]

@@ -14,9 +14,9 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.record import Record
-from stickslip.rigs._control import COLUMNS
-from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, samples, speed_up
+from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.procedures.moves import ROOM, brake, holder, now, samples, speed_up
 from stickslip.rigs.rig import Rig, setpoints
 
 __all__ = ["PROCEDURE", "Resonance"]

@@ -13,9 +13,9 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.record import Record, encoder_step
-from stickslip.rigs.procedures._moves import ROOM, brake, holder, now, uniform
-from stickslip.rigs.procedures._resting import RESTING, resting
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.procedures.moves import ROOM, brake, holder, now, uniform
+from stickslip.rigs.procedures.resting import RESTING, resting
 from stickslip.rigs.rig import Rig, setpoints
 
 __all__ = ["DRY", "GREASED", "PROCEDURE", "Sliding"]

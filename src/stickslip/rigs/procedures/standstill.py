@@ -15,8 +15,8 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.record import Record
-from stickslip.rigs.procedures._moves import ROOM, holder, now, samples, smooth
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.procedures.moves import ROOM, holder, now, samples, smooth
 from stickslip.rigs.rig import Rig, setpoints
 
 __all__ = ["PROCEDURE", "Standstill"]

@@ -26,8 +26,8 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.machines.angle import AngleMap
 from stickslip.model import Model, Reference
 from stickslip.record import Record
-from stickslip.rigs.procedures._moves import ROOM, samples
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
+from stickslip.rigs.procedures.moves import ROOM, samples
 from stickslip.rigs.rig import Rig, setpoints
 
 __all__ = ["PROCEDURE", "REFERENCES", "Track"]

@@ -13,32 +13,6 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel
-from stickslip.simulation._case import (
-    COLUMNS,
-    DIVERGED,
-    DONE,
-    DURATION,
-    INERTIA,
-    KI,
-    KP,
-    MAX_STEP,
-    METERED,
-    NOT_FINITE,
-    POSITION_0,
-    POSITION_LIMIT,
-    SAMPLE_TIME,
-    STIFFNESS,
-    STORM,
-    STORM_EVENTS,
-    STORM_TIME,
-    TOLERANCE,
-    TOO_STIFF,
-    VELOCITY_0,
-    VELOCITY_LIMIT,
-    Case,
-    Outcome,
-    StepBudget,
-)
 from stickslip.simulation._meter import (
     MAX_WINDOW,
     SIGNALS,
@@ -47,7 +21,6 @@ from stickslip.simulation._meter import (
     meter,
     new_meter,
 )
-from stickslip.simulation._metrics import settle_band_of
 from stickslip.simulation.adaptive.hybrid import (
     COMPENSATION_TORQUE,
     EXTRA,
@@ -82,6 +55,33 @@ from stickslip.simulation.adaptive.step import (
     dense,
     note,
 )
+from stickslip.simulation.case_arrays import (
+    COLUMNS,
+    DIVERGED,
+    DONE,
+    DURATION,
+    INERTIA,
+    KI,
+    KP,
+    MAX_STEP,
+    METERED,
+    NOT_FINITE,
+    POSITION_0,
+    POSITION_LIMIT,
+    SAMPLE_TIME,
+    STIFFNESS,
+    STORM,
+    STORM_EVENTS,
+    STORM_TIME,
+    TOLERANCE,
+    TOO_STIFF,
+    VELOCITY_0,
+    VELOCITY_LIMIT,
+    Case,
+    Outcome,
+    StepBudget,
+)
+from stickslip.simulation.metrics import settle_band_of
 from stickslip.waiting import Reached, watched
 
 __all__ = ["can_run", "run"]

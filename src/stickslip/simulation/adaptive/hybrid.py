@@ -32,7 +32,7 @@ from stickslip.jit import (
     kernel,
     pointer,
 )
-from stickslip.simulation._case import (
+from stickslip.simulation.case_arrays import (
     COMPENSATOR_SCALE,
     FILTER,
     FROM_MEASUREMENT,

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel
-from stickslip.simulation._case import DONE, NO_STEP, NOT_FINITE, TOLERANCE
 from stickslip.simulation.adaptive.chebyshev import chebyshev, chebyshev_error, stages_for
 from stickslip.simulation.adaptive.dormand_prince import ERROR, NODES, TABLEAU
 from stickslip.simulation.adaptive.hybrid import (
@@ -29,6 +28,7 @@ from stickslip.simulation.adaptive.hybrid import (
     rates,
     small_enough,
 )
+from stickslip.simulation.case_arrays import DONE, NO_STEP, NOT_FINITE, TOLERANCE
 
 SHORTEST = 1e-14
 LOCAL = 1e-3

@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulation._case import INERTIA
+from stickslip.simulation.case_arrays import INERTIA
 from stickslip.simulation.exact.flow import Linear, linear, relaxed, upper_terms
 from stickslip.simulation.exact.state import (
     ADDED,

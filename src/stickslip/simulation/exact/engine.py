@@ -25,7 +25,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import flat
-from stickslip.simulation._case import (
+from stickslip.simulation._forcing import NO_CELLS, feedforward
+from stickslip.simulation._meter import SIZE, close_standstill, new_meter
+from stickslip.simulation.case_arrays import (
     COLUMNS,
     DURATION,
     FILTER,
@@ -43,11 +45,9 @@ from stickslip.simulation._case import (
     Side,
     StepBudget,
 )
-from stickslip.simulation._forcing import NO_CELLS, feedforward
-from stickslip.simulation._meter import SIZE, close_standstill, new_meter
-from stickslip.simulation._metrics import settle_band_of
 from stickslip.simulation.exact import state as col
 from stickslip.simulation.exact.kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, LONGEST_STEP, solve
+from stickslip.simulation.metrics import settle_band_of
 from stickslip.spec import Bristle, Elements, Law, Option
 from stickslip.waiting import Reached, watched
 
@@ -109,7 +109,7 @@ def modulations(law: Law) -> str:
 
 
 def is_literal(side: Side) -> bool:
-    """Whether a side's elements break away by the literal slip rule (`stickslip.laws._stick`)."""
+    """Whether a side's elements break away by the literal slip rule (`stickslip.laws.slip_rule`)."""
     return side.model is not None and side.model.law.option_of("slip_rule") == "literal"
 
 
@@ -363,7 +363,7 @@ def even_spacing(grid: Array) -> float:
 
 
 def run(case: Case) -> Outcome:
-    """Run `case`; see `stickslip.simulation._case.Outcome`.
+    """Run `case`; see `stickslip.simulation.case_arrays.Outcome`.
 
     Raises
     ------

@@ -47,7 +47,7 @@ VELOCITY_WEIGHT = 10.0
 
 @kernel(exact=False)
 def load_of(literal: bool, direction: float, force: float) -> float:
-    """The load that the slip rule compares (`stickslip.laws._stick`)."""
+    """The load that the slip rule compares (`stickslip.laws.slip_rule`)."""
     return abs(force) if literal else direction * force
 
 

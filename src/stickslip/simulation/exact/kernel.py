@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulation._case import (
+from stickslip.simulation.case_arrays import (
     DIVERGED,
     DONE,
     DURATION,

@@ -11,7 +11,6 @@ import math
 from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
-from stickslip.simulation._case import KD, KP, KR
 from stickslip.simulation._meter import (
     AT,
     COMPENSATING,
@@ -24,6 +23,7 @@ from stickslip.simulation._meter import (
     SIGNALS,
     SPEED,
 )
+from stickslip.simulation.case_arrays import KD, KP, KR
 from stickslip.simulation.exact.flow import (
     UNMOVED,
     Cubic,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulation._case import COLUMNS
+from stickslip.simulation.case_arrays import COLUMNS
 from stickslip.simulation.exact.flow import UNMOVED, Linear, flow, free_motion, kept_flow
 from stickslip.simulation.exact.segment import (
     FREE_POSITION,
@@ -96,7 +96,7 @@ def put_row(
     rows: Any, count: Any, t: float, goal: float, rate: float, theta: float, v: float, tm: float, tf: float, th: float,
     event: float,
 ) -> None:  # fmt: skip
-    """Write the next row, in the order of `_case.COLUMNS`."""
+    """Write the next row, in the order of `case_arrays.COLUMNS`."""
     row_at = pointer(rows, int(count[ROWS_WRITTEN]) * ROW_SIZE)
     count[ROWS_WRITTEN] += 1.0
     row_at[0] = t

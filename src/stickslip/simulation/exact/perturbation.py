@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulation._case import PERTURBATION
+from stickslip.simulation.case_arrays import PERTURBATION
 from stickslip.simulation.exact.state import (
     ELEMENT_SIZE,
     ELEMENTS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulation._case import KI
+from stickslip.simulation.case_arrays import KI
 from stickslip.simulation.exact.flow import Cubic, Linear, flow, hermite, hermite_slope, moved
 from stickslip.simulation.exact.state import (
     DS,

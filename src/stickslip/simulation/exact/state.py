@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import Any
 
 from stickslip.jit import call_profile, call_value, kernel, pointer
-from stickslip.simulation._case import GAIN, INERTIA, KD, KI, KP, KR
 from stickslip.simulation._forcing import CELL_SIZE
+from stickslip.simulation.case_arrays import GAIN, INERTIA, KD, KI, KP, KR
 from stickslip.simulation.exact.flow import Linear, linear
 
 # ---- columns of `elements` (those of finite stiffness) -------------------------------------------------------

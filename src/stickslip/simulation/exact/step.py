@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulation._case import INERTIA, KI
+from stickslip.simulation.case_arrays import INERTIA, KI
 from stickslip.simulation.exact.bristle import bristle_rate, bristle_terms, curve_rest, curve_terms
 from stickslip.simulation.exact.flow import (
     Linear,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulation._case import KI, KP
+from stickslip.simulation.case_arrays import KI, KP
 from stickslip.simulation.exact.segment import (
     GOAL_END,
     GOAL_MID,

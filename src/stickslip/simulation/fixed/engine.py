@@ -18,7 +18,8 @@ import numpy as np
 
 from stickslip.errors import ParameterError
 from stickslip.jit import kernel
-from stickslip.simulation._case import (
+from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter
+from stickslip.simulation.case_arrays import (
     COLUMNS,
     COMPENSATOR_SCALE,
     DIVERGED,
@@ -49,8 +50,6 @@ from stickslip.simulation._case import (
     Side,
     surroundings,
 )
-from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter
-from stickslip.simulation._metrics import settle_band_of
 from stickslip.simulation.fixed.loop import (
     FRICTION,
     GATHERED,
@@ -74,6 +73,7 @@ from stickslip.simulation.fixed.output import (
     write,
 )
 from stickslip.simulation.fixed.step import GROWTH, LANDING, advance
+from stickslip.simulation.metrics import settle_band_of
 from stickslip.simulation.root import ROOT
 from stickslip.simulation.root import compiled as root
 from stickslip.spec import Surroundings

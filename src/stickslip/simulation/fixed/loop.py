@@ -10,7 +10,7 @@ import math
 from typing import Any, NamedTuple
 
 from stickslip.jit import call_holding, call_profile, call_step, kernel, pointer
-from stickslip.simulation._case import (
+from stickslip.simulation.case_arrays import (
     FILTER,
     FROM_MEASUREMENT,
     FROM_REFERENCE,

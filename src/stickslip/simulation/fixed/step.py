@@ -20,7 +20,7 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulation._case import (
+from stickslip.simulation.case_arrays import (
     FILTER,
     FROM_MEASUREMENT,
     FROM_REFERENCE,

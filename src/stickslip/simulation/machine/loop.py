@@ -22,9 +22,6 @@ from stickslip.jit import call_profile, call_sample, compiled_profile, flat, ker
 from stickslip.machines.machine import Machine
 from stickslip.model import Reference
 from stickslip.record import Record
-from stickslip.simulation._case import COLUMNS as OF_AXES
-from stickslip.simulation._case import UNITS as OF_AXES_UNITS
-from stickslip.simulation._case import ruled, ruled_in, slip_rules
 from stickslip.simulation._meter import (
     MAX_WINDOW,
     SIGNALS,
@@ -33,12 +30,15 @@ from stickslip.simulation._meter import (
     meter,
     new_meter,
 )
-from stickslip.simulation._metrics import metrics, settle_band_of
-from stickslip.simulation._sampled import Sampled, compiled
+from stickslip.simulation.case_arrays import COLUMNS as OF_AXES
+from stickslip.simulation.case_arrays import UNITS as OF_AXES_UNITS
+from stickslip.simulation.case_arrays import ruled, ruled_in, slip_rules
+from stickslip.simulation.compiled_controller import Sampled, compiled
 from stickslip.simulation.fixed.loop import NUDGE
 from stickslip.simulation.machine import step
 from stickslip.simulation.machine.layout import Laid, lay_out_machine, look
 from stickslip.simulation.machine.step import Plant, axis_itself, plant_of, sample
+from stickslip.simulation.metrics import metrics, settle_band_of
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout
 

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError, ParameterError, UnknownName
-from stickslip.simulation import _case, _meter
-from stickslip.simulation._case import (
+from stickslip.simulation import _meter, case_arrays
+from stickslip.simulation._meter import LONG_WINDOW, MAX_WINDOW
+from stickslip.simulation.case_arrays import (
     DURATION,
     FROM_MEASUREMENT,
     FROM_REFERENCE,
@@ -26,19 +27,18 @@ from stickslip.simulation._case import (
     Array,
     Case,
 )
-from stickslip.simulation._meter import LONG_WINDOW, MAX_WINDOW
-from stickslip.simulation._metrics import COARSE, METRICS, columns, settle_band_of
 from stickslip.simulation.exact import state as col
 from stickslip.simulation.exact.engine import TURNS, can_run
 from stickslip.simulation.exact.engine import prepare as prepare_one
 from stickslip.simulation.exact.kernel import AT_ELEMENTS, AT_SIDES, LONGEST_STEP
 from stickslip.simulation.many.batch_kernel import solve_all
 from stickslip.simulation.many.batch_layout import Member, member, share_curves
+from stickslip.simulation.metrics import COARSE, METRICS, columns, settle_band_of
 
 __all__ = ["METRICS", "NUMBERS", "Batch", "Results", "prepare", "refusal"]
 
 NUMBERS = {
-    "inertia": INERTIA, "kp": _case.KP, "ki": _case.KI, "kd": KD, "kr": _case.KR, "gain": GAIN,
+    "inertia": INERTIA, "kp": case_arrays.KP, "ki": case_arrays.KI, "kd": KD, "kr": case_arrays.KR, "gain": GAIN,
 }  # fmt: skip
 """What may vary besides parameters of laws: ``friction.NAME`` and, of a feedback compensator, ``law.NAME``."""
 
@@ -93,7 +93,7 @@ class Batch:
         Parameters
         ----------
         metrics : sequence of str
-            Those wanted. Where `stickslip.simulation._metrics.COARSE` has all of them, nothing is counted, which is
+            Those wanted. Where `stickslip.simulation.metrics.COARSE` has all of them, nothing is counted, which is
             a little faster. None at all is the fastest.
 
         Raises
@@ -116,7 +116,7 @@ class Batch:
             np.zeros((0 if coarse else TURNS, 2)), np.zeros((8, 5)), cycles, codes, ends, bool(metrics),
         )  # fmt: skip
         found = columns(accs, cycles[:, 0], cycles[:, 1])
-        ran = codes == _case.DONE
+        ran = codes == case_arrays.DONE
         wanted = {name: np.where(ran, found[name], np.nan) for name in metrics}
         return Results(codes, ends[:, 0], ends[:, 1], ends[:, 2], wanted, np.zeros(n, dtype=np.int64))
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from stickslip.jit import call_value, kernel, pointer
 from stickslip.simulation._meter import TURN_COUNT, close_standstill
-from stickslip.simulation._metrics import limit_cycle
 from stickslip.simulation.exact.kernel import AT_LOOP, AT_SIDES, solve
+from stickslip.simulation.metrics import limit_cycle
 
 BISECTIONS = 200
 

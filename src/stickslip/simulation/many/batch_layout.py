@@ -17,7 +17,7 @@ import numpy as np
 
 from stickslip.binding import bound
 from stickslip.errors import ParameterError, UnknownName
-from stickslip.simulation._case import Array, Side
+from stickslip.simulation.case_arrays import Array, Side
 from stickslip.simulation.exact import state as col
 from stickslip.simulation.exact.engine import CURVE_SPEEDS, curve_of, elements_of
 from stickslip.simulation.many.batch_kernel import curve_at, layers, least_of

@@ -20,8 +20,9 @@ import numpy as np
 
 from stickslip.errors import InputError, UnknownName
 from stickslip.jit import compiled_lanes
-from stickslip.simulation import _case
-from stickslip.simulation._case import (
+from stickslip.simulation import case_arrays
+from stickslip.simulation._forcing import feedforward
+from stickslip.simulation.case_arrays import (
     DURATION,
     FROM_REFERENCE,
     GAIN,
@@ -36,7 +37,6 @@ from stickslip.simulation._case import (
     Array,
     Case,
 )
-from stickslip.simulation._forcing import feedforward
 from stickslip.simulation.exact import state as col
 from stickslip.simulation.exact.engine import curve_of, is_literal
 from stickslip.simulation.many.batch import Results, laid_out, refusal
@@ -55,7 +55,7 @@ METRICS = (
     "second_half_position_rms_rad", "second_half_position_peak_rad", "second_half_position_span_rad",
     "second_half_velocity_rms_rad_s", "second_half_torque_rms_Nm", "motor_work_J", "friction_loss_J",
 )  # fmt: skip
-"""Metrics that lanes give: those of `stickslip.simulation._metrics.COARSE`."""
+"""Metrics that lanes give: those of `stickslip.simulation.metrics.COARSE`."""
 LIGHT = (
     "position_rms_rad",
     "position_peak_rad",
@@ -158,7 +158,7 @@ class Lanes:
             with ThreadPoolExecutor(jobs) as pool:
                 list(pool.map(part, *zip(*parts)))
         fine = np.all(np.isfinite(ends), axis=1)
-        codes = np.where(fine, _case.DONE, _case.NOT_FINITE)
+        codes = np.where(fine, case_arrays.DONE, case_arrays.NOT_FINITE)
         found = self._metrics(sums, ends)
         wanted = {name: np.where(fine, found[name], np.nan) for name in metrics}
         times = np.full(n, self.case.numbers[DURATION])

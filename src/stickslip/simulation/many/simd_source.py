@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.laws._curve import decay
+from stickslip.laws.sliding_curve import decay
 from stickslip.spec import Law
 from stickslip.subset import law_layouts, lower
 

@@ -11,7 +11,7 @@ from stickslip.errors import InputError, StepFailure, UnknownName
 from stickslip.jit import compiled_profile, flat
 from stickslip.model import Model, Reference
 from stickslip.record import Record
-from stickslip.simulation._case import Side, ruled, slip_rules
+from stickslip.simulation.case_arrays import Side, ruled, slip_rules
 from stickslip.simulation.prescribed.kernels import Motion, march
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout

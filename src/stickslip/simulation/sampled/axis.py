@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from stickslip.simulation._case import (
+from stickslip.simulation.case_arrays import (
     INERTIA,
     MAX_STEP,
     METERED,

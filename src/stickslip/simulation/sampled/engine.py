@@ -7,7 +7,7 @@ an element breaks away or the axis turns (`sampled.modes`). That is for laws tha
 (`sampled.general`). The tolerance is, as that of the other integrators, the error in position that a well-conditioned
 run may gather; general steps, of second order, gather more where a contact's spring rings at rest.
 
-The controller is one compiled function a sample (`_sampled`), whatever it is made of.
+The controller is one compiled function a sample (`compiled_controller`), whatever it is made of.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.jit import call_profile, call_sample, kernel, pointer
-from stickslip.simulation._case import (
+from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter
+from stickslip.simulation.case_arrays import (
     COLUMNS,
     DIVERGED,
     DONE,
@@ -36,10 +37,9 @@ from stickslip.simulation._case import (
     Outcome,
     surroundings,
 )
-from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter
-from stickslip.simulation._metrics import settle_band_of
-from stickslip.simulation._sampled import Sampled, compiled, measured_position
+from stickslip.simulation.compiled_controller import Sampled, compiled, measured_position
 from stickslip.simulation.exact.engine import crosses_once, elements_of, modulations
+from stickslip.simulation.metrics import settle_band_of
 from stickslip.simulation.recorded_input.contact import Plant
 from stickslip.simulation.sampled.axis import axis_of, general_axis
 from stickslip.simulation.sampled.general import Contact, act_on, contact_of, hold, plant_of, step_on

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.jit import call_holding, call_step, kernel, pointer
-from stickslip.simulation._case import INERTIA, PLANT_BAND, Case, surroundings
+from stickslip.simulation.case_arrays import INERTIA, PLANT_BAND, Case, surroundings
 from stickslip.simulation.recorded_input import contact as driven
 from stickslip.simulation.recorded_input.contact import Plant, keep
 from stickslip.simulation.recorded_input.step import GAMMA, LEAST, MOTION, ROUNDING, two_stages

@@ -60,7 +60,7 @@ def floor_below(axis: Any, v: float) -> float:
 
 @kernel(exact=False, inline=True)
 def heaviest(axis: Any, springs: Any, moved: float, direction: float) -> float:
-    """The largest load of a sticking element over its share, N·m (`stickslip.laws._stick`)."""
+    """The largest load of a sticking element over its share, N·m (`stickslip.laws.slip_rule`)."""
     most = -math.inf
     for i in range(springs.shape[0]):
         if springs[i].slips == 0.0:

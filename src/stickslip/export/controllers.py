@@ -12,10 +12,10 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.export._analysis import merged
-from stickslip.export._nearest import read_by
 from stickslip.export._text import ascii_only
 from stickslip.export.golden import Samples, changing, random_motion, sampled_torques
 from stickslip.export.job import IDENTIFIER, Check, Export
+from stickslip.export.nearest import read_by
 from stickslip.spec import Surroundings
 from stickslip.subset import named
 

@@ -16,7 +16,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import UnknownName
 from stickslip.jit import LawPointers, compiled_law, compiled_profile, flat
-from stickslip.laws._stick import SLIP_RULE
+from stickslip.laws.slip_rule import SLIP_RULE
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.spec import Surroundings

@@ -13,8 +13,8 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers._choose import Choice
 from stickslip.readers._names import KINDS
-from stickslip.readers._table import Array, Column, Table
 from stickslip.readers._units import SI, Unit, parse_unit
+from stickslip.readers.table_columns import Array, Column, Table
 from stickslip.record import Record
 
 __all__ = ["Drive", "convert", "times_of"]
