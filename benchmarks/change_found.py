@@ -20,9 +20,9 @@ from coverage_records import make
 from stickslip.errors import StickslipError
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.compare.change import compare_models
+from stickslip.identify.experiment import experiment_of
 from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
-from stickslip.identify.trial import trial_of
 from stickslip.machines.servo import ServoAxis
 
 RAISED = 1.1
@@ -37,7 +37,7 @@ def study(seed: int) -> tuple[bool, bool] | None:
         for i, case in enumerate(cases):
             try:
                 result = identify_axis(
-                    [trial_of(case.record, axis)], axis, [case.model.law], intervals="prediction"
+                    [experiment_of(case.record, axis)], axis, [case.model.law], intervals="prediction"
                 )
             except StickslipError as error:
                 print(f"seed {seed} ({case.family}): {error}", file=sys.stderr)

@@ -32,7 +32,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 from coverage_records import make  # noqa: E402
 from stickslip.errors import StickslipError  # noqa: E402
 from stickslip.identify.axis.prediction import axis_prediction  # noqa: E402
-from stickslip.identify.trial import trial_of  # noqa: E402
+from stickslip.identify.experiment import experiment_of  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402
 
 ALWAYS = ("inertia", "fc", "sigma2")
@@ -69,7 +69,7 @@ def study(seed: int) -> list[Row]:
     axis = ServoAxis(drive_side="load")
     begin = time.process_time()
     try:
-        found = axis_prediction([trial_of(case.record, axis)], axis, case.model.law)
+        found = axis_prediction([experiment_of(case.record, axis)], axis, case.model.law)
     except StickslipError as error:
         print(f"seed {seed} ({case.family}): {error}", file=sys.stderr)
         return []

@@ -20,7 +20,7 @@ import numpy as np
 import coverage_records as records
 from stickslip.control.linear import place
 from stickslip.identify.axis.loop_check import shown_gains
-from stickslip.identify.trial import Trial
+from stickslip.identify.experiment import Experiment
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 KINDS = ("as seen", "rounded", "late", "reference late", "every fifth row")
@@ -28,7 +28,7 @@ COUNTS = (2000, 16384, 1_000_000)
 KINDS_OF_LOOP = ("PR", "PD", "PID")
 
 
-def trial(seed: int, counts: int, kind: str) -> Trial:
+def experiment(seed: int, counts: int, kind: str) -> Experiment:
     """A record with the loop that made it."""
     rng = np.random.default_rng([77, seed])
     inertia, fc = records.log_uniform(rng, 3e-4, 5e-3), records.log_uniform(rng, 0.1, 0.6)
@@ -66,7 +66,7 @@ def trial(seed: int, counts: int, kind: str) -> Trial:
     if kind == "reference late":
         reference = np.concatenate([reference[[0, 0]], reference[:-2]])
     every = 5 if kind == "every fifth row" else 1
-    return Trial(
+    return Experiment(
         f"seed {seed}", time[::every], position[::every], signal[::every], "torque", reference[::every], loop
     )  # fmt: skip
 
@@ -94,7 +94,7 @@ def main() -> None:
         for counts in COUNTS:
             doubted: Counter[str] = Counter()
             for seed in range(args.first, args.first + args.count):
-                made = trial(seed, counts, kind)
+                made = experiment(seed, counts, kind)
                 assert made.loop is not None
                 for name, loop in claims(made.loop):
                     shown = shown_gains(replace(made, loop=loop))

@@ -32,8 +32,8 @@ import ordinary_logs as logs  # noqa: E402
 from stickslip.errors import StickslipError  # noqa: E402
 from stickslip.identify.axis.agreed import sliding_values  # noqa: E402
 from stickslip.identify.axis.identify import identify_axis  # noqa: E402
+from stickslip.identify.experiment import Experiment  # noqa: E402
 from stickslip.identify.regression.regression import regress_axis  # noqa: E402
-from stickslip.identify.trial import Trial  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402
 
 AXIS = ServoAxis(drive_side="load")
@@ -81,11 +81,11 @@ def study(task: tuple[tuple[int, str, int, str, str, str], str, bool]) -> tuple[
     """The numbers of one log, and the seconds that they took."""
     cell, law, plain = task
     log = logs.draw(*cell)
-    trial = Trial("log", log.time, log.position, log.torque)
+    experiment = Experiment("log", log.time, log.position, log.torque)
     begin = time.process_time()
     try:
         if plain:
-            found = regress_axis([trial], AXIS)
+            found = regress_axis([experiment], AXIS)
             told = {n: (*v, n != "offset" and v[2] <= 2.0 * v[1]) for n, v in sliding_values(found).items()}
             level = found.numbers["fc"].value
             told = {n: (*v[:3], v[3] and not (found.doubt or (n == "fc" and found.level_doubt)))
@@ -93,7 +93,7 @@ def study(task: tuple[tuple[int, str, int, str, str, str], str, bool]) -> tuple[
             value, low, high = sliding_values(found)["offset"]
             told["offset"] = (value, low, high, 0.5 * (high - low) <= 0.1 * level)
         else:
-            result = identify_axis([trial], AXIS, [law] if law else ("coulomb", "stribeck", "lugre"))
+            result = identify_axis([experiment], AXIS, [law] if law else ("coulomb", "stribeck", "lugre"))
             told = {e.name: (e.value, e.lower, e.upper, e.identified) for e in result.estimates}
             found = result.details["regression"]
     except StickslipError as error:
@@ -102,7 +102,12 @@ def study(task: tuple[tuple[int, str, int, str, str, str], str, bool]) -> tuple[
     seconds = time.process_time() - begin
     if found is not None:
         low, high = found.interval("skew")
-        told["skew"] = (found.numbers["skew"].value, low, high, 0.5 * (high - low) <= TOLD * trial.period)
+        told["skew"] = (
+            found.numbers["skew"].value,
+            low,
+            high,
+            0.5 * (high - low) <= TOLD * experiment.period,
+        )
     simple, rows = four_lines(log), list[Row]()
     for name in NAMES:
         if name not in told:

@@ -38,10 +38,10 @@ import numpy as np  # noqa: E402
 from stickslip.errors import StickslipError  # noqa: E402
 from stickslip.identify.axis.agreed import sliding_values  # noqa: E402
 from stickslip.identify.axis.identify import identify_axis  # noqa: E402
+from stickslip.identify.experiment import Experiment  # noqa: E402
 from stickslip.identify.regression.force_error import force_error_on, plain_error_on  # noqa: E402
 from stickslip.identify.regression.inverse import inverse_dynamics  # noqa: E402
 from stickslip.identify.regression.regression import regress_axis  # noqa: E402
-from stickslip.identify.trial import Trial  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402
 
 DATA = Path(os.environ.get("STICKSLIP_DATA", "../shared/data"))
@@ -81,65 +81,67 @@ def rows(path: Path) -> dict[str, np.ndarray]:
     return dict(zip(names, table.T, strict=True))
 
 
-def cut(trial: Trial, parts: int) -> list[Trial]:
+def cut(experiment: Experiment, parts: int) -> list[Experiment]:
     """Equal parts, in the order of time."""
-    edges = np.linspace(0, trial.time.size, parts + 1).astype(int)
+    edges = np.linspace(0, experiment.time.size, parts + 1).astype(int)
     return [
-        replace(trial, name=f"{trial.name} {k + 1}/{parts}", time=trial.time[a:b] - trial.time[a],
-                position=trial.position[a:b], drive=None if trial.drive is None else trial.drive[a:b])
+        replace(experiment, name=f"{experiment.name} {k + 1}/{parts}", time=experiment.time[a:b] - experiment.time[a],
+                position=experiment.position[a:b], drive=None if experiment.drive is None else experiment.drive[a:b])
         for k, (a, b) in enumerate(itertools.pairwise(edges.tolist()))
     ]  # fmt: skip
 
 
-def emps() -> Iterator[tuple[str, ServoAxis, list[Trial]]]:
+def emps() -> Iterator[tuple[str, ServoAxis, list[Experiment]]]:
     """Motor and ball screw."""
     from scipy.io import loadmat
 
     data: Any = loadmat(DATA / "emps" / "DATA_EMPS.mat")
     t, q, u = (np.ascontiguousarray(data[k].ravel(), dtype=float) for k in ("t", "qm", "vir"))
     axis = ServoAxis(motion="linear", drive_gain=float(data["gtau"].item()), drive_side="load")
-    whole = Trial("emps", t, q, u, "voltage")
+    whole = Experiment("emps", t, q, u, "voltage")
     for parts in (2, 4):
         yield f"emps {parts}", axis, cut(whole, parts)
 
 
-def kuka() -> Iterator[tuple[str, ServoAxis, list[Trial]]]:
+def kuka() -> Iterator[tuple[str, ServoAxis, list[Experiment]]]:
     """Joints of a robot arm; the nominal torques of gravity and of the other joints are taken off."""
     axis = ServoAxis(drive_side="load")
     records = {k: rows(DATA / "kuka_kr300" / f"record_{k}.csv.gz") for k in "AB"}
     for j, gear in enumerate(KUKA_GEARS, 1):
-        whole: list[Trial] = []
+        whole: list[Experiment] = []
         for k, r in records.items():
             others = r[f"nom_g{j}_Nm"] + r[f"nom_c{j}_Nm"] + r[f"nom_offdiag{j}_Nm"]
             torque = r[f"tau{j}_motor_Nm"] * gear - others
-            whole.append(Trial(f"kuka {j}{k}", r["t_s"], r[f"q{j}_rad"], torque))
+            whole.append(Experiment(f"kuka {j}{k}", r["t_s"], r[f"q{j}_rad"], torque))
         yield f"kuka {j} AB", axis, whole
         for t in whole:
             yield f"{t.name} 2", axis, cut(t, 2)
 
 
-def laas() -> Iterator[tuple[str, ServoAxis, list[Trial]]]:
+def laas() -> Iterator[tuple[str, ServoAxis, list[Experiment]]]:
     """A brushless motor whose cogging is larger than its friction, under speed and current control."""
     axis = ServoAxis(drive_side="load")
     r = rows(DATA / "laas_cogging" / "acceleration.csv.gz")
-    whole = Trial("laas acceleration", r["t_s"] - r["t_s"][0], r["theta_rad"], TORQUE_CONSTANT * r["iq_A"])
+    whole = Experiment(
+        "laas acceleration", r["t_s"] - r["t_s"][0], r["theta_rad"], TORQUE_CONSTANT * r["iq_A"]
+    )
     for parts in (2, 4):
         yield f"laas acceleration {parts}", axis, cut(whole, parts)
     r = rows(DATA / "laas_cogging" / "speed_a.csv.gz")
-    whole = Trial("laas speed", r["t_s"], r["theta_rad"], TORQUE_CONSTANT * r["iq_A"])
+    whole = Experiment("laas speed", r["t_s"], r["theta_rad"], TORQUE_CONSTANT * r["iq_A"])
     yield "laas speed 2", axis, cut(whole, 2)
     for k, half in enumerate(cut(whole, 2)):
         yield f"laas speed {k} 2", axis, cut(half, 2)
 
 
-def pendulum() -> Iterator[tuple[str, ServoAxis, list[Trial]]]:
+def pendulum() -> Iterator[tuple[str, ServoAxis, list[Experiment]]]:
     """A pendulum on a quasi-direct drive."""
     axis = ServoAxis(gravity="pendulum", drive_side="load")
-    both: list[Trial] = []
+    both: list[Experiment] = []
     for name, end in (("swingup_500hz", math.inf), ("energy_shaping_200hz", 3.9)):
         r = rows(DATA / "qdd_pendulum" / f"{name}.csv.gz")
         used = r["t_s"] < end
-        both.append(Trial(name, r["t_s"][used], r["theta_rad"][used], r["torque_Nm"][used]))
+        both.append(Experiment(name, r["t_s"][used], r["theta_rad"][used], r["torque_Nm"][used]))
     yield "pendulum both", axis, both
     for t in both:
         yield f"pendulum {t.name} 2", axis, cut(t, 2)
@@ -148,14 +150,14 @@ def pendulum() -> Iterator[tuple[str, ServoAxis, list[Trial]]]:
 # ---- parts -----------------------------------------------------------------------------------------------------
 
 
-def identified(task: tuple[str, ServoAxis, list[Trial], int, bool]) -> Part:
+def identified(task: tuple[str, ServoAxis, list[Experiment], int, bool]) -> Part:
     """One part by the default and by plain regression."""
-    _, axis, trials, place, sliding_alone = task
-    trial = trials[place]
-    others = [t for k, t in enumerate(trials) if k != place]
-    part, begin = Part(trial.name), time.process_time()
+    _, axis, experiments, place, sliding_alone = task
+    experiment = experiments[place]
+    others = [t for k, t in enumerate(experiments) if k != place]
+    part, begin = Part(experiment.name), time.process_time()
     try:
-        plain = inverse_dynamics([trial], axis)
+        plain = inverse_dynamics([experiment], axis)
         part.plain = {
             n: (plain[p], QUANTILE * float(plain.robust_std[plain.names.index(p)]))
             for n, p in NAMES.items() if plain.has(p)
@@ -164,7 +166,7 @@ def identified(task: tuple[str, ServoAxis, list[Trial], int, bool]) -> Part:
         plain, part.failure = None, f"plain: {error}"
     try:
         if sliding_alone:
-            regression = regress_axis([trial], axis)
+            regression = regress_axis([experiment], axis)
             found = sliding_values(regression)
             level = abs(found["fc"][0])
             for n in NAMES.keys() & found.keys():
@@ -173,13 +175,13 @@ def identified(task: tuple[str, ServoAxis, list[Trial], int, bool]) -> Part:
                 doubt = regression.doubt or (n == "fc" and regression.level_doubt)
                 part.own[n] = (value, low, high, not doubt and high - low <= 0.5 * size)
         else:
-            result = identify_axis([trial], axis)
+            result = identify_axis([experiment], axis)
             part.law = result.model.law.name
             part.own = {
                 e.name: (e.value, e.lower, e.upper, e.identified) for e in result.estimates if e.name in NAMES
             }
             values = {e.name: e.value for e in result.estimates}
-            for on in ([trial], *([o] for o in others)):
+            for on in ([experiment], *([o] for o in others)):
                 if plain is not None:
                     part.errors.append(
                         (
@@ -277,11 +279,11 @@ def main() -> None:
     given = parser.parse_args()
     if not DATA.is_dir():
         sys.exit(f"no records at {DATA}; name their folder by STICKSLIP_DATA")
-    tasks: list[tuple[str, ServoAxis, list[Trial], int, bool]] = []
+    tasks: list[tuple[str, ServoAxis, list[Experiment], int, bool]] = []
     for records in (emps, kuka, laas, pendulum):
-        for name, axis, trials in records():
+        for name, axis, experiments in records():
             if given.only in name:
-                tasks += [(name, axis, trials, k, given.plain) for k in range(len(trials))]
+                tasks += [(name, axis, experiments, k, given.plain) for k in range(len(experiments))]
     with ProcessPoolExecutor(given.jobs) as pool:
         parts = list(pool.map(identified, tasks))
     sets: dict[str, list[Part]] = defaultdict(list)

@@ -76,8 +76,8 @@ def test_every_statement_can_hold_and_can_fail(claim):
     """Random numbers in place of runs: a predicate that always says the same would judge nothing."""
     rng = np.random.default_rng(7)
     seen = set()
-    for trial in range(3000):
-        spread = (0.05, 1.0, 3.0)[trial % 3]  # close cases, mixed ones, far ones
+    for experiment in range(3000):
+        spread = (0.05, 1.0, 3.0)[experiment % 3]  # close cases, mixed ones, far ones
         base = 10.0 ** rng.uniform(-6.0, 0.5)
         numbers: dict[tuple[str, str], float] = {}
 

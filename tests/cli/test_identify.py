@@ -28,7 +28,7 @@ LOOP = "kp=8,kd=0.08,kr=0.08,limit=3"
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("identify") / "log.csv"
-    t = cases.trial("coulomb", noise=2e-3)
+    t = cases.experiment("coulomb", noise=2e-3)
     assert t.drive is not None
     assert t.reference is not None
     rows = [

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.identify.trial import Trial
+from stickslip.identify.experiment import Experiment
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 from support import axis_cases as cases
 
@@ -107,8 +107,8 @@ def test_records_of_several_loops_in_one_fit(capsys):
 
 
 @pytest.fixture(scope="module")
-def axis() -> Trial:
-    return cases.trial("coulomb", noise=2e-3, seconds=4.0)
+def axis() -> Experiment:
+    return cases.experiment("coulomb", noise=2e-3, seconds=4.0)
 
 
 def test_a_known_torque_beside_the_recorded_one(axis, capsys):

@@ -17,9 +17,9 @@ from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.output import Extras, output_error
 from stickslip.identify.axis.result import rising
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.experiment import Experiment, experiment_of
 from stickslip.identify.fit.axis_start import dimensions, starts
 from stickslip.identify.regression.inverse import correlation_lags, inverse_dynamics
-from stickslip.identify.trial import Trial, trial_of
 from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.plugins import law
 from stickslip.simulation.recorded_input.simulation import Drive, Harmonics, Loop, Mechanics, drive_axis
@@ -30,8 +30,8 @@ AXIS = ServoAxis(drive_side="load")
 
 @pytest.mark.parametrize("name", cases.LAWS)
 def test_known_axis_is_recovered(name: str) -> None:
-    trial = cases.trial(name, noise=2e-3)
-    found = output_error([trial], AXIS, law(name), inverse_dynamics([trial], AXIS))
+    experiment = cases.experiment(name, noise=2e-3)
+    found = output_error([experiment], AXIS, law(name), inverse_dynamics([experiment], AXIS))
     named = found.fit.values
     assert named["inertia"] == pytest.approx(cases.INERTIA, rel=0.03)
     assert found.model.parameters.fc == pytest.approx(cases.FC, rel=0.02)
@@ -45,44 +45,52 @@ def test_known_axis_is_recovered(name: str) -> None:
 @pytest.mark.slow
 def test_what_never_moves_a_curve_is_not_called_identified() -> None:
     # Without a Stribeck effect in the data, nothing says at which velocity it would end.
-    trial = cases.trial("coulomb")
-    found = output_error([trial], AXIS, law("lugre"), inverse_dynamics([trial], AXIS))
+    experiment = cases.experiment("coulomb")
+    found = output_error([experiment], AXIS, law("lugre"), inverse_dynamics([experiment], AXIS))
     verdicts = {e.name: e.identified for e in found.estimates}
     assert verdicts["fc"]
     assert not verdicts["vs"]
 
 
 def test_irregular_records_are_used_as_they_are() -> None:
-    trial = cases.trial("coulomb", drift=0.4)
-    assert np.ptp(np.diff(trial.time)) > 5e-4
-    found = output_error([trial], AXIS, law("coulomb"), inverse_dynamics([trial], AXIS))
+    experiment = cases.experiment("coulomb", drift=0.4)
+    assert np.ptp(np.diff(experiment.time)) > 5e-4
+    found = output_error([experiment], AXIS, law("coulomb"), inverse_dynamics([experiment], AXIS))
     assert found.fit.values["inertia"] == pytest.approx(cases.INERTIA, rel=0.1)
     assert found.fit.values["fc"] == pytest.approx(cases.FC, rel=0.03)
 
 
 def test_a_record_without_controller_is_followed_by_an_observer() -> None:
-    closed = cases.trial("coulomb", noise=2e-3)
-    trial = Trial("open", closed.time, closed.position, closed.drive)
-    found = output_error([trial], AXIS, law("coulomb"), inverse_dynamics([trial], AXIS))
+    closed = cases.experiment("coulomb", noise=2e-3)
+    experiment = Experiment("open", closed.time, closed.position, closed.drive)
+    found = output_error([experiment], AXIS, law("coulomb"), inverse_dynamics([experiment], AXIS))
     assert found.problem.signals == ("position",)
     assert found.fit.values["fc"] == pytest.approx(cases.FC, rel=0.03)
     assert found.fit.values["sigma2"] == pytest.approx(cases.SIGMA2, rel=0.1)
 
 
 def test_frozen_values_stay_and_others_follow() -> None:
-    trial = cases.trial("coulomb")
-    first = inverse_dynamics([trial], AXIS)
-    found = output_error([trial], AXIS, law("coulomb"), first, frozen=["fc"], values={"fc": 0.25})
+    experiment = cases.experiment("coulomb")
+    first = inverse_dynamics([experiment], AXIS)
+    found = output_error([experiment], AXIS, law("coulomb"), first, frozen=["fc"], values={"fc": 0.25})
     assert found.model.parameters.fc == 0.25
     assert "fc" not in found.fit.vector.names
 
 
 def test_outliers_do_not_carry_a_robust_fit_away() -> None:
-    trial = cases.trial("coulomb", noise=2e-3)
-    position = trial.position.copy()
+    experiment = cases.experiment("coulomb", noise=2e-3)
+    position = experiment.position.copy()
     position[::97] += 0.05
-    spoiled = Trial("spoiled", trial.time, position, trial.drive, "torque", trial.reference, trial.loop)
-    first = inverse_dynamics([trial], AXIS)
+    spoiled = Experiment(
+        "spoiled",
+        experiment.time,
+        position,
+        experiment.drive,
+        "torque",
+        experiment.reference,
+        experiment.loop,
+    )
+    first = inverse_dynamics([experiment], AXIS)
     found = output_error([spoiled], AXIS, law("coulomb"), first, robust=True)
     assert found.fit.values["fc"] == pytest.approx(cases.FC, rel=0.02)
 
@@ -94,10 +102,10 @@ def test_pendulum_and_cogging_are_separated_from_friction() -> None:
     out = drive_axis(
         Mechanics(2e-3, gravity=0.2, gravity_angle=0.1), friction, Drive(time, torque, max_step=1e-4)
     )
-    trial = Trial("pendulum", time, out[:, 0], torque)
+    experiment = Experiment("pendulum", time, out[:, 0], torque)
     axis = ServoAxis(drive_side="load", gravity="pendulum")
-    first = inverse_dynamics([trial], axis)
-    found = output_error([trial], axis, law("coulomb"), first, frozen=["offset"], values={"offset": 0.0})
+    first = inverse_dynamics([experiment], axis)
+    found = output_error([experiment], axis, law("coulomb"), first, frozen=["offset"], values={"offset": 0.0})
     assert found.fit.values["gravity"] == pytest.approx(0.2, rel=0.02)
     assert found.fit.values["gravity_angle"] == pytest.approx(0.1, abs=0.02)
     assert found.fit.values["inertia"] == pytest.approx(2e-3, rel=0.03)
@@ -108,7 +116,7 @@ def test_pendulum_and_cogging_are_separated_from_friction() -> None:
 
 
 def test_held_out_rows_are_simulated_but_not_fitted() -> None:
-    whole = cases.trial("coulomb")
+    whole = cases.experiment("coulomb")
     early, late = whole.split(0.3)
     assert early.rows.sum() + late.rows.sum() == late.time.size == whole.time.size
     assert early.time[-1] < late.time[late.rows][0]
@@ -119,7 +127,7 @@ def test_held_out_rows_are_simulated_but_not_fitted() -> None:
 
 def test_laws_are_judged_at_speeds_that_they_were_fitted_to() -> None:
     time = 1e-3 * np.arange(10_000)
-    rising = Trial("rising", time, 0.05 * time**3, np.zeros(time.size))
+    rising = Experiment("rising", time, 0.05 * time**3, np.zeros(time.size))
     fitted, judged = rising.split(0.3)
     assert fitted.time[-1] == time[-1]
     assert judged.time[judged.rows][-1] < fitted.time[0]
@@ -141,8 +149,10 @@ def test_a_law_of_ones_own_is_identified(tmp_path: Path) -> None:
     text = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
     block = next(b for b in re.findall(r"```python\n(.*?)```", text, re.DOTALL) if "LAW = Law(" in b)
     (tmp_path / "own.py").write_text(block, encoding="utf-8")
-    trial = cases.trial("coulomb", noise=2e-3)
-    found = output_error([trial], AXIS, law(str(tmp_path / "own.py")), inverse_dynamics([trial], AXIS))
+    experiment = cases.experiment("coulomb", noise=2e-3)
+    found = output_error(
+        [experiment], AXIS, law(str(tmp_path / "own.py")), inverse_dynamics([experiment], AXIS)
+    )
     # Without viscous friction of its own the law takes the mean torque.
     assert 0.28 < found.model.parameters.fc < 0.34
 
@@ -187,35 +197,35 @@ def test_gearing_and_motor_turn_signals_into_torque_at_one_side() -> None:
 
 def test_records_that_cannot_be_used_say_why() -> None:
     record = cases.record("coulomb", seconds=1.0)
-    assert trial_of(record, AXIS).time.size == 1000
-    still = Trial("still", np.arange(1000) * 1e-3, np.zeros(1000), np.zeros(1000))
+    assert experiment_of(record, AXIS).time.size == 1000
+    still = Experiment("still", np.arange(1000) * 1e-3, np.zeros(1000), np.zeros(1000))
     with pytest.raises(InputError, match="nothing excites inertia, fv, fc"):
         inverse_dynamics([still], AXIS)
     t = np.arange(4000) * 1e-3
-    forward = Trial(
+    forward = Experiment(
         "forward", t, 0.5 * t + 0.05 * np.sin(6.0 * t), np.full(4000, 0.3) + 0.01 * np.cos(6.0 * t)
     )
     with pytest.raises(InputError, match="effects of fc and offset cannot be told apart"):
         inverse_dynamics([forward], AXIS)
     with pytest.raises(InputError, match="too few"):
-        Trial("short", np.arange(10.0), np.zeros(10), np.zeros(10))
+        Experiment("short", np.arange(10.0), np.zeros(10), np.zeros(10))
     with pytest.raises(InputError, match="row 3"):
-        Trial("nan", np.arange(100.0), np.where(np.arange(100) == 3, np.nan, 0.0), np.zeros(100))
+        Experiment("nan", np.arange(100.0), np.where(np.arange(100) == 3, np.nan, 0.0), np.zeros(100))
     with pytest.raises(InputError, match="does not ascend at row 5"):
-        Trial("back", np.where(np.arange(100) == 5, 0.0, np.arange(100.0)), np.zeros(100), np.zeros(100))
+        Experiment("back", np.where(np.arange(100) == 5, 0.0, np.arange(100.0)), np.zeros(100), np.zeros(100))
 
 
 def test_position_dependent_torque_is_found() -> None:
-    trial = cases.trial("coulomb", noise=2e-3)
-    first = inverse_dynamics([trial], AXIS, harmonics=1)
-    found = output_error([trial], AXIS, law("coulomb"), first, extras=Extras(harmonics=1))
+    experiment = cases.experiment("coulomb", noise=2e-3)
+    first = inverse_dynamics([experiment], AXIS, harmonics=1)
+    found = output_error([experiment], AXIS, law("coulomb"), first, extras=Extras(harmonics=1))
     # There is none: its amplitude is within what noise makes.
     assert math.hypot(found.fit.values["cos[0]"], found.fit.values["sin[0]"]) < 0.05 * cases.FC
 
 
 def test_intervals_of_the_prediction_error_hold_the_truth() -> None:
-    trial = cases.trial("coulomb", noise=2e-3)
-    found = identify_axis([trial], AXIS, ["coulomb"], intervals="prediction")
+    experiment = cases.experiment("coulomb", noise=2e-3)
+    found = identify_axis([experiment], AXIS, ["coulomb"], intervals="prediction")
     for name, truth in (("inertia", cases.INERTIA), ("fc", cases.FC), ("sigma2", cases.SIGMA2)):
         e = found[name]
         width = e.upper - e.lower
@@ -224,7 +234,7 @@ def test_intervals_of_the_prediction_error_hold_the_truth() -> None:
     assert found.model is not None
     assert found.model.parameters.fc == found["fc"].value
     with pytest.raises(UnknownName, match="source of intervals"):
-        identify_axis([trial], AXIS, ["coulomb"], intervals="guess")
+        identify_axis([experiment], AXIS, ["coulomb"], intervals="guess")
 
 
 def assert_recovered(found: Identification, truth: dict[str, float]) -> None:
@@ -239,9 +249,9 @@ def assert_recovered(found: Identification, truth: dict[str, float]) -> None:
 def test_torque_and_friction_over_the_position_are_recovered(seed: int) -> None:
     """Cogging, and friction that varies by 12 % over half a radian (thesis 2.1.6)."""
     known = Harmonics(0.5, torque=((0.03, -0.02),), friction=((0.1, 0.06),))
-    trial = cases.trial("coulomb", seed, noise=5e-3, harmonics=known)
+    experiment = cases.experiment("coulomb", seed, noise=5e-3, harmonics=known)
     extras = Extras(harmonics=1, friction_harmonics=1, harmonic_period=0.5)
-    found = identify_axis([trial], AXIS, ["coulomb"], extras=extras, intervals="prediction")
+    found = identify_axis([experiment], AXIS, ["coulomb"], extras=extras, intervals="prediction")
     assert_recovered(
         found,
         {"cos[0]": 0.03, "sin[0]": -0.02, "friction_cos[0]": 0.1, "friction_sin[0]": 0.06, "fc": cases.FC},
@@ -252,10 +262,10 @@ def test_torque_and_friction_over_the_position_are_recovered(seed: int) -> None:
 def test_friction_that_grows_with_the_load_is_recovered(seed: int) -> None:
     """A pendulum: the gearing carries the motor's and gravity's torque, each with a share of its own."""
     known = {"gravity": 0.25, "gravity_angle": 0.1, "load_motor": 0.8, "load_external": 1.5}
-    trial = cases.trial("coulomb", seed, offset=0.0, noise=5e-3, **known)
+    experiment = cases.experiment("coulomb", seed, offset=0.0, noise=5e-3, **known)
     axis = ServoAxis(drive_side="load", gravity="pendulum")
     found = identify_axis(
-        [trial], axis, ["coulomb"], extras=Extras(load=True), frozen=["offset"], values={"offset": 0.0},
+        [experiment], axis, ["coulomb"], extras=Extras(load=True), frozen=["offset"], values={"offset": 0.0},
         intervals="prediction",
     )  # fmt: skip
     assert_recovered(found, {"load_motor": 0.8, "load_external": 1.5, "gravity": 0.25, "fc": cases.FC})
@@ -263,15 +273,15 @@ def test_friction_that_grows_with_the_load_is_recovered(seed: int) -> None:
 
 def test_under_a_constant_torque_load_is_not_told_from_friction_unless_the_drive_brakes() -> None:
     """A torque that always drives is its own load: (1 - l f) T = J a + f sign(v), with l as greater J and f."""
-    trial = cases.trial("coulomb", offset=0.1, load_motor=0.8)
-    found = identify_axis([trial], AXIS, ["coulomb"], extras=Extras(load=True))
+    experiment = cases.experiment("coulomb", offset=0.1, load_motor=0.8)
+    found = identify_axis([experiment], AXIS, ["coulomb"], extras=Extras(load=True))
     assert "load_external" not in {e.name for e in found.estimates}
     assert not 0.75 < found["load_motor"].value < 0.85  # 0.56, with an interval of 0.48 to 0.64
     assert not any(e.identified for e in found.estimates)
     assert "looks like more friction and inertia" in found["load_motor"].verdict
     assert any("the drive brakes" in line for line in found.measure_next)
     # At this record's load; so little of its torque accelerates that when it acted must be known.
-    held = identify_axis([trial], AXIS, ["coulomb"], skew=-0.5 * trial.period)
+    held = identify_axis([experiment], AXIS, ["coulomb"], skew=-0.5 * experiment.period)
     assert all(e.identified for e in held.estimates)
 
 
@@ -279,7 +289,7 @@ def test_the_outer_torques_share_of_the_load_alone_is_judged_too() -> None:
     """With load_motor held, a constant torque loads a drive that never brakes as more friction would."""
     how = {"extras": Extras(load=True), "frozen": ["load_motor"], "free": ["load_external"]}
     flat = identify_axis(
-        [cases.trial("coulomb", offset=0.1, load_motor=0.8)],
+        [cases.experiment("coulomb", offset=0.1, load_motor=0.8)],
         AXIS,
         ["coulomb"],
         values={"load_motor": 0.8},
@@ -290,30 +300,30 @@ def test_the_outer_torques_share_of_the_load_alone_is_judged_too() -> None:
     assert not flat["fc"].identified
     assert flat["inertia"].identified
     known = {"gravity": 0.25, "gravity_angle": 0.1, "load_motor": 0.8, "load_external": 1.5}
-    trial = cases.trial("coulomb", 0, offset=0.0, noise=5e-3, **known)
+    experiment = cases.experiment("coulomb", 0, offset=0.0, noise=5e-3, **known)
     how["frozen"].append("offset")
     swung = identify_axis(
-        [trial], ServoAxis(drive_side="load", gravity="pendulum"), ["coulomb"],
+        [experiment], ServoAxis(drive_side="load", gravity="pendulum"), ["coulomb"],
         values={"load_motor": 0.8, "offset": 0.0}, **how,
     )  # fmt: skip
     assert_recovered(swung, {"load_external": 1.5, "fc": cases.FC})
 
 
 def test_load_is_told_from_friction_where_the_drive_brakes() -> None:
-    trial = braking_trial(load_motor=0.8)
-    assert np.mean(trial.signal()[1:] * np.diff(trial.position) < 0.0) > 0.1
-    found = identify_axis([trial], AXIS, ["coulomb"], extras=Extras(load=True))
+    experiment = braking_experiment(load_motor=0.8)
+    assert np.mean(experiment.signal()[1:] * np.diff(experiment.position) < 0.0) > 0.1
+    found = identify_axis([experiment], AXIS, ["coulomb"], extras=Extras(load=True))
     assert_recovered(found, {"load_motor": 0.8, "fc": cases.FC, "inertia": 1.6e-3})
     assert not found["load_external"].identified  # there is none
     heavy = identify_axis(
-        [braking_trial(load_motor=0.8, load_external=0.8)], AXIS, ["coulomb"], extras=Extras(load=True)
+        [braking_experiment(load_motor=0.8, load_external=0.8)], AXIS, ["coulomb"], extras=Extras(load=True)
     )
     assert_recovered(
         heavy, {"load_motor": 0.8, "load_external": 0.8, "fc": cases.FC, "inertia": 1.6e-3, "offset": 0.1}
     )
 
 
-def braking_trial(**mechanics: float) -> Trial:
+def braking_experiment(**mechanics: float) -> Experiment:
     """Four times the inertia under a fast sinusoid: its acceleration asks for more torque than friction takes."""
     time = np.arange(0.0, 6.0, 1e-3)
     reference = cases.wanted(time, 0) + 0.35 * np.sin(2.0 * math.pi * 4.3 * time)
@@ -322,7 +332,7 @@ def braking_trial(**mechanics: float) -> Trial:
     drive = Drive(time, reference, "feedback", loop, disturbance=push, max_step=1e-4)
     out = drive_axis(Mechanics(1.6e-3, offset=0.1, **mechanics), cases.model("coulomb"), drive)
     position = cases.COUNT * np.round(out[:, 0] / cases.COUNT)
-    return Trial("braking", time, position, out[:, 2], "torque", reference, loop)
+    return Experiment("braking", time, position, out[:, 2], "torque", reference, loop)
 
 
 def test_friction_that_rises_from_rest_is_no_stribeck_effect() -> None:
@@ -337,8 +347,8 @@ def test_friction_that_rises_from_rest_is_no_stribeck_effect() -> None:
 
 def test_without_its_loop_a_record_still_tells_the_law() -> None:
     """The output error of an open loop that drifts told no law from another, and the simplest was taken."""
-    trial = replace(cases.trial("stribeck", noise=5e-3, seconds=8.0), reference=None, loop=None)
-    found = identify_axis([trial], AXIS, ["coulomb", "stribeck"])
+    experiment = replace(cases.experiment("stribeck", noise=5e-3, seconds=8.0), reference=None, loop=None)
+    found = identify_axis([experiment], AXIS, ["coulomb", "stribeck"])
     coulomb, stribeck = (float(np.mean(c.score)) for c in found.details["candidates"])
     assert stribeck < 0.8 * coulomb
     assert found.model is not None
@@ -347,9 +357,9 @@ def test_without_its_loop_a_record_still_tells_the_law() -> None:
 
 
 def test_gains_that_do_not_make_the_recorded_signal_are_doubted() -> None:
-    trial = cases.trial("coulomb", seconds=3.0)
-    right = identify_axis([trial], AXIS, ["coulomb"], intervals="covariance")
+    experiment = cases.experiment("coulomb", seconds=3.0)
+    right = identify_axis([experiment], AXIS, ["coulomb"], intervals="covariance")
     assert not any("loop given" in note or "loop simulated" in note for note in right.notes)
-    wrong = replace(trial, loop=replace(cases.LOOP, kp=100.0 * cases.LOOP.kp))
+    wrong = replace(experiment, loop=replace(cases.LOOP, kp=100.0 * cases.LOOP.kp))
     found = identify_axis([wrong], AXIS, ["coulomb"])
     assert any("kp 800 given, 8 " in note for note in found.notes)

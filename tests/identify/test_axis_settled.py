@@ -13,9 +13,9 @@ from stickslip.identify.axis.choice import Candidate, chosen_of, sentence_on
 from stickslip.identify.axis.identify import nothing_more
 from stickslip.identify.axis.settled import settled
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import inverse_dynamics
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 
@@ -24,7 +24,7 @@ TRUE = {"inertia": 4e-3, "offset": 0.05, "fc": 0.3, "sigma2": 0.02}
 COULOMB = Model("coulomb", fc=0.3, sigma2=0.02)
 
 
-def moving(gravity: float = 0.0, angle: float = 0.0) -> Trial:
+def moving(gravity: float = 0.0, angle: float = 0.0) -> Experiment:
     """An axis that moves both ways at many speeds, its torque known to 0.01 N·m."""
     t = np.arange(0.0, 20.0, 2e-3)
     rates = (1.3, 3.1, 5.7)
@@ -33,7 +33,7 @@ def moving(gravity: float = 0.0, angle: float = 0.0) -> Trial:
     acceleration = -sum(a * w * w * np.sin(w * t) for a, w in zip((1.0, 0.5, 0.2), rates, strict=True))
     torque = TRUE["inertia"] * acceleration + TRUE["sigma2"] * v + TRUE["fc"] * np.sign(v) + TRUE["offset"]
     noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
-    return Trial("made", t, q, torque + gravity * np.sin(q - angle) + noise)
+    return Experiment("made", t, q, torque + gravity * np.sin(q - angle) + noise)
 
 
 def estimate(name: str, value: float, half: float = 0.0, told: bool = True) -> Estimate:
@@ -115,10 +115,10 @@ def test_identified_values_that_explain_the_record_stay() -> None:
 
 
 def test_values_keep_the_bounds_of_physics() -> None:
-    trial = moving()
-    assert trial.drive is not None
-    speed = np.gradient(trial.position, trial.time)
-    inverse = inverse_dynamics([replace(trial, drive=trial.drive - 0.1 * speed)], AXIS)
+    experiment = moving()
+    assert experiment.drive is not None
+    speed = np.gradient(experiment.position, experiment.time)
+    inverse = inverse_dynamics([replace(experiment, drive=experiment.drive - 0.1 * speed)], AXIS)
     assert inverse["fv"] < 0.0
     found, _ = settled([estimate(n, x, told=False) for n, x in TRUE.items()], COULOMB, inverse)
     assert all(e.value >= 0.0 for e in found if e.name != "offset")

@@ -11,11 +11,11 @@ import pytest
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.plain import inverse_identification
 from stickslip.identify.estimate import Identification
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
 from stickslip.identify.monte_carlo import draw_models
 from stickslip.identify.regression.inverse import inverse_dynamics
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from support import axis_cases as cases
@@ -25,12 +25,12 @@ AXIS = ServoAxis()
 
 
 @pytest.fixture(scope="module")
-def trial() -> Trial:
+def experiment() -> Experiment:
     own = cases.model
     each = Model("coulomb", {"symmetry": "asymmetric"}, fc=FORTH, fc_negative=BACK, sigma2=cases.SIGMA2)
     try:
         cases.model = lambda name: each
-        return cases.trial("coulomb", seconds=4.0, offset=0.0)
+        return cases.experiment("coulomb", seconds=4.0, offset=0.0)
     finally:
         cases.model = own
 
@@ -39,8 +39,8 @@ def read_back(found: Identification, folder: Path) -> Model:
     return read_identified(write_model(folder / "model.toml", found)).model
 
 
-def test_least_squares_per_direction_is_an_asymmetric_law(trial: Trial, tmp_path: Path) -> None:
-    found = inverse_identification(inverse_dynamics([trial], AXIS, per_direction=True), AXIS)
+def test_least_squares_per_direction_is_an_asymmetric_law(experiment: Experiment, tmp_path: Path) -> None:
+    found = inverse_identification(inverse_dynamics([experiment], AXIS, per_direction=True), AXIS)
     model = read_back(found, tmp_path)
     assert model.law.chosen["symmetry"] == "asymmetric"
     assert (model.parameters.fc, model.parameters.fc_negative) == pytest.approx((FORTH, BACK), rel=0.06)
@@ -49,10 +49,10 @@ def test_least_squares_per_direction_is_an_asymmetric_law(trial: Trial, tmp_path
 
 @pytest.mark.parametrize("per_direction", [False, True])
 def test_least_squares_names_its_numbers_as_the_law_and_the_axis_do(
-    trial: Trial, tmp_path: Path, per_direction: bool
+    experiment: Experiment, tmp_path: Path, per_direction: bool
 ) -> None:
     """What draws axes from the intervals (`recommend`) looks its numbers up by name."""
-    plain = inverse_dynamics([trial], AXIS, per_direction=per_direction)
+    plain = inverse_dynamics([experiment], AXIS, per_direction=per_direction)
     found = inverse_identification(plain, AXIS)
     read = read_identified(write_model(tmp_path / "model.toml", found))
     own = {f.name for f in read.model.law.fields}
@@ -65,10 +65,12 @@ def test_least_squares_names_its_numbers_as_the_law_and_the_axis_do(
     assert spread == pytest.approx(found["fc"].std, rel=0.4)
 
 
-def test_least_squares_of_friction_below_the_constant_torque_keeps_its_correlations(trial: Trial) -> None:
+def test_least_squares_of_friction_below_the_constant_torque_keeps_its_correlations(
+    experiment: Experiment,
+) -> None:
     """Means and differences of both directions, with the covariance that such have."""
-    assert trial.drive is not None
-    hanging = replace(trial, drive=trial.drive + 3.0 * FORTH)
+    assert experiment.drive is not None
+    hanging = replace(experiment, drive=experiment.drive + 3.0 * FORTH)
     each = inverse_dynamics([hanging], AXIS, per_direction=True)
     assert min(each["fc_plus"], each["fc_minus"]) < 0.0
     found = inverse_identification(each, AXIS)
@@ -90,7 +92,7 @@ def test_least_squares_of_a_pendulum_tells_gravity_and_where_it_hangs(tmp_path: 
         0.02 * a + 0.03 * v + 0.2 * np.sign(v) + 1.5 * np.sin(q - 0.4) + 0.02 * rng.standard_normal(t.size)
     )
     axis = replace(AXIS, gravity="pendulum")
-    plain = inverse_dynamics([Trial("pendulum", t, q, torque)], axis)
+    plain = inverse_dynamics([Experiment("pendulum", t, q, torque)], axis)
     found = inverse_identification(plain, axis)
     assert found["gravity"].value == pytest.approx(1.5, rel=0.01)
     assert found["gravity_angle"].value == pytest.approx(0.4, abs=0.01)
@@ -103,16 +105,20 @@ def test_least_squares_of_a_pendulum_tells_gravity_and_where_it_hangs(tmp_path: 
     assert found["gravity_angle"].std == pytest.approx(float(np.std(np.arctan2(-c, s))), rel=0.05)
 
 
-def test_the_model_of_least_squares_holds_inertia_offset_and_gravity(trial: Trial, tmp_path: Path) -> None:
-    found = inverse_identification(inverse_dynamics([trial], AXIS), AXIS)
+def test_the_model_of_least_squares_holds_inertia_offset_and_gravity(
+    experiment: Experiment, tmp_path: Path
+) -> None:
+    found = inverse_identification(inverse_dynamics([experiment], AXIS), AXIS)
     write_model(tmp_path / "model.toml", found)
     axis = read_identified(tmp_path / "model.toml").axis
     assert axis["inertia"] == pytest.approx(cases.INERTIA, rel=0.15)
     assert axis["offset"] == pytest.approx(0.5 * (FORTH - BACK), rel=0.2)
 
 
-def test_an_axis_per_direction_has_a_law_that_differs_and_no_offset(trial: Trial, tmp_path: Path) -> None:
-    found = identify_axis([trial], AXIS, ["coulomb"], per_direction=True)
+def test_an_axis_per_direction_has_a_law_that_differs_and_no_offset(
+    experiment: Experiment, tmp_path: Path
+) -> None:
+    found = identify_axis([experiment], AXIS, ["coulomb"], per_direction=True)
     by_name = {e.name: e for e in found.estimates}
     assert by_name["fc"].lower <= FORTH <= by_name["fc"].upper
     assert by_name["fc_negative"].lower <= BACK <= by_name["fc_negative"].upper

@@ -11,7 +11,7 @@ from stickslip import Model
 from stickslip.identify.axis.gravity import hanging, nearest, within_a_turn
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate
-from stickslip.identify.trial import Trial
+from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
@@ -48,8 +48,8 @@ def test_an_arm_that_hangs_at_half_a_turn():
     mechanics = Mechanics(2e-3, gravity=0.3, gravity_angle=math.pi + 0.04)
     out = drive_axis(mechanics, Model("coulomb", fc=0.2, sigma2=0.02), drive)
     noisy = out[:, 2] + 1e-3 * np.random.default_rng(0).standard_normal(time.size)
-    trial = Trial("arm", time, out[:, 0], noisy)
-    found = identify_axis([trial], ServoAxis(drive_side="load", gravity="pendulum"), ["coulomb"])
+    experiment = Experiment("arm", time, out[:, 0], noisy)
+    found = identify_axis([experiment], ServoAxis(drive_side="load", gravity="pendulum"), ["coulomb"])
     angle = next(e for e in found.estimates if e.name == "gravity_angle")
     assert angle.value == pytest.approx(math.pi + 0.04, abs=0.03)
     assert angle.lower < angle.value < angle.upper

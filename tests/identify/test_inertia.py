@@ -11,8 +11,8 @@ from stickslip import Model
 from stickslip.cli._identified import show
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.response.inertia import frequency_response, inertia, verdict_on
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.report.identified import shown
 from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, drive_axis
@@ -21,13 +21,13 @@ J = 4.2757e-4  # thesis 4.2
 AXIS = ServoAxis(drive_side="load")
 
 
-def excited(amplitude: float, friction: Model, seed: int = 0, seconds: float = 60.0) -> Trial:
+def excited(amplitude: float, friction: Model, seed: int = 0, seconds: float = 60.0) -> Experiment:
     """Random torque held over 4 ms, on a light axis with a counted position."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 1e-3)
     torque = amplitude * np.repeat(rng.normal(size=time.size // 4 + 1), 4)[: time.size]
     out = drive_axis(Mechanics(J), friction, Drive(time, torque))
-    return Trial(f"{amplitude:g} N·m", time, out[:, 0] + 1e-5 * rng.normal(size=time.size), torque)
+    return Experiment(f"{amplitude:g} N·m", time, out[:, 0] + 1e-5 * rng.normal(size=time.size), torque)
 
 
 def test_inertia_and_viscous_friction_of_a_linear_axis() -> None:
@@ -47,7 +47,7 @@ def test_amplitudes_agree_on_the_inertia_and_not_on_the_friction() -> None:
     assert found["viscous[0]"].value > 1.2 * found["viscous[1]"].value
 
 
-def two_masses(mode: float, seed: int = 0, noise: float = 1e-6) -> Trial:
+def two_masses(mode: float, seed: int = 0, noise: float = 1e-6) -> Experiment:
     """Motor and load of equal inertia on a spring with that natural frequency (Hz), 2 % of damping; exact."""
     from scipy.signal import cont2discrete, dlsim
 
@@ -62,7 +62,7 @@ def two_masses(mode: float, seed: int = 0, noise: float = 1e-6) -> Trial:
     torque = 0.5 * rng.normal(size=60_000)
     position = dlsim(system, torque)[1][:, 0]
     time = dt * np.arange(torque.size)
-    return Trial("two masses", time, position + noise * rng.normal(size=time.size), torque)
+    return Experiment("two masses", time, position + noise * rng.normal(size=time.size), torque)
 
 
 @pytest.mark.parametrize("mode", [70.0, 230.0])
@@ -74,9 +74,9 @@ def test_a_true_mode_is_found_and_nothing_else(mode: float) -> None:
 
 @pytest.mark.parametrize("noise", [1e-6, 1e-4, 1e-3])
 def test_noise_on_a_rigid_axis_is_no_resonance(noise: float) -> None:
-    trials = [excited(0.5, Model("coulomb", fc=0.02, sigma2=0.018), seed) for seed in (1, 2)]
+    experiments = [excited(0.5, Model("coulomb", fc=0.02, sigma2=0.018), seed) for seed in (1, 2)]
     rng = np.random.default_rng(9)
-    noisy = [replace(t, position=t.position + noise * rng.normal(size=t.time.size)) for t in trials]
+    noisy = [replace(t, position=t.position + noise * rng.normal(size=t.time.size)) for t in experiments]
     assert inertia(noisy, AXIS, band=(0.4, 10.0)).details["resonances"] == ()
 
 
@@ -88,11 +88,11 @@ def test_coherence_lies_between_the_estimators() -> None:
 
 
 def test_what_cannot_be_fitted_is_said() -> None:
-    trial = excited(0.5, Model("coulomb", fc=0.0, sigma2=0.018), seconds=5.0)
+    experiment = excited(0.5, Model("coulomb", fc=0.0, sigma2=0.018), seconds=5.0)
     with pytest.raises(InputError, match="two windows"):
-        inertia([trial], AXIS)
+        inertia([experiment], AXIS)
     with pytest.raises(InputError, match="ascending"):
-        inertia([trial], AXIS, band=(5.0, 1.0))
+        inertia([experiment], AXIS, band=(5.0, 1.0))
     with pytest.raises(InputError, match="no record"):
         inertia([], AXIS)
 

@@ -11,7 +11,7 @@ import pytest
 
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.loop_check import GAINS, doubted_loops, shown_gains
-from stickslip.identify.trial import Trial
+from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 from support import axis_cases as cases
@@ -24,7 +24,7 @@ WRONG: dict[str, dict[str, Any]] = {
 }
 
 
-def recorded(counts: float, seen: float, seed: int = 0, late: int = 0) -> Trial:
+def recorded(counts: float, seen: float, seed: int = 0, late: int = 0) -> Experiment:
     """A record of so many counts a turn, made by a controller that saw the position in `seen` of them."""
     time = 1e-3 * np.arange(6000)
     rng = np.random.default_rng(seed)
@@ -35,7 +35,7 @@ def recorded(counts: float, seen: float, seed: int = 0, late: int = 0) -> Trial:
     out = drive_axis(Mechanics(cases.INERTIA, offset=0.03), cases.model("stribeck"), drive)
     count = 2.0 * math.pi / counts
     signal = np.roll(out[:, 2] + 2e-3 * rng.standard_normal(time.size), late)
-    return Trial(
+    return Experiment(
         "log.csv", time, count * np.round(out[:, 0] / count), signal, "torque", reference, cases.LOOP
     )
 
@@ -86,7 +86,7 @@ def test_a_reference_that_is_recorded_late_is_told(kr: float) -> None:
     reference = cases.wanted(time, 0)
     drive = Drive(time, reference, "feedback", loop, max_step=2e-4)
     out = drive_axis(Mechanics(cases.INERTIA), cases.model("stribeck"), drive)
-    made = Trial("log.csv", time, out[:, 0], out[:, 2], "torque", reference, loop)
+    made = Experiment("log.csv", time, out[:, 0], out[:, 2], "torque", reference, loop)
     assert doubted_loops([made]) == []
     for late, said in ((2, "2 rows late"), (1, "1 row late"), (-1, "1 row early")):
         moved = reference[np.clip(np.arange(time.size) - late, 0, time.size - 1)]

@@ -15,11 +15,11 @@ import pytest
 from stickslip.errors import InputError
 from stickslip.identify.axis.prediction import axis_prediction, held_torque, motion_of
 from stickslip.identify.estimate import Estimate
+from stickslip.identify.experiment import experiment_of
 from stickslip.identify.fit.jackknife import leave_blocks_out
 from stickslip.identify.fit.sample_rate_limit import contact_frequency, of_slow_motion, unseen_refused
 from stickslip.identify.observer.observer import GRASP, REMEMBERED, Prepared, prepare
 from stickslip.identify.regression.inverse import inverse_dynamics
-from stickslip.identify.trial import trial_of
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.record import encoder_step
@@ -41,7 +41,7 @@ def generator() -> Any:
 
 def test_inertia_and_friction_of_one_record(generator: Any) -> None:
     case = generator.make(0, "coulomb")
-    found = axis_prediction([trial_of(case.record, AXIS)], AXIS, case.model.law)
+    found = axis_prediction([experiment_of(case.record, AXIS)], AXIS, case.model.law)
     for e in found.estimates:
         assert e.identified, e
         width = e.upper - e.lower
@@ -54,8 +54,8 @@ def test_inertia_and_friction_of_one_record(generator: Any) -> None:
 
 def test_same_seed_same_numbers(generator: Any) -> None:
     case = generator.make(0, "coulomb")
-    trials = [trial_of(case.record, AXIS)]
-    one, two = (axis_prediction(trials, AXIS, case.model.law, seed=3) for _ in range(2))
+    experiments = [experiment_of(case.record, AXIS)]
+    one, two = (axis_prediction(experiments, AXIS, case.model.law, seed=3) for _ in range(2))
     assert [e.as_dict() for e in one.estimates] == [e.as_dict() for e in two.estimates]
 
 
@@ -68,7 +68,7 @@ def test_resolution_of_a_counted_position(count: float) -> None:
 
 def test_a_record_without_drive_is_refused(generator: Any) -> None:
     case = generator.make(0, "coulomb")
-    t = trial_of(case.record, AXIS)
+    t = experiment_of(case.record, AXIS)
     closed = replace(t, drive=None, reference=t.position, loop=generator.Loop(kp=1.0))
     with pytest.raises(InputError, match="drive's signal"):
         axis_prediction([closed], AXIS, case.model.law)
@@ -97,15 +97,15 @@ def test_a_block_that_tells_everything_leaves_few_degrees_of_freedom() -> None:
 
 def test_torque_at_rest_is_the_static_torque_where_the_axis_sticks(generator: Any) -> None:
     case = generator.make(5016)  # a Stribeck contact that sticks and slips on its slow levels
-    trial = trial_of(case.record, AXIS)
-    found = held_torque([trial], AXIS, inverse_dynamics([trial], AXIS))
+    experiment = experiment_of(case.record, AXIS)
+    found = held_torque([experiment], AXIS, inverse_dynamics([experiment], AXIS))
     assert found == pytest.approx(case.truth["fs"], rel=0.05)
 
 
 def test_the_true_parameters_need_few_corrections_where_the_axis_sticks_and_slips(generator: Any) -> None:
     """A soft observer parts from the contact that sticks by chance: it corrects more under the true law."""
     case = generator.make(7021)  # friction falls with velocity ten times faster than a soft observer damps
-    motion = motion_of(trial_of(case.record, AXIS))
+    motion = motion_of(experiment_of(case.record, AXIS))
     axis = Mechanics(case.truth["inertia"], offset=case.truth["offset"])
     firm, soft = (
         prepare(motion, case.model.law, case.truth["inertia"], case.truth["fc"], 40.0, grasp=grasp)
@@ -121,7 +121,7 @@ def test_what_was_asked_a_moment_ago_is_not_simulated_again(
 ) -> None:
     case = generator.make(0, "coulomb")
     p = case.model.parameters
-    motion = motion_of(trial_of(case.record, AXIS))
+    motion = motion_of(experiment_of(case.record, AXIS))
     prepared = prepare(motion, case.model.law, case.truth["inertia"], case.truth["fc"], 40.0)
     asked: list[Mechanics] = []
     raw = Prepared.raw
@@ -172,9 +172,9 @@ def test_an_inertia_that_the_inverse_dynamics_misses_is_found(generator: Any) ->
     case = generator.make(
         11025
     )  # 14-bit encoder and a small inertia: the inverse dynamics finds a negative one
-    trial = trial_of(case.record, AXIS)
-    assert inverse_dynamics([trial], AXIS)["inertia"] < 0.0
-    found = axis_prediction([trial], AXIS, case.model.law)
+    experiment = experiment_of(case.record, AXIS)
+    assert inverse_dynamics([experiment], AXIS)["inertia"] < 0.0
+    found = axis_prediction([experiment], AXIS, case.model.law)
     by_name = {e.name: e.value for e in found.estimates}
     assert by_name["inertia"] == pytest.approx(case.truth["inertia"], rel=0.2)
 

@@ -349,9 +349,9 @@ def test_what_acts_beside_friction_is_on_the_axes() -> None:
         ("offset", Plant(INERTIA, plain, offset=0.2)),
         ("wave", Plant(INERTIA, plain, waves=((3.0, 0.1, 0.5),))),
     ):
-        trial = run(plant, linear, drive)
-        assert not isinstance(trial, str)
-        rests[name] = float(trial.reference[-1] - trial.position[-1])
+        experiment = run(plant, linear, drive)
+        assert not isinstance(experiment, str)
+        rests[name] = float(experiment.reference[-1] - experiment.position[-1])
     assert rests["offset"] == pytest.approx(0.2 / linear.linear.kp, rel=0.01)
     assert rests["wave"] == pytest.approx(
         -0.1 * math.cos(0.5 - 3.0 * rests["wave"]) / linear.linear.kp, rel=0.01

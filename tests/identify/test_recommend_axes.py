@@ -160,9 +160,9 @@ def test_the_reference_velocity_is_of_the_instant_on_some_axes_and_of_the_last_s
     smooth = Model("coulomb", fc=1e-9, sigma2=0.0)
     errors: dict[bool, Any] = {}
     for backward in (False, True):
-        trial = run(Plant(INERTIA, smooth, backward=backward), drive.loop(INERTIA), drive)
-        assert not isinstance(trial, str)
-        errors[backward] = trial.reference - trial.position
+        experiment = run(Plant(INERTIA, smooth, backward=backward), drive.loop(INERTIA), drive)
+        assert not isinstance(experiment, str)
+        errors[backward] = experiment.reference - experiment.position
     w = 2.0 * math.pi * drive.frequency
     stiffness = PD.kp - INERTIA * w * w + 1j * w * PD.kd
     late = (

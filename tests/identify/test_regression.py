@@ -18,6 +18,7 @@ from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.plain import inverse_identification
 from stickslip.identify.doctor import examine
 from stickslip.identify.estimate import Estimate
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.smooth import Window, seen
 from stickslip.identify.regression.band_fit import Number
@@ -26,7 +27,6 @@ from stickslip.identify.regression.force_error import force_error, force_error_o
 from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.identify.regression.orders import Harmonic
 from stickslip.identify.regression.regression import regress_axis, together
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.record import Record
@@ -46,8 +46,8 @@ def logs() -> Any:
     return ordinary_logs
 
 
-def trial(log: Any) -> Trial:
-    return Trial("log", log.time, log.position, log.torque)
+def experiment(log: Any) -> Experiment:
+    return Experiment("log", log.time, log.position, log.torque)
 
 
 # ---- windows ----------------------------------------------------------------------------------------------------
@@ -107,7 +107,7 @@ def test_inertia_and_friction_hold_whatever_the_column_of_the_torque_is(logs: An
     beside: list[float] = []
     for column, rate in itertools.product(("held", "commanded", "actual", "mean"), (1000, 250)):
         log = logs.draw(811 + rate, column, rate, "p-pi", "staircase", "clean")
-        found = regress_axis([trial(log)], AXIS)
+        found = regress_axis([experiment(log)], AXIS)
         for name in NAMES:
             low, high = found.interval(name)
             beside.append(abs(log.truth[name] - 0.5 * (low + high)) / (0.5 * (high - low)))
@@ -120,7 +120,7 @@ def test_inertia_and_friction_hold_whatever_the_column_of_the_torque_is(logs: An
 @pytest.mark.parametrize("column", ["held", "commanded", "actual", "mean"])
 def test_the_skew_is_found_to_a_tenth_of_a_row(logs: Any, column: str) -> None:
     log = logs.draw(4242, column, 1000, "p-pi", "production", "clean")
-    found = regress_axis([trial(log)], AXIS)
+    found = regress_axis([experiment(log)], AXIS)
     assert found.numbers["skew"].value == pytest.approx(log.truth["skew"], abs=1e-4)
     low, high = found.interval("skew")
     assert low <= log.truth["skew"] <= high
@@ -130,7 +130,7 @@ def test_the_skew_is_found_to_a_tenth_of_a_row(logs: Any, column: str) -> None:
 
 def test_a_skew_of_many_rows_is_found_and_taken_out(logs: Any) -> None:
     log = logs.draw(4242, "held", 1000, "p-pi", "production", "clean")
-    late = Trial("late", log.time, log.position, np.interp(log.time - 8e-3, log.time, log.torque))
+    late = Experiment("late", log.time, log.position, np.interp(log.time - 8e-3, log.time, log.torque))
     found = regress_axis([late], AXIS)
     assert found.numbers["skew"].value == pytest.approx(log.truth["skew"] + 8e-3, abs=1e-4)
     (moved,) = aligned([late], found)
@@ -140,15 +140,15 @@ def test_a_skew_of_many_rows_is_found_and_taken_out(logs: Any) -> None:
 
 def test_a_skew_that_is_given_is_kept(logs: Any) -> None:
     log = logs.draw(4242, "actual", 1000, "p-pi", "production", "clean")
-    found = regress_axis([trial(log)], AXIS, skew=0.0)
+    found = regress_axis([experiment(log)], AXIS, skew=0.0)
     assert found.numbers["skew"].value == 0.0
-    free = regress_axis([trial(log)], AXIS)
+    free = regress_axis([experiment(log)], AXIS)
     assert found.numbers["inertia"].value != free.numbers["inertia"].value
 
 
 def test_cogging_is_found_and_does_not_ruin_friction(logs: Any) -> None:
     log = logs.draw(97, "held", 1000, "p-pi", "staircase", "cogging", orders=(4, 12, 24))
-    found = regress_axis([trial(log)], AXIS)
+    found = regress_axis([experiment(log)], AXIS)
     whole = {round(2.0 * math.pi * o) for o in found.orders}
     assert 4 in whole
     assert found.numbers["fc"].value == pytest.approx(log.truth["fc"], rel=0.02)
@@ -163,11 +163,11 @@ def test_no_fall_of_friction_is_made_up_and_a_real_one_is_seen() -> None:
     a = -6.75 * np.sin(1.5 * t) - 19.6 * np.sin(7.0 * t)
     noise = 1e-3 * np.random.default_rng(3).standard_normal(t.size)
     plain = 0.01 * a + 0.02 * v + 0.3 * np.sign(v) + 0.05 + noise
-    none = regress_axis([Trial("coulomb", t, q, plain)], AXIS)
+    none = regress_axis([Experiment("coulomb", t, q, plain)], AXIS)
     assert none.falls < 0.5
     assert none.numbers["fc"].value == pytest.approx(0.3, rel=0.01)
     some = regress_axis(
-        [Trial("stribeck", t, q, plain + 0.15 * np.sign(v) * np.exp(-((v / 0.4) ** 2)))], AXIS
+        [Experiment("stribeck", t, q, plain + 0.15 * np.sign(v) * np.exp(-((v / 0.4) ** 2)))], AXIS
     )
     assert some.falls > 0.95
     assert some.numbers["fc"].value == pytest.approx(0.3, rel=0.02)
@@ -179,7 +179,9 @@ def test_gravity_of_a_pendulum_is_told_by_sliding() -> None:
     q = 2.0 * np.sin(2.0 * t) + 0.4 * np.sin(9.0 * t)
     v, a = 4.0 * np.cos(2.0 * t) + 3.6 * np.cos(9.0 * t), -8.0 * np.sin(2.0 * t) - 32.4 * np.sin(9.0 * t)
     torque = 0.02 * a + 0.01 * v + 0.1 * np.sign(v) + 0.5 * np.sin(q - 0.2)
-    found = regress_axis([Trial("pendulum", t, q, torque)], ServoAxis(drive_side="load", gravity="pendulum"))
+    found = regress_axis(
+        [Experiment("pendulum", t, q, torque)], ServoAxis(drive_side="load", gravity="pendulum")
+    )
     sine, cosine = found.numbers["gravity_sin"].value, found.numbers["gravity_cos"].value
     assert math.hypot(sine, cosine) == pytest.approx(0.5, rel=0.03)
     assert math.atan2(-cosine, sine) == pytest.approx(0.2, abs=0.03)
@@ -188,7 +190,7 @@ def test_gravity_of_a_pendulum_is_told_by_sliding() -> None:
 def test_an_axis_that_always_accelerates_is_no_error() -> None:
     t = np.arange(4000) * 1e-3
     q, v, a = 3.0 * np.sin(9.0 * t), 27.0 * np.cos(9.0 * t), -243.0 * np.sin(9.0 * t)
-    found = regress_axis([Trial("fast", t, q, 0.01 * a + 1e-3 * v + 0.01 * np.sign(v))], AXIS)
+    found = regress_axis([Experiment("fast", t, q, 0.01 * a + 1e-3 * v + 0.01 * np.sign(v))], AXIS)
     low, high = found.interval("inertia")
     assert low <= 0.01 <= high
 
@@ -197,7 +199,7 @@ def test_too_little_sliding_is_refused() -> None:
     t = np.arange(500) * 1e-3
     noise = 1e-4 * np.random.default_rng(5).standard_normal(t.size)
     with pytest.raises(InputError, match=r"certain sliding|one direction"):
-        regress_axis([Trial("still", t, noise, np.sin(t))], AXIS)
+        regress_axis([Experiment("still", t, noise, np.sin(t))], AXIS)
 
 
 # ---- one result of several estimators -----------------------------------------------------------------------------
@@ -207,7 +209,7 @@ def test_what_the_prediction_error_alone_says_is_not_identified_where_it_contrad
     logs: Any,
 ) -> None:
     log = logs.draw(4242, "held", 1000, "p-pi", "production", "clean")
-    found = regress_axis([trial(log)], AXIS)
+    found = regress_axis([experiment(log)], AXIS)
     model = Model("lugre", sigma0=600.0, sigma1=1.0, fs=0.09, fc=0.07, vs=0.2, sigma2=1e-3)
     extra = [
         Parameter("inertia", Par("kg·m²", "J", "", positive=True), 1.0),
@@ -235,7 +237,7 @@ def test_what_the_prediction_error_alone_says_is_not_identified_where_it_contrad
 def test_an_ordinary_log_is_identified_by_the_default(logs: Any) -> None:
     # The prediction error alone held 2 of 10 intervals of fc on such logs.
     log = logs.draw(4242, "actual", 1000, "p-pi", "production", "clean")
-    found = identify_axis([trial(log)], AXIS, ["lugre"])
+    found = identify_axis([experiment(log)], AXIS, ["lugre"])
     for name in (*NAMES, "fs"):
         assert found[name].identified, name
         assert found[name].lower <= log.truth[name] <= found[name].upper, name
@@ -250,7 +252,7 @@ def test_a_law_that_sliding_tells_whole_needs_no_search() -> None:
     v = 4.5 * np.cos(1.5 * t) + 2.8 * np.cos(7.0 * t)
     a = -6.75 * np.sin(1.5 * t) - 19.6 * np.sin(7.0 * t)
     torque = 0.01 * a + 0.02 * v + 0.3 * np.sign(v) + 0.05
-    found = identify_axis([Trial("log", t, q, torque)], AXIS, ["coulomb"])
+    found = identify_axis([Experiment("log", t, q, torque)], AXIS, ["coulomb"])
     assert found.model is not None
     assert found.model.parameters.fc == pytest.approx(0.3, rel=0.01)
     assert found["inertia"].identified
@@ -260,9 +262,9 @@ def test_a_law_that_sliding_tells_whole_needs_no_search() -> None:
 
 def test_the_plain_inverse_dynamics_is_held_against_certain_sliding(logs: Any) -> None:
     log = logs.draw(4242, "actual", 1000, "p-pi", "production", "clean")
-    inverse = inverse_dynamics([trial(log)], AXIS)
+    inverse = inverse_dynamics([experiment(log)], AXIS)
     alone = inverse_identification(inverse, AXIS)
-    both = inverse_identification(inverse, AXIS, regress_axis([trial(log)], AXIS))
+    both = inverse_identification(inverse, AXIS, regress_axis([experiment(log)], AXIS))
     assert not alone["fc"].lower <= log.truth["fc"] <= alone["fc"].upper
     assert both["fc"].lower <= 1.002 * log.truth["fc"]
     assert any(n.startswith("fc: ") for n in both.notes)
@@ -273,13 +275,13 @@ def test_the_plain_inverse_dynamics_is_held_against_certain_sliding(logs: Any) -
 
 def test_force_error_is_that_of_the_inverse_dynamics_for_its_own_values(logs: Any) -> None:
     log = logs.draw(4242, "held", 1000, "p-pi", "production", "clean")
-    inverse = inverse_dynamics([trial(log)], AXIS)
+    inverse = inverse_dynamics([experiment(log)], AXIS)
     model = Model("coulomb", fc=inverse.coulomb, sigma2=max(inverse.viscous, 0.0))
     values = {"inertia": inverse["inertia"], "offset": inverse.offset}
     own = force_error(inverse, model, values)
     assert own == pytest.approx(inverse.relative_error, rel=0.02)
-    assert force_error_on([trial(log)], AXIS, model, values) == own
-    assert plain_error_on([trial(log)], AXIS, inverse) == pytest.approx(inverse.relative_error, rel=1e-6)
+    assert force_error_on([experiment(log)], AXIS, model, values) == own
+    assert plain_error_on([experiment(log)], AXIS, inverse) == pytest.approx(inverse.relative_error, rel=1e-6)
     assert force_error(inverse, model, values | {"inertia": 2.0 * values["inertia"]}) > 2.0 * own
 
 
@@ -317,7 +319,7 @@ def test_the_doctor_says_when_the_torque_acted(logs: Any) -> None:
 def test_ringing_is_not_explained_half_a_cycle_late_by_an_inertia_below_0(logs: Any) -> None:
     """Tuning steps with cogging: a skew of 5 rows made J -0.3 of the truth, Fc half as high again."""
     log = logs.draw(140636, "mean", 500, "pid", "steps", "cogging")
-    found = regress_axis([trial(log)], AXIS)
+    found = regress_axis([experiment(log)], AXIS)
     assert abs(found.numbers["skew"].value - log.truth["skew"]) < 0.5 * found.period
     assert found.numbers["inertia"].value == pytest.approx(log.truth["inertia"], rel=0.2)
 
@@ -342,7 +344,7 @@ def test_a_torque_that_cancels_within_every_stroke_leaves_level_and_slope_certai
     ripple = 0.1 * np.sin(23.0 * turn * t) * np.sign(speed) + 0.01 * np.random.default_rng(0).standard_normal(
         t.size
     )
-    made = Trial("made", t, position, 1e-3 * acceleration + friction + 0.1 + ripple)
+    made = Experiment("made", t, position, 1e-3 * acceleration + friction + 0.1 + ripple)
     found = regress_axis([made], AXIS, harmonics=False).numbers["fc"]
     assert found.value == pytest.approx(1.0, abs=0.02)
     assert 0.005 < found.std < 0.1  # 40 strokes say the same, each to a few hundredths
@@ -350,26 +352,26 @@ def test_a_torque_that_cancels_within_every_stroke_leaves_level_and_slope_certai
 
 def test_friction_is_not_believed_where_the_axis_does_not_follow(logs: Any) -> None:
     log = logs.draw(140118, "held", 500, "feedforward", "steps", "flexible")
-    found = regress_axis([trial(log)], AXIS)
+    found = regress_axis([experiment(log)], AXIS)
     assert "does not follow" in found.doubt
-    result = identify_axis([trial(log)], AXIS, ["coulomb"])
+    result = identify_axis([experiment(log)], AXIS, ["coulomb"])
     assert not result["fc"].identified
-    calm = regress_axis([trial(logs.draw(4, "held", 1000, "p-pi", "production", "clean"))], AXIS)
+    calm = regress_axis([experiment(logs.draw(4, "held", 1000, "p-pi", "production", "clean"))], AXIS)
     assert calm.doubt == ""
 
 
 def test_a_level_that_friction_has_not_fallen_to_is_not_identified(logs: Any) -> None:
     """A sine no faster than twice the Stribeck velocity: viscous friction is a fortieth of the level."""
     slow = logs.draw(230005, "held", 1000, "p-pi", "sine", "clean")
-    found = regress_axis([trial(slow)], AXIS)
+    found = regress_axis([experiment(slow)], AXIS)
     assert abs(found.numbers["fc"].value / slow.truth["fc"] - 1.0) > 0.1
     low, high = found.interval("fc")
     assert low < slow.truth["fc"] < high < 2.0 * low
     assert found.level_doubt.startswith("extrapolated")
-    level = identify_axis([trial(slow)], AXIS, ["coulomb"])["fc"]
+    level = identify_axis([experiment(slow)], AXIS, ["coulomb"])["fc"]
     assert not level.identified
     assert level.verdict == found.level_doubt
-    fast = regress_axis([trial(logs.draw(4, "held", 1000, "p-pi", "production", "clean"))], AXIS)
+    fast = regress_axis([experiment(logs.draw(4, "held", 1000, "p-pi", "production", "clean"))], AXIS)
     assert fast.level_doubt == ""
 
 
@@ -377,7 +379,7 @@ def test_play_that_opens_while_the_drive_brakes_does_not_move_friction(logs: Any
     """The load runs ahead through the gap, meets the other flank and rebounds: in a short window J dv/dt is not the
     torque that accelerates, and Fc came out 29 % too low with an interval of 14 %."""
     log = logs.draw(410422, "actual", 500, "p-pi", "production", "backlash")
-    found = regress_axis([trial(log)], AXIS)
+    found = regress_axis([experiment(log)], AXIS)
     assert found.widened > 1.0
     for name in NAMES:
         low, high = found.interval(name)
@@ -396,7 +398,7 @@ def test_play_that_opens_while_the_drive_brakes_does_not_move_friction(logs: Any
     ],
 )
 def test_windows_are_no_wider_than_noise_asks_where_that_shows_no_more(logs: Any, cell: Any) -> None:
-    found = regress_axis([trial(logs.draw(*cell))], AXIS)
+    found = regress_axis([experiment(logs.draw(*cell))], AXIS)
     assert found.widened == 1.0
     assert on_width(found) == []
     assert found.numbers["inertia"].value == pytest.approx(

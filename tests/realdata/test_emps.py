@@ -12,8 +12,8 @@ import pytest
 
 from stickslip.identify.axis.loop_check import doubted_loops
 from stickslip.identify.axis.output import output_error
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.inverse import inverse_dynamics
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.plugins import law
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
@@ -31,7 +31,7 @@ PUBLISHED = {
 
 
 @pytest.fixture(scope="module")
-def emps() -> tuple[Trial, ServoAxis]:
+def emps() -> tuple[Experiment, ServoAxis]:
     from scipy.io import loadmat
 
     data: Any = loadmat(FILE)
@@ -39,29 +39,29 @@ def emps() -> tuple[Trial, ServoAxis]:
     kp, kv, gain = (float(data[k].item()) for k in ("kp", "kv", "gtau"))
     loop = Loop(kp=kv * kp, kd=kv, limit=10.0, velocity_span=2)
     axis = ServoAxis(motion="linear", drive_gain=gain, drive_side="load")
-    return Trial("emps", t, q, u, "voltage", r, loop), axis
+    return Experiment("emps", t, q, u, "voltage", r, loop), axis
 
 
-def test_the_loop_makes_the_recorded_voltage(emps: tuple[Trial, ServoAxis]) -> None:
-    trial, _ = emps
-    assert trial.loop is not None
-    assert trial.reference is not None
-    assert trial.drive is not None
-    made = control_signal(trial.loop, trial.time, trial.reference, trial.position)
-    assert np.sqrt(np.mean((made - trial.drive)[3:] ** 2)) < 4.7e-3
+def test_the_loop_makes_the_recorded_voltage(emps: tuple[Experiment, ServoAxis]) -> None:
+    experiment, _ = emps
+    assert experiment.loop is not None
+    assert experiment.reference is not None
+    assert experiment.drive is not None
+    made = control_signal(experiment.loop, experiment.time, experiment.reference, experiment.position)
+    assert np.sqrt(np.mean((made - experiment.drive)[3:] ** 2)) < 4.7e-3
 
 
-def test_its_gains_are_not_doubted_and_wrong_ones_are(emps: tuple[Trial, ServoAxis]) -> None:
-    trial, _ = emps
-    assert trial.loop is not None
-    assert doubted_loops([trial]) == []
-    (said,) = doubted_loops([replace(trial, loop=replace(trial.loop, kd=2.0 * trial.loop.kd))])
+def test_its_gains_are_not_doubted_and_wrong_ones_are(emps: tuple[Experiment, ServoAxis]) -> None:
+    experiment, _ = emps
+    assert experiment.loop is not None
+    assert doubted_loops([experiment]) == []
+    (said,) = doubted_loops([replace(experiment, loop=replace(experiment.loop, kd=2.0 * experiment.loop.kd))])
     assert "kd 486.9 given, 243.4" in said
 
 
-def test_inverse_dynamics_gives_the_published_parameters(emps: tuple[Trial, ServoAxis]) -> None:
-    trial, axis = emps
-    found = inverse_dynamics([trial], axis)
+def test_inverse_dynamics_gives_the_published_parameters(emps: tuple[Experiment, ServoAxis]) -> None:
+    experiment, axis = emps
+    found = inverse_dynamics([experiment], axis)
     for name, (value, spread) in PUBLISHED.items():
         place = found.names.index(name)
         assert abs(found.values[place] - value) < spread
@@ -72,9 +72,9 @@ def test_inverse_dynamics_gives_the_published_parameters(emps: tuple[Trial, Serv
     assert found.units == ("kg", "N·s/m", "N", "N")
 
 
-def test_friction_per_direction(emps: tuple[Trial, ServoAxis]) -> None:
-    trial, axis = emps
-    found = inverse_dynamics([trial], axis, per_direction=True)
+def test_friction_per_direction(emps: tuple[Experiment, ServoAxis]) -> None:
+    experiment, axis = emps
+    found = inverse_dynamics([experiment], axis, per_direction=True)
     assert found.relative_error <= 0.0320
     published = {
         "inertia": 95.154,
@@ -87,9 +87,9 @@ def test_friction_per_direction(emps: tuple[Trial, ServoAxis]) -> None:
         assert found[name] == pytest.approx(value, rel=2e-3)
 
 
-def test_closed_loop_output_error(emps: tuple[Trial, ServoAxis]) -> None:
-    trial, axis = emps
-    found = output_error([trial], axis, law("coulomb"), inverse_dynamics([trial], axis))
+def test_closed_loop_output_error(emps: tuple[Experiment, ServoAxis]) -> None:
+    experiment, axis = emps
+    found = output_error([experiment], axis, law("coulomb"), inverse_dynamics([experiment], axis))
     assert found.errors["position_relative"] < 3e-5
     assert found.errors["drive_relative"] <= 0.048
     assert found.mechanics.inertia == pytest.approx(95.1, rel=0.01)

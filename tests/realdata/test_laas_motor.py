@@ -12,8 +12,8 @@ from stickslip.errors import InputError
 from stickslip.identify.axis.over_angle import over_angle
 from stickslip.identify.cogging import identify_cogging
 from stickslip.identify.cogging.moving import in_motion
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.regression import regress_axis
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 
@@ -112,6 +112,6 @@ def test_motion_without_slow_rows_gives_an_axis_no_map():
     axis = ServoAxis(drive_side="load")
     for name, why in (("acceleration", "neither fitted nor applied"), ("speed_a", "a revolution each way")):
         _, table = read(name)
-        trial = Trial(name, table["t_s"] - table["t_s"][0], table["theta_rad"], table["iq_A"])
+        experiment = Experiment(name, table["t_s"] - table["t_s"][0], table["theta_rad"], table["iq_A"])
         with pytest.raises(InputError, match=why):
-            over_angle([trial], axis, None, regress_axis)
+            over_angle([experiment], axis, None, regress_axis)

@@ -27,7 +27,7 @@ def example() -> Any:
 
 @pytest.mark.slow
 def test_position_error_with_one_law_for_all_records(example: Any) -> None:
-    trials = [example.trial(p) for p in sorted(DATA.glob("kp*.json"))]
-    assert len(trials) == 12
-    found = example.identify(trials, "coulomb")
-    assert example.mean_absolute(found, trials) <= 0.046
+    experiments = [example.experiment(p) for p in sorted(DATA.glob("kp*.json"))]
+    assert len(experiments) == 12
+    found = example.identify(experiments, "coulomb")
+    assert example.mean_absolute(found, experiments) <= 0.046

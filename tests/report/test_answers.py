@@ -17,7 +17,7 @@ from stickslip.cli._identified import show
 from stickslip.finding import Finding
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.trial import Trial
+from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 from stickslip.report.answers import answers_of, counts_of, lacking, meaning_of, one_number_each
@@ -51,8 +51,8 @@ def log() -> Record:
 @cache
 def identified() -> Identification:
     record = log()
-    trial = Trial("log.csv", record.time, record["position"], record["motor_torque"])
-    return identify_axis([trial], ServoAxis(drive_side="load"), ["coulomb"])
+    experiment = Experiment("log.csv", record.time, record["position"], record["motor_torque"])
+    return identify_axis([experiment], ServoAxis(drive_side="load"), ["coulomb"])
 
 
 def test_the_torque_of_the_model_is_compared_where_the_axis_slides_and_when_it_acted() -> None:

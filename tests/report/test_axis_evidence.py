@@ -12,8 +12,8 @@ import pytest
 from stickslip import Model
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Identification
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.inverse import inverse_dynamics
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.report.axis_evidence import beside, judgements, measured_friction, slow_rows
 from stickslip.report.axis_pictures import pictures_of
@@ -31,7 +31,7 @@ def steady(v: Any) -> Any:
 
 
 @cache
-def record(law: str = "stribeck") -> Trial:
+def record(law: str = "stribeck") -> Experiment:
     """Levels of velocity in both directions, counted, with white noise of the torque."""
     friction = (
         Model("stribeck", k=100.0, **TRUTH) if law == "stribeck" else Model("coulomb", fc=0.2, sigma2=0.01)
@@ -43,7 +43,7 @@ def record(law: str = "stribeck") -> Trial:
     drive = Drive(time, reference, "feedback", LOOP, max_step=1e-4)
     out = drive_axis(Mechanics(8e-4, offset=0.02), friction, drive)
     noise = 2e-3 * np.random.default_rng(0).standard_normal(time.size)
-    return Trial(
+    return Experiment(
         "log.csv", time, COUNT * np.round(out[:, 0] / COUNT), out[:, 2] + noise, "torque", reference, LOOP
     )
 
@@ -73,7 +73,7 @@ def test_the_slow_motion_is_where_the_axis_moves_least_but_moves() -> None:
     assert 12 * COUNT < np.ptp(shown) < 0.2
     assert slow_rows(record().until(1000)) is None
     time = 1e-3 * np.arange(4000)
-    assert slow_rows(Trial("even", time, 3.0 * time, 0.0 * time)) is None
+    assert slow_rows(Experiment("even", time, 3.0 * time, 0.0 * time)) is None
 
 
 def test_misfits_are_judged_beside_the_noise() -> None:

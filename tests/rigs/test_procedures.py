@@ -12,10 +12,10 @@ import pytest
 
 from stickslip.cli import main
 from stickslip.errors import InputError, UnknownName
+from stickslip.identify.experiment import experiment_of
 from stickslip.identify.presliding.breakaway import find_breaks
 from stickslip.identify.response.inertia import inertia
 from stickslip.identify.sliding.segments import sliding_points
-from stickslip.identify.trial import trial_of
 from stickslip.machines.files import machine
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
@@ -72,14 +72,14 @@ def test_every_procedure_keeps_to_its_plan_and_passes_its_checks(name, where, tm
 def test_inertia_is_recovered(where):
     result = run("inertia", virtual_rig(where))
     axis = ServoAxis()
-    found = inertia([trial_of(result.part(label), axis) for label, *_ in result.segments], axis)
+    found = inertia([experiment_of(result.part(label), axis) for label, *_ in result.segments], axis)
     assert found["inertia"].value == pytest.approx(4.2757e-4, rel=0.03)
 
 
 def test_the_response_shows_the_modes_of_the_machine_and_no_others():
     """The encoder's mount (85 Hz, 4.2) and the shaft (308 Hz, as `machines/library/thesis-dry.toml` says)."""
     result = run("inertia", virtual_rig("thesis-dry"), band="400", current="1.6")
-    records = [trial_of(result.part(label), ServoAxis()) for label, *_ in result.segments]
+    records = [experiment_of(result.part(label), ServoAxis()) for label, *_ in result.segments]
     assert inertia(records, ServoAxis()).details["resonances"] == pytest.approx([85.0, 308.0], rel=0.02)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip import Model, Record
-from stickslip.identify.trial import Trial
+from stickslip.identify.experiment import Experiment
 from stickslip.plugins import law
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
@@ -50,7 +50,7 @@ def wanted(time: Any, seed: int) -> Any:
     )
 
 
-def trial(
+def experiment(
     name: str,
     seed: int = 0,
     seconds: float = 6.0,
@@ -58,7 +58,7 @@ def trial(
     noise: float = 0.01,
     drift: float = 0.0,
     **mechanics: Any,
-) -> Trial:
+) -> Experiment:
     """One record; `noise` is the standard deviation of a torque with a time constant of 5 ms, N·m."""
     time = np.arange(0.0, seconds, 1e-3) + 0.0
     rng = np.random.default_rng(1000 + seed)
@@ -73,11 +73,11 @@ def trial(
     drive = Drive(time, reference, "feedback", loop, disturbance=push, max_step=1e-4)
     out = drive_axis(Mechanics(INERTIA, offset=offset, **mechanics), model(name), drive)
     position = COUNT * np.round(out[:, 0] / COUNT)
-    return Trial(f"{name} {seed}", time, position, out[:, 2], "torque", reference, LOOP)
+    return Experiment(f"{name} {seed}", time, position, out[:, 2], "torque", reference, LOOP)
 
 
 def record(name: str, seed: int = 0, **options: Any) -> Record:
-    t = trial(name, seed, **options)
+    t = experiment(name, seed, **options)
     assert t.drive is not None
     assert t.reference is not None
     return Record(

@@ -23,7 +23,7 @@ LOOP = {"kp": 8.0, "kd": 0.08, "kr": 0.08, "limit": 3.0}
 @pytest.fixture(scope="module")
 def signals() -> dict[str, np.ndarray]:
     """An axis of known friction, as its numbers are in the file too."""
-    t = cases.trial("coulomb", noise=2e-3)
+    t = cases.experiment("coulomb", noise=2e-3)
     columns = {"t": t.time, "position": t.position, "torque": t.drive, "reference": t.reference}
     return {name: np.array([float(f"{x:.9f}") for x in values]) for name, values in columns.items()}
 

@@ -29,6 +29,7 @@ from stickslip.commission.stiffness import joined_model, resolved, with_lag, wit
 from stickslip.errors import InputError, LimitCrossed
 from stickslip.identify.cogging import identify_cogging
 from stickslip.identify.estimate import Identification
+from stickslip.identify.experiment import experiment_of
 from stickslip.identify.presliding.breakaway import WINDOW, identify_breakaway
 from stickslip.identify.presliding.hysteresis import Loop as Hysteresis
 from stickslip.identify.presliding.lugre_dynamics import Response, identify_lugre_dynamics
@@ -37,7 +38,6 @@ from stickslip.identify.response.drivetrain import fit_drivetrain, identified_dr
 from stickslip.identify.response.inertia import inertia
 from stickslip.identify.response.nyquist import fastest_pd
 from stickslip.identify.sliding.position_dependence import identify_angle
-from stickslip.identify.trial import trial_of
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
@@ -248,7 +248,7 @@ def _inertia(course: _Course, duration: float) -> tuple[float, float, float]:
     """Inertia, and the speed and the mean torque with which the axis ran."""
     done = course.run(Inertia(duration=duration))
     axis = ServoAxis()
-    found = inertia([trial_of(done.part(label), axis, name=label) for label, *_ in done.segments], axis)
+    found = inertia([experiment_of(done.part(label), axis, name=label) for label, *_ in done.segments], axis)
     course.add("inertia", done, found)
     running = float(np.max(done.record["velocity_reference"])), float(np.mean(done.record["motor_torque"]))
     return found["inertia"].value, running[0], abs(running[1])

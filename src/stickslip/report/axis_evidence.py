@@ -12,9 +12,9 @@ import numpy as np
 from stickslip.identify.axis.loop_check import position_noise
 from stickslip.identify.axis.search import FittedAxis
 from stickslip.identify.estimate import Identification
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.noise import white_std
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.trial import Trial
 from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
@@ -85,17 +85,19 @@ def measured_friction(inverse: InverseDynamics, mechanics: Mechanics | None) -> 
 # ---- the slow motion ------------------------------------------------------------------------------------------------
 
 
-def slow_rows(trial: Trial) -> slice | None:
+def slow_rows(experiment: Experiment) -> slice | None:
     """Rows of a fifteenth of a record in which the axis moves least, but some steps of its encoder and a thousandth of
     its way; None where it moves as much everywhere, or the record is short."""
-    length = trial.time.size // WINDOW
+    length = experiment.time.size // WINDOW
     if length < 100:
         return None
-    whole = float(np.ptp(trial.position))
-    least = max(STEPS * encoder_step(trial.position), 1e-3 * whole)
-    begins = range(0, trial.time.size - length, max(length // 4, 1))
+    whole = float(np.ptp(experiment.position))
+    least = max(STEPS * encoder_step(experiment.position), 1e-3 * whole)
+    begins = range(0, experiment.time.size - length, max(length // 4, 1))
     ways = {
-        b: float(np.ptp(trial.position[b : b + length])) for b in begins if trial.rows[b : b + length].all()
+        b: float(np.ptp(experiment.position[b : b + length]))
+        for b in begins
+        if experiment.rows[b : b + length].all()
     }
     moving = {b: w for b, w in ways.items() if w > least}
     if not moving:
@@ -114,16 +116,18 @@ def judgements(found: Identification) -> dict[str, str]:
     output, inverse = found.details.get("output"), found.details.get("inverse")
     out: dict[str, str] = {}
     if isinstance(output, FittedAxis):
-        trials = output.problem.trials
-        noise = {"position": levels([position_noise(t.position) for t in trials])}
+        experiments = output.problem.experiments
+        noise = {"position": levels([position_noise(t.position) for t in experiments])}
         if "drive" in output.problem.signals:
-            noise["drive"] = levels([white_std(t.signal()) for t in trials])
-        what = {"position": "the encoder's rounding" if has_encoder(trials) else "the noise of the position"}
+            noise["drive"] = levels([white_std(t.signal()) for t in experiments])
+        what = {
+            "position": "the encoder's rounding" if has_encoder(experiments) else "the noise of the position"
+        }
         for signal, level in noise.items():
             rms = float(found.misfit.get(f"{signal}_rms", math.nan))
             out[f"{signal}_relative"] = beside(rms, level, what.get(signal, "the noise of the signal"))
         told = out["position_relative"]
-        if told and not told.startswith("good") and not all(t.closed_loop for t in trials):
+        if told and not told.startswith("good") and not all(t.closed_loop for t in experiments):
             out["position_relative"] = f"{told}: the recorded torque alone lets it drift (--loop holds it)"
         if inverse is not None:
             # Its filters round every reversal: even the true axis leaves some per cent.
@@ -139,9 +143,9 @@ def beside(rms: float, level: float, what: str) -> str:
     return f"good: at {what}" if times <= GOOD else f"{float(f'{times:.2g}'):g} times {what}"
 
 
-def has_encoder(trials: Sequence[Trial]) -> bool:
+def has_encoder(experiments: Sequence[Experiment]) -> bool:
     """Whether every position moves in steps."""
-    return all(encoder_step(t.position) > 0.0 for t in trials)
+    return all(encoder_step(t.position) > 0.0 for t in experiments)
 
 
 def levels(each: Sequence[float]) -> float:

@@ -98,7 +98,7 @@ def pictures_of(
 def tells(found: Identification, output: FittedAxis, sliding: Sliding | None) -> bool:
     """Whether the simulation's position says how good the model is: driven by the recorded torque alone it drifts."""
     minimised = "prediction" not in found.details and not (sliding is not None and sliding.certain)
-    return minimised or all(t.closed_loop for t in output.problem.trials)
+    return minimised or all(t.closed_loop for t in output.problem.experiments)
 
 
 def torque_pictures(found: Identification, sliding: Sliding) -> list[Picture]:
@@ -137,15 +137,15 @@ def fits(output: FittedAxis) -> list[Picture]:
     out: list[Picture] = []
     problem = output.problem
     runs = problem.simulated(output.u) or []
-    for place, (run, trial) in enumerate(zip(runs[:SHOWN], problem.trials[:SHOWN], strict=True)):
+    for place, (run, experiment) in enumerate(zip(runs[:SHOWN], problem.experiments[:SHOWN], strict=True)):
         for signal in problem.signals:
-            seen, simulated = measured(trial, signal), run[:, PLACE[signal]]
-            off = float(np.sqrt(np.mean((simulated - seen)[trial.rows] ** 2)))
+            seen, simulated = measured(experiment, signal), run[:, PLACE[signal]]
+            off = float(np.sqrt(np.mean((simulated - seen)[experiment.rows] ** 2)))
             unit = problem.units[signal]
             out.append(Picture(
-                f"fit-{place + 1}-{signal}", f"{Path(trial.name).name}: {signal}, measured and simulated",
+                f"fit-{place + 1}-{signal}", f"{Path(experiment.name).name}: {signal}, measured and simulated",
                 f"Root mean square of the difference: {quantity(off, unit)}", "time (s)", f"{signal} ({unit})",
-                (over_time("measured", trial.time, seen), over_time("simulated", trial.time, simulated)),
+                (over_time("measured", experiment.time, seen), over_time("simulated", experiment.time, simulated)),
             ))  # fmt: skip
     return [*out, *close_up(output, runs)]
 
@@ -154,17 +154,17 @@ def close_up(output: FittedAxis, runs: Sequence[Array]) -> list[Picture]:
     """The slow motion of the first record: in pictures of all of it, friction's part is a line's width."""
     out: list[Picture] = []
     problem = output.problem
-    trial = problem.trials[0]
-    rows = slow_rows(trial)
+    experiment = problem.experiments[0]
+    rows = slow_rows(experiment)
     if rows is None or not runs:
         return out
-    time = trial.time[rows]
+    time = experiment.time[rows]
     for signal in problem.signals:
-        seen, simulated = measured(trial, signal)[rows], runs[0][rows, PLACE[signal]]
+        seen, simulated = measured(experiment, signal)[rows], runs[0][rows, PLACE[signal]]
         off = float(np.sqrt(np.mean((simulated - seen) ** 2)))
         unit = problem.units[signal]
         out.append(Picture(
-            f"slow-{signal}", f"{Path(trial.name).name}: {signal} in slow motion, measured and simulated",
+            f"slow-{signal}", f"{Path(experiment.name).name}: {signal} in slow motion, measured and simulated",
             f"Root mean square of the difference here: {quantity(off, unit)}", "time (s)", f"{signal} ({unit})",
             (over_time("measured", time, seen), over_time("simulated", time, simulated)),
         ))  # fmt: skip
@@ -175,14 +175,15 @@ def output_residuals(output: FittedAxis) -> list[Picture]:
     """Residuals of every signal over position, velocity and time."""
     problem = output.problem
     runs = problem.simulated(output.u) or []
-    position = np.concatenate([t.position[t.rows] for t in problem.trials])
-    velocity = np.concatenate([run[:, 1][t.rows] for run, t in zip(runs, problem.trials, strict=True)])
-    time = np.concatenate([(t.time - t.time[0])[t.rows] for t in problem.trials])
+    position = np.concatenate([t.position[t.rows] for t in problem.experiments])
+    velocity = np.concatenate([run[:, 1][t.rows] for run, t in zip(runs, problem.experiments, strict=True)])
+    time = np.concatenate([(t.time - t.time[0])[t.rows] for t in problem.experiments])
     out: list[Picture] = []
     axis = problem.axis
     for signal in problem.signals:
         rest = np.concatenate([
-            (run[:, PLACE[signal]] - measured(t, signal))[t.rows] for run, t in zip(runs, problem.trials, strict=True)
+            (run[:, PLACE[signal]] - measured(t, signal))[t.rows]
+            for run, t in zip(runs, problem.experiments, strict=True)
         ])  # fmt: skip
         label = f"simulated minus measured {signal} ({problem.units[signal]})"
         out += residuals(

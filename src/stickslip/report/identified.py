@@ -171,7 +171,7 @@ def headed(pictures: Sequence[Picture], rest: Sequence[Picture]) -> tuple[list[P
 def open_loop(found: Identification) -> bool:
     """Whether misfits of a position are those of a simulation that the recorded torque alone drives."""
     output = found.details.get("output")
-    return isinstance(output, FittedAxis) and not all(t.closed_loop for t in output.problem.trials)
+    return isinstance(output, FittedAxis) and not all(t.closed_loop for t in output.problem.experiments)
 
 
 def tally(found: Identification, sources: Sequence[Source]) -> list[dict[str, Any]]:

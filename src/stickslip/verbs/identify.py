@@ -14,11 +14,11 @@ from stickslip import plugins
 from stickslip.errors import InputError
 from stickslip.identify.doctor import Diagnosis, examine
 from stickslip.identify.estimate import Identification, silent
+from stickslip.identify.experiment import DRIVES
 from stickslip.identify.methods import method_named
 from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.on_a_line import along_a_line
 from stickslip.identify.regression.regressions import Regress, Regressions
-from stickslip.identify.trial import DRIVES
 from stickslip.model import Model
 from stickslip.readers.cut import file_rows, pieces
 from stickslip.record import Record

@@ -17,6 +17,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.estimate import Estimate
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.uncertainty import RATIO, verdict_on
@@ -24,7 +25,6 @@ from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import QUANTILE, Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
 from stickslip.identify.regression.strokes import stacked
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 
 __all__ = [
@@ -62,25 +62,25 @@ UNDECIDED = (
 
 
 def regressed(
-    trials: Sequence[Trial], axis: ServoAxis, skew: float | None, harmonic_period: float | None = None,
+    experiments: Sequence[Experiment], axis: ServoAxis, skew: float | None, harmonic_period: float | None = None,
     regress: Regress = regress_axis,
 ) -> tuple[Regression | None, list[str]]:  # fmt: skip
     """The regression on certain sliding, where the records allow it; else why they do not."""
-    if any(t.drive is None for t in trials):
+    if any(t.drive is None for t in experiments):
         return None, []
     try:
-        return regress(trials, axis, skew=skew, harmonic_period=harmonic_period), []
+        return regress(experiments, axis, skew=skew, harmonic_period=harmonic_period), []
     except InputError as error:
         return None, [f"No regression on certain sliding: {error}."]
 
 
-def aligned(trials: Sequence[Trial], found: Regression | None) -> list[Trial]:
-    """The trials, their drive's signal moved so that it acts from its row to the next, as simulations take it."""
+def aligned(experiments: Sequence[Experiment], found: Regression | None) -> list[Experiment]:
+    """The experiments, their drive's signal moved so that it acts from its row to the next, as simulations take it."""
     if found is None:
-        return list(trials)
+        return list(experiments)
     skew = found.numbers["skew"]
-    out: list[Trial] = []
-    for t in trials:
+    out: list[Experiment] = []
+    for t in experiments:
         late = skew.value + 0.5 * t.period
         if t.drive is None or abs(late) <= ALIGNED * t.period or QUANTILE * skew.std > KNOWN * t.period:
             out.append(t)

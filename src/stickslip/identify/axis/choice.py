@@ -18,13 +18,13 @@ from stickslip.errors import InputError
 from stickslip.identify.axis.prediction import motion_of, searched, watched
 from stickslip.identify.axis.search import errors_of, fitted_axis
 from stickslip.identify.estimate import silent
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import feasible
 from stickslip.identify.fit.parallel import mapped
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.observer.innovations import BAND, FIRST, Criterion, robust_std
 from stickslip.identify.observer.observer import Motion, Prepared, prepare
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
@@ -71,14 +71,14 @@ class Candidate:
 
 
 def foreseen(
-    fitted: Sequence[Trial], held: Sequence[Trial], axis: ServoAxis, laws: Sequence[Law],
+    fitted: Sequence[Experiment], held: Sequence[Experiment], axis: ServoAxis, laws: Sequence[Law],
     inverse: InverseDynamics, options: Mapping[str, Any], progress: Callable[[str], None] = silent,
 ) -> list[Candidate]:  # fmt: skip
     """Fit every law by the prediction error and look at the torque that it lacks on the held-out data.
 
     Parameters
     ----------
-    fitted, held : sequence of Trial
+    fitted, held : sequence of Experiment
         With the drive's signal; of those held out only the rows that count are judged.
     axis : ServoAxis
     laws : sequence of Law
@@ -130,7 +130,7 @@ def foreseen_by(
     criterion: Criterion,
     u: Array,
     weights: Criterion,
-    held: Sequence[Trial],
+    held: Sequence[Experiment],
     motions: Sequence[Motion],
     friction: float,
 ) -> Candidate:
@@ -155,15 +155,18 @@ def failed(law: Law, why: str) -> Candidate:
     return Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), {}, why)
 
 
-def lacking(criterion: Criterion, record: Prepared, u: Array, trial: Trial) -> Array:
-    """Squares of the corrections of one trial in scales, outliers weighed, in the rows that count."""
+def lacking(criterion: Criterion, record: Prepared, u: Array, experiment: Experiment) -> Array:
+    """Squares of the corrections of one experiment in scales, outliers weighed, in the rows that count."""
     time = record.course.drive.time[record.edge : -record.edge : record.stride]
-    used = np.interp(time[criterion.whitening.size - 1 :], trial.time, trial.rows.astype(np.float64)) > 0.5
+    used = (
+        np.interp(time[criterion.whitening.size - 1 :], experiment.time, experiment.rows.astype(np.float64))
+        > 0.5
+    )
     return replace(criterion, records=[record]).residuals(u)[used] ** 2
 
 
 def compared(
-    fitted: Sequence[Trial], held: Sequence[Trial], axis: ServoAxis, laws: Sequence[Law],
+    fitted: Sequence[Experiment], held: Sequence[Experiment], axis: ServoAxis, laws: Sequence[Law],
     inverse: InverseDynamics | None, options: Mapping[str, Any], progress: Callable[[str], None] = silent,
 ) -> list[Candidate]:  # fmt: skip
     """Fit every law and look at what it says about the held-out data."""

@@ -37,10 +37,10 @@ from stickslip.identify.axis.output import output_error
 from stickslip.identify.axis.result import assembled, narrow_note, noted
 from stickslip.identify.axis.search import Extras, require_start
 from stickslip.identify.estimate import Identification, silent
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
 from stickslip.identify.regression.regression import Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
 
@@ -64,11 +64,11 @@ HELD_OUT = 0.3
 
 
 def identify_axis(
-    trials: Sequence[Trial],
+    experiments: Sequence[Experiment],
     axis: ServoAxis,
     laws: Sequence[str | Law] = AUTOMATIC,
     *,
-    validation: Sequence[Trial] = (),
+    validation: Sequence[Experiment] = (),
     free: Sequence[str] = (),
     frozen: Sequence[str] = (),
     values: Mapping[str, Any] | None = None,
@@ -85,13 +85,13 @@ def identify_axis(
 
     Parameters
     ----------
-    trials : sequence of Trial
+    experiments : sequence of Experiment
         Fitted together.
     axis : ServoAxis
     laws : sequence of str or Law
         Names, paths of law files, or laws. Of several, the one with the fewest parameters is taken whose held-out
         error lies within one standard error of the best (Hastie, Tibshirani and Friedman 2009, 7.10).
-    validation : sequence of Trial
+    validation : sequence of Experiment
         Held out. Without any, and with several laws, the last 30 % of every record are held out for the choice
         (the first, where the end is half as fast again as all before), and the chosen law is then fitted to all.
     free, frozen, values, extras
@@ -136,10 +136,10 @@ def identify_axis(
     options: dict[str, Any] = {
         "free": free, "frozen": frozen, "values": values, "extras": extras, "robust": robust
     }  # fmt: skip
-    refuse_harmonics(trials, extras.harmonics + extras.friction_harmonics, simulated=True)
-    evidence, notes = looked_at(trials, validation, axis, extras, skew, per_direction, regress)
+    refuse_harmonics(experiments, extras.harmonics + extras.friction_harmonics, simulated=True)
+    evidence, notes = looked_at(experiments, validation, axis, extras, skew, per_direction, regress)
     if evidence.inverse is None:
-        require_start(evidence.trials, axis, tried, dict(values or {}), extras)
+        require_start(evidence.experiments, axis, tried, dict(values or {}), extras)
     if per_direction or not plain_axis(extras, free, values):
         evidence = replace(evidence, sliding=None)
     automatic = tuple(laws) == AUTOMATIC
@@ -164,7 +164,7 @@ def identify_axis(
             return found
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."
-    result = output_error(evidence.trials, axis, chosen, evidence.inverse, profiles=profiles, **own)
+    result = output_error(evidence.experiments, axis, chosen, evidence.inverse, profiles=profiles, **own)
     found = assembled(
         result, result.estimates, result.fit.correlation, evidence.inverse, evidence.validation,
         evidence.candidates, notes,
@@ -173,18 +173,18 @@ def identify_axis(
 
 
 def looked_at(
-    trials: Sequence[Trial], validation: Sequence[Trial], axis: ServoAxis, extras: Extras, skew: float | None,
-    per_direction: bool, regress: Regress,
+    experiments: Sequence[Experiment], validation: Sequence[Experiment], axis: ServoAxis, extras: Extras,
+    skew: float | None, per_direction: bool, regress: Regress,
 ) -> tuple[Evidence, list[str]]:  # fmt: skip
     """What the regressions tell, the torque of every record moved to where it acted; and what is to be said."""
     # A turn is what the regression takes where no period is given: so the doctor has asked before.
     period = None if extras.harmonic_period == Extras().harmonic_period else extras.harmonic_period
-    sliding, notes = regressed(trials, axis, skew, period, regress)
-    trials, validation = aligned(trials, sliding), aligned(validation, sliding)
-    inverse, more = first_look(trials, axis, extras, per_direction)
-    unchecked = sliding is None and all(t.drive is not None for t in trials)
+    sliding, notes = regressed(experiments, axis, skew, period, regress)
+    experiments, validation = aligned(experiments, sliding), aligned(validation, sliding)
+    inverse, more = first_look(experiments, axis, extras, per_direction)
+    unchecked = sliding is None and all(t.drive is not None for t in experiments)
     said = [*(on_timing(sliding) if skew is None else []), *on_width(sliding), *notes, *more]
-    return Evidence(trials, validation, axis, inverse, sliding, unchecked), said
+    return Evidence(experiments, validation, axis, inverse, sliding, unchecked), said
 
 
 def shortlist(laws: Sequence[Law], sliding: Regression | None) -> list[Law]:
@@ -218,7 +218,7 @@ def judged_laws(
 ) -> tuple[list[Candidate], list[str]]:
     """The laws judged as the chosen one will be fitted; and what is to be said where that could not be."""
     axis, inverse = evidence.axis, evidence.inverse
-    fitted, held = held_out(evidence.trials, evidence.validation)
+    fitted, held = held_out(evidence.experiments, evidence.validation)
     said: list[str] = []
     if intervals == "prediction" and inverse is not None:
         try:
@@ -236,27 +236,29 @@ def plain_axis(extras: Extras, free: Sequence[str], values: Mapping[str, Any] | 
     return not (extras.load or extras.friction_harmonics or more & {*free, *(values or {})})
 
 
-def held_out(trials: Sequence[Trial], validation: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
+def held_out(
+    experiments: Sequence[Experiment], validation: Sequence[Experiment]
+) -> tuple[list[Experiment], list[Experiment]]:
     """What laws are fitted to, and what they are compared on."""
     if validation:
-        return list(trials), list(validation)
-    pairs = [t.split(HELD_OUT) for t in trials]
+        return list(experiments), list(validation)
+    pairs = [t.split(HELD_OUT) for t in experiments]
     return [a for a, _ in pairs], [b for _, b in pairs]
 
 
 def first_look(
-    trials: Sequence[Trial], axis: ServoAxis, extras: Extras, per_direction: bool
+    experiments: Sequence[Experiment], axis: ServoAxis, extras: Extras, per_direction: bool
 ) -> tuple[InverseDynamics | None, list[str]]:
     """The inverse dynamics, where the records allow one."""
     try:
         found = inverse_dynamics(
-            trials, axis, harmonics=extras.harmonics, harmonic_period=extras.harmonic_period
+            experiments, axis, harmonics=extras.harmonics, harmonic_period=extras.harmonic_period
         )
     except InputError as error:
         return None, [f"No inverse dynamics: {error}"]
     notes: list[str] = []
     if per_direction:
-        each = inverse_dynamics(trials, axis, per_direction=True, harmonics=extras.harmonics)
+        each = inverse_dynamics(experiments, axis, per_direction=True, harmonics=extras.harmonics)
         notes.append(
             f"Per direction: Fc {each['fc_plus']:.4g} and {each['fc_minus']:.4g}, Fv {each['fv_plus']:.4g} and "
             f"{each['fv_minus']:.4g}; relative error {100 * each.relative_error:.2f} % instead of "

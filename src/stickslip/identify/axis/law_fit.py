@@ -30,10 +30,10 @@ from stickslip.identify.axis.result import assembled, evident, noted, untold_by_
 from stickslip.identify.axis.search import Extras, FittedAxis
 from stickslip.identify.axis.settled import ALIKE, settled
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
 
@@ -51,7 +51,7 @@ class Evidence:
 
     Attributes
     ----------
-    trials, validation : sequence of Trial
+    experiments, validation : sequence of Experiment
         Fitted, and held out; the torque where it acted.
     axis : ServoAxis
     inverse : InverseDynamics or None
@@ -64,8 +64,8 @@ class Evidence:
         The laws that were compared.
     """
 
-    trials: Sequence[Trial]
-    validation: Sequence[Trial]
+    experiments: Sequence[Experiment]
+    validation: Sequence[Experiment]
     axis: ServoAxis
     inverse: InverseDynamics | None
     sliding: Regression | None
@@ -105,11 +105,13 @@ def by_sliding(
     notes: Sequence[str],
 ) -> Identification:
     """An axis whose law certain sliding tells whole: nothing is left for a search."""
-    trials, axis = evidence.trials, evidence.axis
+    experiments, axis = evidence.experiments, evidence.axis
     given = dict(options["values"] or {})
-    model = starting_models(trials, law, inverse, given)[0]
+    model = starting_models(experiments, law, inverse, given)[0]
     extras: Extras = options["extras"]
-    vector, _ = laid_out(trials, axis, law, inverse, model, given, options["free"], options["frozen"], extras)
+    vector, _ = laid_out(
+        experiments, axis, law, inverse, model, given, options["free"], options["frozen"], extras
+    )
     level = abs(sliding.numbers["fc"].value)
     scale = {p.name: 1.0 if p.par.unit == "rad" else level for p in vector.free}
     start = vector.values(vector.start)
@@ -121,11 +123,11 @@ def by_sliding(
     ]
     estimates, said = agreed(first, sliding, vector, inverse, scale, fine=False)
     u = vector.coordinates(vector.named(vector.start) | {e.name: e.value for e in estimates})
-    estimates = evident(estimates, vector, u, trials, axis)
+    estimates = evident(estimates, vector, u, experiments, axis)
     estimates, more = settled(estimates, model, inverse, believed=as_good(inverse, sliding, ALIKE))
     estimates = with_level(estimates, sliding)
     u = vector.coordinates(vector.named(u) | {e.name: e.value for e in estimates})
-    found = with_values(trials, axis, law, vector, u, extras)
+    found = with_values(experiments, axis, law, vector, u, extras)
     shown = [replace(e, unit=axis.unit(e.unit)) for e in estimates]
     names, told = [e.name for e in shown], list(sliding.numbers)[:4]
     correlation = np.eye(len(names))
@@ -147,11 +149,16 @@ def by_sliding(
 
 
 def with_values(
-    trials: Sequence[Trial], axis: ServoAxis, law: Law, vector: Vector, u: Array, extras: Extras
+    experiments: Sequence[Experiment], axis: ServoAxis, law: Law, vector: Vector, u: Array, extras: Extras
 ) -> FittedAxis:
     """The axis with these values, ready to be simulated."""
     problem = Problem.of(
-        trials, axis, law, vector, inertia=vector.named(u)["inertia"], harmonic_period=extras.harmonic_period
+        experiments,
+        axis,
+        law,
+        vector,
+        inertia=vector.named(u)["inertia"],
+        harmonic_period=extras.harmonic_period,
     )
     return FittedAxis(problem.weighted(u).resolved(u), u)
 
@@ -160,9 +167,14 @@ def predicted(
     law: Law, options: Mapping[str, Any], evidence: Evidence, notes: Sequence[str]
 ) -> Identification:
     """Each number from the estimator that shows it, misfits of the simulation with these values."""
-    trials, axis, inverse, sliding = evidence.trials, evidence.axis, evidence.inverse, evidence.sliding
+    experiments, axis, inverse, sliding = (
+        evidence.experiments,
+        evidence.axis,
+        evidence.inverse,
+        evidence.sliding,
+    )
     given = {k: v for k, v in options.items() if k != "robust"}
-    result = axis_prediction(trials, axis, law, first=inverse, **given)
+    result = axis_prediction(experiments, axis, law, first=inverse, **given)
     estimates, u, said = result.estimates, result.u, list[str]()
     if sliding is not None:
         level = abs(sliding.numbers["fc"].value)
@@ -173,7 +185,7 @@ def predicted(
         u = result.vector.coordinates(
             result.vector.named(u) | {e.name: e.value for e in estimates if e.name in TOLD_BY_SLIDING}
         )
-    estimates = evident(estimates, result.vector, u, trials, axis)
+    estimates = evident(estimates, result.vector, u, experiments, axis)
     if evidence.unchecked and inverse is not None:
         estimates = held_against(estimates, inverse)
     if sliding is not None and inverse is not None:
@@ -182,7 +194,7 @@ def predicted(
         said = [*said, *more]
     estimates = with_level(estimates, sliding) if sliding is not None else estimates
     u = result.vector.coordinates(result.vector.named(u) | {e.name: e.value for e in estimates})
-    fitted = with_values(trials, axis, law, result.vector, u, options["extras"])
+    fitted = with_values(experiments, axis, law, result.vector, u, options["extras"])
     estimates = tuple(replace(e, unit=axis.unit(e.unit)) for e in estimates)
     found = assembled(
         fitted,

@@ -26,10 +26,10 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.jackknife import leave_blocks_out
 from stickslip.identify.fit.noise import white_std
 from stickslip.identify.fit.student import student_quantile
-from stickslip.identify.trial import Trial
 from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 
@@ -118,10 +118,10 @@ def bound(left: float) -> float:
     return max(MISSED, WORSE * left)
 
 
-def doubted_loops(trials: Sequence[Trial], gain: float = 1.0) -> list[str]:
+def doubted_loops(experiments: Sequence[Experiment], gain: float = 1.0) -> list[str]:
     """A sentence for each record that clearly was made by other gains than given, or whose reference is recorded rows
     late or early; `gain` as in `shown_gains`."""
-    found = [(trial.name, shown_gains(trial, gain)) for trial in trials]
+    found = [(experiment.name, shown_gains(experiment, gain)) for experiment in experiments]
     return [said for name, shown in found if shown is not None and (said := doubt(name, shown))]
 
 
@@ -144,39 +144,41 @@ def doubt(name: str, shown: ShownGains) -> str:
     )
 
 
-def shown_gains(trial: Trial, gain: float = 1.0) -> ShownGains | None:
+def shown_gains(experiment: Experiment, gain: float = 1.0) -> ShownGains | None:
     """Gains of the controller that made a record, by least squares.
 
     Parameters
     ----------
-    trial : Trial
+    experiment : Experiment
         With its drive's signal, reference and loop.
     gain : float
-        Factor on the controller's output, beside the trial's own.
+        Factor on the controller's output, beside the experiment's own.
 
     Returns
     -------
     ShownGains or None
         None where the record lacks one of these, or is too short.
     """
-    if trial.drive is None or trial.reference is None or trial.loop is None:
+    if experiment.drive is None or experiment.reference is None or experiment.loop is None:
         return None
-    columns, noise = columns_of(trial, trial.loop), position_noise(trial.position)
-    span = trial.loop.velocity_span
+    columns, noise = columns_of(experiment, experiment.loop), position_noise(experiment.position)
+    span = experiment.loop.velocity_span
     length, velocity_noise = 0, 0.0
     for length in LENGTHS:
-        x, u, _ = means(trial, columns, length, 0)
+        x, u, _ = means(experiment, columns, length, 0)
         if u.size < FEWEST:
             return None
-        velocity_noise = 2.0 * (noise / (max(length, span) * trial.period)) ** 2
+        velocity_noise = 2.0 * (noise / (max(length, span) * experiment.period)) ** 2
         if velocity_noise < NOISY * own_variance(x, GAINS.index("kd")):
             break
-    given = np.array([getattr(trial.loop, name) for name in GAINS])
-    factor = gain * trial.gain
-    tries = {0: delayed(trial, columns, length, factor)}
+    given = np.array([getattr(experiment.loop, name) for name in GAINS])
+    factor = gain * experiment.gain
+    tries = {0: delayed(experiment, columns, length, factor)}
     if unexplained(*best_of(tries[0])[:2], given) >= MISSED:
         for late in LATE[1:]:
-            tries[late] = delayed(trial, columns_of(shifted(trial, late), trial.loop), length, factor)
+            tries[late] = delayed(
+                experiment, columns_of(shifted(experiment, late), experiment.loop), length, factor
+            )
     x, u, time = best_of(tries[likeliest(tries)])
     values, half_widths = with_intervals(x, u, time, velocity_noise)
     parts = np.sqrt(np.mean(x[:, :-1] ** 2, axis=0)) / max(rms(u), 1e-300)
@@ -187,16 +189,16 @@ def shown_gains(trial: Trial, gain: float = 1.0) -> ShownGains | None:
     return ShownGains(given, values, half_widths, parts, left, by_row[late], late if needed else 0)
 
 
-def shifted(trial: Trial, late: int) -> Trial:
+def shifted(experiment: Experiment, late: int) -> Experiment:
     """The same with the reference that many rows earlier."""
-    assert trial.reference is not None
-    rows = np.clip(np.arange(trial.time.size) + late, 0, trial.time.size - 1)
-    return replace(trial, reference=trial.reference[rows])
+    assert experiment.reference is not None
+    rows = np.clip(np.arange(experiment.time.size) + late, 0, experiment.time.size - 1)
+    return replace(experiment, reference=experiment.reference[rows])
 
 
-def delayed(trial: Trial, columns: Array, length: int, factor: float) -> list[Means]:
+def delayed(experiment: Experiment, columns: Array, length: int, factor: float) -> list[Means]:
     """Means with the signal each of the `DELAYS` later, without a factor on it."""
-    tries = [means(trial, columns, length, delay) for delay in DELAYS]
+    tries = [means(experiment, columns, length, delay) for delay in DELAYS]
     return [(x, u / factor, time) for x, u, time in tries]
 
 
@@ -223,33 +225,34 @@ def unexplained(x: Array, u: Array, given: Array) -> float:
     return rms(missed - np.mean(missed)) / max(rms(u), 1e-300)
 
 
-def columns_of(trial: Trial, loop: Loop) -> Array:
+def columns_of(experiment: Experiment, loop: Loop) -> Array:
     """What each gain multiplies, shape (rows, 4): the controller with this gain 1 and no other."""
-    assert trial.reference is not None
+    assert experiment.reference is not None
     plain = Loop(velocity_span=loop.velocity_span)
     columns = np.column_stack([
-        control_signal(replace(plain, **{name: 1.0}), trial.time, trial.reference, trial.position) for name in GAINS
+        control_signal(replace(plain, **{name: 1.0}), experiment.time, experiment.reference, experiment.position)
+        for name in GAINS
     ])  # fmt: skip
-    if 0.0 < loop.period < 0.75 * trial.period:
+    if 0.0 < loop.period < 0.75 * experiment.period:
         # It acts between the rows too, so that its velocities are those at a row, not the mean until then.
-        columns[:, GAINS.index("kr")] = np.gradient(trial.reference, trial.time)
-        columns[:, GAINS.index("kd")] = -np.gradient(trial.position, trial.time)
+        columns[:, GAINS.index("kr")] = np.gradient(experiment.reference, experiment.time)
+        columns[:, GAINS.index("kd")] = -np.gradient(experiment.position, experiment.time)
     return columns
 
 
-def means(trial: Trial, columns: Array, length: int, delay: int) -> Means:
+def means(experiment: Experiment, columns: Array, length: int, delay: int) -> Means:
     """Columns beside a constant, signal and time, as means over `length` rows, where nothing is cut off."""
-    assert trial.drive is not None
-    assert trial.loop is not None
-    size = np.abs(trial.drive)
-    whole = size < CUT * min(trial.loop.limit, float(np.quantile(size, 0.999)))
+    assert experiment.drive is not None
+    assert experiment.loop is not None
+    size = np.abs(experiment.drive)
+    whole = size < CUT * min(experiment.loop.limit, float(np.quantile(size, 0.999)))
     margin = max(abs(d) for d in DELAYS)
-    count = (trial.time.size - 2 * margin) // length
+    count = (experiment.time.size - 2 * margin) // length
     rows = margin + np.arange(count * length).reshape(count, length)
     keep = whole[rows + delay].all(axis=1)
     rows = rows[keep]
     x: Array = np.column_stack([columns[rows].mean(axis=1), np.ones(rows.shape[0])])
-    return x, trial.drive[rows + delay].mean(axis=1), trial.time[rows].mean(axis=1)
+    return x, experiment.drive[rows + delay].mean(axis=1), experiment.time[rows].mean(axis=1)
 
 
 def with_intervals(x: Array, u: Array, time: Array, velocity_noise: float) -> tuple[Array, Array]:

@@ -19,10 +19,10 @@ from stickslip.identify.axis.search import (
     starting_models,
 )
 from stickslip.identify.estimate import Estimate
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import level_of
 from stickslip.identify.fit.uncertainty import Fit, fit
 from stickslip.identify.regression.inverse import InverseDynamics, correlation_lags
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
 
@@ -64,7 +64,7 @@ class OutputError(FittedAxis):
 
 
 def output_error(
-    trials: Sequence[Trial],
+    experiments: Sequence[Experiment],
     axis: ServoAxis,
     law: Law,
     first: InverseDynamics | None,
@@ -80,7 +80,7 @@ def output_error(
 
     Parameters
     ----------
-    trials : sequence of Trial
+    experiments : sequence of Experiment
     axis : ServoAxis
     law : Law
         Any; a user's own from its file.
@@ -107,7 +107,7 @@ def output_error(
         If nothing is free, or no simulation from the starting values succeeds.
     """
     found = fitted_axis(
-        trials, axis, law, first, free=free, frozen=frozen, values=values, extras=extras, robust=robust
+        experiments, axis, law, first, free=free, frozen=frozen, values=values, extras=extras, robust=robust
     )
     return judged(found, profiles)
 
@@ -125,7 +125,7 @@ def judged(found: FittedAxis, profiles: bool = False) -> OutputError:
     )  # fmt: skip
     misfits = problem.misfits(result.u)
     assert misfits is not None
-    return OutputError(problem, result.u, result, errors_of(problem.trials, problem.signals, misfits))
+    return OutputError(problem, result.u, result, errors_of(problem.experiments, problem.signals, misfits))
 
 
 def scales_of(problem: Problem, u: Array) -> dict[str, float]:
@@ -134,9 +134,9 @@ def scales_of(problem: Problem, u: Array) -> dict[str, float]:
     Torques with the law's own at slow motion; an angle has no relative width, and is compared with a radian (a
     position on a linear axis with the range travelled), shares with the whole.
     """
-    speeds = np.concatenate([np.abs(np.diff(t.position) / np.diff(t.time)) for t in problem.trials])
+    speeds = np.concatenate([np.abs(np.diff(t.position) / np.diff(t.time)) for t in problem.experiments])
     torque = level_of(problem.law, problem.model(u).parameters, 0.1 * float(np.sqrt(np.mean(speeds**2))))
-    travel = max(float(np.ptp(t.position)) for t in problem.trials)
+    travel = max(float(np.ptp(t.position)) for t in problem.experiments)
     length = 1.0 if problem.axis.motion == "rotary" else travel
     sizes = {"rad": length, "m": length, "-": 1.0}
     return {p.name: sizes.get(p.par.unit, torque) for p in problem.vector.free}

@@ -23,10 +23,10 @@ from stickslip.identify.cogging.remarks import Lag, eccentricities, lag_of
 from stickslip.identify.cogging.result import ROUND, Choice, estimates_of, pictures_of, remarks_of
 from stickslip.identify.cogging.rows import Places
 from stickslip.identify.estimate import Estimate, Identification, Picture
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.regression import Regression
 from stickslip.identify.regression.regressions import Regress
 from stickslip.identify.regression.strokes import stacked, strokes_of
-from stickslip.identify.trial import Trial
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
 
@@ -85,16 +85,16 @@ class OverAngle:
     skew: float
     """s by which the torque's column lies behind the torque that acted."""
 
-    def taken_out_of(self, trial: Trial, axis: ServoAxis) -> Trial:
-        """The trial without the map's torque in the drive's signal."""
-        gain, _ = axis.drive_gains(trial.quantity)
-        factor = gain * (np.ones(trial.time.size) if trial.supply is None else trial.supply)
-        acted = trial.time - self.skew
-        angle = np.interp(acted, trial.time, trial.position)
-        direction = np.sign(np.interp(acted, trial.time, speed_of(trial)))
+    def taken_out_of(self, experiment: Experiment, axis: ServoAxis) -> Experiment:
+        """The experiment without the map's torque in the drive's signal."""
+        gain, _ = axis.drive_gains(experiment.quantity)
+        factor = gain * (np.ones(experiment.time.size) if experiment.supply is None else experiment.supply)
+        acted = experiment.time - self.skew
+        angle = np.interp(acted, experiment.time, experiment.position)
+        direction = np.sign(np.interp(acted, experiment.time, speed_of(experiment)))
         torque = self.found.beside(angle) + direction * self.found.ripple(angle)
         own = np.divide(torque, factor, out=np.zeros_like(torque), where=factor != 0.0)
-        return replace(trial, drive=trial.signal() - own)
+        return replace(experiment, drive=experiment.signal() - own)
 
     def joined_to(self, axis: Identification) -> Identification:
         """The axis's result with the map's numbers, notes and pictures."""
@@ -115,12 +115,14 @@ class OverAngle:
         )  # fmt: skip
 
 
-def over_angle(trials: Sequence[Trial], axis: ServoAxis, skew: float | None, regress: Regress) -> OverAngle:
+def over_angle(
+    experiments: Sequence[Experiment], axis: ServoAxis, skew: float | None, regress: Regress
+) -> OverAngle:
     """The map over the angle that the records show.
 
     Parameters
     ----------
-    trials : sequence of Trial
+    experiments : sequence of Experiment
         With the drive's signal; angles in rad, the same zero in all.
     axis : ServoAxis
     skew : float or None
@@ -135,9 +137,9 @@ def over_angle(trials: Sequence[Trial], axis: ServoAxis, skew: float | None, reg
     """
     if axis.motion != "rotary":
         raise InputError("the positions are lengths; give the motor's angle")
-    if any(t.drive is None or t.closed_loop for t in trials):
+    if any(t.drive is None or t.closed_loop for t in experiments):
         raise InputError("it is found in the recorded torque, not in a simulated loop; leave --loop out")
-    sliding = regress(trials, axis, skew=skew)
+    sliding = regress(experiments, axis, skew=skew)
     places = places_of(sliding, axis)
     refuse_narrow(places)
     orders = orders_of(places)

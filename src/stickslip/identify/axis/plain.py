@@ -12,10 +12,10 @@ import numpy as np
 from stickslip.identify.axis.agreed import SAME
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.force_error import plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import QUANTILE, Regression
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.simulation.recorded_input.simulation import Mechanics
@@ -32,7 +32,7 @@ def inverse_identification(
     found: InverseDynamics,
     axis: ServoAxis,
     sliding: Regression | None = None,
-    validation: Sequence[Trial] = (),
+    validation: Sequence[Experiment] = (),
 ) -> Identification:
     """The inverse dynamics as an `Identification`, its friction as the law ``coulomb``.
 

@@ -13,6 +13,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.axis.output import Extras, laid_out, starting_models
 from stickslip.identify.axis.problem import mechanics_of
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import steady_fits
 from stickslip.identify.fit.broyden import Secants
 from stickslip.identify.fit.levenberg_marquardt import cost_of
@@ -22,7 +23,6 @@ from stickslip.identify.observer.innovations import BAND, Criterion
 from stickslip.identify.observer.observer import ROUGH, Motion, Prepared, prepare
 from stickslip.identify.observer.prediction_error import PredictionError, prediction_error
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, uniform
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.record import encoder_step
@@ -55,7 +55,7 @@ LEVELS = 24
 
 
 def axis_prediction(
-    trials: Sequence[Trial],
+    experiments: Sequence[Experiment],
     axis: ServoAxis,
     law: Law,
     *,
@@ -70,7 +70,7 @@ def axis_prediction(
 
     Parameters
     ----------
-    trials : sequence of Trial
+    experiments : sequence of Experiment
         With the drive's signal.
     axis : ServoAxis
     law : Law
@@ -91,10 +91,10 @@ def axis_prediction(
         If a record has no drive signal, moves too little, the axis has backlash, or no simulation from the starting
         values succeeds.
     """
-    motions, band = watched(trials, axis, values, free)
-    start = first or inverse_dynamics(trials, axis)
+    motions, band = watched(experiments, axis, values, free)
+    start = first or inverse_dynamics(experiments, axis)
     criterion, u = searched(
-        trials, axis, law, motions, start, dict(values or {}), free, frozen, extras, band, seed
+        experiments, axis, law, motions, start, dict(values or {}), free, frozen, extras, band, seed
     )
     return prediction_error(
         motions, law, criterion.vector, criterion.mechanics, inertia=criterion.vector.named(u)["inertia"],
@@ -103,21 +103,21 @@ def axis_prediction(
 
 
 def watched(
-    trials: Sequence[Trial], axis: ServoAxis, values: Mapping[str, Any] | None, free: Sequence[str]
+    experiments: Sequence[Experiment], axis: ServoAxis, values: Mapping[str, Any] | None, free: Sequence[str]
 ) -> tuple[list[Motion], float]:
     """What the observer follows, and the Hz up to which its corrections count; refuses what it cannot follow."""
-    for t in trials:
+    for t in experiments:
         if t.drive is None:
             raise InputError(f"{t.name}: the drive's signal is missing; this method needs it")
     if (values or {}).get("backlash", axis.backlash) > 0.0 or "backlash" in free:
         raise InputError(
             "its observer takes the measured velocity for the axis's own, which backlash forbids"
         )
-    return [motion_of(t) for t in trials], min(BAND, *(0.1 / t.period for t in trials))
+    return [motion_of(t) for t in experiments], min(BAND, *(0.1 / t.period for t in experiments))
 
 
 def searched(
-    trials: Sequence[Trial], axis: ServoAxis, law: Law, motions: Sequence[Motion], start: InverseDynamics,
+    experiments: Sequence[Experiment], axis: ServoAxis, law: Law, motions: Sequence[Motion], start: InverseDynamics,
     given: Mapping[str, Any], free: Sequence[str], frozen: Sequence[str], extras: Extras, band: float, seed: int,
     hops: int = HOPS,
 ) -> tuple[Criterion, Array]:  # fmt: skip
@@ -125,8 +125,8 @@ def searched(
     records: list[Prepared] = []
     criteria: list[Criterion] = []
     mechanics = functools.partial(mechanics_of, harmonic_period=extras.harmonic_period)
-    for model in starting_points(trials, axis, law, start, given):
-        vector, inertia = laid_out(trials, axis, law, start, model, given, free, frozen, extras)
+    for model in starting_points(experiments, axis, law, start, given):
+        vector, inertia = laid_out(experiments, axis, law, start, model, given, free, frozen, extras)
         # All start from one inertia.
         records = records or [
             prepare(m, law, inertia, abs(start.coulomb), band, rounding=ROUGH) for m in motions
@@ -193,15 +193,19 @@ def hop(vector: Vector, u: Array, law: set[str], rng: np.random.Generator) -> Ar
     return np.clip(there, vector.lower, vector.upper)
 
 
-def motion_of(trial: Trial) -> Motion:
-    """The trial on a regular grid, its drive's signal as it acts."""
-    t, q, u, _ = uniform(trial)
-    supply = 1.0 if trial.supply is None else np.interp(t, trial.time, trial.supply)
+def motion_of(experiment: Experiment) -> Motion:
+    """The experiment on a regular grid, its drive's signal as it acts."""
+    t, q, u, _ = uniform(experiment)
+    supply = 1.0 if experiment.supply is None else np.interp(t, experiment.time, experiment.supply)
     return Motion(t, q, supply * u, encoder_step(q))
 
 
 def starting_points(
-    trials: Sequence[Trial], axis: ServoAxis, law: Law, first: InverseDynamics, given: Mapping[str, Any]
+    experiments: Sequence[Experiment],
+    axis: ServoAxis,
+    law: Law,
+    first: InverseDynamics,
+    given: Mapping[str, Any],
 ) -> list[Model]:
     """Examples on this axis's scales, as they are and with their steady torque fitted to the measured levels.
 
@@ -210,12 +214,12 @@ def starting_points(
     """
     held = [f.name for f in law.fields if f.name in given]
     slower = [replace(first, velocity=part * first.velocity) for part in SLOWER]
-    examples = [m for f in slower for m in starting_models(trials, law, f, given)]
+    examples = [m for f in slower for m in starting_models(experiments, law, f, given)]
     speed, torque = levels_of(first)
     fitted = steady_fits(examples, speed, torque, held)
     misfits = [misfit_of(m, speed, torque) for m in fitted]
     near = [m for m, misfit in zip(fitted, misfits, strict=True) if misfit <= WORSE * min(misfits)]
-    held_at = held_torque(trials, axis, first)
+    held_at = held_torque(experiments, axis, first)
     if held_at <= first.coulomb:
         return examples + near
     slow = max(1, LEVELS // 8)
@@ -223,15 +227,15 @@ def starting_points(
     return examples + near + steady_fits(examples, speed, torque, held)
 
 
-def held_torque(trials: Sequence[Trial], axis: ServoAxis, first: InverseDynamics) -> float:
+def held_torque(experiments: Sequence[Experiment], axis: ServoAxis, first: InverseDynamics) -> float:
     """Torque that the contact withstood at rest, N·m: where the position stays within two counts for a while."""
     level = 0.0
-    for trial in trials:
-        motion = motion_of(trial)
+    for experiment in experiments:
+        motion = motion_of(experiment)
         reach = max(1, round(RESTING / float(motion.time[1] - motion.time[0])))
         moved = np.abs(motion.position[reach:] - motion.position[:-reach])
         still = moved <= max(2.0 * motion.count, RESTING * SLOWEST * first.usual_speed)
-        gain, _ = axis.drive_gains(trial.quantity)
+        gain, _ = axis.drive_gains(experiment.quantity)
         if np.any(still):
             torque = np.abs(gain * motion.torque[reach:][still] - first.offset)
             level = max(level, float(np.quantile(torque, 0.98)))

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import feasible
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.simulation.recorded_input.simulation import Course, Drive, Harmonics, Mechanics
@@ -100,7 +100,7 @@ class Problem:
 
     Attributes
     ----------
-    trials : tuple of Trial
+    experiments : tuple of Experiment
     axis : ServoAxis
     law : Law
     vector : Vector
@@ -115,7 +115,7 @@ class Problem:
     harmonic_period : float
     """
 
-    trials: tuple[Trial, ...]
+    experiments: tuple[Experiment, ...]
     axis: ServoAxis
     law: Law
     vector: Vector
@@ -127,14 +127,14 @@ class Problem:
 
     @staticmethod
     def of(
-        trials: Sequence[Trial], axis: ServoAxis, law: Law, vector: Vector, *, inertia: float, robust: bool = False,
-        harmonic_period: float = 2.0 * math.pi, max_step: float = MAX_STEP,
+        experiments: Sequence[Experiment], axis: ServoAxis, law: Law, vector: Vector, *, inertia: float,
+        robust: bool = False, harmonic_period: float = 2.0 * math.pi, max_step: float = MAX_STEP,
     ) -> Problem:  # fmt: skip
         """Lay the records out; `inertia` sets the observer's stiffness where one is needed."""
-        courses = tuple(Course(law, drive_of(t, inertia, max_step)) for t in trials)
-        signals = tuple(s for s in SIGNALS if all(has(t, s) for t in trials))
+        courses = tuple(Course(law, drive_of(t, inertia, max_step)) for t in experiments)
+        signals = tuple(s for s in SIGNALS if all(has(t, s) for t in experiments))
         return Problem(
-            tuple(trials),
+            tuple(experiments),
             axis,
             law,
             vector,
@@ -148,7 +148,7 @@ class Problem:
     @property
     def units(self) -> dict[str, str]:
         """Unit of each signal that is compared."""
-        drive = self.axis.unit(UNITS[self.trials[0].quantity])
+        drive = self.axis.unit(UNITS[self.experiments[0].quantity])
         return {s: self.axis.unit("rad") if s == "position" else drive for s in self.signals}
 
     def weighted(self, u: Array) -> Problem:
@@ -171,7 +171,7 @@ class Problem:
         for _ in range(HALVINGS):
             finer = replace(problem, courses=tuple(
                 Course(self.law, replace(c.drive, max_step=0.5 * min(c.drive.max_step, t.period)))
-                for c, t in zip(problem.courses, problem.trials, strict=True)
+                for c, t in zip(problem.courses, problem.experiments, strict=True)
             ))  # fmt: skip
             change = finer.residuals(u) - problem.residuals(u)
             if not np.sqrt(np.mean(change**2)) > STEP_ERROR:
@@ -193,7 +193,7 @@ class Problem:
         gain = named["controller_gain"]
         return [
             c.run(mechanics, p, gain=t.gain * gain if t.closed_loop else 1.0)
-            for c, t in zip(self.courses, self.trials, strict=True)
+            for c, t in zip(self.courses, self.experiments, strict=True)
         ]
 
     def misfits(self, u: Array) -> list[Array] | None:
@@ -202,16 +202,16 @@ class Problem:
         if runs is None:
             return None
         out: list[Array] = []
-        for run, trial in zip(runs, self.trials, strict=True):
-            parts = [run[:, PLACE[s]] - measured(trial, s) for s in self.signals]
-            out.append(np.column_stack(parts)[trial.rows])
+        for run, experiment in zip(runs, self.experiments, strict=True):
+            parts = [run[:, PLACE[s]] - measured(experiment, s) for s in self.signals]
+            out.append(np.column_stack(parts)[experiment.rows])
         return out
 
     def residuals(self, u: Array) -> Array:
         """All misfits over their weights, signals of one time side by side, shape (n,)."""
         misfits = self.misfits(u)
         if misfits is None:
-            return np.full(sum(int(t.rows.sum()) for t in self.trials) * len(self.signals), np.inf)
+            return np.full(sum(int(t.rows.sum()) for t in self.experiments) * len(self.signals), np.inf)
         size = np.array([self.weights[s] for s in self.signals])
         r = np.concatenate([(m / size).ravel() for m in misfits])
         return soft(r) if self.robust else r
@@ -226,14 +226,14 @@ class Problem:
 PLACE = {"position": 0, "drive": 2}
 
 
-def has(trial: Trial, signal: str) -> bool:
+def has(experiment: Experiment, signal: str) -> bool:
     """Whether a simulation of this record can be compared with that signal."""
-    return signal == "position" or (trial.closed_loop and trial.drive is not None)
+    return signal == "position" or (experiment.closed_loop and experiment.drive is not None)
 
 
-def measured(trial: Trial, signal: str) -> Array:
+def measured(experiment: Experiment, signal: str) -> Array:
     """The measured signal that a simulation is compared with, shape (n,)."""
-    return trial.position if signal == "position" else trial.signal()
+    return experiment.position if signal == "position" else experiment.signal()
 
 
 def soft(r: Array) -> Array:
@@ -241,27 +241,28 @@ def soft(r: Array) -> Array:
     return np.copysign(np.sqrt(2.0 * (np.sqrt(1.0 + r * r) - 1.0)), r)
 
 
-def drive_of(trial: Trial, inertia: float, max_step: float) -> Drive:
+def drive_of(experiment: Experiment, inertia: float, max_step: float) -> Drive:
     """What moves the simulated axis."""
-    if trial.closed_loop:
-        assert trial.reference is not None
+    if experiment.closed_loop:
+        assert experiment.reference is not None
         return Drive(
-            trial.time, trial.reference, "feedback", trial.loop, trial.supply, trial.start(), trial.gain,
-            max_step=max_step,
+            experiment.time, experiment.reference, "feedback", experiment.loop, experiment.supply, experiment.start(),
+            experiment.gain, max_step=max_step,
         )  # fmt: skip
-    omega = 2.0 * math.pi * min(OBSERVER_HZ, 0.02 / trial.period)
-    even = smooth(trial)
+    omega = 2.0 * math.pi * min(OBSERVER_HZ, 0.02 / experiment.period)
+    even = smooth(experiment)
     return Drive(
-        trial.time, trial.signal(), "held", None, trial.supply, trial.start(), position=trial.position,
-        spring=inertia * omega**2, damping=np.full(trial.time.size, 2.0 * inertia * omega),
-        goal=np.append(np.diff(even) / np.diff(trial.time), 0.0), max_step=max_step,
+        experiment.time, experiment.signal(), "held", None, experiment.supply, experiment.start(),
+        position=experiment.position, spring=inertia * omega**2,
+        damping=np.full(experiment.time.size, 2.0 * inertia * omega),
+        goal=np.append(np.diff(even) / np.diff(experiment.time), 0.0), max_step=max_step,
     )  # fmt: skip
 
 
-def smooth(trial: Trial) -> Array:
+def smooth(experiment: Experiment) -> Array:
     """The position behind a zero-phase low-pass at a tenth of the sample rate, at the record's times."""
     from stickslip.identify.fit.filters import low_pass
     from stickslip.identify.regression.inverse import uniform
 
-    t, q, _, rate = uniform(trial)
-    return np.interp(trial.time, t, low_pass(q, 0.1 * rate, rate, order=2))
+    t, q, _, rate = uniform(experiment)
+    return np.interp(experiment.time, t, low_pass(q, 0.1 * rate, rate, order=2))

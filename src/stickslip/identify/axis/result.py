@@ -19,12 +19,12 @@ from stickslip.identify.axis.output import OutputError
 from stickslip.identify.axis.search import FittedAxis, errors_of
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.evidence import within_speeds
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import told_by
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
@@ -46,14 +46,14 @@ LOOP_OFF = 0.3
 
 def assembled(
     result: FittedAxis, estimates: Sequence[Estimate], correlation: Array, inverse: InverseDynamics | None,
-    validation: Sequence[Trial], candidates: Sequence[Candidate], notes: Sequence[str],
+    validation: Sequence[Experiment], candidates: Sequence[Candidate], notes: Sequence[str],
     sliding: Regression | None = None,
 ) -> Identification:  # fmt: skip
     """Everything in one `Identification`, but for what is to be said of its intervals."""
-    trials = result.problem.trials
-    estimates = within_a_turn(estimates, np.concatenate([t.position for t in trials]))
+    experiments = result.problem.experiments
+    estimates = within_a_turn(estimates, np.concatenate([t.position for t in experiments]))
     judged = judged_load(estimates, inverse, result.mechanics)
-    misfit = errors_of(trials, result.problem.signals, result.misfits(trials))
+    misfit = errors_of(experiments, result.problem.signals, result.misfits(experiments))
     axis, named = result.problem.axis, result.problem.vector.named(result.u)
     if inverse is not None and inverse.has("fc"):
         misfit["force_relative"] = force_error(inverse, result.model, named)
@@ -82,11 +82,15 @@ def assembled(
 
 
 def evident(
-    estimates: Sequence[Estimate], vector: Vector, u: Array, trials: Sequence[Trial], axis: ServoAxis
+    estimates: Sequence[Estimate],
+    vector: Vector,
+    u: Array,
+    experiments: Sequence[Experiment],
+    axis: ServoAxis,
 ) -> tuple[Estimate, ...]:
     """The estimates, those refused that the record cannot hold: too high levels, effects at other speeds."""
-    largest = max(float(np.max(np.abs(t.torque(axis, speed_of(t))))) for t in trials)
-    speeds = np.concatenate([np.abs(speed_of(t)) for t in trials])
+    largest = max(float(np.max(np.abs(t.torque(axis, speed_of(t))))) for t in experiments)
+    speeds = np.concatenate([np.abs(speed_of(t)) for t in experiments])
     moving = speeds[speeds > CREEP * float(np.max(speeds))]
     seen = np.quantile(moving, np.linspace(0.02, 1.0, 50)) if moving.size else np.zeros(0)
     out: list[Estimate] = []
@@ -108,12 +112,14 @@ def evident(
     return tuple(out)
 
 
-def speed_of(trial: Trial) -> Array:
+def speed_of(experiment: Experiment) -> Array:
     """Velocity over `WINDOW` seconds at every row, rad/s (m/s)."""
-    reach = max(1, round(0.5 * WINDOW / trial.period))
-    low = np.maximum(np.arange(trial.time.size) - reach, 0)
-    high = np.minimum(np.arange(trial.time.size) + reach, trial.time.size - 1)
-    return (trial.position[high] - trial.position[low]) / (trial.time[high] - trial.time[low])
+    reach = max(1, round(0.5 * WINDOW / experiment.period))
+    low = np.maximum(np.arange(experiment.time.size) - reach, 0)
+    high = np.minimum(np.arange(experiment.time.size) + reach, experiment.time.size - 1)
+    return (experiment.position[high] - experiment.position[low]) / (
+        experiment.time[high] - experiment.time[low]
+    )
 
 
 def untold_by_reversals(
@@ -143,7 +149,7 @@ def strange_loop(found: Identification) -> list[str]:
     """That the loop does not make the drive's signal that was recorded; nothing where it does, or there is none."""
     fitted: FittedAxis = found.details["output"]
     named = fitted.problem.vector.named(fitted.u)
-    if others := doubted_loops(fitted.problem.trials, named["controller_gain"]):
+    if others := doubted_loops(fitted.problem.experiments, named["controller_gain"]):
         return others
     off = found.misfit.get("drive_relative", 0.0)
     if off <= LOOP_OFF:
@@ -166,7 +172,7 @@ def narrow_note(result: OutputError, ask: bool = True) -> str:
     said = "Intervals come from the covariance of the output error: too narrow where noise is coloured"
     if result.problem.law.velocity_scale:
         said += ", most of all for what slow motion and break-away tell"
-    if ask and all(t.drive is not None for t in result.problem.trials):
+    if ask and all(t.drive is not None for t in result.problem.experiments):
         said += ". --intervals prediction gives honest ones"
     return said + "."
 

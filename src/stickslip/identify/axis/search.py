@@ -18,11 +18,11 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.axis.load_check import tells_external
 from stickslip.identify.axis.problem import Problem, measured, mechanics_parameters
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import frozen_by_default, starts
 from stickslip.identify.fit.broyden import descend_by_secants
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.simulation.recorded_input.simulation import Mechanics
@@ -93,42 +93,46 @@ class FittedAxis:
         """All but friction."""
         return self.problem.mechanics(self.problem.vector.named(self.u))
 
-    def on(self, trials: Sequence[Trial]) -> Problem:
+    def on(self, experiments: Sequence[Experiment]) -> Problem:
         """The same problem with other records (or rows)."""
         problem = self.problem
-        if len(trials) == len(problem.trials) and all(map(operator.is_, trials, problem.trials)):
+        if len(experiments) == len(problem.experiments) and all(
+            map(operator.is_, experiments, problem.experiments)
+        ):
             return problem
         return replace(
             Problem.of(
-                trials, problem.axis, problem.law, problem.vector, inertia=self.mechanics.inertia,
+                experiments, problem.axis, problem.law, problem.vector, inertia=self.mechanics.inertia,
                 harmonic_period=problem.harmonic_period, max_step=problem.courses[0].drive.max_step,
             ),
             weights=problem.weights, robust=problem.robust,
         )  # fmt: skip
 
-    def simulated(self, trials: Sequence[Trial]) -> list[Array]:
+    def simulated(self, experiments: Sequence[Experiment]) -> list[Array]:
         """Any records simulated with the fitted axis (`stickslip.simulation.recorded_input.simulation.COLUMNS`)."""
-        runs = self.on(trials).simulated(self.u)
+        runs = self.on(experiments).simulated(self.u)
         assert runs is not None
         return runs
 
-    def misfits(self, trials: Sequence[Trial]) -> list[Array]:
+    def misfits(self, experiments: Sequence[Experiment]) -> list[Array]:
         """Simulated minus measured signals on records (or rows), each of shape (rows, signals)."""
-        misfits = self.on(trials).misfits(self.u)
+        misfits = self.on(experiments).misfits(self.u)
         assert misfits is not None
         return misfits
 
-    def held_out(self, trials: Sequence[Trial]) -> dict[str, float]:
+    def held_out(self, experiments: Sequence[Experiment]) -> dict[str, float]:
         """The errors (`errors_of`) on records (or rows) that were not fitted."""
-        return errors_of(trials, self.problem.signals, self.misfits(trials))
+        return errors_of(experiments, self.problem.signals, self.misfits(experiments))
 
 
-def errors_of(trials: Sequence[Trial], signals: Sequence[str], misfits: Sequence[Array]) -> dict[str, float]:
+def errors_of(
+    experiments: Sequence[Experiment], signals: Sequence[str], misfits: Sequence[Array]
+) -> dict[str, float]:
     """Norms of misfit over norms of signal, root mean squares and mean absolute misfits of each signal."""
     out: dict[str, float] = {}
     for place, name in enumerate(signals):
         wrong = np.concatenate([m[:, place] for m in misfits])
-        right = np.concatenate([measured(t, name)[t.rows] for t in trials])
+        right = np.concatenate([measured(t, name)[t.rows] for t in experiments])
         out[f"{name}_relative"] = float(np.linalg.norm(wrong) / np.linalg.norm(right))
         out[f"{name}_rms"] = float(np.sqrt(np.mean(wrong**2)))
         out[f"{name}_mean_absolute"] = float(np.mean(np.abs(wrong)))
@@ -136,7 +140,7 @@ def errors_of(trials: Sequence[Trial], signals: Sequence[str], misfits: Sequence
 
 
 def fitted_axis(
-    trials: Sequence[Trial],
+    experiments: Sequence[Experiment],
     axis: ServoAxis,
     law: Law,
     first: InverseDynamics | None,
@@ -155,17 +159,17 @@ def fitted_axis(
     """
     given = dict(values or {})
     if first is None:
-        require_start(trials, axis, [law], given, extras)
+        require_start(experiments, axis, [law], given, extras)
     candidates = [
-        laid_out(trials, axis, law, first, model, given, free, frozen, extras)
-        for model in starting_models(trials, law, first, given)
+        laid_out(experiments, axis, law, first, model, given, free, frozen, extras)
+        for model in starting_models(experiments, law, first, given)
     ]
-    beginnings = [t.until(rows_until(t, BEGIN)) for t in trials]
+    beginnings = [t.until(rows_until(t, BEGIN)) for t in experiments]
     ranked = ranked_starts(beginnings, axis, law, candidates, extras, robust)
     rough = ranked[0][1].resolved(ranked[0][2])
     tried = [descended(rough, u, ROUGH) for _, _, u in ranked[:DESCENTS]]
     found = FittedAxis(rough, min(tried, key=lambda found: found[1])[0])
-    problem, u = found.on(trials), found.u
+    problem, u = found.on(experiments), found.u
     for descents in range(3):
         weights = problem.weights
         problem = problem.weighted(u)
@@ -177,9 +181,9 @@ def fitted_axis(
     return FittedAxis(problem, u)
 
 
-def rows_until(trial: Trial, part: float) -> int:
+def rows_until(experiment: Experiment, part: float) -> int:
     """Rows in which a part of the whole way is travelled."""
-    way: Array = np.cumsum(np.abs(np.diff(trial.position)))
+    way: Array = np.cumsum(np.abs(np.diff(experiment.position)))
     return int(np.sum(way < part * float(way[-1]))) + 2
 
 
@@ -194,15 +198,21 @@ def descended(
 
 
 def ranked_starts(
-    trials: Sequence[Trial], axis: ServoAxis, law: Law, candidates: Sequence[tuple[Vector, float]], extras: Extras,
-    robust: bool,
+    experiments: Sequence[Experiment], axis: ServoAxis, law: Law, candidates: Sequence[tuple[Vector, float]],
+    extras: Extras, robust: bool,
 ) -> list[tuple[float, Problem, Array]]:  # fmt: skip
     """Sum of squares, problem and coordinates of every start that can be simulated, the best first."""
     out: list[tuple[float, Problem, Array]] = []
     weights: Mapping[str, float] | None = None
     for vector, inertia in candidates:
         problem = Problem.of(
-            trials, axis, law, vector, inertia=inertia, robust=robust, harmonic_period=extras.harmonic_period
+            experiments,
+            axis,
+            law,
+            vector,
+            inertia=inertia,
+            robust=robust,
+            harmonic_period=extras.harmonic_period,
         )
         problem = problem.weighted(vector.start) if weights is None else replace(problem, weights=weights)
         weights = problem.weights
@@ -246,17 +256,17 @@ class NearVector(Vector):
 
 
 def starting_models(
-    trials: Sequence[Trial], law: Law, first: InverseDynamics | None, given: Mapping[str, Any]
+    experiments: Sequence[Experiment], law: Law, first: InverseDynamics | None, given: Mapping[str, Any]
 ) -> list[Model]:
     """Models to start from: scaled examples, or what the user gave."""
     known = {f.name: given[f.name] for f in law.fields if f.name in given}
     needed = [f.name for f in law.fields if f.par.default is None]
     if all(name in known for name in needed):
         return [Model(law, **known)]
-    travel = max(float(np.ptp(t.position)) for t in trials)
+    travel = max(float(np.ptp(t.position)) for t in experiments)
     level = float(given.get("fc", 0.0))
     if first is None:
-        speeds = np.concatenate([np.diff(t.position) / np.diff(t.time) for t in trials])
+        speeds = np.concatenate([np.diff(t.position) / np.diff(t.time) for t in experiments])
         speed = math.sqrt(float(np.mean(speeds**2)))
         return starts(law, level, float(given.get("sigma2", 0.0)), speed, travel, known)
     coulomb = level or max(first.coulomb, 1e-3 * float(np.sqrt(np.mean(first.torque**2))))
@@ -264,7 +274,7 @@ def starting_models(
 
 
 def laid_out(
-    trials: Sequence[Trial], axis: ServoAxis, law: Law, first: InverseDynamics | None, model: Model,
+    experiments: Sequence[Experiment], axis: ServoAxis, law: Law, first: InverseDynamics | None, model: Model,
     given: Mapping[str, Any], free: Sequence[str], frozen: Sequence[str], extras: Extras,
 ) -> tuple[Vector, float]:  # fmt: skip
     """The vector of everything that is fitted, and the inertia it starts from."""
@@ -281,7 +291,7 @@ def laid_out(
     law_names = {f.name for f in law.fields}
     values |= {k: float(v) for k, v in given.items() if k not in law_names}
     extra = mechanics_parameters(
-        axis, trials[0].quantity, values, extras.harmonics, extras.friction_harmonics
+        axis, experiments[0].quantity, values, extras.harmonics, extras.friction_harmonics
     )
     require_known([*free, *given], law_names | {p.name for p in extra} | LEVELS)
     if not values["inertia"] > 0.0:
@@ -300,7 +310,11 @@ def laid_out(
 
 
 def require_start(
-    trials: Sequence[Trial], axis: ServoAxis, laws: Sequence[Law], given: Mapping[str, Any], extras: Extras
+    experiments: Sequence[Experiment],
+    axis: ServoAxis,
+    laws: Sequence[Law],
+    given: Mapping[str, Any],
+    extras: Extras,
 ) -> None:
     """Refuse a search that has neither inverse dynamics nor starting values of any of the laws: it says why.
 
@@ -316,7 +330,9 @@ def require_start(
         return
     why = "the search has no start"
     try:
-        inverse_dynamics(trials, axis, harmonics=extras.harmonics, harmonic_period=extras.harmonic_period)
+        inverse_dynamics(
+            experiments, axis, harmonics=extras.harmonics, harmonic_period=extras.harmonic_period
+        )
     except InputError as error:
         why = str(error)
     asked = " and ".join(f"--set {name}=.." for name in needed)

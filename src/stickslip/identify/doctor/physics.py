@@ -17,7 +17,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.identify.doctor._view import Array, Smooth, View
-from stickslip.identify.trial import Trial
+from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 
 __all__ = ["gravity", "line_of", "sign", "skew", "usable"]
@@ -120,7 +120,7 @@ def skew(view: View) -> Iterator[Finding]:
     position, torque = (record[n][view.usable] for n in ("position", "motor_torque"))
     axis = ServoAxis(motion="linear" if linear else "rotary", drive_side="load")
     try:
-        found = view.regress([Trial("record", view.time, position, torque)], axis)
+        found = view.regress([Experiment("record", view.time, position, torque)], axis)
     except (InputError, np.linalg.LinAlgError):
         return
     low, high = found.interval("skew")

@@ -11,7 +11,7 @@ from stickslip.identify.axis.result import speed_of
 from stickslip.identify.doctor._view import View
 from stickslip.identify.doctor.play import dead_travel
 from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.trial import Trial
+from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 
@@ -20,12 +20,14 @@ __all__ = ["with_dead_travel"]
 HOLDS_ZERO = "its interval holds 0"
 
 
-def with_dead_travel(found: Identification, trials: Sequence[Trial], axis: ServoAxis) -> Identification:
+def with_dead_travel(
+    found: Identification, experiments: Sequence[Experiment], axis: ServoAxis
+) -> Identification:
     """The axis's result with ``dead_travel``, where one of the records shows one; of several the most often seen."""
     unit, force = axis.unit("rad"), axis.unit("N·m")
     seen = [
         one
-        for t in trials
+        for t in experiments
         if t.drive is not None and not t.closed_loop
         and (one := dead_travel(View(Record(
             t.time, {"position": t.position, "motor_torque": t.torque(axis, speed_of(t))},

@@ -12,11 +12,11 @@ from stickslip.identify.axis.output import Extras
 from stickslip.identify.axis.over_angle import over_angle
 from stickslip.identify.axis.plain import inverse_identification
 from stickslip.identify.estimate import Identification
+from stickslip.identify.experiment import Experiment
+from stickslip.identify.methods._experiments import driven, experiments_of
 from stickslip.identify.methods._play import with_dead_travel
-from stickslip.identify.methods._trials import driven, trials_of
 from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.regression.inverse import inverse_dynamics
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 
@@ -25,31 +25,31 @@ __all__ = ["METHOD"]
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """The whole axis; the last records judge where some are held out."""
-    axis, trials = trials_of(records, options)
-    count = len(trials) - options.held_out
-    skew = skew_of(trials[:count], options)
+    axis, experiments = experiments_of(records, options)
+    count = len(experiments) - options.held_out
+    skew = skew_of(experiments[:count], options)
     mapped = with_map if options.position_map else identified
-    return with_dead_travel(mapped(axis, trials, count, skew, options), trials[:count], axis)
+    return with_dead_travel(mapped(axis, experiments, count, skew, options), experiments[:count], axis)
 
 
 def with_map(
-    axis: ServoAxis, trials: Sequence[Trial], count: int, skew: float | None, options: Options
+    axis: ServoAxis, experiments: Sequence[Experiment], count: int, skew: float | None, options: Options
 ) -> Identification:
-    """The axis and what its torque over the angle is, from the first so many trials."""
+    """The axis and what its torque over the angle is, from the first so many experiments."""
     try:
-        over = over_angle(trials[:count], axis, skew, options.regress)
+        over = over_angle(experiments[:count], axis, skew, options.regress)
     except InputError as error:
-        found = identified(axis, trials, count, skew, options)
+        found = identified(axis, experiments, count, skew, options)
         return replace(found, notes=(*found.notes, f"No torque over the angle is identified: {error}."))
-    without = [over.taken_out_of(t, axis) for t in trials]
+    without = [over.taken_out_of(t, axis) for t in experiments]
     return over.joined_to(identified(axis, without, count, skew, options))
 
 
 def identified(
-    axis: ServoAxis, trials: Sequence[Trial], count: int, skew: float | None, options: Options
+    axis: ServoAxis, experiments: Sequence[Experiment], count: int, skew: float | None, options: Options
 ) -> Identification:
-    """The axis from the first so many trials, judged by the rest."""
-    fitted, held = trials[:count], trials[count:]
+    """The axis from the first so many experiments, judged by the rest."""
+    fitted, held = experiments[:count], experiments[count:]
     if options.inverse:
         plain = inverse_dynamics(
             fitted, axis, per_direction=options.per_direction, harmonics=options.harmonics
@@ -64,13 +64,13 @@ def identified(
     )  # fmt: skip
 
 
-def skew_of(trials: Sequence[Trial], options: Options) -> float | None:
+def skew_of(experiments: Sequence[Experiment], options: Options) -> float | None:
     """s by which the torque's column lies behind the torque that acted, if the options say so."""
     if options.torque_is is None and options.delay is None:
         return None
     # A command acts half a row after its row, on average; a mean over the row before acted half a row before it.
     rows = {"commanded": -0.5, "actual": 0.0, "mean": 0.5}[options.torque_is or "commanded"]
-    return rows * max(t.period for t in trials) - (options.delay or 0.0)
+    return rows * max(t.period for t in experiments) - (options.delay or 0.0)
 
 
 METHOD = Method("axis", "inertia, offset or gravity and friction jointly", identify, driven, holds_out=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from stickslip.identify.estimate import Identification
-from stickslip.identify.methods._trials import driven, trials_of
+from stickslip.identify.methods._experiments import driven, experiments_of
 from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.response.inertia import inertia
 from stickslip.record import Record
@@ -15,8 +15,8 @@ __all__ = ["METHOD"]
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """The inertia."""
-    axis, trials = trials_of(records, options)
-    return inertia(trials, axis)
+    axis, experiments = experiments_of(records, options)
+    return inertia(experiments, axis)
 
 
 METHOD = Method("inertia", "inertia from the frequency response", identify, driven)

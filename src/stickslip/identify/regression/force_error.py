@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 
@@ -66,7 +66,7 @@ def model_torque(inverse: InverseDynamics, model: Model, axis_values: Mapping[st
 
 
 def force_error_on(
-    trials: Sequence[Trial], axis: ServoAxis, model: Model, axis_values: Mapping[str, float],
+    experiments: Sequence[Experiment], axis: ServoAxis, model: Model, axis_values: Mapping[str, float],
     cutoff: float | None = None,
 ) -> float:  # fmt: skip
     """The same on records; not a number where they hold too little motion.
@@ -75,16 +75,16 @@ def force_error_on(
     other errors.
     """
     try:
-        return force_error(inverse_dynamics(trials, axis, cutoff=cutoff), model, axis_values)
+        return force_error(inverse_dynamics(experiments, axis, cutoff=cutoff), model, axis_values)
     except InputError:
         return math.nan
 
 
-def plain_error_on(trials: Sequence[Trial], axis: ServoAxis, found: InverseDynamics) -> float:
+def plain_error_on(experiments: Sequence[Experiment], axis: ServoAxis, found: InverseDynamics) -> float:
     """Relative error of the plain inverse dynamics on records that it was not fitted to; not a number where too
     short."""
     try:
-        there = inverse_dynamics(trials, axis, per_direction=found.has("fc_plus"), cutoff=found.cutoff)
+        there = inverse_dynamics(experiments, axis, per_direction=found.has("fc_plus"), cutoff=found.cutoff)
     except InputError:
         return math.nan
     shared = [n for n in there.names if found.has(n)]

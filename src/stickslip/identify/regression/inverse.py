@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.filters import decimated, low_pass, spectrum
 from stickslip.identify.fit.profile import inverse_information, long_run
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 
 __all__ = ["InverseDynamics", "inverse_dynamics", "refuse_harmonics"]
@@ -109,7 +109,7 @@ class InverseDynamics:
 
 
 def inverse_dynamics(
-    trials: Sequence[Trial],
+    experiments: Sequence[Experiment],
     axis: ServoAxis,
     *,
     per_direction: bool = False,
@@ -121,7 +121,7 @@ def inverse_dynamics(
 
     Parameters
     ----------
-    trials : sequence of Trial
+    experiments : sequence of Experiment
     axis : ServoAxis
     per_direction : bool
         Friction of its own for each direction of motion.
@@ -142,21 +142,21 @@ def inverse_dynamics(
     InputError
         If the records move too little to tell the parameters apart.
     """
-    if not trials:
+    if not experiments:
         raise InputError("no record; give at least one")
-    refuse_harmonics(trials, harmonics)
+    refuse_harmonics(experiments, harmonics)
     if cutoff is not None and not cutoff > 0.0:
         raise InputError(f"cutoff = {cutoff:g} Hz must be greater than 0")
-    corner = min(suitable_cutoff(t) for t in trials) if cutoff is None else cutoff
-    columns = [_columns(t, axis, corner, per_direction, harmonics, harmonic_period) for t in trials]
+    corner = min(suitable_cutoff(t) for t in experiments) if cutoff is None else cutoff
+    columns = [_columns(t, axis, corner, per_direction, harmonics, harmonic_period) for t in experiments]
     names, units = _names(axis, per_direction, harmonics)
     w = np.concatenate([c.matrix for c in columns])
     y = np.concatenate([c.torque for c in columns])
     if y.size < 3 * len(names):
         raise InputError(
-            f"{sum(t.time.size for t in trials)} samples hold {y.size} independent ones in motion (the filters take "
-            f"{TAPER / corner:.2g} s at both ends of a record), too few for {len(names)} parameters; give a longer "
-            "record with more motion"
+            f"{sum(t.time.size for t in experiments)} samples hold {y.size} independent ones in motion (the filters "
+            f"take {TAPER / corner:.2g} s at both ends of a record), too few for {len(names)} parameters; give a "
+            "longer record with more motion"
         )
     size = np.linalg.norm(w, axis=0)
     rank = np.linalg.matrix_rank(w / np.where(size > 0.0, size, 1.0), tol=1e-8)
@@ -189,12 +189,12 @@ def _undetermined(names: Sequence[str], w: Array, size: Array) -> str:
     return f"the effects of {', '.join(tied[:-1])} and {tied[-1]} cannot be told apart"
 
 
-def refuse_harmonics(trials: Sequence[Trial], harmonics: int, *, simulated: bool = False) -> None:
+def refuse_harmonics(experiments: Sequence[Experiment], harmonics: int, *, simulated: bool = False) -> None:
     """Refuse more harmonics than the samples can tell apart, before a column is made for each.
 
     Parameters
     ----------
-    trials : sequence of Trial
+    experiments : sequence of Experiment
     harmonics : int
         Each has two parameters.
     simulated : bool
@@ -205,7 +205,7 @@ def refuse_harmonics(trials: Sequence[Trial], harmonics: int, *, simulated: bool
     InputError
         With the number of parameters, the memory or the time, and how many harmonics may be given.
     """
-    samples, count = sum(t.time.size for t in trials), OTHERS + 2 * harmonics
+    samples, count = sum(t.time.size for t in experiments), OTHERS + 2 * harmonics
     if harmonics and samples < 3 * count:
         raise InputError(
             f"{harmonics} harmonics make {count} parameters, too many for {samples} samples, which tell at most "
@@ -244,21 +244,26 @@ def correlation_lags(residual: Array) -> int:
 # ---- from a record to the linear system --------------------------------------------------------------------------
 
 
-def uniform(trial: Trial) -> tuple[Array, Array, Array, float]:
+def uniform(experiment: Experiment) -> tuple[Array, Array, Array, float]:
     """Times, positions and drive signal on a regular grid, and its rate in Hz; unchanged where regular already."""
-    steps = np.diff(trial.time)
-    period = trial.period
-    signal = trial.signal()
+    steps = np.diff(experiment.time)
+    period = experiment.period
+    signal = experiment.signal()
     if np.max(np.abs(steps - period)) <= 1e-3 * period + 1e-9:
-        return trial.time, trial.position, signal, 1.0 / period
-    rows = float(trial.time[-1] - trial.time[0]) / period
-    if not rows <= SPARSE * trial.time.size:
+        return experiment.time, experiment.position, signal, 1.0 / period
+    rows = float(experiment.time[-1] - experiment.time[0]) / period
+    if not rows <= SPARSE * experiment.time.size:
         raise InputError(
-            f"{trial.name}: {trial.time.size} samples mostly {period:.3g} s apart lie over {rows * period:.3g} s; cut "
-            "the record where it has gaps (--from, --to)"
+            f"{experiment.name}: {experiment.time.size} samples mostly {period:.3g} s apart lie over "
+            f"{rows * period:.3g} s; cut the record where it has gaps (--from, --to)"
         )
-    t = np.arange(trial.time[0], trial.time[-1], period)
-    return t, np.interp(t, trial.time, trial.position), np.interp(t, trial.time, signal), 1.0 / period
+    t = np.arange(experiment.time[0], experiment.time[-1], period)
+    return (
+        t,
+        np.interp(t, experiment.time, experiment.position),
+        np.interp(t, experiment.time, signal),
+        1.0 / period,
+    )
 
 
 def white_noise(q: Array, rate: float) -> float:
@@ -270,9 +275,9 @@ def white_noise(q: Array, rate: float) -> float:
     return float(np.median(power[high] / (2.0 - 2.0 * np.cos(2.0 * math.pi * f[high] / rate)) ** 2))
 
 
-def suitable_cutoff(trial: Trial) -> float:
+def suitable_cutoff(experiment: Experiment) -> float:
     """Corner of the low-pass at which noise makes up `NOISE_SHARE` of the acceleration's power, within limits, Hz."""
-    _, q, _, rate = uniform(trial)
+    _, q, _, rate = uniform(experiment)
     highest = min(HIGHEST_CUTOFF, CUTOFF_PER_RATE * rate)
     density = white_noise(q, rate)
     corner = highest
@@ -289,7 +294,7 @@ def suitable_cutoff(trial: Trial) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """The decimated linear system of one trial."""
+    """The decimated linear system of one experiment."""
 
     matrix: Array
     torque: Array
@@ -299,21 +304,21 @@ class Columns:
 
 
 def _columns(
-    trial: Trial, axis: ServoAxis, cutoff: float, per_direction: bool, harmonics: int, period: float
+    experiment: Experiment, axis: ServoAxis, cutoff: float, per_direction: bool, harmonics: int, period: float
 ) -> Columns:
-    t, q, u, rate = uniform(trial)
+    t, q, u, rate = uniform(experiment)
     dt = 1.0 / rate
     if q.size < 12 * math.ceil(rate / cutoff):
         raise InputError(
-            f"{trial.name}: {q.size} samples, {q.size * dt:.3g} s, are too few for a low-pass at {cutoff:.3g} Hz, "
+            f"{experiment.name}: {q.size} samples, {q.size * dt:.3g} s, are too few for a low-pass at {cutoff:.3g} Hz, "
             f"which takes {12 * math.ceil(rate / cutoff)}; give a longer record"
         )
     density = white_noise(q, rate)
     q = low_pass(q, cutoff, rate)
     v = np.gradient(q, dt)
     acceleration = np.gradient(v, dt)
-    gain, loss = axis.drive_gains(trial.quantity)
-    supply = 1.0 if trial.supply is None else np.interp(t, trial.time, trial.supply)
+    gain, loss = axis.drive_gains(experiment.quantity)
+    supply = 1.0 if experiment.supply is None else np.interp(t, experiment.time, experiment.supply)
     torque = gain * supply * u - loss * v
     ahead, back = (v > 0.0).astype(float), (v < 0.0).astype(float)
     columns = [acceleration]
@@ -330,7 +335,7 @@ def _columns(
     edge = math.ceil(TAPER / cutoff * rate)
     floor = DEAD_ZONE * math.sqrt(density * (2.0 * math.pi) ** 2 * cutoff**3 / 3.0)
     sure = np.abs(v) >= floor
-    rows = np.asarray(np.interp(t, trial.time, trial.rows.astype(float)) > 0.5, dtype=np.bool_)
+    rows = np.asarray(np.interp(t, experiment.time, experiment.rows.astype(float)) > 0.5, dtype=np.bool_)
     rows[:edge] = rows[v.size - edge :] = False
     keep = np.arange(0, v.size, factor)
     chosen = (rows & sure)[keep]

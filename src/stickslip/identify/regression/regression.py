@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.band_fit import BandFit, Number
 from stickslip.identify.regression.bands import calmed, follows, in_bands
 from stickslip.identify.regression.sliding_rows import SlidingRows, narrowest_width, signals_of
 from stickslip.identify.regression.strokes import stacked
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 
 __all__ = ["Regression", "regress_axis"]
@@ -149,14 +149,14 @@ class Regression:
 
 
 def regress_axis(
-    trials: Sequence[Trial], axis: ServoAxis, *, skew: float | None = None, harmonics: bool = True,
+    experiments: Sequence[Experiment], axis: ServoAxis, *, skew: float | None = None, harmonics: bool = True,
     harmonic_period: float | None = None,
 ) -> Regression:  # fmt: skip
     """Inertia, friction, offset and skew of an axis by least squares on certain sliding, in several bands.
 
     Parameters
     ----------
-    trials : sequence of Trial
+    experiments : sequence of Experiment
         With the drive's signal. Fitted together.
     axis : ServoAxis
     skew : float, optional
@@ -175,9 +175,9 @@ def regress_axis(
     InputError
         If the records slide too little in one direction at a time, or a motor's constant is missing.
     """
-    if not trials:
+    if not experiments:
         raise InputError("no record; give at least one")
-    signals = [signals_of(t, axis) for t in trials]
+    signals = [signals_of(t, axis) for t in experiments]
     width = max(narrowest_width(s) for s in signals)
     period = max(s.period for s in signals)
     size = max(SKEW_ROWS * period, SKEW_TIME) if skew is None else GIVEN * period

@@ -6,8 +6,8 @@ import hashlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.regression import Regression, regress_axis
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 
 __all__ = ["Regress", "Regressions"]
@@ -26,19 +26,19 @@ class Regressions:
     def __init__(self) -> None:
         self._found: dict[bytes, Regression] = {}
 
-    def __call__(self, trials: Sequence[Trial], axis: ServoAxis, **options: Any) -> Regression:
+    def __call__(self, experiments: Sequence[Experiment], axis: ServoAxis, **options: Any) -> Regression:
         """As `regress_axis`, with its parameters and errors."""
-        key = content_of(trials, axis, options)
+        key = content_of(experiments, axis, options)
         if key not in self._found:
-            self._found[key] = regress_axis(trials, axis, **options)
+            self._found[key] = regress_axis(experiments, axis, **options)
         return self._found[key]
 
 
-def content_of(trials: Sequence[Trial], axis: ServoAxis, options: dict[str, Any]) -> bytes:
+def content_of(experiments: Sequence[Experiment], axis: ServoAxis, options: dict[str, Any]) -> bytes:
     """A digest of all that a regression depends on; options at their defaults count as not given."""
     given = sorted((name, repr(x)) for name, x in options.items() if x is not None)
     digest = hashlib.sha256(repr((axis.motion, axis.gravity, given)).encode())
-    for t in trials:
+    for t in experiments:
         arrays = (t.time, t.position, t.signal(), t.rows, t.supply)
         digest.update(repr((axis.drive_gains(t.quantity), t.time.size, [a is None for a in arrays])).encode())
         for a in arrays:

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.smooth import CORNER, NARROWEST, Window, seen
 from stickslip.identify.regression.inverse import uniform, white_noise
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 
 __all__ = ["Signals", "SlidingRows", "narrowest_width", "signals_of", "sliding_rows"]
@@ -36,7 +36,7 @@ DIRECTION = 2  # its column
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """A trial on a regular grid, without gaps: what the windows look at.
+    """An experiment on a regular grid, without gaps: what the windows look at.
 
     Attributes
     ----------
@@ -66,12 +66,12 @@ class Signals:
         return float((self.time[-1] - self.time[0]) / (self.time.size - 1))
 
 
-def signals_of(trial: Trial, axis: ServoAxis) -> Signals:
-    """The trial on a regular grid."""
-    t, q, u, rate = uniform(trial)
-    gain, loss = axis.drive_gains(trial.quantity)
-    supply = 1.0 if trial.supply is None else np.interp(t, trial.time, trial.supply)
-    rows = np.interp(t, trial.time, trial.rows.astype(np.float64)) > 0.5
+def signals_of(experiment: Experiment, axis: ServoAxis) -> Signals:
+    """The experiment on a regular grid."""
+    t, q, u, rate = uniform(experiment)
+    gain, loss = axis.drive_gains(experiment.quantity)
+    supply = 1.0 if experiment.supply is None else np.interp(t, experiment.time, experiment.supply)
+    rows = np.interp(t, experiment.time, experiment.rows.astype(np.float64)) > 0.5
     noise = math.sqrt(white_noise(q, rate) * rate / 2.0)
     return Signals(t, q - q[0], gain * supply * u, loss, np.asarray(rows, dtype=np.bool_), noise, float(q[0]))
 

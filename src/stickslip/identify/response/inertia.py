@@ -19,9 +19,9 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.filters import cross_spectrum, spectrum
 from stickslip.identify.regression.inverse import uniform
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 
 __all__ = ["Response", "frequency_response", "inertia"]
@@ -68,7 +68,7 @@ class Response:
     windows: int
 
 
-def frequency_response(trial: Trial, axis: ServoAxis, *, lowest: float = BAND[0]) -> Response:
+def frequency_response(experiment: Experiment, axis: ServoAxis, *, lowest: float = BAND[0]) -> Response:
     """Position over torque of one record; windows are 4 periods of the lowest frequency long.
 
     Raises
@@ -76,18 +76,18 @@ def frequency_response(trial: Trial, axis: ServoAxis, *, lowest: float = BAND[0]
     InputError
         If the record has fewer than two such windows, or no torque.
     """
-    t, q, u, rate = uniform(trial)
+    t, q, u, rate = uniform(experiment)
     length = math.ceil(4.0 * rate / lowest)
     if q.size < 2 * length:
         raise InputError(
-            f"{trial.name}: {q.size / rate:.3g} s hold fewer than two windows of {length / rate:.3g} s; give a longer "
-            "record or a higher lowest frequency"
+            f"{experiment.name}: {q.size / rate:.3g} s hold fewer than two windows of {length / rate:.3g} s; give a "
+            "longer record or a higher lowest frequency"
         )
-    gain, _ = axis.drive_gains(trial.quantity)
-    supply = 1.0 if trial.supply is None else np.interp(t, trial.time, trial.supply)
+    gain, _ = axis.drive_gains(experiment.quantity)
+    supply = 1.0 if experiment.supply is None else np.interp(t, experiment.time, experiment.supply)
     torque = gain * supply * u
     if not np.std(torque) > 0.0:
-        raise InputError(f"{trial.name}: the torque never changes; excite the axis")
+        raise InputError(f"{experiment.name}: the torque never changes; excite the axis")
     # The position wanders; its difference does not, and leaks less. Central, so that it keeps its phase.
     speed = np.gradient(q, 1.0 / rate)
     f, sxx = spectrum(torque, rate, length)
@@ -102,19 +102,23 @@ def frequency_response(trial: Trial, axis: ServoAxis, *, lowest: float = BAND[0]
     h2 = syy[keep] / np.conj(sxy[keep]) / s / held
     coherence = np.abs(sxy[keep]) ** 2 / (sxx[keep] * syy[keep])
     return Response(
-        trial.name, float(np.std(torque)), f[keep], h1.astype(np.complex128), h2.astype(np.complex128), coherence,
+        experiment.name, float(np.std(torque)), f[keep], h1.astype(np.complex128), h2.astype(np.complex128), coherence,
         q.size // length,
     )  # fmt: skip
 
 
 def inertia(
-    trials: Sequence[Trial], axis: ServoAxis, *, band: tuple[float, float] = BAND, estimator: str = "h1"
+    experiments: Sequence[Experiment],
+    axis: ServoAxis,
+    *,
+    band: tuple[float, float] = BAND,
+    estimator: str = "h1",
 ) -> Identification:
     """Inertia and effective viscous friction from open-loop records of one or several amplitudes.
 
     Parameters
     ----------
-    trials : sequence of Trial
+    experiments : sequence of Experiment
         With the torque that excited them (random, or a sweep).
     axis : ServoAxis
     band : (float, float)
@@ -131,13 +135,13 @@ def inertia(
     InputError
         If there is no coherent response in the band.
     """
-    if not trials:
+    if not experiments:
         raise InputError("no record; give at least one")
     if estimator not in ("h1", "h2"):
         raise InputError(f"estimator = {estimator!r} must be 'h1' or 'h2'")
     if not 0.0 < band[0] < band[1]:
         raise InputError(f"band = {band} must be two ascending frequencies in Hz")
-    responses = [frequency_response(t, axis, lowest=band[0]) for t in trials]
+    responses = [frequency_response(t, axis, lowest=band[0]) for t in experiments]
     rows: list[Array] = []
     sides: list[Array] = []
     weights: list[Array] = []
@@ -154,7 +158,10 @@ def inertia(
         impedance = 1.0 / (1j * omega * h)
         # Standard deviation of a response from its coherence: Bendat and Piersol 2010, eq. 9.90.
         spread = np.abs(impedance) * np.sqrt(np.maximum(1.0 - g, 1e-6) / (2.0 * g * r.windows))
-        real, imaginary = np.zeros((omega.size, 1 + len(trials))), np.zeros((omega.size, 1 + len(trials)))
+        real, imaginary = (
+            np.zeros((omega.size, 1 + len(experiments))),
+            np.zeros((omega.size, 1 + len(experiments))),
+        )
         real[:, 1 + place], imaginary[:, 0] = 1.0, omega
         rows += [real, imaginary]
         sides += [impedance.real, impedance.imag]
@@ -166,7 +173,7 @@ def inertia(
     # A Hann window spreads each line over its neighbours: half of them count as independent.
     level = max(1.0, float(residual @ residual) / max(y.size - solution.size, 1))
     covariance: Array = (2.0 * level * np.linalg.inv(a.T @ a)).astype(np.float64)
-    resonances = modes_of(trials, axis, float(solution[0]), band[1])
+    resonances = modes_of(experiments, axis, float(solution[0]), band[1])
     return _result(responses, solution, covariance, axis, band, estimator, resonances)
 
 
@@ -203,14 +210,16 @@ def verdict_on(low: float, high: float) -> str:
     return "the data do not distinguish it from 0" if low <= 0.0 else "its interval is too wide"
 
 
-def modes_of(trials: Sequence[Trial], axis: ServoAxis, inertia: float, above: float) -> list[float]:
+def modes_of(experiments: Sequence[Experiment], axis: ServoAxis, inertia: float, above: float) -> list[float]:
     """Frequencies at which a record's response has a resonance, Hz; those of several records that are alike are one."""
     found: list[float] = []
-    for trial in trials:
+    for experiment in experiments:
         # Shorter windows than the fit's: many averages, which tell a mode from chance.
-        span = float(trial.time[-1] - trial.time[0])
+        span = float(experiment.time[-1] - experiment.time[0])
         try:
-            response = frequency_response(trial, axis, lowest=max(above / MODE_BAND, 4.0 * FEWEST / span))
+            response = frequency_response(
+                experiment, axis, lowest=max(above / MODE_BAND, 4.0 * FEWEST / span)
+            )
         except InputError:
             continue  # The record is too short for them.
         found += resonances_of(response, inertia, above)

@@ -13,7 +13,7 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 
-__all__ = ["Trial", "trial_of"]
+__all__ = ["Experiment", "experiment_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
@@ -25,12 +25,13 @@ DRIVES = {
 """Channels that may hold the drive's signal, in the order in which they are looked for, and what they are."""
 REFERENCES = ("position_reference", "reference")
 FASTER, WINDOW = 1.5, 0.1
-"""Times as fast that the end of a trial must be to be fitted instead of its begin; s over which a speed is averaged."""
+"""Times as fast that the end of an experiment must be to be fitted instead of its start; s over which a speed is
+averaged."""
 FEWEST = 50
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class Experiment:
     """One motion of an axis.
 
     Attributes
@@ -135,8 +136,8 @@ class Trial:
         line, *_ = np.linalg.lstsq(powers, q, rcond=None)
         return float(line[0]), float(line[1])
 
-    def split(self, share: float) -> tuple[Trial, Trial]:
-        """Most of this trial, and the whole of it looked at in the rest: the last `share` of its time.
+    def split(self, share: float) -> tuple[Experiment, Experiment]:
+        """Most of this experiment, and the whole of it looked at in the rest: the last `share` of its time.
 
         Where the end is faster than all before, the first `share` is looked at instead: laws are judged at speeds that
         they were fitted to.
@@ -161,26 +162,26 @@ class Trial:
             return 0.0
         return float(np.max(np.abs(q[step:] - q[:-step]) / (t[step:] - t[:-step])))
 
-    def since(self, row: int) -> Trial:
-        """Its rows from this one on, at least as many as a trial needs."""
+    def since(self, row: int) -> Experiment:
+        """Its rows from this one on, at least as many as an experiment needs."""
         begin = min(row, self.time.size - FEWEST)
         arrays = ("time", "position", "drive", "reference", "supply", "used")
         cut = {n: None if (a := getattr(self, n)) is None else a[begin:] for n in arrays}
         return replace(self, **cut)
 
-    def until(self, rows: int) -> Trial:
-        """Its first rows, at least as many as a trial needs."""
+    def until(self, rows: int) -> Experiment:
+        """Its first rows, at least as many as an experiment needs."""
         end = max(rows, FEWEST)
         arrays = ("time", "position", "drive", "reference", "supply", "used")
         cut = {n: None if (a := getattr(self, n)) is None else a[:end] for n in arrays}
         return replace(self, **cut)
 
 
-def trial_of(
+def experiment_of(
     record: Record, axis: ServoAxis, *, loop: Loop | None = None, gain: float = 1.0, name: str = "",
     channels: Sequence[str] = tuple(DRIVES), output: str = "torque",
-) -> Trial:  # fmt: skip
-    """Take a trial from a record.
+) -> Experiment:  # fmt: skip
+    """Take an experiment from a record.
 
     Parameters
     ----------
@@ -189,7 +190,7 @@ def trial_of(
         ``torque_percent`` (% of rated) or ``voltage`` (V); perhaps ``position_reference`` and ``supply``.
     axis : ServoAxis
     loop, gain
-        As in `Trial`.
+        As in `Experiment`.
     channels : sequence of str
         Channels that may hold the drive's signal, in the order of preference.
     output : str
@@ -212,7 +213,7 @@ def trial_of(
     def column(name: str) -> Array:
         return np.ascontiguousarray(record[name][keep], dtype=np.float64)
 
-    return Trial(
+    return Experiment(
         name or str(record.meta.get("source", "record")),
         np.ascontiguousarray(record.time[keep], dtype=np.float64),
         factor * column("position"),

@@ -1,4 +1,4 @@
-"""From records to trials of an axis, as the options say; and what is refused before anything is computed."""
+"""From records to experiments of an axis, as the options say; and what is refused before anything is computed."""
 
 from __future__ import annotations
 
@@ -8,34 +8,34 @@ from dataclasses import replace
 
 from stickslip.config import named_numbers
 from stickslip.errors import InputError, UnknownName
+from stickslip.identify.experiment import DRIVES, Experiment, experiment_of
 from stickslip.identify.methods.method import Options
-from stickslip.identify.trial import DRIVES, Trial, trial_of
 from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Loop
 
-__all__ = ["driven", "loop_of", "trials_of"]
+__all__ = ["driven", "experiments_of", "loop_of"]
 
 LOOP_NAMES = ("kp", "ki", "kd", "kr", "limit", "period", "count", "span")
 NOT_NEGATIVE = ("kp", "ki", "kd", "kr", "period", "count")
 RANGES = {"limit": "greater than 0", **dict.fromkeys(NOT_NEGATIVE, "a finite number of 0 or more")}
 
 
-def trials_of(records: Sequence[Record], options: Options) -> tuple[ServoAxis, list[Trial]]:
-    """The axis and a trial for every record."""
+def experiments_of(records: Sequence[Record], options: Options) -> tuple[ServoAxis, list[Experiment]]:
+    """The axis and an experiment for every record."""
     axis = axis_of(records[0], options)
-    return axis, [trial(record, axis, options) for record in records]
+    return axis, [experiment(record, axis, options) for record in records]
 
 
 def driven(records: Sequence[Record], options: Options) -> None:
     """Refuse records that lack what moves the axis, and numbers that nothing would be multiplied by."""
-    _, trials = trials_of(records, options)
-    refuse_unused(records, trials, options)
+    _, experiments = experiments_of(records, options)
+    refuse_unused(records, experiments, options)
 
 
-def refuse_unused(records: Sequence[Record], trials: Sequence[Trial], options: Options) -> None:
+def refuse_unused(records: Sequence[Record], experiments: Sequence[Experiment], options: Options) -> None:
     """A motor's constant that nothing is multiplied by would be left out in silence."""
-    quantities = {t.quantity for t in trials} if options.drive_gain is None else {"gain"}
+    quantities = {t.quantity for t in experiments} if options.drive_gain is None else {"gain"}
     derived = any("motor_torque" in r.meta.get("derived", {}) for r in records)
     unused: list[str] = []
     if options.torque_constant is not None and not quantities & {"current", "voltage"} and not derived:
@@ -44,7 +44,7 @@ def refuse_unused(records: Sequence[Record], trials: Sequence[Trial], options: O
         unused.append(f"--resistance {options.resistance:g}")
     if unused:
         instead = "; --drive-gain says all of it" if options.drive_gain is not None else ""
-        made = ", the loop's output" if any(t.drive is None for t in trials) else ""
+        made = ", the loop's output" if any(t.drive is None for t in experiments) else ""
         raise InputError(
             f"{' and '.join(unused)} would not be used: the drive's signal is a {' and a '.join(sorted(quantities))}"
             f"{made}{instead}; leave it out, map the current or voltage (--map current=COLUMN), or say --loop-output"
@@ -65,8 +65,8 @@ def axis_of(record: Record, options: Options) -> ServoAxis:
     )  # fmt: skip
 
 
-def trial(record: Record, axis: ServoAxis, options: Options) -> Trial:
-    """The record as a trial."""
+def experiment(record: Record, axis: ServoAxis, options: Options) -> Experiment:
+    """The record as an experiment."""
     name = str(record.meta.get("reading", {}).get("file", "")) or "record"
     loop = str(record.meta.get("loop", ""))
     if loop and not {"position_reference", "reference"} & set(record.channels):
@@ -80,7 +80,7 @@ def trial(record: Record, axis: ServoAxis, options: Options) -> Trial:
         record = replace(record, channels={k: v for k, v in record.channels.items() if k != "supply"})
     if options.extra_torque:
         record = with_extra(record, options.extra_torque, loop)
-    return trial_of(record, axis, loop=loop_of(loop) if loop else None, name=name, output=output)
+    return experiment_of(record, axis, loop=loop_of(loop) if loop else None, name=name, output=output)
 
 
 def with_extra(record: Record, channel: str, loop: str) -> Record:
