@@ -20,21 +20,21 @@ import numpy as np
 from scipy.io import loadmat
 
 from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.inverse import inverse_dynamics
-from stickslip.identify.trial import Trial
 from stickslip.machines.servo import ServoAxis
 from stickslip.simulation.recorded_input.simulation import Loop
 
 FILE = Path(os.environ.get("STICKSLIP_DATA", "../shared/data")) / "emps" / "DATA_EMPS.mat"
 
 
-def emps() -> tuple[Trial, ServoAxis]:
+def emps() -> tuple[Experiment, ServoAxis]:
     """The record with its position and velocity loop: u = kv (kp e - dq), |u| <= 10 V."""
     data: Any = loadmat(FILE)
     t, q, r, u = (np.ascontiguousarray(data[k].ravel(), dtype=float) for k in ("t", "qm", "qg", "vir"))
     kp, kv, gain = (float(data[k].item()) for k in ("kp", "kv", "gtau"))
     loop = Loop(kp=kv * kp, kd=kv, limit=10.0, velocity_span=2)
-    return Trial("emps", t, q, u, "voltage", r, loop), ServoAxis(
+    return Experiment("emps", t, q, u, "voltage", r, loop), ServoAxis(
         motion="linear", drive_gain=gain, drive_side="load"
     )
 
@@ -44,14 +44,14 @@ def main() -> int:
     if not FILE.exists():
         print(f"no record at {FILE}: fetch DATA_EMPS.mat from nonlinearbenchmark.org and set STICKSLIP_DATA")
         return 0
-    trial, axis = emps()
+    experiment, axis = emps()
     for per_direction in (False, True):
-        found = inverse_dynamics([trial], axis, per_direction=per_direction)
+        found = inverse_dynamics([experiment], axis, per_direction=per_direction)
         print(f"inverse dynamics, relative force error {100 * found.relative_error:.4f} %")
         for name, value, std, unit in zip(found.names, found.values, found.std, found.units):
             print(f"  {name:<10}{value:>10.4f} +- {std:.4f} {unit}")
     # The output error is what was published; the prediction error looks at what Coulomb friction leaves out, too.
-    result = identify_axis([trial], axis, ["coulomb"], intervals="covariance")
+    result = identify_axis([experiment], axis, ["coulomb"], intervals="covariance")
     print(
         f"closed loop, relative errors: position {100 * result.misfit['position_relative']:.5f} %, "
         f"force {100 * result.misfit['drive_relative']:.3f} %"

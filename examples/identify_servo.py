@@ -27,7 +27,7 @@ import numpy as np
 from stickslip import plugins
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.output import Extras, OutputError, output_error
-from stickslip.identify.trial import Trial
+from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.simulation.recorded_input.simulation import Loop
 
@@ -42,7 +42,7 @@ LAWS = ("coulomb",)
 """Friction grows with the load in each; a Stribeck effect can be tried by adding its name."""
 
 
-def trial(path: Path) -> Trial:
+def experiment(path: Path) -> Experiment:
     """One record: the loop is simulated, the drive is off where torque is disabled."""
     data = json.loads(path.read_text(encoding="utf-8"))
     column: dict[str, Any] = {
@@ -50,7 +50,7 @@ def trial(path: Path) -> Trial:
         for k in ("timestamp", "position", "goal_position", "torque_enable")
     }
     loop = Loop(kp=VOLTS_PER_GAIN * data["kp"], limit=SUPPLY, period=1e-3)
-    return Trial(
+    return Experiment(
         path.stem, column["timestamp"], column["position"], None, "voltage", column["goal_position"], loop,
         column["torque_enable"],
     )  # fmt: skip
@@ -65,34 +65,38 @@ OPTIONS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def identify(trials: list[Trial], name: str) -> OutputError:
+def identify(experiments: list[Experiment], name: str) -> OutputError:
     """Motor, controller gain, gravity's angle and friction, from positions alone."""
     start: dict[str, dict[str, float]] = {
         "coulomb": {"fc": 0.01, "sigma2": 0.005},
         "stribeck": {"fc": 0.01, "fs": 0.015, "vs": 0.5, "k": 10.0, "sigma2": 0.005},
     }
-    return output_error(trials, AXIS, plugins.law(name), None, values={**MECHANICS, **start[name]}, **OPTIONS)
+    return output_error(
+        experiments, AXIS, plugins.law(name), None, values={**MECHANICS, **start[name]}, **OPTIONS
+    )
 
 
-def choose(trials: list[Trial]) -> None:
+def choose(experiments: list[Experiment]) -> None:
     """Fit every law, let held-out data choose, and fit that to all."""
     begin = time.process_time()
     laws = [name for name in plugins.law_names() if plugins.law(name).steady]
-    found = identify_axis(trials, AXIS, laws, values={**MECHANICS, "fc": 0.01, "sigma2": 0.005}, **OPTIONS)
+    found = identify_axis(
+        experiments, AXIS, laws, values={**MECHANICS, "fc": 0.01, "sigma2": 0.005}, **OPTIONS
+    )
     print("law              free  mean absolute position error on the last 30 %, rad")
     for c in found.details["candidates"]:
         print(
             f"{c.law:16s} {c.parameters:4d}  {c.held_out.get('position_mean_absolute', math.nan):.4f} {c.failure}"
         )
     assert found.model
-    error = mean_absolute(found.details["output"], trials)
+    error = mean_absolute(found.details["output"], experiments)
     spent = time.process_time() - begin
-    print(f"chosen: {found.model.law.name}, {error:.4f} rad on {len(trials)} records; CPU {spent:.1f} s")
+    print(f"chosen: {found.model.law.name}, {error:.4f} rad on {len(experiments)} records; CPU {spent:.1f} s")
 
 
-def mean_absolute(found: OutputError, trials: list[Trial]) -> float:
+def mean_absolute(found: OutputError, experiments: list[Experiment]) -> float:
     """Mean over the records of the mean absolute position error, rad."""
-    return float(np.mean([found.held_out([t])["position_mean_absolute"] for t in trials]))
+    return float(np.mean([found.held_out([t])["position_mean_absolute"] for t in experiments]))
 
 
 def main() -> None:
@@ -100,23 +104,24 @@ def main() -> None:
     words = [w for w in sys.argv[1:] if w != "--all"]
     data = os.environ.get("STICKSLIP_DATA", "../shared/data")
     folder = Path(words[0] if words else f"{data}/xl330_pendulum")
-    trials = [trial(p) for p in sorted(folder.glob("kp*.json"))]
+    experiments = [experiment(p) for p in sorted(folder.glob("kp*.json"))]
     if "--all" in sys.argv:
-        choose(trials)
+        choose(experiments)
         return
-    gains = sorted({t.name.partition("_")[0] for t in trials})
+    gains = sorted({t.name.partition("_")[0] for t in experiments})
     for name in LAWS:
         begin = time.process_time()
-        found = identify(trials, name)
+        found = identify(experiments, name)
         print(
-            f"{name}: mean absolute position error {mean_absolute(found, trials):.4f} rad on {len(trials)} records"
+            f"{name}: mean absolute position error {mean_absolute(found, experiments):.4f} rad on "
+            f"{len(experiments)} records"
         )
         for e in found.estimates:
             print(f"  {e.symbol:10s} {e.value:10.5g} [{e.lower:.4g}, {e.upper:.4g}] {e.unit} {e.verdict}")
         errors: list[float] = []
         for gain in gains:
-            others = [t for t in trials if not t.name.startswith(gain + "_")]
-            left_out = [t for t in trials if t.name.startswith(gain + "_")]
+            others = [t for t in experiments if not t.name.startswith(gain + "_")]
+            left_out = [t for t in experiments if t.name.startswith(gain + "_")]
             errors.append(mean_absolute(identify(others, name), left_out))
         listing = ", ".join(f"{g} {e:.4f}" for g, e in zip(gains, errors, strict=True))
         print(

@@ -14,8 +14,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.identify.doctor import examine
-from stickslip.identify.doctor._view import View
 from stickslip.identify.doctor.play import backlash, dead_travel
+from stickslip.identify.doctor.view import View
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, drive_axis

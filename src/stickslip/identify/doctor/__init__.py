@@ -16,7 +16,7 @@ import numpy as np
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import change, excitation, physics, play, signals, spikes, timing, units
-from stickslip.identify.doctor._view import View
+from stickslip.identify.doctor.view import View
 from stickslip.identify.regression.regression import regress_axis
 from stickslip.identify.regression.regressions import Regress
 from stickslip.readers.cut import range_words, taken

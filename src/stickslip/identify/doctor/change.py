@@ -17,7 +17,7 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import Array, Smooth, View, row
+from stickslip.identify.doctor.view import Array, Smooth, View, row
 from stickslip.identify.fit.profile import long_run
 
 __all__ = ["changes", "temperature"]

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import View
+from stickslip.identify.doctor.view import View
 from stickslip.record import encoder_step
 
 __all__ = ["channels", "moved", "reversed_and_slow"]

@@ -16,7 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import Array, Smooth, View
+from stickslip.identify.doctor.view import Array, Smooth, View
 from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 

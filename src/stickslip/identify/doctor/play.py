@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import Array, Smooth, View
 from stickslip.identify.doctor.physics import line_of, usable
+from stickslip.identify.doctor.view import Array, Smooth, View
 
 __all__ = ["DeadTravel", "backlash", "dead_travel"]
 

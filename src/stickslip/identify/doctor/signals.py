@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import Array, View, is_number, row
 from stickslip.identify.doctor.spikes import sticking_out
+from stickslip.identify.doctor.view import Array, View, is_number, row
 
 __all__ = ["missing", "quantised", "saturated", "supply", "wrapped"]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import Array, View, row
+from stickslip.identify.doctor.view import Array, View, row
 from stickslip.readers.cut import range_words
 from stickslip.record import Record
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import View, row
+from stickslip.identify.doctor.view import View, row
 
 __all__ = ["ascending", "sampling", "scale"]
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor._view import Array, View
+from stickslip.identify.doctor.view import Array, View
 
 __all__ = ["assumed", "counted", "degrees", "reference_scale", "too_fast", "torque_scale", "velocity_scale"]
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip.identify.axis.result import speed_of
-from stickslip.identify.doctor._view import View
 from stickslip.identify.doctor.play import dead_travel
+from stickslip.identify.doctor.view import View
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
