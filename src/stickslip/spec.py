@@ -276,15 +276,14 @@ class Configurable(Described):
 
     def state(self, p: Any) -> types.SimpleNamespace:
         """Return the state at rest, everything zero and sticking, for the plain Python functions."""
-        n = self.elements_in(p)
+        sizes = {f.name: self.count_in(p, f.par.per) for f in self.state_fields if f.per_element}
         return types.SimpleNamespace(
-            **{f.name: [0.0] * n if f.per_element else 0.0 for f in self.state_fields}
+            **{f.name: [0.0] * sizes[f.name] if f.per_element else 0.0 for f in self.state_fields}
         )
 
     def state_size(self, p: Any) -> int:
         """The length of the flat state."""
-        n = self.elements_in(p)
-        return sum(n if f.per_element else 1 for f in self.state_fields)
+        return sum(self.count_in(p, f.par.per) if f.per_element else 1 for f in self.state_fields)
 
     def pack_state(self, z: types.SimpleNamespace) -> list[float]:
         """Return a state `z` as the flat list that compiled functions read."""

@@ -227,8 +227,8 @@ def test_what_adapts_stands_over_an_integral_or_an_observer(name):
         SampledController(sample_time=TIME, **{**places, "loop": pid()})
 
 
-def test_seven_laws_adapt():
-    assert len(ADAPTING) == 7
+def test_eight_laws_adapt():
+    assert len(ADAPTING) == 8
 
 
 def test_a_scale_needs_a_friction_law_with_a_torque_at_constant_velocity():

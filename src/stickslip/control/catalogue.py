@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from stickslip.control import registry
 from stickslip.control.belief import Belief
 from stickslip.control.block import ControlBlock
@@ -121,6 +123,27 @@ def adaptive(belief: Belief, functions: str, leak: float = 0.05) -> ControlBlock
     return ControlBlock(law, None, **values)
 
 
+def powers(belief: Belief) -> list[float]:
+    """N·m: the GMS law's sliding curve up to twice the Stribeck velocity as a polynomial of the third degree."""
+    model = elements(belief)
+    steady, p = model.law.steady, model.parameters
+    assert steady is not None
+    share = np.linspace(0.01, 1.0, 100)
+    speeds = 2.0 * belief.number("vs") * share
+    levels = [0.5 * (steady(v, p) - steady(-v, p)) - belief.number("sigma2") * v for v in speeds.tolist()]
+    return np.polynomial.polynomial.polyfit(share, levels, 3).tolist()
+
+
+def adaptive_elements(belief: Belief) -> ControlBlock:
+    """The GMS law with a sliding curve that is learned."""
+    p, curve = elements(belief).parameters, powers(belief)
+    return ControlBlock(
+        "adaptive_gms", None, k=p.k, alpha=p.alpha, level=curve, rate=[integral_pace(belief)] * len(curve),
+        top=2.0 * belief.number("vs"), sigma2=belief.number("sigma2"), slope=0.5 * belief.pace,
+        largest=3.0 * belief.number("fs"),
+    )  # fmt: skip
+
+
 def level(belief: Belief, direction: str) -> ControlBlock:
     """A Coulomb observer."""
     smooth = 0.1 * belief.number("vs") if direction == "reference" else belief.number("vs")
@@ -164,12 +187,8 @@ def sliding(belief: Belief) -> ControlBlock:
     """A sliding mode with a boundary layer."""
     torque = 1.5 * belief.number("fs")
     return ControlBlock(
-        "boundary_layer",
-        inertia=belief.inertia,
-        slope=0.5 * belief.pace,
-        torque=torque,
-        layer=layer(belief, torque),
-    )
+        "boundary_layer", inertia=belief.inertia, slope=0.5 * belief.pace, torque=torque, layer=layer(belief, torque),
+    )  # fmt: skip
 
 
 def twisting(belief: Belief, form: str) -> ControlBlock:
@@ -207,10 +226,8 @@ def springs(belief: Belief) -> ControlBlock:
     """Nonlinear Maxwell-slip: together eight times as stiff as the PD, and just below break-away."""
     whole = 8.0 * stiffness(belief)
     return ControlBlock(
-        "nonlinear_maxwell_slip",
-        k=[x * whole / 7.0 for x in (4.0, 2.0, 1.0)],
-        w=[0.3 * belief.number("fs")] * 3,
-    )
+        "nonlinear_maxwell_slip", k=[x * whole / 7.0 for x in (4.0, 2.0, 1.0)], w=[0.3 * belief.number("fs")] * 3
+    )  # fmt: skip
 
 
 def knocker(belief: Belief) -> ControlBlock:
@@ -298,6 +315,9 @@ CATALOGUE: Mapping[str, Compensator] = {
     "rbf": Compensator(
         "friction learnt, Gaussians", LEVELS, lambda b: {"observer": adaptive(b, "gaussians", 0.01)},
         against="21 weights do what Makkar's three do, and forget at one speed what they learn at another",
+    ),
+    "adaptive-gms": Compensator(
+        "GMS with a learned sliding curve", ELEMENTS, lambda b: {"observer": adaptive_elements(b)}
     ),
     "friedland-park": Compensator(
         "Coulomb observer", CURVE, lambda b: {"observer": level(b, "reference")}, ("PD",),

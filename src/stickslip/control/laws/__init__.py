@@ -27,6 +27,7 @@ CONTROL_LAWS = (
     "dual_observer",
     "coulomb_observer",
     "adaptive_friction",
+    "adaptive_gms",
     "disturbance_observer",
     "extended_state_observer",
     "stiction_push",
