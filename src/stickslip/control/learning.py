@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-__all__ = ["bin_response", "low_pass", "low_pass_response", "relearned", "smoothed"]
+from stickslip.control.block import ControlBlock
+
+__all__ = [
+    "AngleTable",
+    "TimeTable",
+    "bin_response",
+    "low_pass",
+    "low_pass_response",
+    "relearned",
+    "smoothed",
+]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 REACH = 5.0
@@ -68,3 +79,96 @@ def relearned(
     """
     earlier = np.concatenate([torque[advance:], np.full(advance, torque[-1])])
     return np.clip(smoothed(table + rate * earlier, weights), -largest, largest)
+
+
+# ---- tables ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class TimeTable:
+    """A feedforward over the time of a repetition.
+
+    Attributes
+    ----------
+    torque : array, shape (n,)
+        N·m, sample by sample.
+    step : float
+        Of a sample, s.
+    rate, advance, weights, largest
+        As of `relearned`.
+    """
+
+    torque: Array
+    step: float
+    rate: float
+    advance: int
+    weights: Array
+    largest: float
+
+    def block(self) -> ControlBlock:
+        """The block `table_feedforward` that gives it."""
+        return ControlBlock(
+            "table_feedforward", None, {"over": "time"}, step=self.step, table=self.torque.tolist()
+        )
+
+    def after(self, torque: Array) -> TimeTable:
+        """The next table, of what the loop gave besides (N·m, shape (n,))."""
+        found = relearned(self.torque, torque, self.rate, self.advance, self.weights, self.largest)
+        return replace(self, torque=found)
+
+
+@dataclass(frozen=True, eq=False)
+class AngleTable:
+    """A feedforward over the reference's angle and direction: `learned_feedforward`'s map, a repetition at a time.
+
+    Attributes
+    ----------
+    torque : array, shape (2, bins)
+        N·m, forward and backward, in equal bins from lower to upper.
+    lower, upper : float
+        rad
+    bin : array of int, shape (n,)
+        Of every sample of a repetition.
+    side : array, shape (n,)
+        Sign of the reference's velocity there; what stands teaches nothing.
+    rate : float
+        Share of the loop's torque that a repetition takes over.
+    largest : float
+        Bound, N·m.
+    """
+
+    torque: Array
+    lower: float
+    upper: float
+    bin: np.ndarray[Any, np.dtype[np.int64]]
+    side: Array
+    rate: float
+    largest: float
+
+    @classmethod
+    def over(cls, angle: Array, velocity: Array, bins: int, rate: float, largest: float) -> AngleTable:
+        """An empty table over the range of a motion, angle in rad and velocity in rad/s, shape (n,)."""
+        lower, upper = float(np.min(angle)), float(np.max(angle))
+        place = np.floor(bins * (angle - lower) / (upper - lower)).astype(np.int64)
+        return cls(
+            np.zeros((2, bins)), lower, upper, np.minimum(place, bins - 1), np.sign(velocity), rate, largest
+        )
+
+    def block(self) -> ControlBlock:
+        """The block `table_feedforward` that gives it."""
+        forward, backward = self.torque.tolist()
+        return ControlBlock(
+            "table_feedforward", lower=self.lower, upper=self.upper, forward=forward, backward=backward
+        )
+
+    def after(self, torque: Array) -> AngleTable:
+        """The next table, of what the loop gave besides (N·m, shape (n,)), through [1/4 1/2 1/4] over the bins."""
+        bins = self.torque.shape[1]
+        grown = self.torque.copy()
+        for row, side in enumerate((1.0, -1.0)):
+            at = self.bin[self.side == side]
+            total = np.bincount(at, torque[self.side == side], bins)
+            grown[row] += self.rate * total / np.maximum(np.bincount(at, minlength=bins), 1)
+        padded = np.pad(grown, ((0, 0), (1, 1)), mode="edge")
+        found = 0.25 * padded[:, :-2] + 0.5 * padded[:, 1:-1] + 0.25 * padded[:, 2:]
+        return replace(self, torque=np.clip(found, -self.largest, self.largest))

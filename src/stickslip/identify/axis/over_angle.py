@@ -63,9 +63,9 @@ class SlidingPlaces(Places):
         """Columns of what else the torque may hold, shape (n, k)."""
         return self.others
 
-    def motion(self, orders: Sequence[float]) -> Array:
-        """Velocity and acceleration, which the windows free of noise, shape (n, 2)."""
-        return np.column_stack([self.velocity, self.acceleration])
+    def motion(self, orders: Sequence[float], late: float = 0.0) -> Array:
+        """Velocity and acceleration, which the windows free of noise, `late` s before each place, shape (n, 2)."""
+        return np.column_stack([self.velocity - late * self.acceleration, self.acceleration])
 
     def damping(self, order: float) -> Array:
         """What the window leaves of a wave of this order, shape (n,)."""

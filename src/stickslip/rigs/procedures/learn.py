@@ -1,4 +1,4 @@
-"""Learn: a tracking repeated, each time with a feedforward over time that the times before have left."""
+"""Learn: a tracking repeated, each time with a feedforward that the times before have left, over time or the angle."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from stickslip.config import read_toml
 from stickslip.control.block import ControlBlock
 from stickslip.control.composed import composed_of
 from stickslip.control.learned import refuse_others, write_table
-from stickslip.control.learning import low_pass, relearned
+from stickslip.control.learning import AngleTable, TimeTable, low_pass
+from stickslip.control.position import position_feedforward
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control.written import tables_of
-from stickslip.errors import InputError
+from stickslip.errors import InputError, UnknownName
+from stickslip.machines.position_map import PositionMap
 from stickslip.record import Record
 from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Step, Steps
@@ -28,6 +31,7 @@ __all__ = ["PROCEDURE", "Learn"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TORQUE = COLUMNS.index("torque_command")
+OVER = ("time", "angle")
 RETURNED = 1e-3
 """Of the reference's range, by which it may end beside its start."""
 GROWN = 1.5
@@ -37,10 +41,14 @@ GROWN = 1.5
 @dataclass(frozen=True)
 class Learn(Track):
     """Options of `track`, with a reference that returns to its start; ``times`` repetitions, of whose torque the share
-    ``rate`` is taken over each time through a low-pass without lag of the ``corner`` (Hz; 0: the bandwidth), given
-    ``advance`` samples earlier. ``save`` is the TOML file to which the controller with the best table is written, for
-    `track` with ``controller``; one that is there is replaced only where the same was learned on the same machine. Its
-    ``uncertainty`` is by how much another repetition would have changed the table, N·m RMS.
+    ``rate`` is taken over each time. ``over`` time: through a low-pass without lag of the ``corner`` (Hz; 0: the
+    bandwidth), given ``advance`` samples earlier. ``over`` angle: the mean of each direction in each of ``bins`` of the
+    reference's range, which holds for every motion in it, as far as torque depends on the angle. ``map`` is the
+    model.toml of an identified map over the angle (``[position_map]``): its even part is fed forward from the first
+    repetition on, and what is learned is what the map leaves. ``save`` is the TOML file to which the controller with
+    the best table (and the map) is written, for `track` with ``controller``; one that is there is replaced only where
+    the same was learned on the same machine. Its ``uncertainty`` is by how much another repetition would have changed
+    the table, N·m RMS.
 
     No model of the rig is asked for, so that the condition of convergence is not checked beforehand
     (`stickslip learn` does on a simulation): a repetition whose error is half as large again as the least ends it.
@@ -53,8 +61,11 @@ class Learn(Track):
     linear: str = "PID"
     bandwidth: float = 10.0
     duration: float = 10.0
+    over: str = "time"
+    map: str = ""
     times: int = 6
     rate: float = 0.8
+    bins: int = 64
     corner: float = 0.0
     advance: int = 0
     save: str = ""
@@ -69,6 +80,8 @@ class Learn(Track):
             )
         if self.learned:
             raise InputError(f"learn: learned = {self.learned} belongs to `track`; give save")
+        self.domain()
+        self.mapped()
         if self.save:
             refuse_others(Path(self.save), self.origin(rig))
         if self.times < 2 or not 0.0 < self.rate < 2.0:
@@ -77,38 +90,78 @@ class Learn(Track):
             )
         text = (
             *one.text,
-            f"{self.times} times; {100.0 * self.rate:.0f} % of the torque is taken over each time",
+            f"{self.times} times; {100.0 * self.rate:.0f} % of the torque is taken over each time, by the {self.over}",
         )
         return replace(one, duration=self.times * one.duration, text=text, pauses=self.times * self.wait)
+
+    def domain(self) -> None:
+        """Refuse an unknown domain, and options of the other one."""
+        if self.over not in OVER:
+            raise UnknownName("domain of learning", self.over, OVER)
+        if self.over == "angle" and (self.corner or self.advance):
+            raise InputError(
+                "learn: corner and advance belong to learning over time; leave them out, or set bins"
+            )
+        if self.bins < 2:
+            raise InputError(f"learn: bins = {self.bins} must be at least 2")
+
+    def mapped(self) -> list[ControlBlock]:
+        """The feedforward of the map, by the reference's angle; none without a map.
+
+        Raises
+        ------
+        InputError
+            If the file holds none, or the compensator's model brings one of its own.
+        """
+        if not self.map:
+            return []
+        if self.angle().largest > 0.0:
+            raise InputError(
+                f"learn: map = {self.map} and the [angle] of model = {self.model} would both be compensated; leave one "
+                "out"
+            )
+        table = read_toml(Path(self.map))
+        if not table.has("position_map"):
+            raise InputError(
+                f"learn: map = {self.map} holds no map over the angle; give the model.toml of `stickslip identify "
+                "--method cogging`"
+            )
+        return [position_feedforward(PositionMap.of(table.table("position_map").values), angle="reference")]
+
+    def table(self, rig: Rig, path: Array, largest: float) -> TimeTable | AngleTable:
+        """What is learned, empty."""
+        if self.over == "angle":
+            return AngleTable.over(path[:, 0], path[:, 1], self.bins, self.rate, largest)
+        weights = low_pass(self.corner or self.bandwidth, rig.sample_time)
+        return TimeTable(np.zeros(len(path)), rig.sample_time, self.rate, self.advance, weights, largest)
 
     def steps(self, rig: Rig) -> Steps:
         """`Track.steps`, from the same place each time."""
         rows = yield Step(setpoints(round(0.05 / rig.sample_time)), pause=self.wait)
         motion = self.samples(rig)
         path = np.column_stack([float(rows[-1, POSITION]) + motion[:, 0], motion[:, 1:]])
-        own = replace(composed_of(self.made(rig)), sample_time=rig.sample_time)
-        weights, table = low_pass(self.corner or self.bandwidth, rig.sample_time), np.zeros(len(path))
+        own = with_more(replace(composed_of(self.made(rig)), sample_time=rig.sample_time), self.mapped())
+        table = self.table(rig, path, own.torque_limit)
         least, best, uncertainty = math.inf, own, math.nan
         for i in range(1, self.times + 1):
-            controller = with_table(own, table)
-            wanted = setpoints(
+            controller = with_more(own, [table.block()])
+            sent = setpoints(
                 len(path), position=path[:, 0], velocity=path[:, 1], acceleration=path[:, 2],
                 torque=self.angle().torque(path[:, 0]), closed=1.0,
             )  # fmt: skip
-            rest = (
-                self.wait if i > 1 else 0.0
-            )  # every repetition starts from rest without torque, as the first does
-            rows = yield Step(wanted, controller, keep=True, pause=rest, label=f"repetition {i}")
+            # Every repetition starts from rest without torque, as the first does.
+            rest = self.wait if i > 1 else 0.0
+            rows = yield Step(sent, controller, keep=True, pause=rest, label=f"repetition {i}")
             error = rms(path[: len(rows), 0] - rows[:, POSITION])
-            before, better = table, error < least
+            better = error < least
             if better:
                 least, best = error, controller
             if error > GROWN * least or len(rows) < len(path):
                 break
-            taken = rows[:, TORQUE] - ahead_of(controller, rows[:, POSITION], path)
-            table = relearned(table, taken, self.rate, self.advance, weights, own.torque_limit)
+            before = table
+            table = table.after(rows[:, TORQUE] - ahead_of(controller, rows[:, POSITION], path))
             if better:
-                uncertainty = rms(table - before)
+                uncertainty = rms(table.torque - before.torque)
         if self.save:
             content = {"axis": {"inertia": self.inertia}, **tables_of(best)}
             told = {"origin": self.origin(rig), "uncertainty": {"table": uncertainty}}
@@ -116,7 +169,9 @@ class Learn(Track):
 
     def origin(self, rig: Rig) -> dict[str, str]:
         """What says whose table it is."""
-        return {"machine": machine_in(rig.name), "procedure": self.name, "reference": self.reference}
+        return {
+            "machine": machine_in(rig.name), "procedure": self.name, "reference": self.reference, "domain": self.over,
+        }  # fmt: skip
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
         """Whether the error fell."""
@@ -127,13 +182,10 @@ class Learn(Track):
         )  # fmt: skip
 
 
-def with_table(controller: SampledController, table: Array) -> SampledController:
-    """The controller with a feedforward over time."""
+def with_more(controller: SampledController, more: list[ControlBlock]) -> SampledController:
+    """The controller with more feedforwards."""
     ahead = [b for b in controller.blocks.values() if b.law.place == "feedforward"]
-    more = ControlBlock(
-        "table_feedforward", None, {"over": "time"}, step=controller.sample_time, table=table.tolist()
-    )
-    return replace(controller, feedforward=[*ahead, more])
+    return replace(controller, feedforward=[*ahead, *more])
 
 
 def ahead_of(controller: SampledController, position: Array, path: Array) -> Array:
