@@ -55,3 +55,46 @@ def test_functions_of_one_text_are_compiled_once():
     one, other = loaded("once", shared(8.0)), loaded("twice", shared(16.0))
     assert one._part is other._part
     assert one._half is other._half
+
+
+NAMES = """
+import hashlib
+from stickslip import jit, plugins
+from stickslip.laws import LAWS
+from stickslip.simulation.recorded_input.branchless import NotStraight, Trace
+from stickslip.simulation.recorded_input.segments import source
+
+class Named(Exception):
+    pass
+
+def named(name, text):
+    print(name)
+    raise Named
+
+jit.loaded = named
+for law in map(plugins.law, LAWS):
+    try:
+        jit.compiled_law(law)
+    except Named:
+        pass
+    try:
+        parameters = law.parameters(dict(law.example))
+        text = source(law, Trace(law.pack(parameters)))
+        print(law.name, hashlib.sha256(text.encode()).hexdigest())
+    except NotStraight:
+        pass
+"""
+
+
+def test_a_text_is_the_same_in_every_process():
+    """It names the file of its compiled code: in the order of a set, every process would compile anew."""
+    told = set()
+    for seed in ("1", "2", "3"):
+        surroundings = {**os.environ, "PYTHONHASHSEED": seed}
+        done = subprocess.run(
+            [sys.executable, "-c", NAMES], env=surroundings, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr[-500:]
+        told.add(done.stdout)
+    (names,) = told
+    assert len(names.split()) > 20

@@ -234,7 +234,8 @@ class _Run:
         self.arrays.update(before)
         value_2, _ = self.block(other, scope_2)
         for mine, first, second in ((self.arrays, after_1, dict(self.arrays)), (scope, scope_1, scope_2)):
-            for key in first.keys() & second.keys():
+            # In the order of the text, not of a set: it names the file that the compiled code is kept in.
+            for key in (k for k in first if k in second):
                 mine[key] = self.trace.select(test, first[key], second[key])
         value = None if value_1 is None else self.trace.select(test, value_1, value_2)
         return value, returns
