@@ -17,7 +17,7 @@ from stickslip.analyse.presliding_loop import Axis
 from stickslip.control.block import ControlBlock
 from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
-from stickslip.control.learning import low_pass, relearned
+from stickslip.control.learning import TimeTable, low_pass
 from stickslip.control.sampled_controller import SampledController
 from stickslip.control.written import tables_of
 from stickslip.errors import InputError, UnknownName
@@ -276,28 +276,24 @@ def _over_time(
     else:
         found = over_time(axis, own, rate, corner, advance or 0, loop.delay)
     _insist(found, "lower corner or rate, or leave corner and advance out to have them chosen")
-    weights, table = low_pass(found.corner, time), np.zeros(loop.count)
+    weights = low_pass(found.corner, time)
+    table = TimeTable(np.zeros(loop.count), time, rate, found.advance, weights, loop.largest)
     errors: list[float] = []
     best = (table, None)
     for i in range(1, repetitions + 1):
-        controller = loop.having(over_the_time(table, time))
+        controller = loop.having(table.block())
         record = loop.run(controller)
         error, inputs = loop.rows(record, loop.count)
         errors.append(_rms(error))
         if errors[-1] == min(errors):
             best = (table, record)
         taken, _ = _replayed(controller, inputs)
-        table = relearned(table, taken, rate, found.advance, weights, loop.largest)
+        table = table.after(taken)
         if progress:
             progress(i, repetitions)
     assert best[1] is not None
-    block = over_the_time(best[0], time)
+    block = best[0].block()
     return LearningResult("time", tuple(errors), block, loop.having(block), found, best[1], loop.axis.inertia)
-
-
-def over_the_time(table: Array, step: float) -> ControlBlock:
-    """The block that gives a table over time."""
-    return ControlBlock("table_feedforward", None, {"over": "time"}, step=step, table=table.tolist())
 
 
 def _replayed(controller: SampledController, inputs: Array) -> tuple[Array, Any]:
