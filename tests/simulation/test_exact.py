@@ -20,7 +20,7 @@ from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.case_arrays import DIVERGED, DONE, Case, Outcome, lay_out
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.exact import engine as exact
-from stickslip.spec import Bristle
+from stickslip.spec import Bristle, Surroundings
 from support.thesis_loops import CASES, INERTIA, METRICS, PARAMETERS, PLANT, misses, thesis_run
 
 NAMES = ["rms_e", "max_e", "ss_e", "rms_ev", "rms_Tm", "rms_hp", "rev_per_s"]
@@ -231,6 +231,23 @@ def test_feedforward_table_follows_the_law():
     model = controller.compensator.model
     want = [model.law.steady(v, model.parameters) for v in reference.sample(t)[:, 1]]
     assert np.max(np.abs(table - want)) < 1e-9
+
+
+def test_the_table_of_a_feedforward_gives_its_law_all_that_a_law_may_read(monkeypatch):
+    """Karnopp in its band gives back the applied torque, the last of them: read past the end, it was what lay there."""
+    handed = []
+    tabulate = forcing.tabulate
+
+    def watched(step, p, u, *more):
+        handed.append(u.copy())
+        return tabulate(step, p, u, *more)
+
+    monkeypatch.setattr(forcing, "tabulate", watched)
+    karnopp = Model("karnopp", dv=1e-3, fs=0.335, fc=0.285, vs=0.01, sigma2=0.018)
+    case = loop(GMS, Controller(PD, Feedforward(karnopp, gain=0.8031)), SINE, 0.1)
+    cells, _ = forcing.feedforward(case)
+    assert [Surroundings(*u) for u in handed] == [Surroundings()]
+    assert cells[0, 2] == 0.0
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.jit import call_profile, call_step, kernel, pointer
-from stickslip.simulation.case_arrays import Array, Case
+from stickslip.simulation.case_arrays import Array, Case, surroundings
 
 __all__ = ["CELL_SIZE", "NO_CELLS", "feedforward"]
 
@@ -203,7 +203,7 @@ def feedforward(case: Case) -> tuple[Array, list[float]]:
         while True:
             cells = np.empty((room, CELL_SIZE))
             n = tabulate(
-                side.pointers.step, side.parameters, np.array([0.0, 1.0, 20.0]), case.profile,
+                side.pointers.step, side.parameters, surroundings(case.numbers), case.profile,
                 case.reference_parameters, edges, side.state, side.modes, cells,
             )  # fmt: skip
             if n >= 0:
