@@ -11,7 +11,7 @@ from stickslip.contract.control_laws import CHECKS, continuous, examine, specime
 from stickslip.control.linear import Compensation
 from stickslip.control.registry import control_law, control_law_names
 from stickslip.control_spec import ControlLaw
-from stickslip.simulation.compiled_controller import compiled, replay
+from stickslip.simulation.compiled_controller import FAULT, compiled, replay
 from stickslip.spec import Par, Surroundings
 
 ALL = {
@@ -122,7 +122,7 @@ def test_what_a_law_makes_that_is_no_number_is_a_fault_and_does_not_come_out():
     inputs = np.zeros((5, 4))
     inputs[[0, 1, 4], 1] = 10.0
     torque, fault = np.zeros(5), np.zeros(5)
-    replay(sampled, inputs, np.array(Surroundings()), torque, fault)
+    replay(sampled, inputs, np.array(Surroundings()), FAULT, torque, fault)
     assert torque[:2] == pytest.approx(0.5)
     assert torque[2:4] == pytest.approx(0.5 * np.array([0.99, 0.98]))
     assert list(fault) == [0.0, 0.0, 1.0, 2.0, 0.0]

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stickslip.simulation.compiled_controller import compiled, replay
+from stickslip.simulation.compiled_controller import FAULT, compiled, replay
 from stickslip.spec import Surroundings
 from support.golden_rows import ROWS
 
@@ -34,6 +34,6 @@ def test_torques_are_those_of_the_reference(row):
 )
 def test_compiled_torques_are_those_of_the_reference(row):
     torque, fault = np.zeros(len(INPUTS)), np.zeros(len(INPUTS))
-    replay(compiled(ROWS[row]), INPUTS, np.array(Surroundings()), torque, fault)
+    replay(compiled(ROWS[row]), INPUTS, np.array(Surroundings()), FAULT, torque, fault)
     assert np.abs(torque - DATA[row]).max() <= AGREED
     assert not fault.any()

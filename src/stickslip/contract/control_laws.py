@@ -25,7 +25,7 @@ from stickslip.errors import LawError
 from stickslip.export import c99_controller
 from stickslip.export.golden import random_motion
 from stickslip.model import Model
-from stickslip.simulation.compiled_controller import Sampled, compiled, replay
+from stickslip.simulation.compiled_controller import FAULT, Sampled, compiled, replay
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import lower
 
@@ -116,7 +116,7 @@ def torques(controller: SampledController, inputs: Array, slow: float | None = N
 def replayed(sampled: Sampled, inputs: Array) -> Array:
     """The torques of the compiled controller from its present state on, N·m."""
     out, fault = np.zeros(len(inputs)), np.zeros(len(inputs))
-    replay(sampled, np.ascontiguousarray(inputs), np.array(Surroundings()), out, fault)
+    replay(sampled, np.ascontiguousarray(inputs), np.array(Surroundings()), FAULT, out, fault)
     return out
 
 

@@ -21,7 +21,6 @@ __all__ = [
     "compiled",
     "measured_position",
     "replay",
-    "replay_memory",
 ]
 
 COMPENSATION, FAULT, FEEDFORWARD = (
@@ -75,26 +74,12 @@ _compiled: dict[Any, int] = {}
 
 
 @kernel()
-def replay(sampled: Sampled, inputs: Any, surroundings: Any, torque: Any, fault: Any) -> None:
+def replay(sampled: Sampled, inputs: Any, surroundings: Any, place: int, torque: Any, seen: Any) -> None:
     """Run a controller over recorded samples.
 
-    Each row of `inputs` is measured position, reference position, velocity and acceleration; `torque` (N·m) and `fault`
-    get what the controller answers and how many samples in a row were no numbers.
+    Each row of `inputs` is measured position, reference position, velocity and acceleration; `torque` (N·m) gets what
+    the controller answers, `seen` what then stands at a place of its memory (`COMPENSATION`, `FAULT`, `FEEDFORWARD`).
     """
-    for i in range(inputs.shape[0]):
-        torque[i] = call_sample(
-            sampled.address, inputs[i, 0], inputs[i, 1], inputs[i, 2], inputs[i, 3], pointer(sampled.settings, 0),
-            pointer(sampled.memory, 0), pointer(sampled.state, 0), pointer(sampled.parameters, 0),
-            pointer(surroundings, 0),
-        )  # fmt: skip
-        fault[i] = sampled.memory[sampled.fault]
-
-
-@kernel()
-def replay_memory(
-    sampled: Sampled, inputs: Any, surroundings: Any, place: int, torque: Any, seen: Any
-) -> None:
-    """As `replay`; `seen` gets what stands at a place of the memory after every sample."""
     for i in range(inputs.shape[0]):
         torque[i] = call_sample(
             sampled.address, inputs[i, 0], inputs[i, 1], inputs[i, 2], inputs[i, 3], pointer(sampled.settings, 0),

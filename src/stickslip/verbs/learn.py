@@ -27,7 +27,7 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.record import Record
 from stickslip.simulation.closed_loop import simulate
-from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, replay_memory
+from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, replay
 from stickslip.spec import Surroundings
 from stickslip.study.files import prepared_folder, unwritable
 
@@ -300,7 +300,7 @@ def _replayed(controller: SampledController, inputs: Array) -> tuple[Array, Any]
     """What the loop gave besides the feedforwards, N·m, shape (n,), and the state of the laws at the end."""
     sampled, torque, ahead = compiled(controller), np.zeros(len(inputs)), np.zeros(len(inputs))
     around = np.array(Surroundings())
-    replay_memory(sampled, np.ascontiguousarray(inputs), around, FEEDFORWARD, torque, ahead)
+    replay(sampled, np.ascontiguousarray(inputs), around, FEEDFORWARD, torque, ahead)
     return torque - ahead, controller.unpacked_state(sampled.state.tolist())
 
 

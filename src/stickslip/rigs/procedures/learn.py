@@ -24,7 +24,7 @@ from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Step, Steps
 from stickslip.rigs.procedures.track import Track, machine_in
 from stickslip.rigs.rig import Rig, setpoints
-from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, replay_memory
+from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, replay
 from stickslip.spec import Surroundings
 
 __all__ = ["PROCEDURE", "Learn"]
@@ -192,7 +192,7 @@ def ahead_of(controller: SampledController, position: Array, path: Array) -> Arr
     """The feedforward of every sample, N·m, shape (n,)."""
     torque, ahead = np.zeros(len(path)), np.zeros(len(path))
     inputs = np.ascontiguousarray(np.column_stack([position, path]))
-    replay_memory(compiled(controller), inputs, np.array(Surroundings()), FEEDFORWARD, torque, ahead)
+    replay(compiled(controller), inputs, np.array(Surroundings()), FEEDFORWARD, torque, ahead)
     return ahead
 
 
