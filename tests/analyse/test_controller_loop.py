@@ -65,6 +65,18 @@ def test_the_loop_is_that_of_the_gains(kind):
     )
 
 
+@pytest.mark.parametrize("observer", [None, "disturbance_observer"])
+def test_a_constant_torque_changes_no_loop(observer):
+    """It stands at rest: the loop about it is the same (and was refused, as not smooth)."""
+    own = {} if observer is None else {"observer": block_of(control_law(observer))}
+    found = []
+    for held in (0.0, 0.08):
+        ahead = ControlBlock("inertia_feedforward", inertia=3.8623e-4, offset=held)
+        controller, _ = placed("PID", 20.0, feedforward=ahead, **own)
+        found.append(linearised(controller, 1e-6, 100.0).response(np.array([1.0, 30.0, 200.0])))
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
+
+
 def test_a_held_friction_law_is_its_spring_and_damper():
     law = DRY.models["gms"]
     controller, gains = placed("PD", 36.0, observer=ControlBlock("friction_feedback", law, gain=0.8))

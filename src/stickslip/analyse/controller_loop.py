@@ -238,13 +238,18 @@ class _Sample:
             self.run(0.0, 0.0, 0.0, 0.0, self.n, self.m, self.z, self.p, self.u)
         self.rest = self._flat(self.m, self.z)
         self.size = len(self.rest)
+        # A constant torque stands at rest, and what observes it moves on: neither is an answer to a change.
+        self.unchanged = self._after(np.zeros(self.size + 1))
 
     def answers(self, change: Array) -> Array:
         """What the sample makes of a change, shape (size + 1,): of every number, and of the torque."""
+        return self._after(change) - self.unchanged
+
+    def _after(self, change: Array) -> Array:
         m, z, u = copy.deepcopy((self.m, self.z, self.u))
         self._set(m, z, self.rest + change[:-1])
         torque = self.run(float(change[-1]), 0.0, 0.0, 0.0, self.n, m, z, self.p, u)
-        return np.append(self._flat(m, z) - self.rest, torque)
+        return np.append(self._flat(m, z), torque)
 
     def _flat(self, m: Any, z: Any) -> Array:
         return np.array([*(getattr(m, name) for name in CARRIED), *_numbers(z)])
