@@ -57,6 +57,28 @@ def test_functions_of_one_text_are_compiled_once():
     assert one._half is other._half
 
 
+TIDY = """
+import sys
+import numpy as np
+from stickslip.simulation.biquads import zero_phase
+zero_phase(np.zeros((2, 6)), np.zeros((2, 2)), np.zeros(10))
+print("numba.np.arraymath" in sys.modules)
+"""
+
+
+def test_reading_compiled_code_loads_nothing_that_compiles(tmp_path):
+    """numba's implementations of all of NumPy, for which it imports SciPy, take a third of a second a process."""
+    surroundings = {**os.environ, "STICKSLIP_CACHE": str(tmp_path)}
+    told = []
+    for _ in ("compiles", "reads"):
+        done = subprocess.run(
+            [sys.executable, "-c", TIDY], env=surroundings, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr[-500:]
+        told.append(done.stdout.strip())
+    assert told == ["True", "False"]
+
+
 NAMES = """
 import hashlib
 from stickslip import jit, plugins
