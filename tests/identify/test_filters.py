@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import signal
+from scipy import linalg, signal
 
 from stickslip.errors import InputError
 from stickslip.identify.fit.filters import (
@@ -19,6 +19,7 @@ from stickslip.identify.fit.filters import (
     spectrum,
 )
 from stickslip.identify.fit.parallel import mapped
+from stickslip.identify.observer.innovations import durbin
 
 
 def wandering(n: int, seed: int):
@@ -84,3 +85,12 @@ def test_side_by_side_keeps_the_order_and_hands_errors_on():
     ]
     with pytest.raises(ZeroDivisionError):
         mapped(lambda i: 1 / i, [1, 0, 2])
+
+
+@given(seed=st.integers(0, 1000), order=st.integers(1, 16))
+def test_the_weights_of_last_values_are_those_of_scipy(seed: int, order: int):
+    """Yule and Walker's equations are Toeplitz's; SciPy's solver takes a quarter of a second to load."""
+    x = wandering(400, seed)
+    r = np.array([x[: x.size - k] @ x[k:] for k in range(order + 1)])
+    expected = linalg.solve_toeplitz(r[:order], r[1:])
+    assert durbin(r.tolist()) == pytest.approx(expected, rel=1e-9, abs=1e-9 * float(np.max(np.abs(expected))))

@@ -5,7 +5,6 @@ See `stickslip.identify.observer.prediction_error` for the method that minimises
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -53,15 +52,29 @@ def autoregression(e: Sequence[Array], order: int) -> Array:
 
     What lies beyond 4 standard deviations (robust) counts as if it lay there.
     """
-    linalg: Any = importlib.import_module("scipy.linalg")  # it carries no types
-
     border = 4.0 * robust_std(np.concatenate(list(e)))
     r = np.zeros(order + 1)
     for x in e:
         spectrum = np.abs(np.fft.rfft(np.clip(x, -border, border), 2 * x.size)) ** 2
         r += np.fft.irfft(spectrum)[: order + 1]
     r[0] = r[0] * (1.0 + 1e-8) or 1.0
-    return np.concatenate([[1.0], -linalg.solve_toeplitz(r[:order], r[1:])])
+    return np.array([1.0, *(-x for x in durbin(r.tolist()))])
+
+
+def durbin(r: Sequence[float]) -> list[float]:
+    """Weights of a series' last values, the latest first, for its next one (Durbin's recursion).
+
+    ``r`` are its autocovariances from 0 on, one more than weights. Written out: `scipy.linalg` takes long to load.
+    """
+    x = [r[1] / r[0]]
+    for m in range(1, len(r) - 1):
+        above, below = -r[m + 1], -r[0]
+        for j in range(m):
+            above += r[m - j] * x[j]
+            below += r[m - j] * x[m - j - 1]
+        k = above / below
+        x = [*(x[j] - k * x[m - j - 1] for j in range(m)), k]
+    return x
 
 
 def whitened(filter_: Array, e: Array) -> Array:
