@@ -175,6 +175,20 @@ def test_a_creep_at_rest_is_no_limit_cycle():
     assert judged(record(creep, 0.3 + 0.0 * k))["hunting_rad"] == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("cycles", [1.0, 1.3, 1.75, 2.5])
+def test_a_limit_cycle_has_its_whole_swing_wherever_the_record_cuts_it(cycles):
+    k = np.arange(2000)
+    error = 1e-3 * np.cos(2.0 * np.pi * cycles * (k - 1400) / 600.0)  # metrics look at the last 600 rows or more
+    found = judged(record(error, 0.0 * k, moving=800))["hunting_rad"]
+    assert found == pytest.approx(2e-3, rel=0.02)
+
+
+def test_one_jump_at_rest_is_no_limit_cycle():
+    k = np.arange(1000)
+    jump = np.where(k < 900, 1e-3, -1e-3)
+    assert judged(record(jump, 0.0 * k))["hunting_rad"] == 0.0
+
+
 def test_recovery_is_when_a_tenth_of_the_deviation_is_left():
     k = np.arange(1000)
     error = 1e-3 + np.where(k > 100, -4e-3 * np.exp(-(k - 100) / 40.0), 0.0)

@@ -26,7 +26,7 @@ METRICS = {
     "rest_rad": "error left at the end of a hold, mean of its second half",
     "chatter_Nm": "RMS of the torque's change from sample to sample, second half of a hold",
     "chatter_moving_Nm": "the same while the reference moves",
-    "hunting_rad": "peak to peak of the position in the second half of a hold, less its net creep: the limit cycle",
+    "hunting_rad": "smaller of the largest rise and fall of the position, second half of a hold: the limit cycle",
     "recovery_s": "time after a change of friction until a tenth of the error's deviation is left",
     "effort_Nm": "torque RMS while the reference moves",
 }
@@ -79,8 +79,13 @@ def rms(values: Array) -> float | None:
 
 
 def back_and_forth(position: Array) -> float:
-    """Peak to peak less the net displacement, rad: 0 of a creep in one direction."""
-    return float(np.ptp(position)) - abs(float(position[-1] - position[0]))
+    """The smaller of the largest rise and the largest fall, rad: 0 of a creep or a jump in one direction.
+
+    A limit cycle has its whole swing so, wherever the record cuts it.
+    """
+    rise = position - np.minimum.accumulate(position)
+    fall = np.maximum.accumulate(position) - position
+    return min(float(rise.max()), float(fall.max()))
 
 
 def recovery(time: Array, error: Array, moving: Places, event: float) -> float | None:
