@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,10 +17,12 @@ from stickslip.control.catalogue import CATALOGUE, compensated
 from stickslip.control.files import read_controller
 from stickslip.errors import ParameterError, UnknownName
 from stickslip.identify.identified_file import Identified
+from stickslip.identify.setting import beside
 from stickslip.identify.setting import recommend as recommending
 from stickslip.identify.setting.beside import belief_of
 from stickslip.identify.setting.file import write_setting
 from stickslip.identify.setting.recommend import Drive, recommend
+from stickslip.identify.setting.swings import between_counts
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
@@ -122,6 +125,26 @@ def test_what_is_wrong_is_said_in_a_line():
         belief_of(known(**THESIS).model, Drive(amplitude=0.1, controller=loop), 4e-4)
 
 
+@pytest.mark.parametrize(
+    ("cycles", "counts", "swing", "said"),
+    [
+        (1.5, 0.0, 1e-3, "hunts at rest, 1000 µrad peak to peak"),  # cut in mid-cycle: its net way is all
+        (20.25, 0.0, 1e-3, "hunts at rest, 1000 µrad peak to peak"),
+        (20.25, 2.0**16, 2.8e-4, ""),  # within the neighbours of a count: no loop holds an axis closer
+        (20.25, 2.0**16, 3.0e-4, "hunts at rest, 300 µrad peak to peak"),
+        (0.5, 0.0, 1e-3, ""),  # a creep
+    ],
+)
+def test_a_limit_cycle_is_as_large_as_what_rises_and_falls_again(monkeypatch, cycles, counts, swing, said):
+    drive = Drive(amplitude=0.2, encoder_counts=counts)
+    seen = round(0.5 * beside.RESTS / drive.sample_time)
+    position = 0.5 * swing * np.cos(2.0 * math.pi * cycles * np.linspace(0.0, 1.0, seen))
+    monkeypatch.setattr(beside, "simulated", lambda *_: position)
+    before = beside.Trial({"position_rms_rad": 1e-6}, position, position, drive.sample_time)
+    bench = SimpleNamespace(drive=drive, plants=[None], before=lambda _: before, ran=lambda: None)
+    assert beside.limit_cycle(None, bench, 0) == said
+
+
 # ---- "my axis sticks at reversal and my PID hunts; what do I switch on?" -------------------------------------------
 
 STRANGERS = {
@@ -159,14 +182,7 @@ def along(machine, control, phase=0.0):
         "table", time=[*t, MOVES + RESTS], position=[*position, position[-1]], velocity=[*velocity[:-1], 0.0, 0.0]
     )  # fmt: skip
     start = (phase * 2.0 * math.pi / machine.encoder.counts, 0.0)
-    record = simulate(machine, control, table, MOVES + RESTS, metered=False, initial=start)
-    return {**judged(record), "swing": swing_of(record["position"][record.time > MOVES + 0.5 * RESTS])}
-
-
-def swing_of(position):
-    """The smaller of the largest rise and the largest fall, rad: a limit cycle's, wherever the record cuts it."""
-    rise, fall = position - np.minimum.accumulate(position), np.maximum.accumulate(position) - position
-    return min(rise.max(), fall.max())
+    return judged(simulate(machine, control, table, MOVES + RESTS, metered=False, initial=start))
 
 
 def usually(machine, control, phases=8):
@@ -178,13 +194,9 @@ def usually(machine, control, phases=8):
 
 
 def calm(metrics, counts):
-    """Whether it neither hunts nor chatters.
-
-    A loop sees that it has left its setpoint when the encoder shows the next count: one that is held between the two
-    neighbours of a count swings by up to three.
-    """
-    swing = max(3.0 * 2.0 * math.pi / counts, 0.03 * metrics["rms_rad"], 3e-5)
-    return metrics["swing"] <= swing and metrics["chatter_Nm"] <= CHATTER * metrics["effort_Nm"]
+    """Whether it neither hunts nor chatters."""
+    swing = max(between_counts(counts), 0.03 * metrics["rms_rad"], 3e-5)
+    return metrics["hunting_rad"] <= swing and metrics["chatter_Nm"] <= CHATTER * metrics["effort_Nm"]
 
 
 @pytest.mark.slow

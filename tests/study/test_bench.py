@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -55,6 +56,7 @@ def test_the_bench_of_the_package_holds_four_machines_and_seven_changes():
     assert len({p.run.key for p in runs}) == len(runs)
     assert {p.run.compensator for p in runs} == set(CATALOGUE)
     assert all(p.machine.encoder.counts == (65536.0 if p.run.change == "coarse" else 2.0**20) for p in runs)
+    assert all(p.run.counts == p.machine.encoder.counts for p in runs)
     assert all((p.machine.delay == 1.0) == (p.run.change == "late") for p in runs)
     weaker = next(p for p in runs if p.run.key.startswith("grease/weaker/"))
     before = machine("thesis-grease").contact.direction
@@ -178,7 +180,9 @@ def test_a_creep_at_rest_is_no_limit_cycle():
 @pytest.mark.parametrize("cycles", [1.0, 1.3, 1.75, 2.5])
 def test_a_limit_cycle_has_its_whole_swing_wherever_the_record_cuts_it(cycles):
     k = np.arange(2000)
-    error = 1e-3 * np.cos(2.0 * np.pi * cycles * (k - 1400) / 600.0)  # metrics look at the last 600 rows or more
+    error = 1e-3 * np.cos(
+        2.0 * np.pi * cycles * (k - 1400) / 600.0
+    )  # metrics look at the last 600 rows or more
     found = judged(record(error, 0.0 * k, moving=800))["hunting_rad"]
     assert found == pytest.approx(2e-3, rel=0.02)
 
@@ -226,6 +230,30 @@ def test_what_hunts_or_chatters_or_is_not_worth_it_is_not_chosen_and_the_reason_
     assert by["its inertia", "friction as believed"].label == "PD + dob-reset"
     assert by["a friction law", "friction as believed"].label == "PD + scale-dob"
     assert by["a friction law", "friction as believed"].mean == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("counts", "swing", "said"),
+    [
+        (2.0**16, 2.8e-4, ""),  # within the two neighbours of a count, rad: no loop holds an axis closer
+        (2.0**16, 3.0e-4, "hunts: 300 µrad peak to peak at rest"),
+        (2.0**20, 2.8e-4, "hunts: 280 µrad peak to peak at rest"),
+        (2.0**20, 1.9e-4, ""),
+    ],
+)
+def test_what_goes_to_and_fro_within_the_neighbours_of_a_count_does_not_hunt(counts, swing, said):
+    bare, observed = runs_of(none=(1e-2, 0.0, 0.0), dob=(1e-3, 0.0, swing))
+    found = {s.compensator: s for s in standings([bare, replace(observed, counts=counts)])}
+    assert found["dob"].why_not == said
+    assert found["dob"].hunting == swing
+
+
+def test_the_limit_cycle_that_is_told_is_one():
+    bare, fine = runs_of(none=(1e-2, 0.0, 0.0), dob=(1e-3, 0.0, 2.2e-4))
+    coarse = replace(fine, change="coarse", counts=2.0**16, metrics={**fine.metrics, "hunting_rad": 2.8e-4})
+    found = {s.compensator: s for s in standings([bare, replace(bare, change="coarse"), fine, coarse])}
+    assert found["dob"].why_not == "hunts: 220 µrad peak to peak at rest"
+    assert found["dob"].hunting == 2.8e-4
 
 
 def test_a_run_that_ends_early_rules_its_compensator_out():

@@ -80,7 +80,7 @@ class Bench:
 @dataclass(frozen=True)
 class BenchRun:
     """One run of the bench, done or to be done; `metrics` are those of `stickslip.study.bench_metrics`,
-    `learned` what the record of its end says (`stickslip.control.learned`)."""
+    `learned` what the record of its end says (`stickslip.control.learned`), `counts` those of the encoder."""
 
     machine: str
     change: str
@@ -90,6 +90,7 @@ class BenchRun:
     metrics: Mapping[str, float | None]
     failure: str = ""
     learned: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    counts: float = COUNTS
 
     @property
     def key(self) -> str:
@@ -258,7 +259,8 @@ def _planned(bench: Bench) -> Iterator[Planned]:
             own = hash_of(changed)
             for r in change.references:
                 for (loop, name), control in controls.items():
-                    run = BenchRun(m, c, r, loop if CATALOGUE[name].loops else "-", name, {})
+                    where = loop if CATALOGUE[name].loops else "-"
+                    run = BenchRun(m, c, r, where, name, {}, counts=changed.encoder.counts)
                     yield Planned(run, changed, control, *bench.motions[r], event, (own, prints[loop, name]))
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from stickslip.control.catalogue import CATALOGUE, INERTIA, LEVELS, NOTHING
+from stickslip.identify.setting.swings import between_counts
 from stickslip.study.bench import BenchRun
 
 __all__ = [
@@ -36,10 +37,10 @@ On the four machines the bare PD, which differentiates noise and counts, reaches
 at 0.075 and a square wave at 0.6.
 """
 HUNTING = 2e-4
-"""rad peak to peak at rest: what is beyond it hunts.
+"""rad peak to peak at rest: what is beyond it, and beyond what an encoder lets a loop see, hunts.
 
-Two counts of the coarsest encoder (16 bits): a loop that steps between counts stays below 180 µrad there. What resets
-or slips for ever makes 200 µrad and more, most of it 0.4 to 2 mrad.
+What measurement noise moves at 20 bits stays below 150 µrad. What resets or slips for ever makes more, most of it 0.4
+to 15 mrad.
 """
 NEAR = 1.1
 """Of the best mean: as good as the best."""
@@ -74,7 +75,7 @@ class Standing:
     worst : float
         The largest of these.
     chatter, hunting : float
-        Largest torque change over torque RMS (RMS, at rest), and largest peak to peak at rest, rad.
+        Largest torque change over torque RMS (RMS, at rest), and largest peak to peak of a limit cycle at rest, rad.
     recovery : float
         After a drop of friction, s; NaN where none was tried.
     effort : float
@@ -121,14 +122,15 @@ def _standing(
     errors = [ratio(r, b, "rms_rad") for r, b in pairs]
     chatter = largest(number(r, "chatter_Nm") / max(number(r, "effort_Nm"), 1e-9) for r, _ in pairs)
     hunting = largest(number(r, "hunting_rad") for r, _ in pairs)
+    cycle = largest(number(r, "hunting_rad") for r, _ in pairs if hunts(r))
     mean, worst = (math.inf, math.inf) if failed or not errors else (geometric(errors), max(errors))
     why = ""
     if failed:
         why = f"{failed.change}, {failed.reference}: {failed.failure}"
     elif chatter > CHATTER:
         why = f"chatters: its torque changes by {100.0 * chatter:.0f} % of its size from sample to sample at rest"
-    elif hunting > HUNTING:
-        why = f"hunts: {1e6 * hunting:.0f} µrad peak to peak at rest"
+    elif cycle:
+        why = f"hunts: {1e6 * cycle:.0f} µrad peak to peak at rest"
     elif worst > 1.05:
         why = f"somewhere worse than the PD alone, {worst:.2f} times its error"
     elif CATALOGUE[key[2]].against:
@@ -141,6 +143,11 @@ def _standing(
 def number(run: BenchRun, metric: str) -> float:
     """A metric; 0 where the run has none."""
     return run.metrics.get(metric) or 0.0
+
+
+def hunts(run: BenchRun) -> bool:
+    """Whether it goes to and fro at rest by more than its encoder lets it see."""
+    return number(run, "hunting_rad") > max(HUNTING, between_counts(run.counts))
 
 
 def ratio(run: BenchRun, bare: BenchRun, metric: str) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.identify.setting.swings import back_and_forth
 from stickslip.record import Record
 
 __all__ = ["METRICS", "judged"]
@@ -76,16 +77,6 @@ def moves(speed: Array) -> Places:
 def rms(values: Array) -> float | None:
     """Root of the mean square; None of nothing."""
     return math.sqrt(float(np.mean(values * values))) if values.size else None
-
-
-def back_and_forth(position: Array) -> float:
-    """The smaller of the largest rise and the largest fall, rad: 0 of a creep or a jump in one direction.
-
-    A limit cycle has its whole swing so, wherever the record cuts it.
-    """
-    rise = position - np.minimum.accumulate(position)
-    fall = np.maximum.accumulate(position) - position
-    return min(float(rise.max()), float(fall.max()))
 
 
 def recovery(time: Array, error: Array, moving: Places, event: float) -> float | None:

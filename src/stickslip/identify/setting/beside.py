@@ -23,6 +23,7 @@ from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
 from stickslip.identify.setting.candidate_run import AT_REST, Drive, Trial, dangers, run, simulated
 from stickslip.identify.setting.candidates import Bench
+from stickslip.identify.setting.swings import back_and_forth, between_counts
 from stickslip.model import Model
 
 __all__ = ["Beside", "belief_of", "limit_cycle", "tried_beside"]
@@ -229,6 +230,6 @@ def limit_cycle(controller: Controller | SampledController, bench: Bench, axis: 
     bench.ran()
     if position is None:
         return "at rest position or velocity left every reasonable bound"
-    late = position[-held.shape[0] // 2 :]
-    swing = float(np.ptp(late)) - abs(float(late[-1] - late[0]))
-    return f"hunts at rest, {1e6 * swing:.0f} µrad peak to peak" if swing > before.swing(drive) else ""
+    swing = back_and_forth(position[-held.shape[0] // 2 :])
+    most = max(before.swing(drive), between_counts(drive.encoder_counts))
+    return f"hunts at rest, {1e6 * swing:.0f} µrad peak to peak" if swing > most else ""

@@ -9,12 +9,14 @@ import numpy as np
 
 from stickslip.jit import kernel
 
-__all__ = ["above", "repeats", "reversals", "turning_points", "turns"]
+__all__ = ["above", "back_and_forth", "between_counts", "repeats", "reversals", "turning_points", "turns"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SHRINKS = 0.7
 """Of the largest swing before it: a last swing below that is one of a sequence that decays."""
+HELD = 3.0
+"""Counts: a loop sees that the axis has left a count only in one of its neighbours, and holds it within these three."""
 
 
 def reversals(velocity: Array, trigger: float) -> int:
@@ -51,6 +53,21 @@ def repeats(position: Array, swing: float) -> bool:
     """
     sizes = np.abs(np.diff(turning_points(position, swing)[1:]))
     return sizes.size < 2 or float(sizes[-1]) > SHRINKS * float(np.max(sizes[:-1]))
+
+
+def back_and_forth(position: Array) -> float:
+    """The smaller of the largest rise and the largest fall, rad: 0 of a creep or a jump in one direction.
+
+    A limit cycle has its whole swing so, wherever the record cuts it.
+    """
+    rise = position - np.minimum.accumulate(position)
+    fall = np.maximum.accumulate(position) - position
+    return min(float(rise.max()), float(fall.max()))
+
+
+def between_counts(counts: float) -> float:
+    """What no loop can keep an axis at rest from going to and fro by, rad; `counts` per revolution, 0: exact."""
+    return HELD * 2.0 * math.pi / counts if counts else 0.0
 
 
 def above(velocity: Array, corner: float, sample_time: float) -> float:
