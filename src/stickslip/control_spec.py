@@ -18,13 +18,14 @@ Argument order, everywhere: signals of the loop ``y``, state ``z``, parameters `
                                          estimator the corner of its low-pass, rad/s; a sentence where these
                                          parameters have none
 ``placed(inertia, bandwidth, damping)``  parameters that place the poles of the loop without friction, by name
-``deviations(z, p, sample_time)``        standard deviations of what was learned by the names of the states, as far as
-                                         the state tells them
+``deviations[name](z, p, sample_time)``  standard deviation of what was learned in the state of that name; -1 where
+                                         the state does not tell it
 =======================================  ===========================================================
 
-``sample``, ``take_over`` and ``accelerating`` are written in the scalar subset (`stickslip.subset`). ``y`` has the
-fields of `Signals`, ``u`` those of `stickslip.spec.Surroundings`. A law that holds a friction law calls ``friction(v0,
-v1, dt, z.friction, p.friction, u)``, and ``friction_steady(v, p.friction)`` for its torque at constant velocity.
+``sample``, ``take_over``, ``accelerating`` and ``deviations`` are written in the scalar subset (`stickslip.subset`).
+``y`` has the fields of `Signals`, ``u`` those of `stickslip.spec.Surroundings`. A law that holds a friction law calls
+``friction(v0, v1, dt, z.friction, p.friction, u)``, and ``friction_steady(v, p.friction)`` for its torque at constant
+velocity.
 """
 
 from __future__ import annotations
@@ -109,7 +110,8 @@ class ControlLaw(Configurable):
         Parameters for an axis of 3.8623e-4 kg·m² at 1 kHz, for documentation and the contract tests.
     State : type or None
         As ``Params``, for the internal state. Everything is 0 at the start.
-    take_over, accelerating, check, delay, continuous, placed, deviations : callable or None
+    take_over, accelerating, check, delay, continuous, placed : callable or None
+    deviations : mapping of str to callable
     linear : bool
         Superposition holds while the torque is within its limit. A declaration: the contract tests try it.
     holds_friction : bool
@@ -141,7 +143,9 @@ class ControlLaw(Configurable):
     delay: Callable[[Any, float], float] | None = None
     continuous: Callable[[Any], Any] | None = None
     placed: Callable[[float, float, float], Mapping[str, float]] | None = None
-    deviations: Callable[[Any, Any, float], Mapping[str, float]] | None = None
+    deviations: Mapping[str, Callable[[Any, Any, float], float]] = field(
+        default_factory=dict[str, Callable[[Any, Any, float], float]]
+    )
     linear: bool = False
     holds_friction: bool = False
     integrates: bool = False

@@ -72,13 +72,16 @@ def test_what_is_not_switched_on_is_told_why(tmp_path):
     assert why["ff-gms"].startswith("no GMS law is known")
     by_label = {b.label: b for b in advice.beside}
     assert by_label["PD + makkar"].why_not == "it adapts, and nothing under it moves an axis that sticks"
+    scale = by_label["PD + scale-dob"].learned["feedforward_scale"]
+    assert abs(scale["value"] - 1.0) <= 5.0 * scale["uncertainty"] < 0.2
+    assert by_label["PD + dob"].learned == {}
     # The bare observers hunt at rest on this stiff contact: what is switched on does not.
     taken = advice.instead
     lines = beside_lines(advice)
     if taken is None:
         assert lines[-1] == "none of these is better than what is said above"
     else:
-        assert lines[-1].startswith(f"switch on instead: {taken.label}; it leaves at most")
+        assert any(x.startswith(f"switch on instead: {taken.label}; it leaves at most") for x in lines)
         file = write_setting(tmp_path / "recommended.toml", found, advice)
         assert read_controller(file).values() == pytest.approx(taken.controller.values())
 
@@ -143,6 +146,18 @@ def test_a_limit_cycle_is_as_large_as_what_rises_and_falls_again(monkeypatch, cy
     before = beside.Trial({"position_rms_rad": 1e-6}, position, position, drive.sample_time)
     bench = SimpleNamespace(drive=drive, plants=[None], before=lambda _: before, ran=lambda: None)
     assert beside.limit_cycle(None, bench, 0) == said
+
+
+def test_what_is_switched_on_tells_what_it_learned_with_its_uncertainty():
+    learned = {
+        "feedforward_scale": {"meaning": "scale", "unit": "-", "value": 1.02, "uncertainty": 0.03},
+        "feedforward_angle": {"meaning": "map", "unit": "N·m", "value": [0.1, 0.2], "uncertainty": None},
+    }
+    taken = beside.Beside("scale-dob", "PD", (0.1,), "", None, learned)
+    lines = beside_lines(SimpleNamespace(beside=(taken,), instead=taken, hunts=""))
+    assert lines[-3].startswith("switch on instead: PD + scale-dob; it leaves at most 10.0 %")
+    assert lines[-2] == "learned there:     scale (feedforward_scale) = 1.02 ± 0.03"
+    assert lines[-1].endswith("= 2 values from 0.1 to 0.2 N·m; no uncertainty told")
 
 
 # ---- "my axis sticks at reversal and my PID hunts; what do I switch on?" -------------------------------------------

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import linecache
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from stickslip.control.block import ControlBlock
 
-__all__ = ["calls_of"]
+__all__ = ["calls_of", "deviations_of"]
 
 SUMS = {
     "estimate": ("estimator", "sample", "Velocity by the estimator, rad/s."),
@@ -48,9 +48,35 @@ def calls_of(blocks: Mapping[str, ControlBlock]) -> dict[str, Callable[..., floa
     ]
     lines += [f"    missing = {part}_take_over(missing, m, z.{part}, p.{part}, u)" for part in able]
     lines += ["    return missing", ""]
-    text = "\n".join(lines)
-    # The translation reads a function's text, as it does that of a file.
-    file = f"<controller of {', '.join(f'{part}: {block.law.name}' for part, block in blocks.items())}>"
+    written(lines, scope, f"controller of {named(blocks)}")
+    return {name: scope[name] for name in (*SUMS, "left_over")}
+
+
+def deviations_of(blocks: Mapping[str, ControlBlock]) -> dict[str, Callable[..., float]]:
+    """Standard deviations of what these laws learn, by its whole names."""
+    lines: list[str] = []
+    scope: dict[str, Any] = {}
+    own = {f"{part}_{name}": (part, f) for part, b in blocks.items() for name, f in b.law.deviations.items()}
+    for name, (part, function) in own.items():
+        about = (function.__doc__ or "").partition("\n")[0]
+        lines += [
+            f"def {name}_deviation(n, z, p):",
+            f'    """{about}"""',
+            f"    return {part}_{function.__name__}(z.{part}, p.{part}, n.sample_time)",
+            "",
+        ]
+        scope[f"{part}_{function.__name__}"] = function
+    written(lines, scope, f"deviations of {named(blocks)}")
+    return {name: scope[f"{name}_deviation"] for name in own}
+
+
+def named(blocks: Mapping[str, ControlBlock]) -> str:
+    """The laws by their parts, for the name of a text."""
+    return ", ".join(f"{part}: {block.law.name}" for part, block in blocks.items())
+
+
+def written(lines: Sequence[str], scope: dict[str, Any], about: str) -> None:
+    """Run a text; the translation reads it again, as it does that of a file."""
+    text, file = "\n".join(lines), f"<{about}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
     exec(compile(text, file, "exec"), scope)
-    return {name: scope[name] for name in (*SUMS, "left_over")}

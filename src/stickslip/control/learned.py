@@ -88,16 +88,12 @@ def learned_values(
         At which it ran, s; 0 for its own.
     """
     values, period = controller.learned(z), sample_time or controller.sample_time
-    spread = {
-        f"{part}_{name}": deviation
-        for part, block in controller.blocks.items()
-        if block.law.deviations is not None
-        for name, deviation in block.law.deviations(getattr(z, part), block.parameters, period).items()
-    }
+    n, p = controller.settings._replace(sample_time=period), controller.parameters
+    spread = {name: deviation(n, z, p) for name, deviation in controller.deviations.items()}
     return tuple(
         LearnedValue(
             f.name, f.par.meaning, f.par.unit, values[f.name],
-            WIDTH * spread[f.name] if f.name in spread else None,
+            WIDTH * spread[f.name] if spread.get(f.name, -1.0) >= 0.0 else None,
         )
         for f in controller.state_fields
         if isinstance(f.par, Learned) and not isinstance(f.par, Kept)

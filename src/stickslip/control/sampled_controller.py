@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from stickslip.control.block import ControlBlock, fields_in, state_fields_in, within
-from stickslip.control.calls import calls_of
+from stickslip.control.calls import calls_of, deviations_of
 from stickslip.control.composition import MEMORY, Settings, functions_with
 from stickslip.control.continuous import Continuous, continuous_form, refuse_windup
 from stickslip.control_spec import PLACES, ControlLaw
@@ -143,6 +143,11 @@ class SampledController:
     def functions(self) -> dict[str, Callable[..., float]]:
         """The functions of `stickslip.control.composition` with its laws in their places."""
         return functions_with(calls_of(self.blocks))
+
+    @functools.cached_property
+    def deviations(self) -> dict[str, Callable[..., float]]:
+        """Functions ``(n, z, p)`` by the whole names of what its laws learn: its standard deviation, -1: not told."""
+        return deviations_of(self.blocks)
 
     @functools.cached_property
     def continuous(self) -> Continuous:

@@ -33,8 +33,10 @@ from stickslip.export.controllers import (
     ControllerTarget,
     checked_name,
     counts_of,
+    deviations_of,
     golden_samples,
     head_of,
+    learned_of,
     settings_of,
     trees_of,
 )
@@ -102,8 +104,9 @@ def check(export: Export, name: str) -> Check:
 def code_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
     """Names, structures and functions."""
     # In single precision the ones with whole positions are `wide`.
-    trees = trees_of(controller, [n for n in PUBLIC if n.endswith("_turns") or not dialect.single])
-    known, public = analyse(trees), [n for n in PUBLIC if n in trees]
+    told = [f"_{name}" for name in deviations_of(controller)]
+    trees = trees_of(controller, [*(n for n in PUBLIC if n.endswith("_turns") or not dialect.single), *told])
+    known, public = analyse(trees), [n for n in (*PUBLIC, *told) if n in trees]
     written = functions(trees, dialect, public)
     about = {n: ascii_only(first_line(doc)) for n, doc, _ in written}
     text = "\n".join(line for _, _, lines in written for line in lines)
@@ -126,6 +129,7 @@ def numbers_of(controller: SampledController, dialect: Dialect, around: Surround
     """Values of the structures."""
     values = controller.values()
     return {
+        "learned": [*learned_of(controller)],
         "unlimited": math.isinf(controller.torque_limit),
         "counts": {dialect.count(name): size for name, size in counts_of(controller).items()},
         "designed": [*initial(controller.fields, values, dialect)],

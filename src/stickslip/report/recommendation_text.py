@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from stickslip.control.learned import told
 from stickslip.identify.setting.recommend import WORTH, Candidate, Recommendation
 from stickslip.model import Model
 
@@ -50,7 +51,7 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
 
 
 def beside_lines(result: Recommendation) -> list[str]:
-    """Compensators of the catalogue: what each leaves of the error, or why it is not switched on."""
+    """Compensators of the catalogue: what each leaves of the error, or why it is not switched on; what is learned."""
     if not result.beside:
         return []
     out = ["", f"{'compensator':<22}{'error left':>10}  {'worst':>7}  switched on"]
@@ -65,7 +66,8 @@ def beside_lines(result: Recommendation) -> list[str]:
         return [*out, "none of these is better than what is said above"]
     said = f"it leaves at most {100 * taken.worst:.1f} % of the linear controller's error on all sampled axes"
     why = f"; the setting above {result.hunts}" if result.hunts else ""
-    return [*out, f"switch on instead: {taken.label}; {said}{why}"]
+    learned = [f"learned there:     {line}" for line in told({"learned": taken.learned})]
+    return [*out, f"switch on instead: {taken.label}; {said}{why}", *learned]
 
 
 def safety(c: Candidate) -> str:

@@ -156,22 +156,31 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     return given
 
 
-def deviations(z: Any, p: Any, sample_time: float) -> dict[str, float]:
-    """By the covariance, where it and the values are within their bounds: of white noise that has passed the low-pass.
+def deviation(value: float, lowest: float, highest: float, p_ii: float, z: Any, p: Any, time: float) -> float:
+    """By the covariance, where it and the value are within their bounds: of white noise that has passed the low-pass.
 
     Neighbouring residuals are alike; the weights of old ones are in P once, and squared in the error.
     """
-    if z.variance <= 0.0 or z.p11 + z.p22 + z.p33 >= FULL * p.trace:
-        return {}
-    alike = math.exp(-p.corner * sample_time)
+    if z.variance <= 0.0 or z.p11 + z.p22 + z.p33 >= FULL * p.trace or value <= lowest or value >= highest:
+        return -1.0
+    alike = math.exp(-p.corner * time)
     one = z.variance * (1.0 + alike) / (1.0 - alike) / (1.0 + p.forgetting)
-    most = p.most_offset * p.fc
-    own = (
-        ("coulomb", z.p11, p.lowest * p.fc < z.coulomb < p.highest * p.fc),
-        ("viscous", z.p22, 0.0 < z.viscous < p.most_viscous * p.sigma2 * p.speed),
-        ("offset", z.p33, -most < z.offset < most),
-    )
-    return {name: math.sqrt(one * max(p_ii, 0.0)) for name, p_ii, within in own if within}
+    return math.sqrt(one * max(p_ii, 0.0))
+
+
+def deviation_of_coulomb(z: Any, p: Any, sample_time: float) -> float:
+    """Standard deviation of the Coulomb torque, N·m; -1 where it is not told."""
+    return deviation(z.coulomb, p.lowest * p.fc, p.highest * p.fc, z.p11, z, p, sample_time)
+
+
+def deviation_of_viscous(z: Any, p: Any, sample_time: float) -> float:
+    """Standard deviation of the viscous torque at the speed v_0, N·m; -1 where it is not told."""
+    return deviation(z.viscous, 0.0, p.most_viscous * p.sigma2 * p.speed, z.p22, z, p, sample_time)
+
+
+def deviation_of_offset(z: Any, p: Any, sample_time: float) -> float:
+    """Standard deviation of the offset, N·m; -1 where it is not told."""
+    return deviation(z.offset, -p.most_offset * p.fc, p.most_offset * p.fc, z.p33, z, p, sample_time)
 
 
 CONTROL_LAW = ControlLaw(
@@ -187,5 +196,7 @@ CONTROL_LAW = ControlLaw(
     State=State,
     holds_friction=True,
     adapts=True,
-    deviations=deviations,
+    deviations={
+        "coulomb": deviation_of_coulomb, "viscous": deviation_of_viscous, "offset": deviation_of_offset,
+    },
 )  # fmt: skip

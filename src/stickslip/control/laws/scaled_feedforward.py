@@ -102,13 +102,17 @@ def sample(y: Any, z: Any, p: Any, u: Any) -> float:
     return given
 
 
-def deviations(z: Any, p: Any, sample_time: float) -> dict[str, float]:
-    """Of a scale within its bounds: a low-pass of what samples say, whose white noise has passed the observer's."""
-    if z.variance <= 0.0 or not p.lowest < z.scale < p.highest:
-        return {}
-    stays, alike = math.exp(-p.rate * sample_time), math.exp(-p.corner * sample_time)
+def deviation_of_scale(z: Any, p: Any, sample_time: float) -> float:
+    """Standard deviation of the scale, -; -1 where it is not told, as at a bound.
+
+    The scale is a low-pass of what samples say, whose white noise has passed the observer's.
+    """
+    if z.variance <= 0.0 or z.scale <= p.lowest or z.scale >= p.highest:
+        return -1.0
+    stays = math.exp(-p.rate * sample_time)
+    alike = math.exp(-p.corner * sample_time)
     left = (1.0 - stays) / (1.0 + stays) * (1.0 + stays * alike) / (1.0 - stays * alike)
-    return {"scale": math.sqrt(z.variance * left)}
+    return math.sqrt(z.variance * left)
 
 
 def check(p: Any) -> str:
@@ -129,7 +133,7 @@ CONTROL_LAW = ControlLaw(
     },
     State=State,
     check=check,
-    deviations=deviations,
+    deviations={"scale": deviation_of_scale},
     holds_friction=True,
     adapts=True,
 )  # fmt: skip

@@ -7,8 +7,8 @@ rests for as long as slow limit cycles take. What has been found not worth switc
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,8 @@ class Beside:
         Why it is not to be switched on, or "".
     controller : SampledController or None
         None where it cannot be made for this axis.
+    learned : mapping
+        What it has learned on the best estimate, along the motion (`stickslip.control.learned.plain`).
     """
 
     name: str
@@ -54,6 +56,7 @@ class Beside:
     errors: tuple[float, ...]
     why_not: str
     controller: SampledController | None
+    learned: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @property
     def label(self) -> str:
@@ -69,7 +72,8 @@ class Beside:
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {"compensator": self.name, "loop": self.loop, "errors": list(self.errors), "why_not": self.why_not,
-                "controller": self.controller.as_dict() if self.controller else None}  # fmt: skip
+                "controller": self.controller.as_dict() if self.controller else None,
+                "learned": dict(self.learned)}  # fmt: skip
 
 
 def belief_of(model: Model, drive: Drive, inertia: float) -> Belief:
@@ -187,17 +191,19 @@ def confirmed(best: Beside, bench: Bench, others: Bench) -> Beside:
 
 def on_axes(beside: Beside, bench: Bench, where: str) -> Beside:
     """It on every axis of a bench; why it is not safe on one of them."""
-    assert beside.controller is not None
+    controller = beside.controller
+    assert controller is not None
     errors: list[float] = []
     for i, plant in enumerate(bench.plants):
-        before, after = bench.before(i), run(plant, beside.controller, bench.drive)
+        before, after = bench.before(i), run(plant, controller, bench.drive)
         bench.ran()
         if isinstance(after, str) or isinstance(before, str):
             why = after if isinstance(after, str) else "the linear controller alone fails"
             return replace(beside, errors=tuple(errors), why_not=why + where.rstrip())
         errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
+        beside = replace(beside, learned=beside.learned or after.learned)
         unsafe = unsafe_at(beside, before, after, bench.drive)
-        if AT_REST in unsafe and not limit_cycle(beside.controller, bench, i):
+        if AT_REST in unsafe and not limit_cycle(controller, bench, i):
             unsafe.remove(AT_REST)  # it came to rest later: a jump back behind the motion is no limit cycle
         if unsafe:
             return replace(beside, errors=tuple(errors), why_not=", ".join(unsafe) + where.rstrip())

@@ -4,14 +4,15 @@ controller alone, which may ring by itself: a count of the encoder looks like kd
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from stickslip.control.controller import Controller
+from stickslip.control.learned import after
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
@@ -257,12 +258,15 @@ class Trial:
         Of the axis and its reference at every sample, rad.
     sample_time : float
         s
+    learned : mapping
+        What a controller made of control laws has learned at the end (`stickslip.control.learned.plain`).
     """
 
     moving: dict[str, float]
     position: Array
     reference: Array
     sample_time: float
+    learned: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def restless(self, swing: float) -> tuple[float, float]:
         """Swings per second by more than `swing`, rad: beyond those of the reference in all, and at rest behind it."""
@@ -284,7 +288,8 @@ class Trial:
 def run(plant: RigidAxis, controller: Controller | SampledController, drive: Drive) -> Trial | str:
     """The motion and the rest behind it; the reason where it cannot be run to its end."""
     reference = drive.reference_backward if isinstance(plant, Plant) and plant.backward else drive.reference
-    position = simulated(plant, controller, reference)
+    learned: dict[str, Any] = {}
+    position = simulated(plant, controller, reference, learned=learned)
     if position is None:
         return "position or velocity left every reasonable bound"
     time = controller.sample_time
@@ -296,16 +301,17 @@ def run(plant: RigidAxis, controller: Controller | SampledController, drive: Dri
             "velocity_above_50Hz_rms_rad_s": above(velocity, FAST, time),
             "speed_rms_rad_s": math.sqrt(float(np.mean(reference[:moving, 1] ** 2))),
         },
-        position, np.ascontiguousarray(reference[:, 0]), time,
+        position, np.ascontiguousarray(reference[:, 0]), time, learned,
     )  # fmt: skip
 
 
 def simulated(
-    plant: RigidAxis, controller: Controller | SampledController, reference: Array, start: float = 0.0
-) -> Array | None:
+    plant: RigidAxis, controller: Controller | SampledController, reference: Array, start: float = 0.0,
+    learned: dict[str, Any] | None = None,
+) -> Array | None:  # fmt: skip
     """Positions of the axis itself at every sample along a reference, rad; None where it diverges.
 
-    The axis starts at rest at `start`, rad.
+    The axis starts at rest at `start`, rad. `learned` gets what a controller made of control laws has learned.
     """
     control = control_of(controller, UNLIMITED, controller.sample_time)
     arrays = arrays_of(plant, controller.sample_time, controller.encoder_counts)
@@ -320,6 +326,8 @@ def simulated(
     )
     positions = np.empty(len(path))
     done = follow(*arrays, control, path, np.empty(len(COLUMNS)), positions)
+    if learned is not None and isinstance(controller, SampledController):
+        learned.update(after(controller, control.state, controller.sample_time))
     return positions if done == len(path) and bool(np.all(np.isfinite(positions))) else None
 
 
