@@ -141,7 +141,8 @@ def test_law_of_contributing_passes_the_contract(tmp_path):
     )
     assert "stiffness at rest" in shown.stdout, shown.stderr
     suite = subprocess.run(
-        [*python, "pytest", "-p", "no:cacheprovider", "tests/contract", "-k", "dahl and example"],
+        # In one process: others would each collect the suite first.
+        [*python, "pytest", "-n0", "-p", "no:cacheprovider", "tests/contract", "-k", "dahl and example"],
         cwd=ROOT, env=environment, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert suite.returncode == 0, suite.stdout[-3000:]
