@@ -19,7 +19,7 @@ from stickslip.errors import ParameterError, UnknownName
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.setting import beside
 from stickslip.identify.setting import recommend as recommending
-from stickslip.identify.setting.beside import belief_of
+from stickslip.identify.setting.beside import belief_of, tried_beside
 from stickslip.identify.setting.file import write_setting
 from stickslip.identify.setting.recommend import Drive, recommend
 from stickslip.identify.setting.swings import between_counts
@@ -84,6 +84,20 @@ def test_what_is_not_switched_on_is_told_why(tmp_path):
         assert any(x.startswith(f"switch on instead: {taken.label}; it leaves at most") for x in lines)
         file = write_setting(tmp_path / "recommended.toml", found, advice)
         assert read_controller(file).values() == pytest.approx(taken.controller.values())
+
+
+@pytest.mark.parametrize(("plain", "taken"), [(1.05, "PD + ff-lugre"), (1.2, "PID + scale")])
+def test_of_those_as_good_what_adapts_nothing_is_switched_on(monkeypatch, plain, taken):
+    """Within a tenth; what is passed over says so."""
+    errors = {"ff-lugre": 0.02 * plain, "scale": 0.02, "none": 0.5}
+    monkeypatch.setattr(beside, "on_axes", lambda b, *_: replace(b, errors=(errors[b.name],)))
+    monkeypatch.setattr(beside, "limit_cycle", lambda *_: "")
+    drive = Drive(10.0, linear="PID")
+    belief = belief_of(known(**THESIS).model, drive, THESIS["inertia"])
+    tried = tried_beside(tuple(errors), belief, SimpleNamespace(drive=drive), SimpleNamespace(drive=drive))
+    assert tried[0].label == taken
+    (scale,) = (b for b in tried if b.name == "scale")
+    assert scale.why_not == ("" if scale.label == taken else "it adapts, and PD + ff-lugre is as good")
 
 
 @pytest.mark.usefixtures("few")

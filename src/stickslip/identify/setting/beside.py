@@ -30,6 +30,8 @@ __all__ = ["Beside", "belief_of", "limit_cycle", "tried_beside"]
 
 RESTS = 20.0
 """s at rest, of which the second half is judged: an integral that is reset on a soft contact cycles in 6 to 12 s."""
+NEAR = 1.1
+"""Of the smallest error: as good as it. What then adapts nothing is taken, since nothing in it can drift."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +71,11 @@ class Beside:
         """The greatest remaining part of the error."""
         return max(self.errors, default=math.inf)
 
+    @property
+    def adapts(self) -> bool:
+        """Whether what it has learned acts on the axis."""
+        return self.controller is not None and any(b.law.adapts for b in self.controller.blocks.values())
+
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {"compensator": self.name, "loop": self.loop, "errors": list(self.errors), "why_not": self.why_not,
@@ -107,7 +114,8 @@ def tried_beside(
     inertia: float = 0.0,
     offset: float = 0.0,
 ) -> tuple[Beside, ...]:
-    """The compensators of those names, best first: those to be switched on, then the others.
+    """The compensators of those names, the one to be switched on first: the best, or of those as good one that adapts
+    nothing. The rest follow by their errors, then those that are not safe.
 
     The best is confirmed on the other axes, where its errors then are.
 
@@ -126,12 +134,20 @@ def tried_beside(
     ready = sorted((b for b in found if not b.why_not), key=lambda b: b.worst)
     left = [b for b in found if b.why_not]
     while ready:
-        best = confirmed(ready[0], bench, others)
+        first = min(ready, key=lambda b: (b.worst > NEAR * ready[0].worst, b.adapts))
+        ready.remove(first)
+        best = confirmed(first, bench, others)
         if not best.why_not:
-            return (best, *ready[1:], *left)
+            return (best, *(passed_over(b, first) for b in ready), *left)
         left.append(best)
-        ready = ready[1:]
     return tuple(left)
+
+
+def passed_over(one: Beside, taken: Beside) -> Beside:
+    """Beside the one that is taken: why not one with a smaller error, which `tried_beside` passes over."""
+    return (
+        replace(one, why_not=f"it adapts, and {taken.label} is as good") if one.worst < taken.worst else one
+    )
 
 
 def judged(
