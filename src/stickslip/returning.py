@@ -17,7 +17,15 @@ MUST = frozenset({"step", "rate", "steady", "holding", "stored", "sliding", "sam
 
 def gives(tree: ast.FunctionDef) -> bool:
     """Whether the function returns a number anywhere."""
-    return any(_has_value(node) for node in ast.walk(tree) if isinstance(node, ast.Return))
+    return any(map(_has_value, _returns(tree)))
+
+
+def _returns(node: ast.stmt) -> list[ast.Return]:
+    if isinstance(node, ast.Return):
+        return [node]
+    # Expressions hold none, and are most of a tree.
+    parts = (*getattr(node, "body", ()), *getattr(node, "orelse", ()))
+    return [found for part in parts for found in _returns(part)]
 
 
 def missing_return(tree: ast.FunctionDef, *, must: bool = False) -> ast.stmt | None:
@@ -29,12 +37,10 @@ def missing_return(tree: ast.FunctionDef, *, must: bool = False) -> ast.stmt | N
     must : bool
         Whether a function that returns nothing at all misses it too.
     """
-    if not (gives(tree) or must):
+    returns = _returns(tree)
+    if not (must or any(map(_has_value, returns))):
         return None
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Return) and not _has_value(node):
-            return node
-    return _open_end(tree.body)
+    return next((node for node in returns if not _has_value(node)), None) or _open_end(tree.body)
 
 
 def _has_value(node: ast.Return) -> bool:

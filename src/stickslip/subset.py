@@ -307,7 +307,8 @@ class _Translator(ast.NodeTransformer):
 
     def rename(self, tree: ast.FunctionDef) -> None:
         """Find names for numbers that would hide a structure."""
-        bases = {view.base for view in self.views.values()} - self.views.keys()
+        if not (bases := {view.base for view in self.views.values()} - self.views.keys()):
+            return
         own = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)} | set(self.arguments)
         self.renamed = {name: f"{name}_number" for name in own & bases}
 
