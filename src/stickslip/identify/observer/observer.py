@@ -185,10 +185,13 @@ def prepare(
 
 def in_segments(law: Law, drive: Drive, way: Array, period: float, rounding: float) -> Segments:
     """The same followed in segments; `period` is that of the observer's natural frequency, in rows."""
-    rows = [math.ceil(periods * period) for periods in FORGOTTEN]
-    cuts = [cut(forgotten(way, warm), warm) for warm in rows]
-    tried = [Segments(law, drive, c, warm, rounding) for c, warm in zip(cuts, rows, strict=True)]
-    return tried[0] if tried[0].longest <= SHORT else min(tried, key=lambda s: s.longest)
+    found: list[Segments] = []
+    for periods in FORGOTTEN:
+        warm = math.ceil(periods * period)
+        found.append(Segments(law, drive, cut(forgotten(way, warm), warm), warm, rounding))
+        if found[0].longest <= SHORT:
+            break
+    return min(found, key=lambda s: s.longest)
 
 
 def firmness(seen: SeenVelocity, firm: float, least: float, friction: float) -> Array:
