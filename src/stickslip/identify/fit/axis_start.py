@@ -135,7 +135,7 @@ def starts(
     # Faster than the Stribeck velocities that are tried, so that what lies below them keeps the example's shape.
     v = speed * np.array([-3.0, -2.0, -1.4, -1.0, -0.7, -0.5, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0])
     curve = np.sign(v) * coulomb + viscous * v
-    out: list[Model] = []
+    out, fits = list[Model](), dict[Any, dict[str, float]]()
     lengths = LENGTHS if law.state_fields else LENGTHS[1:2]
     velocities = VELOCITIES if law.velocity_scale else VELOCITIES[:1]
     for part in lengths:
@@ -149,7 +149,7 @@ def starts(
             try:
                 values |= viscous_ones(Model(law, **values), viscous, 3.0 * speed) | known
                 model = Model(law, **values)
-                out.append(steady_fit(model, v, curve, list(known)) if law.steady else model)
+                out.append(steady_fit(model, v, curve, list(known), fits) if law.steady else model)
             except ParameterError:
                 continue
     if not out:
@@ -194,23 +194,25 @@ def length_of(law: Law, p: Any, torque: float) -> float:
     return torque / stiffness if stiffness > 0.0 else 1e-5
 
 
-def steady_fit(model: Model, v: Array, curve: Array, held: Sequence[str]) -> Model:
-    """The model with its steady torque fitted to a curve; what the curve does not tell stays as it was."""
-    return steady_fits([model], v, curve, held)[0]
-
-
 def steady_fits(models: Sequence[Model], v: Array, curve: Array, held: Sequence[str]) -> list[Model]:
-    """`steady_fit` of models of one law; those that differ in what the curve does not tell share a fit."""
+    """`steady_fit` of models of one law."""
     fits: dict[Any, dict[str, float]] = {}
-    out: list[Model] = []
-    for model in models:
-        names = told_by(model, v, held)
-        start = tuple(getattr(model.parameters, name) for name in names)
-        if (names, start) not in fits:
-            fits[names, start] = steady_values(model, v, curve, names) if names else {}
-        p = feasible(model.law, model.parameters._replace(**fits[names, start]))
-        out.append(model if p is None else Model(model.law, **p._asdict()))
-    return out
+    return [steady_fit(model, v, curve, held, fits) for model in models]
+
+
+def steady_fit(
+    model: Model, v: Array, curve: Array, held: Sequence[str], fits: dict[Any, dict[str, float]]
+) -> Model:
+    """The model with its steady torque fitted to a curve; what the curve does not tell stays as it was.
+
+    ``fits`` are those of the same law to the same curve: models that differ in what it does not tell share one.
+    """
+    names = told_by(model, v, held)
+    start = tuple(getattr(model.parameters, name) for name in names)
+    if (names, start) not in fits:
+        fits[names, start] = steady_values(model, v, curve, names) if names else {}
+    p = feasible(model.law, model.parameters._replace(**fits[names, start]))
+    return model if p is None else Model(model.law, **p._asdict())
 
 
 def told_by(model: Model, v: Array, held: Sequence[str]) -> tuple[str, ...]:
