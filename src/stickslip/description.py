@@ -236,7 +236,8 @@ def packed(fields: Sequence[Field], p: Any) -> list[float]:
     field with several values.
     """
     flat = [getattr(p, f.name) for f in fields if not f.per_element]
-    blocks = [f for f in fields if f.per_element]
+    if not (blocks := [f for f in fields if f.per_element]):
+        return flat
     sizes = {f.par.per: len(getattr(p, f.name)) for f in reversed(blocks)}
     flat += [float(sizes[per]) for per in dict.fromkeys(f.par.per for f in blocks)]
     for f in blocks:

@@ -113,6 +113,7 @@ class Vector:
         groups = dict.fromkeys(p.shares for p in self.free if p.shares)
         self._groups = [[p for p in self.free if p.shares == g] for g in groups]
         self._fixed = {p.name: p.value for p in self.parameters if not p.free}
+        self._scales = [(p.name, p.logarithmic, p.scale) for p in self._plain]
 
     # ---- sizes and bounds ------------------------------------------------------------------------------------
 
@@ -158,8 +159,8 @@ class Vector:
     def named(self, u: Array) -> dict[str, float]:
         """Every parameter by name, frozen ones too."""
         values = dict(self._fixed)
-        for x, p in zip(u, self._plain, strict=False):
-            values[p.name] = math.exp(x) if p.logarithmic else x * p.scale
+        for x, (name, logarithmic, scale) in zip(u.tolist(), self._scales, strict=False):
+            values[name] = math.exp(x) if logarithmic else x * scale
         place = len(self._plain)
         for group in self._groups:
             ratios = [*u[place : place + len(group) - 1].tolist(), 0.0]
