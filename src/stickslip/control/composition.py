@@ -112,11 +112,11 @@ def unusable(
     reference_acceleration: float, u: Any,
 ) -> float:  # fmt: skip
     """1 where an input is no number, or one that no machine has; else 0."""
-    size = abs(turns) + abs(position) + abs(reference_turns) + abs(reference) + abs(reference_velocity)
-    size += abs(reference_acceleration)
+    where = abs(turns) + abs(position) + (abs(reference_turns) + abs(reference))
+    moving = abs(reference_velocity) + abs(reference_acceleration)
     # Clocks that count from 1970 are beyond 1e9 s.
-    size += abs(u.load) + abs(u.temperature) + 1e-6 * abs(u.time) + abs(u.applied)
-    if size < LARGEST:
+    around = abs(u.load) + abs(u.temperature) + (1e-6 * abs(u.time) + abs(u.applied))
+    if where + moving + around < LARGEST:
         return 0.0
     return 1.0
 
@@ -144,9 +144,10 @@ def keep_time(n: Any, m: Any, u: Any) -> None:
     if n.clock != 0.0:
         u.time = m.seconds + m.part
         m.part += n.sample_time
-        whole = math.floor(m.part)
-        m.seconds += whole
-        m.part -= whole
+        if m.part >= 1.0:  # a floor in every sample costs a tenth of an exported one
+            whole = math.floor(m.part)
+            m.seconds += whole
+            m.part -= whole
 
 
 def see(
