@@ -11,6 +11,7 @@ import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -220,9 +221,9 @@ class System:
 
     def residual(self, torque: Array, c: Candidate) -> Array:
         """What a candidate leaves, N·m (N)."""
-        return torque - self.columns[:, np.concatenate([c.columns, self.small])] @ np.concatenate(
-            [c.values, c.small]
-        )
+        coefficients = np.zeros(self.columns.shape[1])
+        coefficients[c.columns], coefficients[self.small] = c.values, c.small
+        return torque - self.columns @ coefficients
 
     def weights(self, candidates: Sequence[Candidate]) -> Array:
         """Probability of every candidate after the record."""
@@ -253,9 +254,11 @@ class System:
     def covariance(self, torque: Array, c: Candidate) -> Array:
         """Of a candidate's values: noise that pieces share, what no law holds, and misfit that does not average out."""
         residual = self.residual(torque, c)
-        own = self.columns[:, c.columns] - self.columns[:, self.small] @ c.mixing
         begins = np.flatnonzero(np.concatenate([[True], np.diff(self.piece) != 0]))
-        scores = np.add.reduceat(own * residual[:, None], begins, axis=0)
+        bounds = pairwise([*begins.tolist(), residual.size])
+        sums = np.array([residual[i:j] @ self.columns[i:j] for i, j in bounds])
+        # What the small columns explain of the others is taken out of a piece's sum, which is as good as of every row.
+        scores = sums[:, c.columns] - sums[:, self.small] @ c.mixing
         count = student(begins.size - 1) ** 2 * begins.size / max(1, begins.size - 1)
         noise = c.inverse @ (scores.T @ scores) @ c.inverse * count
         shrunk = self.products[np.ix_(c.columns, self.small)]
