@@ -90,12 +90,21 @@ def test_what_is_not_switched_on_is_told_why(tmp_path):
 def test_of_those_as_good_what_adapts_nothing_is_switched_on(monkeypatch, plain, taken):
     """Within a tenth; what is passed over says so."""
     errors = {"ff-lugre": 0.02 * plain, "scale": 0.02, "none": 0.5}
-    monkeypatch.setattr(beside, "on_axes", lambda b, *_: replace(b, errors=(errors[b.name],)))
+    later = " on an axis sampled later "
+
+    def on_axes(one, _, where):
+        return replace(one, errors=(errors[one.name] * (1.5 if where == later else 1.0),))
+
+    monkeypatch.setattr(beside, "on_axes", on_axes)
     monkeypatch.setattr(beside, "limit_cycle", lambda *_: "")
     drive = Drive(10.0, linear="PID")
     belief = belief_of(known(**THESIS).model, drive, THESIS["inertia"])
     tried = tried_beside(tuple(errors), belief, SimpleNamespace(drive=drive), SimpleNamespace(drive=drive))
     assert tried[0].label == taken
+    # All are compared on the same axes; what is promised holds the later ones.
+    assert (tried[0].worst, tried[0].at_most) == pytest.approx(
+        (errors[tried[0].name], 1.5 * errors[tried[0].name])
+    )
     (scale,) = (b for b in tried if b.name == "scale")
     assert scale.why_not == ("" if scale.label == taken else "it adapts, and PD + ff-lugre is as good")
 

@@ -64,7 +64,9 @@ def beside_lines(result: Recommendation) -> list[str]:
     taken = result.instead
     if taken is None:
         return [*out, "none of these is better than what is said above"]
-    said = f"it leaves at most {100 * taken.worst:.1f} % of the linear controller's error on all sampled axes"
+    said = (
+        f"it leaves at most {100 * taken.at_most:.1f} % of the linear controller's error on all sampled axes"
+    )
     why = f"; the setting above {result.hunts}" if result.hunts else ""
     learned = [f"learned there:     {line}" for line in told({"learned": taken.learned})]
     return [*out, f"switch on instead: {taken.label}; {said}{why}", *learned]

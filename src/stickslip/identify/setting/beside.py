@@ -51,6 +51,8 @@ class Beside:
         None where it cannot be made for this axis.
     learned : mapping
         What it has learned on the best estimate, along the motion (`stickslip.control.learned.plain`).
+    confirmed : tuple of float
+        As `errors`, on axes that it was not chosen on; empty where it is not the one that is switched on.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Beside:
     why_not: str
     controller: SampledController | None
     learned: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    confirmed: tuple[float, ...] = ()
 
     @property
     def label(self) -> str:
@@ -68,8 +71,13 @@ class Beside:
 
     @property
     def worst(self) -> float:
-        """The greatest remaining part of the error."""
+        """The greatest remaining part of the error, on axes that all were tried on."""
         return max(self.errors, default=math.inf)
+
+    @property
+    def at_most(self) -> float:
+        """The greatest remaining part of the error on all axes."""
+        return max((self.worst, *self.confirmed))
 
     @property
     def adapts(self) -> bool:
@@ -78,7 +86,8 @@ class Beside:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return {"compensator": self.name, "loop": self.loop, "errors": list(self.errors), "why_not": self.why_not,
+        return {"compensator": self.name, "loop": self.loop, "errors": list(self.errors),
+                "confirmed": list(self.confirmed), "why_not": self.why_not,
                 "controller": self.controller.as_dict() if self.controller else None,
                 "learned": dict(self.learned)}  # fmt: skip
 
@@ -117,7 +126,7 @@ def tried_beside(
     """The compensators of those names, the one to be switched on first: the best, or of those as good one that adapts
     nothing. The rest follow by their errors, then those that are not safe.
 
-    The best is confirmed on the other axes, where its errors then are.
+    The best is confirmed on the other axes.
 
     Parameters
     ----------
@@ -202,7 +211,8 @@ def confirmed(best: Beside, bench: Bench, others: Bench) -> Beside:
     assert best.controller is not None
     if cycle := limit_cycle(best.controller, bench, 0):
         return replace(best, why_not=cycle)
-    return on_axes(best, others, " on an axis sampled later ")
+    found = on_axes(best, others, " on an axis sampled later ")
+    return replace(found, errors=best.errors, confirmed=found.errors)
 
 
 def on_axes(beside: Beside, bench: Bench, where: str) -> Beside:

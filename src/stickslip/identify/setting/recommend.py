@@ -105,9 +105,9 @@ class Recommendation:
     def instead(self) -> Beside | None:
         """The compensator of the catalogue to be switched on instead of the chosen setting; None: none is better."""
         best = next((b for b in self.beside if not b.why_not), None)
-        if best is None or best.name == "none" or ALLOWANCE * best.worst > 1.0:
+        if best is None or best.name == "none" or ALLOWANCE * best.at_most > 1.0:
             return None
-        return best if self.chosen is None or self.hunts or NEAR * best.worst < self.chosen.worst else None
+        return best if self.chosen is None or self.hunts or NEAR * best.at_most < self.chosen.worst else None
 
     @property
     def reduction(self) -> tuple[float, float]:
