@@ -103,6 +103,18 @@ def test_a_plain_inverse_dynamics_that_certain_sliding_refutes_moves_nothing_out
     assert all(e.lower <= f.value <= e.upper for e, f in zip(given, found, strict=True))
 
 
+def test_a_refuted_plain_inverse_dynamics_moves_nothing_out_of_what_certain_sliding_says() -> None:
+    """However wide the interval given is, so as to hold both."""
+    inverse = inverse_dynamics([moving()], AXIS)
+    given = [estimate(n, x, 0.4 * x if n == "fc" else 0.01 * x) for n, x in (TRUE | {"fc": 0.36}).items()]
+    free, told = (
+        {e.name: e.value for e in settled(given, COULOMB, inverse, believed=False, sliding=own)[0]}
+        for own in ({}, {"fc": (0.35, 0.37)})
+    )
+    assert free["fc"] < 0.33
+    assert 0.35 <= told["fc"] <= 0.37
+
+
 def test_identified_values_that_explain_the_record_stay() -> None:
     inverse = inverse_dynamics([moving()], AXIS)
     given = [

@@ -21,8 +21,9 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.uncertainty import RATIO, verdict_on
+from stickslip.identify.regression.bands import rough
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.regression.regression import QUANTILE, Regression, regress_axis
+from stickslip.identify.regression.regression import FALLS, QUANTILE, Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
@@ -50,8 +51,6 @@ SAME = 0.05
 AS_GOOD = 1.5
 """Times as much as the regression leaves of the torque in certain sliding, that other values may leave and still
 stand."""
-FALLS = 0.95
-"""Probability of a fall of friction in certain sliding from which on its numbers are held against the others'."""
 TOLD_BY_SLIDING = ("inertia", "offset", "gravity", "gravity_angle", "fc", "sigma2")
 DOUBT = "the prediction error, the only evidence for it, contradicts certain sliding on {name}: {other} against {own}"
 
@@ -271,7 +270,9 @@ def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tup
 def as_good(inverse: InverseDynamics, found: Regression, times: float = AS_GOOD) -> bool:
     """Whether the plain inverse dynamics explains certain sliding as well as the regression: else that refutes it.
 
-    It may leave so many `times` as much of the torque there.
+    It may leave so many `times` as much of the torque there; a fall of friction that shows is the regression's, where
+    little else is left. Where motor and load move as one in wider windows alone, it looks at what they do apart, and
+    has no say.
     """
     values = {
         "inertia": inverse["inertia"],
@@ -280,8 +281,10 @@ def as_good(inverse: InverseDynamics, found: Regression, times: float = AS_GOOD)
         "offset": inverse.offset,
     }
     gravity = {n: inverse[n] for n in ("gravity_sin", "gravity_cos") if inverse.has(n)}
-    own = {n: v.value for n, v in found.numbers.items()}
-    return found.left_by(values | gravity) <= times * found.left_by(own)
+    own = {n: x.value for n, x in found.numbers.items()}
+    if found.shows_a_fall and not rough(found.bands[0]):
+        own |= {"vs": found.vs.value}
+    return found.widened == 1.0 and found.left_by(values | gravity) <= times * found.left_by(own)
 
 
 def held_together(

@@ -52,8 +52,6 @@ AUTOMATIC = ("coulomb", "stribeck", "lugre")
 """Laws among which the held-out error chooses where none is named."""
 NO_PREDICTION = "The prediction error cannot be had from these records:"
 INTERVALS = ("prediction", "covariance")
-FALLS, SHOWN = 0.95, 4.0
-"""Probability, and standard deviations of Fs - Fc, from which on friction is taken to fall with velocity."""
 SIMPLEST = (
     "Law '{simplest}' is given instead of '{law}': the record does not determine the additional parameters of "
     "'{law}', and no "
@@ -192,7 +190,7 @@ def shortlist(laws: Sequence[Law], sliding: Regression | None) -> list[Law]:
 
     Where none shows it may lie below the speeds of certain sliding.
     """
-    if sliding is None or sliding.falls < FALLS or sliding.fall_shown < SHOWN:
+    if sliding is None or not sliding.shows_a_fall:
         return list(laws)
     return [law for law in laws if "fs" in {f.name for f in law.fields}] or list(laws)
 

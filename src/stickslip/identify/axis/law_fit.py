@@ -18,6 +18,7 @@ from stickslip.identify.axis.agreed import (
     agreed,
     as_good,
     held_against,
+    sliding_values,
     with_level,
 )
 from stickslip.identify.axis.choice import (
@@ -35,6 +36,7 @@ from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
 from stickslip.spec import Law
 
 __all__ = ["Evidence", "estimated", "predicted"]
@@ -124,7 +126,7 @@ def by_sliding(
     estimates, said = agreed(first, sliding, vector, inverse, scale, fine=False)
     u = vector.coordinates(vector.named(vector.start) | {e.name: e.value for e in estimates})
     estimates = evident(estimates, vector, u, experiments, axis)
-    estimates, more = settled(estimates, model, inverse, believed=as_good(inverse, sliding, ALIKE))
+    estimates, more = beside_plain(estimates, model, inverse, sliding)
     estimates = with_level(estimates, sliding)
     u = vector.coordinates(vector.named(u) | {e.name: e.value for e in estimates})
     found = with_values(experiments, axis, law, vector, u, extras)
@@ -146,6 +148,14 @@ def by_sliding(
         sliding,
     )
     return noted(result)
+
+
+def beside_plain(
+    estimates: Sequence[Estimate], model: Model, inverse: InverseDynamics, sliding: Regression
+) -> tuple[tuple[Estimate, ...], list[str]]:
+    """The estimates settled beside the plain inverse dynamics, as far as certain sliding does not refute it."""
+    own = {n: (low, high) for n, (_, low, high) in sliding_values(sliding).items()}
+    return settled(estimates, model, inverse, believed=as_good(inverse, sliding, ALIKE), sliding=own)
 
 
 def with_values(
@@ -189,8 +199,7 @@ def predicted(
     if evidence.unchecked and inverse is not None:
         estimates = held_against(estimates, inverse)
     if sliding is not None and inverse is not None:
-        believed = as_good(inverse, sliding, ALIKE)
-        estimates, more = settled(estimates, result.model, inverse, believed=believed)
+        estimates, more = beside_plain(estimates, result.model, inverse, sliding)
         said = [*said, *more]
     estimates = with_level(estimates, sliding) if sliding is not None else estimates
     u = result.vector.coordinates(result.vector.named(u) | {e.name: e.value for e in estimates})

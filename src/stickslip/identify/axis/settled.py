@@ -150,7 +150,12 @@ class Settling:
 
 
 def settled(
-    estimates: Sequence[Estimate], model: Model, inverse: InverseDynamics | None, *, believed: bool = True
+    estimates: Sequence[Estimate],
+    model: Model,
+    inverse: InverseDynamics | None,
+    *,
+    believed: bool = True,
+    sliding: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[tuple[Estimate, ...], list[str]]:
     """The estimates, what is not identified chosen so that the record's torque is explained best; and what to say.
 
@@ -165,6 +170,9 @@ def settled(
     believed : bool
         Whether it explains certain sliding as well: else it has no weight in an identified value, and none leaves
         its interval for it.
+    sliding : mapping, optional
+        Intervals of certain sliding by name: those that none leaves then, however wide an estimate's is so as to hold
+        both.
     """
     by_name = {e.name: e for e in estimates}
     if inverse is None or model.law.steady is None or not set(PLAIN) <= by_name.keys():
@@ -188,6 +196,8 @@ def settled(
         shared, less = own.solved({**chosen, **both}, free, level)
         if less < error:
             chosen, error = shared, less
+    if not believed:
+        held = {n: shared_part(b, (sliding or {}).get(n, b)) for n, b in held.items()}
     asked = set[str]()
     if held and error > ALIKE * inverse.relative_error:
         moved, less = own.solved(chosen, {**free, **held}, level)
@@ -204,6 +214,12 @@ def settled(
                 f"{100.0 * error:.3g} %."
             ]
     return tuple(placed(e, chosen, inverse, e.name in asked) for e in estimates), notes
+
+
+def shared_part(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
+    """What two intervals have in common; the first where that is nothing."""
+    low, high = max(a[0], b[0]), min(a[1], b[1])
+    return (low, high) if low <= high else a
 
 
 def physical(inverse: InverseDynamics) -> dict[str, tuple[float, float]]:

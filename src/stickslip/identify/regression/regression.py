@@ -28,7 +28,7 @@ from stickslip.identify.regression.sliding_rows import SlidingRows, narrowest_wi
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["Regression", "regress_axis"]
+__all__ = ["FALLS", "QUANTILE", "Regression", "regress_axis"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -43,6 +43,8 @@ GIVEN = 0.05
 """Rows to which a skew that is given is known."""
 LEVEL, EXCLUDED = 0.05, 0.05
 """Half-width, in parts of Fc, up to which it is told in any case; probability of a fall up to which none is there."""
+FALLS, SHOWN = 0.95, 4.0
+"""Probability, and standard deviations of Fs - Fc, from which on friction is taken to fall with velocity."""
 LEVEL_UNTOLD = (
     "extrapolated: friction may still fall at the highest recorded speeds, and viscous friction is not told apart "
     "from it"
@@ -97,12 +99,16 @@ class Regression:
 
     def left_by(self, values: Mapping[str, float]) -> float:
         """RMS of the torque that inertia, sigma2, fc, offset and gravity leave in the rows of certain sliding, N·m
-        (N)."""
+        (N); of a fall of friction also that of `fs` and `vs`, where they are among the values."""
         fixed, position = stacked(self.rows, "fixed"), stacked(self.rows, "position")
         torque = np.concatenate([r.torque(self.numbers["skew"].value) for r in self.rows])
         known = fixed @ np.array([values[n] for n in ("inertia", "sigma2", "fc", "offset")])
         known = known + values.get("gravity_sin", 0.0) * np.sin(position)
         known = known + values.get("gravity_cos", 0.0) * np.cos(position)
+        if {"fs", "vs"} <= values.keys():
+            speed = stacked(self.rows, "speed")
+            falls = np.exp(-((speed / values["vs"]) ** 2))
+            known = known + (values["fs"] - values["fc"]) * falls * np.sign(speed)
         return float(np.sqrt(np.mean((torque - known) ** 2)))
 
     @property
@@ -136,6 +142,11 @@ class Regression:
         """Friction at rest above its level, in standard deviations."""
         rest, level = self.numbers["fs"], self.numbers["fc"]
         return (rest.value - level.value) / max(math.hypot(rest.std, level.std), 1e-300)
+
+    @property
+    def shows_a_fall(self) -> bool:
+        """Whether friction is taken to fall with velocity."""
+        return self.falls >= FALLS and self.fall_shown >= SHOWN
 
     @property
     def harmonics(self) -> Array:
