@@ -12,6 +12,10 @@ import pytest
 
 # What tests approve stays with them; set before anything is imported, so that other processes inherit it.
 os.environ["STICKSLIP_CONFIG"] = tempfile.mkdtemp(prefix="stickslip-tests-")
+# The tests share the cores already: linear algebra in threads of its own waits in a loop for them, at four times the
+# processor's time, and the commands do without as well. Before NumPy is imported, which reads it.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
