@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 # What tests approve stays with them; set before anything is imported, so that other processes inherit it.
 os.environ["STICKSLIP_CONFIG"] = tempfile.mkdtemp(prefix="stickslip-tests-")
@@ -16,6 +17,10 @@ os.environ["STICKSLIP_CONFIG"] = tempfile.mkdtemp(prefix="stickslip-tests-")
 # processor's time, and the commands do without as well. Before NumPy is imported, which reads it.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+# The first example of a test may compile for seconds: no example is held to a time.
+settings.register_profile("stickslip", deadline=None)
+settings.load_profile("stickslip")
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent

@@ -186,7 +186,7 @@ def loads_or_is_refused(load: Any, name: str, tree: dict[str, Any], folder: Path
 
 STUDY = tomllib.loads((DATA / "small_study.toml").read_text())
 RUN = tomllib.loads((DATA / "one_run.toml").read_text())
-QUICK = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+QUICK = settings(max_examples=150, suppress_health_check=list(HealthCheck))
 
 
 @pytest.fixture(scope="module")

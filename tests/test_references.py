@@ -94,7 +94,7 @@ def test_compiled_profile_equals_plain_python(name):
     acceleration=st.floats(1e-1, 200),
     jerk=st.floats(1, 2e4),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_scurve_keeps_its_limits_and_arrives(distance, velocity, acceleration, jerk):
     reference = Reference(
         "scurve", distance=distance, velocity=velocity, acceleration=acceleration, jerk=jerk

@@ -129,7 +129,7 @@ def test_compiled_equals_plain_python_bit_for_bit(law):
 
 @every_law
 @given(motion=motions)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_step_is_bounded_for_any_time_step(law, motion):
     p = example(law)
     torques, z = drive(law, p, motion)
@@ -146,7 +146,7 @@ def test_step_is_bounded_for_any_time_step(law, motion):
 
 @every_law
 @given(motion=motions, v=velocities)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_step_of_no_length_is_the_torque_now(law, motion, v):
     """Engines take the first torque of a run so; nothing is divided by dt."""
     p = example(law)
@@ -163,7 +163,7 @@ def test_a_step_of_no_length_is_the_torque_now(law, motion, v):
 
 @every_law
 @given(motion=motions)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_odd(law, motion):
     if not law.odd:
         pytest.skip("declared not odd")
@@ -175,7 +175,7 @@ def test_odd(law, motion):
 
 @every_law
 @given(v=speeds)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_steady_value_is_reached(law, v):
     if law.steady is None:
         pytest.skip("the torque at constant velocity depends on the past")
@@ -189,7 +189,7 @@ def test_steady_value_is_reached(law, v):
 
 @every_law
 @given(v=speeds, dt=steps)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_exact_at_constant_velocity(law, v, dt):
     """Two half steps are one step while no element breaks away between them."""
     p = example(law)
@@ -224,7 +224,7 @@ def test_step_converges_to_rate(law):
     frequency=st.floats(-1, 1.5).map(lambda e: 10.0**e),
     drift=st.floats(-1, 1),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_passive_from_rest(law, amplitude, frequency, drift):
     """Work done on a contact that starts unloaded is never negative."""
     p = example(law)

@@ -27,7 +27,7 @@ def text_of(model, nearest=False, **values):
     return bam.write(Job(model, "axis", nearest=nearest, settings=values)).files["axis.json"]
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(fc=positive, rise=st.floats(1.0, 2.0), vs=positive, delta_s=st.floats(0.1, 20.0), sigma2=positive)
 def test_the_way_there_and_back_changes_nothing(fc, rise, vs, delta_s, sigma2):
     for model, variant in (

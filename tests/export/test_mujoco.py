@@ -26,7 +26,7 @@ def text_of(model, **wanted):
     return write(job(model, **wanted)).files["axis.xml"]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(0.1, 10.0), positive, st.floats(0.0, 10.0))
 def test_coulomb_friction_comes_back(fc, inertia, sigma2):
     model = Model("coulomb", fc=fc, sigma2=sigma2)
@@ -34,7 +34,7 @@ def test_coulomb_friction_comes_back(fc, inertia, sigma2):
     assert read(text).as_dict() == model.as_dict()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(positive, st.floats(0.0, 10.0), positive, st.floats(1.0, 3.0), positive, st.floats(0.0, 1.0))
 def test_lugre_friction_comes_back(sigma0, sigma1, fc, rise, vs, sigma2):
     p = {

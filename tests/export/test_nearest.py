@@ -21,7 +21,7 @@ MEMORYLESS = ("coulomb", "viscous", "static", "stribeck_plain", "stribeck", "kar
 positive = st.floats(1e-3, 1e3)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(fc=positive, rise=st.floats(1.0, 3.0), vs=positive, sigma2=positive)
 def test_a_law_of_the_forms_own_kind_is_carried_as_it_is(fc, rise, vs, sigma2):
     for form, values in (

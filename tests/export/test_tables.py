@@ -46,7 +46,7 @@ def test_few_points_err_as_little_as_theory_allows():
         assert error <= 1.1 * 2.0 * (top / (count - 1)) ** 2 / 8.0
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(vs=st.floats(1e-3, 1.0), rise=st.floats(1.0, 3.0), delta=st.floats(0.5, 4.0))
 def test_more_points_never_err_more(vs, rise, delta):
     curve = Curve.of(
@@ -79,7 +79,7 @@ def test_a_table_is_read_back_as_written_and_says_how_near_it_is():
     np.testing.assert_allclose(points.torque[moving], expected, rtol=1e-12)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(fc=st.floats(1e-3, 1e3), rise=st.floats(1.0, 3.0), vs=st.floats(1e-3, 10.0), points=st.integers(2, 40))
 def test_every_table_comes_back(fc, rise, vs, points):
     model = Model("stribeck_plain", fs=rise * fc, fc=fc, vs=vs)
@@ -108,7 +108,7 @@ def test_a_damaged_table_is_named(text, says):
 # ---- the kernel's list -----------------------------------------------------------------------------------------
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     fc=st.floats(1e-2, 1e2), rise=st.floats(1.0, 2.0), vs=st.floats(1e-3, 10.0), unit=st.floats(1e-4, 1.0),
     motion=st.sampled_from(["rotary", "linear"]),

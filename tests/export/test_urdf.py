@@ -12,7 +12,7 @@ from stickslip.model import Model
 number = st.floats(0.0, 1e6, allow_subnormal=False)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(fc=number, sigma2=number)
 def test_the_way_there_and_back_changes_nothing(fc, sigma2):
     model = Model("coulomb", fc=fc, sigma2=sigma2)

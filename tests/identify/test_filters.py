@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import linalg, signal
 
@@ -30,7 +30,6 @@ def assert_alike(found, expected, scale):
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * float(np.max(np.abs(scale))))
 
 
-@settings(deadline=None)  # the first call compiles
 @given(
     order=st.sampled_from([2, 4, 6]), corner=st.floats(5.0, 400.0), n=st.integers(60, 400),
     seed=st.integers(0, 100),
@@ -56,7 +55,6 @@ def test_a_series_is_continued_as_far_as_it_goes(reach: int, n: int):
     assert_alike(ZeroPhase(butterworth_poles(2), 0.08, 2.0, reach)(x), expected, x)
 
 
-@settings(deadline=None)
 @given(factor=st.integers(2, 40), n=st.integers(100, 900), seed=st.integers(0, 100))
 def test_decimation_is_that_of_scipy_but_for_the_gain_at_rest(factor: int, n: int, seed: int):
     x = wandering(n, seed)

@@ -53,7 +53,7 @@ def response(b, a, f):
     load=st.floats(0.1, 3.0), mode=st.floats(30.0, 350.0), damping=st.floats(0.005, 0.2), delay=st.integers(0, 4),
     held=st.booleans(), bandwidth=st.floats(1.0, 100.0),
 )  # fmt: skip
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_the_count_is_half_the_unstable_poles(load, mode, damping, delay, held, bandwidth):
     b, a = plant(load, mode, damping, delay, held)
     sizes = np.abs(unstable_poles(b, a, bandwidth))

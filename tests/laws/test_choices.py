@@ -70,7 +70,7 @@ def test_laws_that_slide_have_two_directions():
 
 @with_directions
 @given(motion=motions)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_equal_parameters_are_the_symmetric_law(law, motion):
     other = law.having(symmetry="asymmetric")
     one = drive(law, law.parameters(law.example), motion)
@@ -79,7 +79,7 @@ def test_equal_parameters_are_the_symmetric_law(law, motion):
 
 @with_directions
 @given(motion=motions)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_the_mirror_image_has_the_parameters_exchanged(law, motion):
     other = law.having(symmetry="asymmetric")
     assert not other.odd
@@ -179,7 +179,7 @@ points = st.lists(st.tuples(st.floats(0.001, 0.5), st.floats(0.05, 2.0)), min_si
 
 
 @given(points=points, first=st.floats(0.05, 2.0))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_table_goes_through_its_points_and_never_beyond(points, first):
     law = plugins.law("stribeck").having(curve="table")
     v = [0.0, *np.cumsum([h for h, _ in points])]

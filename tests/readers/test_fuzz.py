@@ -45,7 +45,7 @@ def fuzzer():
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".json"])
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.one_of(st.binary(max_size=300), TABLES.map(lambda text: text.encode("utf-8", "replace"))))
 def test_invented_text(tmp_path, fuzzer, suffix, data):
     path = tmp_path / f"file{suffix}"

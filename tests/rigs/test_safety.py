@@ -92,7 +92,7 @@ def test_within_the_limits_the_controller_has_its_way():
     assert abs(torque) > 0.0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data())
 def test_compiled_and_plain_python_agree_bit_for_bit(data):
     """The kernel is the text: the same samples, whatever they are, give the same commands."""

@@ -109,7 +109,6 @@ def selected(test: bool, a: float, b: float) -> float:
     return a if test else b
 
 
-@settings(deadline=None)
 @given(
     numbers=st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5), phase=st.sampled_from([0.0, 1.0, 2.0, 3.0]),
     inverse=st.floats(0.1, 10.0),

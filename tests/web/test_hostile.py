@@ -168,7 +168,7 @@ def target(served: Served) -> tuple[Any, str, str]:
     return client, project, made["id"]
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     method=st.sampled_from(["GET", "POST", "PUT", "PATCH", "DELETE", "HEAD", "OPTIONS"]), path=PATHS, body=BODIES,
     query=st.dictionaries(st.sampled_from(QUERY), st.text(max_size=10), max_size=3),
