@@ -114,12 +114,13 @@ class Machine:
 
     def _positive_up_to_its_speed(self) -> None:
         """Friction opposes the motion up to the encoder's speed (beyond 74 rad/s thesis Table 10's does not)."""
-        law, top = self.clutch.law, self.encoder.max_speed
-        if law.steady is None or not math.isfinite(top):
+        clutch, top = self.clutch, self.encoder.max_speed
+        steady, p = clutch.law.steady, clutch.parameters
+        if steady is None or not math.isfinite(top):
             return
         for i in range(1, 201):
             for v in (top * i / 200.0, -top * i / 200.0):
-                if law.steady(v, self.clutch.parameters) * v < 0.0:
+                if steady(v, p) * v < 0.0:
                     raise ParameterError(
                         f"machine: friction helps the motion at {v:g} rad/s; lower encoder.max_speed or fix friction"
                     )
