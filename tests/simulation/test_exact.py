@@ -246,7 +246,7 @@ def test_the_table_of_a_feedforward_gives_its_law_all_that_a_law_may_read(monkey
     karnopp = Model("karnopp", dv=1e-3, fs=0.335, fc=0.285, vs=0.01, sigma2=0.018)
     case = loop(GMS, Controller(PD, Feedforward(karnopp, gain=0.8031)), SINE, 0.1)
     cells, _ = forcing.feedforward(case)
-    assert [Surroundings(*u) for u in handed] == [Surroundings()]
+    assert [u.tolist() for u in handed] == [list(Surroundings())]
     assert cells[0, 2] == 0.0
 
 
