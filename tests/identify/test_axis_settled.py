@@ -99,7 +99,7 @@ def test_values_leave_intervals_that_cannot_explain_the_record_and_are_not_ident
 def test_a_plain_inverse_dynamics_that_certain_sliding_refutes_moves_nothing_out_of_its_interval() -> None:
     inverse = inverse_dynamics([moving()], AXIS)
     given = [estimate(n, x, 0.01 * x) for n, x in (TRUE | {"fc": 0.5}).items()]
-    found, _ = settled(given, COULOMB, inverse, believed=False)
+    found, _ = settled(given, COULOMB, inverse, refuted_by={})
     assert all(e.lower <= f.value <= e.upper for e, f in zip(given, found, strict=True))
 
 
@@ -108,7 +108,7 @@ def test_a_refuted_plain_inverse_dynamics_moves_nothing_out_of_what_certain_slid
     inverse = inverse_dynamics([moving()], AXIS)
     given = [estimate(n, x, 0.4 * x if n == "fc" else 0.01 * x) for n, x in (TRUE | {"fc": 0.36}).items()]
     free, told = (
-        {e.name: e.value for e in settled(given, COULOMB, inverse, believed=False, sliding=own)[0]}
+        {e.name: e.value for e in settled(given, COULOMB, inverse, refuted_by=own)[0]}
         for own in ({}, {"fc": (0.35, 0.37)})
     )
     assert free["fc"] < 0.33

@@ -18,7 +18,6 @@ from stickslip.config import read_toml
 from stickslip.control.composed import composed_of
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
-from stickslip.spec import Kept, Learned
 
 __all__ = [
     "WIDTH",
@@ -95,8 +94,7 @@ def learned_values(
             f.name, f.par.meaning, f.par.unit, values[f.name],
             WIDTH * spread[f.name] if spread.get(f.name, -1.0) >= 0.0 else None,
         )
-        for f in controller.state_fields
-        if isinstance(f.par, Learned) and not isinstance(f.par, Kept)
+        for f in controller.learned_fields
     )  # fmt: skip
 
 
@@ -116,7 +114,7 @@ def told(meta: Mapping[str, Any]) -> list[str]:
 def after(controller: Any, state: Any, sample_time: float) -> dict[str, dict[str, Any]]:
     """What `plain` says of a controller of any kind after a run that has left this flat `state`."""
     own = composed_of(controller)
-    if not any(isinstance(f.par, Learned) for f in own.state_fields):
+    if not own.learned_fields:
         return {}
     return plain(learned_values(own, own.unpacked_state(state.tolist()), sample_time))
 

@@ -16,7 +16,7 @@ from stickslip.control.continuous import Continuous, continuous_form, refuse_win
 from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.errors import ParameterError, suggestion
 from stickslip.model import Model
-from stickslip.spec import Field, Learned, Surroundings, fields_of, packed
+from stickslip.spec import Field, Kept, Learned, Surroundings, fields_of, packed
 from stickslip.subset import Layout
 
 __all__ = ["FADE", "SampledController"]
@@ -125,6 +125,13 @@ class SampledController:
     def state_fields(self) -> tuple[Field, ...]:
         """As `fields`, of the states."""
         return _state_fields_of(self.laws)
+
+    @property
+    def learned_fields(self) -> tuple[Field, ...]:
+        """Of the states, those that its laws learn, without what they keep for that alone."""
+        return tuple(
+            f for f in self.state_fields if isinstance(f.par, Learned) and not isinstance(f.par, Kept)
+        )
 
     @functools.cached_property
     def layouts(self) -> dict[str, Layout]:

@@ -33,7 +33,7 @@ from stickslip.export.controllers import (
     ControllerTarget,
     checked_name,
     counts_of,
-    deviations_of,
+    deviation_functions,
     golden_samples,
     head_of,
     learned_of,
@@ -104,7 +104,7 @@ def check(export: Export, name: str) -> Check:
 def code_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
     """Names, structures and functions."""
     # In single precision the ones with whole positions are `wide`.
-    told = [f"_{name}" for name in deviations_of(controller)]
+    told = [f"_{name}" for name in deviation_functions(controller)]
     trees = trees_of(controller, [*(n for n in PUBLIC if n.endswith("_turns") or not dialect.single), *told])
     known, public = analyse(trees), [n for n in (*PUBLIC, *told) if n in trees]
     written = functions(trees, dialect, public)

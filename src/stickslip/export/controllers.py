@@ -16,7 +16,7 @@ from stickslip.export._text import ascii_only
 from stickslip.export.golden import Samples, changing, random_motion, sampled_torques
 from stickslip.export.job import IDENTIFIER, Check, Export
 from stickslip.export.nearest import read_by
-from stickslip.spec import Kept, Learned, Surroundings
+from stickslip.spec import Surroundings
 from stickslip.subset import named
 
 __all__ = [
@@ -26,7 +26,7 @@ __all__ = [
     "compensates_alone",
     "counts_of",
     "depends_on",
-    "deviations_of",
+    "deviation_functions",
     "given_by",
     "golden_samples",
     "head_of",
@@ -70,13 +70,13 @@ def checked_name(name: str) -> str:
 def trees_of(controller: SampledController, public: Sequence[str]) -> dict[str, ast.FunctionDef]:
     """The functions of that name of the composition, and what they call, callees first; ``_`` before a name is kept.
 
-    Those that tell a deviation of what is learned have the names of `deviations_of`.
+    Those that tell a deviation of what is learned have the names of `deviation_functions`.
     """
-    found = {**controller.functions, **deviations_of(controller)}
+    found = {**controller.functions, **deviation_functions(controller)}
     return merged(named({name: found[name.strip("_")] for name in public}, controller.layouts))
 
 
-def deviations_of(controller: SampledController) -> dict[str, Callable[..., float]]:
+def deviation_functions(controller: SampledController) -> dict[str, Callable[..., float]]:
     """The functions that tell a standard deviation of what is learned, ``feedforward_scale_deviation`` by name."""
     return {f"{name}_deviation": function for name, function in controller.deviations.items()}
 
@@ -84,10 +84,9 @@ def deviations_of(controller: SampledController) -> dict[str, Callable[..., floa
 def learned_of(controller: SampledController) -> Iterable[Mapping[str, str]]:
     """What it learns: names, units, meanings, and the functions that tell its deviation ("": none)."""
     told = controller.deviations
-    for f in controller.state_fields:
-        if isinstance(f.par, Learned) and not isinstance(f.par, Kept):
-            deviation = f"{f.name}_deviation" if f.name in told else ""
-            yield {"name": f.name, "unit": f.par.unit, "meaning": f.par.meaning, "deviation": deviation}
+    for f in controller.learned_fields:
+        deviation = f"{f.name}_deviation" if f.name in told else ""
+        yield {"name": f.name, "unit": f.par.unit, "meaning": f.par.meaning, "deviation": deviation}
 
 
 def counts_of(controller: SampledController) -> dict[str, int]:

@@ -155,7 +155,7 @@ def beside_plain(
 ) -> tuple[tuple[Estimate, ...], list[str]]:
     """The estimates settled beside the plain inverse dynamics, as far as certain sliding does not refute it."""
     own = {n: (low, high) for n, (_, low, high) in sliding_values(sliding).items()}
-    return settled(estimates, model, inverse, believed=as_good(inverse, sliding, ALIKE), sliding=own)
+    return settled(estimates, model, inverse, None if as_good(inverse, sliding, ALIKE) else own)
 
 
 def with_values(

@@ -124,6 +124,22 @@ class Settling:
         found = np.clip(own + std * toward, low, high)
         return dict(zip(names, found.tolist(), strict=True))
 
+    def moved(
+        self, values: Mapping[str, float], free: Mapping[str, tuple[float, float]],
+        held: Mapping[str, tuple[float, float]], level: bool,
+        refuted_by: Mapping[str, tuple[float, float]] | None,
+    ) -> tuple[dict[str, float], float, str]:  # fmt: skip
+        """The values moved within their intervals, or next to them, the force error, and which of both."""
+        limit = ALIKE * self.inverse.relative_error
+        if refuted_by is not None:
+            held = {n: shared_part(b, refuted_by.get(n, b)) for n, b in held.items()}
+        found, error = self.solved(values, {**free, **held}, level)
+        if refuted_by is not None or error <= limit:
+            return found, error, "within"
+        halves = {n: max(0.5 * (high - low), 1e-12 * abs(high)) for n, (low, high) in held.items()}
+        where = "within their intervals and, where these cannot explain it, next to"
+        return *self.nearest(found, free, halves, level), where
+
     def nearest(
         self, values: Mapping[str, float], free: Mapping[str, tuple[float, float]], halves: Mapping[str, float],
         level: bool,
@@ -153,9 +169,7 @@ def settled(
     estimates: Sequence[Estimate],
     model: Model,
     inverse: InverseDynamics | None,
-    *,
-    believed: bool = True,
-    sliding: Mapping[str, tuple[float, float]] | None = None,
+    refuted_by: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[tuple[Estimate, ...], list[str]]:
     """The estimates, what is not identified chosen so that the record's torque is explained best; and what to say.
 
@@ -167,12 +181,9 @@ def settled(
         With the law's values, those that are not free among them.
     inverse : InverseDynamics or None
         Of the same records; nothing is changed without.
-    believed : bool
-        Whether it explains certain sliding as well: else it has no weight in an identified value, and none leaves
-        its interval for it.
-    sliding : mapping, optional
-        Intervals of certain sliding by name: those that none leaves then, however wide an estimate's is so as to hold
-        both.
+    refuted_by : mapping, optional
+        Intervals of certain sliding by name, where that refutes it: it then has no weight in an identified value, and
+        none leaves these for it, however wide the estimate's own is so as to hold both.
     """
     by_name = {e.name: e for e in estimates}
     if inverse is None or model.law.steady is None or not set(PLAIN) <= by_name.keys():
@@ -188,24 +199,16 @@ def settled(
         plain, flat = own.solved(values, free, True)
         if not error <= PREFERRED * flat:
             chosen, error = plain, flat
-    notes: list[str] = []
     level = chosen.get("fs") == chosen["fc"] and "fs" in by_name and not by_name["fs"].identified
     held = {n: (by_name[n].lower, by_name[n].upper) for n in PLAIN if by_name[n].identified}
-    both = own.weighed(chosen, held) if believed else None
+    both = own.weighed(chosen, held) if refuted_by is None else None
     if both is not None:
         shared, less = own.solved({**chosen, **both}, free, level)
         if less < error:
             chosen, error = shared, less
-    if not believed:
-        held = {n: shared_part(b, (sliding or {}).get(n, b)) for n, b in held.items()}
-    asked = set[str]()
+    asked, notes = set[str](), list[str]()
     if held and error > ALIKE * inverse.relative_error:
-        moved, less = own.solved(chosen, {**free, **held}, level)
-        where = "within"
-        if believed and less > ALIKE * inverse.relative_error:
-            halves = {n: max(0.5 * (high - low), 1e-12 * abs(high)) for n, (low, high) in held.items()}
-            moved, less = own.nearest(moved, free, halves, level)
-            where = "within their intervals and, where these cannot explain it, next to"
+        moved, less, where = own.moved(chosen, free, held, level, refuted_by)
         if less < error:
             chosen, asked = moved, set(held)
             notes = [

@@ -22,7 +22,7 @@ from stickslip.control.linear import Cascade
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
 from stickslip.identify.setting.candidate_run import AT_REST, Drive, Trial, dangers, run, simulated
-from stickslip.identify.setting.candidates import Bench
+from stickslip.identify.setting.candidates import NEAR, Bench
 from stickslip.identify.setting.swings import back_and_forth, between_counts
 from stickslip.model import Model
 
@@ -30,8 +30,6 @@ __all__ = ["Beside", "belief_of", "limit_cycle", "tried_beside"]
 
 RESTS = 20.0
 """s at rest, of which the second half is judged: an integral that is reset on a soft contact cycles in 6 to 12 s."""
-NEAR = 1.1
-"""Of the smallest error: as good as it. What then adapts nothing is taken, since nothing in it can drift."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +122,7 @@ def tried_beside(
     offset: float = 0.0,
 ) -> tuple[Beside, ...]:
     """The compensators of those names, the one to be switched on first: the best, or of those as good one that adapts
-    nothing. The rest follow by their errors, then those that are not safe.
+    nothing, since nothing in it can drift. The rest follow by their errors, then those that are not safe.
 
     The best is confirmed on the other axes.
 

@@ -288,8 +288,7 @@ class Trial:
 def run(plant: RigidAxis, controller: Controller | SampledController, drive: Drive) -> Trial | str:
     """The motion and the rest behind it; the reason where it cannot be run to its end."""
     reference = drive.reference_backward if isinstance(plant, Plant) and plant.backward else drive.reference
-    learned: dict[str, Any] = {}
-    position = simulated(plant, controller, reference, learned=learned)
+    position, state = followed(plant, controller, reference)
     if position is None:
         return "position or velocity left every reasonable bound"
     time = controller.sample_time
@@ -301,18 +300,24 @@ def run(plant: RigidAxis, controller: Controller | SampledController, drive: Dri
             "velocity_above_50Hz_rms_rad_s": above(velocity, FAST, time),
             "speed_rms_rad_s": math.sqrt(float(np.mean(reference[:moving, 1] ** 2))),
         },
-        position, np.ascontiguousarray(reference[:, 0]), time, learned,
+        position, np.ascontiguousarray(reference[:, 0]), time, after(controller, state, time),
     )  # fmt: skip
 
 
 def simulated(
-    plant: RigidAxis, controller: Controller | SampledController, reference: Array, start: float = 0.0,
-    learned: dict[str, Any] | None = None,
-) -> Array | None:  # fmt: skip
+    plant: RigidAxis, controller: Controller | SampledController, reference: Array, start: float = 0.0
+) -> Array | None:
     """Positions of the axis itself at every sample along a reference, rad; None where it diverges.
 
-    The axis starts at rest at `start`, rad. `learned` gets what a controller made of control laws has learned.
+    The axis starts at rest at `start`, rad.
     """
+    return followed(plant, controller, reference, start)[0]
+
+
+def followed(
+    plant: RigidAxis, controller: Controller | SampledController, reference: Array, start: float = 0.0
+) -> tuple[Array | None, Array]:
+    """As `simulated`, and the state in which it leaves the controller's laws."""
     control = control_of(controller, UNLIMITED, controller.sample_time)
     arrays = arrays_of(plant, controller.sample_time, controller.encoder_counts)
     stand_at(start, arrays[0], arrays[2])
@@ -326,9 +331,8 @@ def simulated(
     )
     positions = np.empty(len(path))
     done = follow(*arrays, control, path, np.empty(len(COLUMNS)), positions)
-    if learned is not None and isinstance(controller, SampledController):
-        learned.update(after(controller, control.state, controller.sample_time))
-    return positions if done == len(path) and bool(np.all(np.isfinite(positions))) else None
+    ended = done == len(path) and bool(np.all(np.isfinite(positions)))
+    return positions if ended else None, control.state
 
 
 @kernel()

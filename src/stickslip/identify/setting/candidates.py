@@ -19,11 +19,23 @@ from stickslip.identify.setting.candidate_run import Drive, Trial, dangers, ring
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 
-__all__ = ["TRIES", "Account", "Bench", "Candidate", "Setting", "on_both", "resistance", "rings_alone"]
+__all__ = [
+    "NEAR",
+    "TRIES",
+    "Account",
+    "Bench",
+    "Candidate",
+    "Setting",
+    "on_both",
+    "resistance",
+    "rings_alone",
+]
 
 FOLLOWS, LIVELY = 3.0, 5.0
 """An axis that the drive's own loop does not hold is not the user's: times the best estimate's error, and swings per
 second beyond the best estimate's, from which on it does not."""
+NEAR = 1.1
+"""Errors within this factor of the best are alike; what is simpler, or has the lower gain, is then taken."""
 TRIES = 4
 """Times as many axes are drawn at most, for so many that are held."""
 LOOKED_AT = 16

@@ -23,6 +23,7 @@ from stickslip.identify.setting.axes import plants_of
 from stickslip.identify.setting.beside import Beside, belief_of, limit_cycle, tried_beside
 from stickslip.identify.setting.candidate_run import Drive
 from stickslip.identify.setting.candidates import (
+    NEAR,
     TRIES,
     Account,
     Bench,
@@ -48,10 +49,8 @@ DEADBAND = 1.5
 """In counts per sample time: a single count, which an axis at rest may give, is then rest."""
 WORTH = 0.95
 """A compensator that leaves more than this part of the error is not worth its risk."""
-NEAR = 1.1
-"""Errors within this factor of the best are alike; the lower gain is then taken."""
 ALIKE = 1.02
-"""The same for leads: the shorter one is taken."""
+"""As `NEAR`, for leads: the shorter one is taken."""
 
 
 @dataclass(frozen=True, eq=False)
