@@ -119,3 +119,20 @@ def test_a_page_that_shows_what_is_not_printed_is_refused(tmp_path: Path) -> Non
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "prints\n2" in done.stderr
+
+
+def test_a_fraction_of_two_digits_without_braces_is_that_fraction() -> None:
+    r"""TeX reads `\tfrac12 x` as a half of x, docutils' translator as 12 over x: three pages showed that."""
+    pytest.importorskip("sphinx")
+    drawn = importlib.import_module("mathml").drawn
+    assert drawn(r"\tfrac12 x", block=False) == drawn(r"\tfrac{1}{2} x", block=False)
+
+
+def test_an_index_stands_beside_an_accented_letter_and_no_accent_in_it() -> None:
+    """Beside one with two accents as well; docutils sets it below."""
+    pytest.importorskip("sphinx")
+    drawn = importlib.import_module("mathml").drawn
+    rate = drawn(r"\dot{\hat\sigma}_1 = \dot e", block=False)
+    assert "munderover" not in rate
+    assert "accent" not in rate
+    assert rate.count("<msub>") == 1

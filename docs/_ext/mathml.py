@@ -11,15 +11,20 @@ from sphinx.application import Sphinx
 
 # An accented letter with an index: docutils sets the index below the letter where it belongs beside it.
 ACCENTED = re.compile(
-    r"<munderover>\s*(<mi[^>]*>[^<]*</mi>)\s*(<m(\w+)[^>]*>(?:(?!munder).)*?</m\3>)\s*"
+    r"<munderover>\s*(<mi[^>]*>[^<]*</mi>|<mover>(?:(?!mover).)*</mover>)\s*(<m(\w+)[^>]*>(?:(?!munder).)*?</m\3>)\s*"
     r"(<mo[^>]*>[˙ˆ˜¨¯~^]</mo>)\s*</munderover>",
     re.DOTALL,
 )
+# Two digits without braces, as TeX takes them: docutils takes both for the numerator.
+UNBRACED = re.compile(r"(\\[dt]?frac)(\d)(\d)")
 
 
 def drawn(equation: str, block: bool) -> str:
     """MathML of an equation."""
-    return ACCENTED.sub(r"<msub><mover>\1\4</mover>\2</msub>", tex2mathml(equation, as_block=block))
+    found = tex2mathml(UNBRACED.sub(r"\1{\2}{\3}", equation), as_block=block)
+    # Without a mathematical font a browser sets what is marked as an accent into the letter: the dot of a rate is lost.
+    found = found.replace('<mover accent="true">', "<mover>")
+    return ACCENTED.sub(r"<msub><mover>\1\4</mover>\2</msub>", found)
 
 
 def visit_inline(translator: Any, node: Any) -> None:
