@@ -13,6 +13,8 @@ __all__ = ["free_memory", "insist_on_jobs", "insist_on_memory", "number_of", "si
 
 MOST_JOBS = 32
 """Workers per processor"""
+LITTLE = 1e6
+"""Bytes that are taken unasked: to look up what is free takes longer than a run of so few samples"""
 LARGEST = 1e15
 """Of a count: beyond it neither memory nor a lifetime are enough, whatever is counted"""
 
@@ -39,6 +41,8 @@ def insist_on_memory(needed: float, what: str, remedy: str = "ask for less") -> 
     InputError
         With both numbers.
     """
+    if needed <= LITTLE:
+        return
     free = free_memory()
     if not needed <= free:
         raise InputError(f"{what} need {size_text(needed)} of memory, {size_text(free)} are free; {remedy}")

@@ -32,6 +32,7 @@ velocity, as in J dv/dt = T_m - T_f (thesis eq. 3.1).
 
 from __future__ import annotations
 
+import functools
 import types
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
@@ -404,7 +405,7 @@ class Law(Configurable):
         said = [found for c in self.choices if (o := self.option(c)).remark and (found := o.remark(p))]
         return f"{self.name}: {'; '.join(said)}" if said else ""
 
-    @property
+    @functools.cached_property
     def reads_surroundings(self) -> bool:
         """Whether the torque depends on position, load, temperature or time."""
         return any(self.option(choice).reads_surroundings for choice in self.choices)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Callable
+from queue import SimpleQueue
 from typing import NamedTuple, TypeVar
 
 __all__ = ["Reached", "Watch", "listen", "silence", "watched"]
@@ -79,6 +81,27 @@ def span(seconds: float) -> str:
     return f"{seconds / 3600.0:.0f} h" if seconds < 1e5 else f"{seconds / 86400.0:.3g} days"
 
 
+_idle: list[SimpleQueue[Callable[[], None]]] = []
+"""Threads beside the main one that wait for work, by their queues: starting one takes as long as a short run. Several,
+as a signal's handler may run a case while the main thread waits for another one."""
+if hasattr(os, "register_at_fork"):
+    # Threads do not cross a fork.
+    os.register_at_fork(after_in_child=_idle.clear)
+
+
+def _beside() -> SimpleQueue[Callable[[], None]]:
+    """A thread that does what is put into its queue, one after another."""
+    works: SimpleQueue[Callable[[], None]] = SimpleQueue()
+
+    def serve() -> None:
+        while True:
+            # No name holds a work, whose arrays may be large, until the next one comes.
+            works.get()()
+
+    threading.Thread(target=serve, name="stickslip run", daemon=True).start()
+    return works
+
+
 def watched(
     work: Callable[[], Result],
     reached: Callable[[], Reached],
@@ -105,8 +128,8 @@ def watched(
             done.set()
 
     looks = watch(reached)
-    thread = threading.Thread(target=run, name="stickslip run")
-    thread.start()
+    beside = _idle.pop() if _idle else _beside()
+    beside.put(run)
     try:
         while not done.wait(looks.wait):
             if line := looks.look():
@@ -114,9 +137,10 @@ def watched(
                     listener(line)
     except BaseException:
         stop()
-        thread.join()
+        done.wait()
         raise
-    thread.join()
+    finally:
+        _idle.append(beside)
     if failed:
         raise failed[0]
     return found[0]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
+import weakref
 
 import pytest
 
@@ -88,6 +90,63 @@ def test_what_the_work_raises_is_raised(said):
         watched(lambda: 1 // 0, lambda: Reached(0.0, 1.0, 0.0), lambda: None)
 
 
+def run(work):
+    return watched(work, lambda: Reached(0.0, 1.0, 0.0), lambda: None)
+
+
+def test_one_thread_beside_this_one_does_work_after_work():
+    threads = {run(threading.get_ident) for _ in range(3)}
+    assert len(threads) == 1
+    assert threading.get_ident() not in threads
+
+
+def test_work_within_a_signals_handler_has_a_thread_of_its_own():
+    """The main thread waits for a run when the handler comes, and its thread is busy until the handler is through."""
+    inner, through = [], threading.Event()
+
+    def handler(*_):
+        inner.append(run(threading.get_ident))
+        through.set()
+
+    def work():
+        os.kill(os.getpid(), signal.SIGUSR1)
+        assert through.wait(60.0)
+        return threading.get_ident()
+
+    before = signal.signal(signal.SIGUSR1, handler)
+    try:
+        assert run(work) not in (inner[0], threading.get_ident())
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_forked_process_has_a_thread_of_its_own():
+    run(threading.get_ident)
+    child = os.fork()
+    if child == 0:
+        signal.alarm(60)
+        os._exit(run(lambda: 7))
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+
+
+def test_no_work_is_kept_after_it():
+    """Its arrays may be large."""
+
+    class Rows:
+        def of(self):
+            return 1
+
+    rows = Rows()
+    gone = weakref.ref(rows)
+    run(rows.of)
+    del rows
+    until = time.monotonic() + 60.0
+    while gone() is not None:  # its thread may still be on the way back
+        assert time.monotonic() < until
+        time.sleep(1e-3)
+
+
 def test_ctrl_c_ends_the_work():
     ending = threading.Event()
 
@@ -97,6 +156,7 @@ def test_ctrl_c_ends_the_work():
 
     with pytest.raises(KeyboardInterrupt):
         watched(work, lambda: Reached(0.0, 1.0, 0.0), ending.set)
+    assert run(lambda: "the next") == "the next"
 
 
 @pytest.mark.parametrize("module", [exact, adaptive, fixed])

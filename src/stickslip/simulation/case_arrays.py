@@ -5,6 +5,7 @@ Kernels share the columns of the rows they write, the codes they end with, and t
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -19,7 +20,7 @@ from stickslip.jit import LawPointers, compiled_law, compiled_profile, flat
 from stickslip.laws.slip_rule import SLIP_RULE
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.spec import Surroundings
+from stickslip.spec import Bristle, Elements, Surroundings
 from stickslip.subset import Layout
 
 __all__ = [
@@ -74,6 +75,13 @@ class Side:
     state: Array
     modes: np.ndarray[Any, np.dtype[np.bool_]]
     velocity_scale: float
+
+    @functools.cached_property
+    def elements(self) -> Elements | Bristle | None:
+        """The law as elements or a bristle, or None."""
+        if self.model is None or self.model.law.modes is None:
+            return None
+        return self.model.law.modes(self.model.parameters)
 
     @property
     def rest_band(self) -> float:

@@ -302,7 +302,7 @@ def _grid(output: float | Sequence[float] | np.ndarray[Any, Any], duration: floa
         # Multiples of the spacing, not a running sum, so that the grid is what a person would write down.
         return np.minimum(np.arange(count + 1) * float(output), duration)
     times = np.asarray(output, dtype=np.float64)
-    if times.ndim != 1 or not np.all(np.isfinite(times)) or np.any(np.diff(times) < 0.0):
+    if times.ndim != 1 or not np.all(np.isfinite(times)) or np.any(times[1:] < times[:-1]):
         raise ParameterError("simulate: output times must be finite and ascend")
     if times.size and (times[0] < 0.0 or times[-1] > duration):
         raise ParameterError(f"simulate: output times must lie within 0 and {duration:g} s")

@@ -64,13 +64,6 @@ CURVE_SPEEDS: Array = np.concatenate([np.linspace(0.0, 10.0, 21), np.geomspace(1
 """Velocities over a curve's scale at which its least value is looked for."""
 
 
-def elements_of(side: Side) -> Elements | Bristle | None:
-    """The law of a side as elements or a bristle, or None."""
-    if side.model is None or side.model.law.modes is None:
-        return None
-    return side.model.law.modes(side.model.parameters)
-
-
 def can_run(case: Case) -> str:
     """Say why the exact integrator cannot run `case`, in one sentence; "" if it can."""
     controller = case.controller
@@ -90,7 +83,7 @@ def can_run(case: Case) -> str:
         complaint = _complaint(side)
         if complaint:
             return f"the exact integrator cannot take the {where}: {complaint}"
-    plant = elements_of(case.plant)
+    plant = case.plant.elements
     springs = isinstance(plant, Elements) and any(math.isfinite(k) for k in plant.stiffness)
     if springs and case.numbers[KP] == 0.0:
         return (
@@ -115,7 +108,7 @@ def is_literal(side: Side) -> bool:
 
 def _complaint(side: Side) -> str:
     name = side.model.law.name if side.model else "no law"
-    e = elements_of(side)
+    e = side.elements
     if e is None:
         return f"law {name!r} gives no `modes`"
     if isinstance(e, Elements):
@@ -221,7 +214,7 @@ def prepare(case: Case) -> Prepared:
     finite: list[list[float]] = []
     sides = np.zeros((len(members), col.SIDE_SIZE))
     for i, (side, weight) in enumerate(members):
-        e = elements_of(side)
+        e = side.elements
         assert e is not None
         plan[col.CURVE_0 + 2 * i] = 0 if e.constant_curve else side.pointers.sliding
         plan[col.PARAMETERS_0 + 2 * i] = sum(b.size for b in blocks)
@@ -359,7 +352,9 @@ def even_spacing(grid: Array) -> float:
     if grid.size < 3:
         return 0.0
     step = float(grid[-1] - grid[0]) / (grid.size - 1)
-    return step if float(np.max(np.abs(np.diff(grid) - step))) < 1e-11 * max(1.0, float(grid[-1])) else 0.0
+    steps = grid[1:] - grid[:-1]
+    apart = max(step - float(steps.min()), float(steps.max()) - step)
+    return step if apart < 1e-11 * max(1.0, float(grid[-1])) else 0.0
 
 
 def run(case: Case) -> Outcome:

@@ -19,7 +19,7 @@ from stickslip.binding import bound
 from stickslip.errors import ParameterError, UnknownName
 from stickslip.simulation.case_arrays import Array, Side
 from stickslip.simulation.exact import state as col
-from stickslip.simulation.exact.engine import CURVE_SPEEDS, curve_of, elements_of
+from stickslip.simulation.exact.engine import CURVE_SPEEDS, curve_of
 from stickslip.simulation.many.batch_kernel import curve_at, layers, least_of
 from stickslip.spec import Bristle, Elements, Field, Law
 
@@ -49,7 +49,7 @@ class Member:
     @property
     def curve(self) -> int:
         """Address of the sliding curve, 0 for a constant one."""
-        e = elements_of(self.side)
+        e = self.side.elements
         return 0 if e is None or e.constant_curve else self.side.pointers.sliding
 
 
@@ -140,7 +140,7 @@ def as_columns(base: Any, values: Mapping[str, Array]) -> Any:
 
 def forms(side: Side, values: Mapping[str, Array], packed: Array, n: int) -> tuple[Array, Array]:
     """Sides and elements, as `exact.fill_side` has them for one case."""
-    e = elements_of(side)
+    e = side.elements
     assert side.model is not None
     assert e is not None
     address = 0 if e.constant_curve else side.pointers.sliding

@@ -1,15 +1,13 @@
 """A case laid out for the sampled engine: the records that its kernels read."""
 
-# scipy's matrix exponential carries no types.
-# pyright: reportUnknownVariableType=false
-
 from __future__ import annotations
 
+import functools
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from stickslip.simulation.case_arrays import (
     INERTIA,
@@ -26,7 +24,7 @@ from stickslip.simulation.case_arrays import (
     Case,
     Side,
 )
-from stickslip.simulation.exact.engine import curve_of, elements_of, is_literal, layer_of, lowest
+from stickslip.simulation.exact.engine import curve_of, is_literal, layer_of, lowest
 from stickslip.simulation.exact.flow import flow, linear
 from stickslip.simulation.sampled.modes import gather
 from stickslip.simulation.sampled.rates import (
@@ -58,6 +56,8 @@ SETTLED = 0.1
 """Of the torque that bends a bristle by the tolerance of a step: it then is bent as in steady sliding."""
 LEVEL = 1e-15
 """Of the curve, by which it may still vary where it counts as level."""
+TERMS = 14
+"""Of the series of exp(x): for |x| < 1/2 what is left out is below 1e-16."""
 
 
 def general_axis(case: Case) -> tuple[Any, Any, Any]:
@@ -78,20 +78,21 @@ def general_axis(case: Case) -> tuple[Any, Any, Any]:
 
 def axis_of(case: Case) -> tuple[Any, Any, Any]:
     """The constants of the axis, its state at the start, and its elements."""
-    e, n, side = elements_of(case.plant), case.numbers, case.plant
+    e, n, side = case.plant.elements, case.numbers, case.plant
     assert e is not None
+    known = levels_of(side, e)
     axis, state, _ = general_axis(case)
     a, z = axis[0], state[0]
     a["local"], a["literal"] = LOCAL * n[TOLERANCE], int(is_literal(side))
     a["viscous"], a["breakaway"] = e.viscous, e.breakaway
     a["curve"], a["scale"] = (0, 1.0) if e.constant_curve else (side.pointers.sliding, e.velocity_scale)
-    a["lowest"], a["floor"] = lowest(side, e), floors(side, e)
+    a["lowest"], a["floor"] = lowest(side, e), known.floors
     springs = fill_bristle(a, e) if isinstance(e, Bristle) else fill_elements(a, side, e)
     z["velocity"], z["goal"] = n[VELOCITY_0], 0.0
     z["mode"] = starting_mode(a, z, springs)
     gather(a, z, springs)
     a["near"] = NEAR * a["local"] * z["spring"]
-    a["far"], a["level"] = level_from(side, e)
+    a["far"], a["level"] = known.far, known.level
     a["glide"] = glide_of(a)
     if z["spring"] > 0.0:
         a["flow"] = flow(linear(a["inertia"], a["viscous"], z["spring"]), a["sample_time"])
@@ -132,14 +133,36 @@ def starting_mode(a: Any, z: Any, springs: Any) -> int:
     return SLIPS if z["velocity"] != 0.0 else RESTS
 
 
-def floors(side: Side, e: Elements | Bristle) -> Array:
-    """Bounds below the sliding curve on velocities up to scale 2^(4 - LEVELS), twice that, and so on; N·m."""
+class Levels(NamedTuple):
+    """What is known of a sliding curve beforehand: numbers in N·m, velocities in rad/s."""
+
+    floors: Array
+    """Bounds below it on velocities up to scale 2^(4 - LEVELS), twice that, and so on"""
+    far: float
+    """The velocity above which it no longer varies; infinite if it does"""
+    level: float
+    """Its value there"""
+
+
+def levels_of(side: Side, e: Elements | Bristle) -> Levels:
+    """What is known of the sliding curve of a side."""
     if e.constant_curve:
-        return np.full(LEVELS, e.breakaway)
+        return Levels(np.full(LEVELS, e.breakaway), 0.0, e.breakaway)
     assert side.model is not None
-    curve, p = curve_of(side).function, side.model.parameters
+    curve = curve_of(side).function
     assert curve is not None
-    tops: list[float] = [e.velocity_scale * 2.0 ** (i + 4 - LEVELS) for i in range(LEVELS)]
+    return levels_on(curve, side.model.parameters, e.velocity_scale)
+
+
+@functools.lru_cache(maxsize=4096, typed=True)
+def levels_on(curve: Callable[..., float], p: Any, scale: float) -> Levels:
+    """What is known of a sliding curve of that velocity scale (rad/s); kept, as a study has few of them."""
+    return Levels(floors(curve, p, scale), *level_from(curve, p, scale))
+
+
+def floors(curve: Callable[..., float], p: Any, scale: float) -> Array:
+    """Bounds below a sliding curve, as `Levels` has them."""
+    tops: list[float] = [scale * 2.0 ** (i + 4 - LEVELS) for i in range(LEVELS)]
     least: list[float] = []
     for low, top in zip([0.0, *tops], tops, strict=False):
         speeds = [low + (top - low) * i / 32.0 for i in range(33)]
@@ -147,15 +170,10 @@ def floors(side: Side, e: Elements | Bristle) -> Array:
     return (1.0 - 1e-4) * np.minimum.accumulate(least)
 
 
-def level_from(side: Side, e: Elements | Bristle) -> tuple[float, float]:
-    """The velocity above which the sliding curve no longer varies, rad/s (infinite if it does), and its value there."""
-    if e.constant_curve:
-        return 0.0, e.breakaway
-    assert side.model is not None
-    curve, p = curve_of(side).function, side.model.parameters
-    assert curve is not None
-    end = curve(1e6 * e.velocity_scale, p)
-    speeds = e.velocity_scale * np.geomspace(1.0, 1e6, 400)
+def level_from(curve: Callable[..., float], p: Any, scale: float) -> tuple[float, float]:
+    """The velocity above which a sliding curve no longer varies, rad/s (infinite if it does), and its value there."""
+    end = curve(1e6 * scale, p)
+    speeds = scale * np.geomspace(1.0, 1e6, 400)
     varies = [abs(curve(float(v), p) - end) > LEVEL * end for v in speeds]
     if varies[-2]:
         return math.inf, end
@@ -171,4 +189,20 @@ def glide_of(a: Any) -> Array:
     rate[1] /= a["inertia"]
     if a["level"] > 0.0:  # else nothing slips against anything
         rate[2, 2], rate[2, 4] = -attraction / a["level"], attraction
-    return np.asarray(expm(rate * a["sample_time"]), dtype=np.float64)[:3, 1:]
+    return exponential(rate * float(a["sample_time"]))[:3, 1:]
+
+
+def exponential(x: Array) -> Array:
+    """exp of a small matrix: the series of a part of it, squared.
+
+    SciPy solves equations for it, at which OpenBLAS wakes a thread and, where other programs keep the cores busy, waits
+    for it for milliseconds.
+    """
+    halvings = max(0, math.frexp(float(np.abs(x).sum(axis=1).max()))[1] + 1)
+    part, unit = x * 0.5**halvings, np.eye(len(x))
+    found = unit
+    for order in range(TERMS, 0, -1):
+        found = unit + part @ found / order
+    for _ in range(halvings):
+        found = found @ found
+    return found

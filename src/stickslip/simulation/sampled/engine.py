@@ -38,7 +38,7 @@ from stickslip.simulation.case_arrays import (
     surroundings,
 )
 from stickslip.simulation.compiled_controller import Sampled, compiled, measured_position
-from stickslip.simulation.exact.engine import crosses_once, elements_of, modulations
+from stickslip.simulation.exact.engine import crosses_once, modulations
 from stickslip.simulation.metrics import settle_band_of
 from stickslip.simulation.recorded_input.contact import Plant
 from stickslip.simulation.sampled.axis import axis_of, general_axis
@@ -87,7 +87,7 @@ def cannot_locate(case: Case) -> str:
     law = side.model.law
     if law.reads_surroundings:
         return f"law {law.name!r} depends on its surroundings ({modulations(law)})"
-    e = elements_of(side)
+    e = side.elements
     if e is None:
         return f"law {law.name!r} gives no `modes`"
     if not e.constant_curve and (not side.pointers.sliding or e.velocity_scale <= 0.0):
