@@ -194,14 +194,15 @@ def test_exact_at_constant_velocity(law, v, dt):
     """Two half steps are one step while no element breaks away between them."""
     p = example(law)
     whole, halves = law.state(p), law.state(p)
+    # Leuven's steps have no closed form: they only agree where the steady value is reached, some 1e-3 rad on.
+    leuven = law.name == "leuven"
     for z in (whole, halves):
         for _ in range(3):
-            law.step(v, v, 10.0, z, p, U)
+            law.step(v, v, max(10.0, 1e-3 / abs(v)) if leuven else 10.0, z, p, U)
     one = law.step(v, v, dt, whole, p, U)
     law.step(v, v, 0.5 * dt, halves, p, U)
     two = law.step(v, v, 0.5 * dt, halves, p, U)
-    # Leuven's steps have no closed form: there they only agree as far as the steady value is reached.
-    assert one == pytest.approx(two, rel=1e-6 if law.name == "leuven" else 1e-9, abs=1e-12)
+    assert one == pytest.approx(two, rel=1e-6 if leuven else 1e-9, abs=1e-12)
 
 
 @every_law
