@@ -199,4 +199,9 @@ def advice(estimates: Sequence[Estimate], law: Law) -> tuple[str, ...]:
         out.append(ADVICE)
     elif "inertia" in missing:
         out.append("Record stronger accelerations.")
+    if "fc" in missing:
+        out.append(
+            "Record stretches at constant speeds, in both directions and at three speeds or more, with gentle ramps "
+            "between them: play stays closed there, and friction's level shows by itself."
+        )
     return tuple(out)

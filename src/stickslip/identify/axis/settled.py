@@ -41,6 +41,27 @@ QUANTILE = 1.96
 TIES, HALVINGS = (1e-6, 1e3), 40
 """Weights between which that is looked for which moves identified values least; halvings of that search."""
 MOVED = "the whole record, reversals included, asks for another value than certain sliding does"
+FOLLOWED = 1.045
+"""Times the force error of plain least squares, a little within `ALIKE`, to which values move that follow them although
+certain sliding refutes them: no farther."""
+LEVEL_LAST = 10.0
+"""Times the weight of others with which friction's level is then held: what play and reversals do to plain least
+squares is put there first."""
+APART, ALONE = 0.05, 1.6
+"""Part of friction's level by which it may then be moved, and upper over lower end up to which certain sliding alone
+tells it."""
+TWO_METHODS = (
+    "two methods are {share:.0%} apart: certain sliding says {own:.4g}, the whole record, reversals included, "
+    "{value:.4g} {unit}"
+)
+TOO_WIDE = (
+    "the interval is too wide: certain sliding alone tells it, to a factor of {factor:.3g}; identified means at most "
+    "{most:.3g} there"
+)
+KEPT = (
+    "Inertia and friction stay those of certain sliding: within its intervals nothing comes near the force error of "
+    "plain least squares, whose numbers it refutes (what play and reversals do is in them)."
+)
 TURNS = 5
 """Rounds in which curve and levels are brought together."""
 
@@ -127,30 +148,35 @@ class Settling:
     def moved(
         self, values: Mapping[str, float], free: Mapping[str, tuple[float, float]],
         held: Mapping[str, tuple[float, float]], level: bool,
-        refuted_by: Mapping[str, tuple[float, float]] | None,
     ) -> tuple[dict[str, float], float, str]:  # fmt: skip
         """The values moved within their intervals, or next to them, the force error, and which of both."""
-        limit = ALIKE * self.inverse.relative_error
-        if refuted_by is not None:
-            held = {n: shared_part(b, refuted_by.get(n, b)) for n, b in held.items()}
         found, error = self.solved(values, {**free, **held}, level)
-        if refuted_by is not None or error <= limit:
+        if error <= ALIKE * self.inverse.relative_error:
             return found, error, "within"
-        halves = {n: max(0.5 * (high - low), 1e-12 * abs(high)) for n, (low, high) in held.items()}
+        bounds = {n: b for n, b in {**physical(self.inverse), **free}.items() if n in free or n in held}
         where = "within their intervals and, where these cannot explain it, next to"
-        return *self.nearest(found, free, halves, level), where
+        return *self.nearest(found, bounds, halves_of(held), level, ALIKE), where
+
+    def followed(
+        self, values: Mapping[str, float], free: Mapping[str, tuple[float, float]],
+        held: Mapping[str, tuple[float, float]], level: bool,
+    ) -> tuple[dict[str, float], float] | None:  # fmt: skip
+        """The values moved within their intervals towards plain least squares that certain sliding refutes, and the
+        force error: as little as these ask for, friction's level last; none where no values there come near theirs."""
+        halves = halves_of(held)
+        halves |= {n: halves[n] / LEVEL_LAST for n in ("fc",) if n in halves}
+        found, error = self.nearest(values, {**free, **held}, halves, level, FOLLOWED)
+        return (found, error) if error <= ALIKE * self.inverse.relative_error else None
 
     def nearest(
-        self, values: Mapping[str, float], free: Mapping[str, tuple[float, float]], halves: Mapping[str, float],
-        level: bool,
+        self, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], halves: Mapping[str, float],
+        level: bool, times: float,
     ) -> tuple[dict[str, float], float]:  # fmt: skip
-        """The values nearest to those given, in `halves`, whose force error is `ALIKE` that of plain least squares.
+        """The values nearest to those given, in `halves`, whose force error is so many `times` plain least squares'.
 
-        Those of the least error where physics allows none. Only values that are free or in `halves` move.
+        Those of the least error where the bounds allow none. Only values with bounds move.
         """
-        bounds = {**physical(self.inverse), **free}
-        bounds = {n: b for n, b in bounds.items() if n in free or n in halves}
-        limit = ALIKE * self.inverse.relative_error
+        limit = times * self.inverse.relative_error
         best = self.solved(values, bounds, level)
         if best[1] > limit:
             return best
@@ -208,7 +234,13 @@ def settled(
             chosen, error = shared, less
     asked, notes = set[str](), list[str]()
     if held and error > ALIKE * inverse.relative_error:
-        moved, less, where = own.moved(chosen, free, held, level, refuted_by)
+        if refuted_by is None:
+            moved, less, where = own.moved(chosen, free, held, level)
+        else:
+            narrow = {n: shared_part(b, refuted_by.get(n, b)) for n, b in held.items()}
+            followed = own.followed(chosen, free, narrow, level)
+            (moved, less), where = followed or (chosen, error), "within"
+            notes = [] if followed else [KEPT]
         if less < error:
             chosen, asked = moved, set(held)
             notes = [
@@ -216,7 +248,33 @@ def settled(
                 f"included: relative force error {100.0 * less:.3g} %, at the middle of the intervals "
                 f"{100.0 * error:.3g} %."
             ]
-    return tuple(placed(e, chosen, inverse, e.name in asked) for e in estimates), notes
+    out = (placed(e, chosen, inverse, e.name in asked) for e in estimates)
+    if refuted_by is None:
+        return tuple(out), notes
+    return tuple(told_alone(e, values["fc"]) if e.name == "fc" else e for e in out), notes
+
+
+def told_alone(e: Estimate, own: float) -> Estimate:
+    """Friction's level where certain sliding, which says `own`, refutes plain least squares.
+
+    It is not identified where it had to be moved far towards them all the same, or where its interval is wide: no other
+    estimator confirms it.
+    """
+    if not e.identified:
+        return e
+    share = abs(e.value - own) / own
+    if share > APART:
+        why = TWO_METHODS.format(share=share, own=own, value=e.value, unit=e.unit)
+    elif e.upper > ALONE * e.lower:
+        why = TOO_WIDE.format(factor=e.upper / e.lower, most=ALONE)
+    else:
+        return e
+    return replace(e, identified=False, verdict=why)
+
+
+def halves_of(held: Mapping[str, tuple[float, float]]) -> dict[str, float]:
+    """Half-widths of intervals, none of them 0."""
+    return {n: max(0.5 * (high - low), 1e-12 * abs(high)) for n, (low, high) in held.items()}
 
 
 def shared_part(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
