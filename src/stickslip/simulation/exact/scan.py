@@ -32,7 +32,7 @@ from stickslip.simulation._meter import (
     rest_seen,
     summit,
 )
-from stickslip.simulation.exact.flow import Matrix, free_motion
+from stickslip.simulation.exact.flow import UNMOVED, Matrix, free_motion
 from stickslip.simulation.exact.ringing import Five, quartic, value
 
 
@@ -76,10 +76,13 @@ def bulge(nodes: Any, row: int) -> float:
 
 
 @kernel(exact=False, inline=True)
-def bounds(nodes: Any, row: int) -> tuple[float, float]:
-    """Least and greatest that the quartic through a row of nodes can have."""
-    low = min(nodes[row, 0], nodes[row, 1], nodes[row, 2], nodes[row, 3], nodes[row, 4])
-    high = max(nodes[row, 0], nodes[row, 1], nodes[row, 2], nodes[row, 3], nodes[row, 4])
+def bounds(nodes: Any, row: int, k: int, quarters: int) -> tuple[float, float]:
+    """Least and greatest that the quartic through a row of nodes can have over quarters of the window, from k on."""
+    low = nodes[row, k]
+    high = low
+    for i in range(k + 1, k + quarters + 1):
+        low = min(low, nodes[row, i])
+        high = max(high, nodes[row, i])
     rise = bulge(nodes, row)
     return low - rise, high + rise
 
@@ -87,7 +90,28 @@ def bounds(nodes: Any, row: int) -> tuple[float, float]:
 @kernel(exact=False, inline=True)
 def reach(nodes: Any, row: int) -> float:
     """Greatest magnitude that the quartic through a row of nodes can have."""
-    low, high = bounds(nodes, row)
+    low, high = bounds(nodes, row, 0, 4)
+    return max(-low, high)
+
+
+@kernel(exact=False, inline=True)
+def keeps_sign(c: Five) -> bool:
+    """Whether a cubic has no zero over s = 0 to 1, as its Bernstein coefficients tell."""
+    first = c[0]
+    second = c[0] + c[1] / 3.0
+    third = second + (c[1] + c[2]) / 3.0
+    last = c[0] + c[1] + c[2] + c[3]
+    return min(first, second, third, last) > 0.0 or max(first, second, third, last) < 0.0
+
+
+@kernel(exact=False, inline=True)
+def peak_of(nodes: Any, row: int, width: float, steps: int) -> float:
+    """Greatest magnitude of the quartic through a row of nodes: at an end, or looked for in so many steps."""
+    values = quartic(nodes, row)
+    rates = slopes(values, width)
+    if keeps_sign(rates):
+        return max(abs(nodes[row, 0]), abs(nodes[row, 4]))
+    low, high = summits(values, rates, width, 0.0, 1.0, UNMOVED, NO_FREE, 0.0, 0.0, steps)
     return max(-low, high)
 
 
@@ -100,15 +124,16 @@ def farther(acc: Any, second: bool, low: float, high: float) -> bool:
 
 
 @kernel(exact=False)
-def calm(acc: Any, nodes: Any, swing: float, sway: float) -> bool:
-    """Whether nothing is counted in a window: no reversal, no standstill's begin or end, none at the settling band.
+def calm(acc: Any, nodes: Any, k: int, quarters: int, swing: float, sway: float) -> bool:
+    """Whether nothing is counted in some quarters of a window, from k on: no reversal, no standstill's begin or end,
+    none at the settling band.
 
     ``swing`` and ``sway`` are the most by which ringing adds to position and velocity.
     """
-    low, high = bounds(nodes, SPEED)
+    low, high = bounds(nodes, SPEED, k, quarters)
     low -= sway
     high += sway
-    slowest, fastest = bounds(nodes, REFERENCE_SPEED)
+    slowest, fastest = bounds(nodes, REFERENCE_SPEED, k, quarters)
     if slowest < -TRIGGER and fastest > TRIGGER:
         return False
     if low <= TRIGGER and high >= -TRIGGER:
@@ -118,7 +143,7 @@ def calm(acc: Any, nodes: Any, swing: float, sway: float) -> bool:
             return False
     band = acc[SETTLE_BAND]
     if band > 0.0:
-        low, high = bounds(nodes, ERROR)
+        low, high = bounds(nodes, ERROR, k, quarters)
         low -= swing
         high += swing
         return low > band or high < -band or (low >= -band and high <= band)
@@ -129,15 +154,19 @@ def calm(acc: Any, nodes: Any, swing: float, sway: float) -> bool:
 
 
 @kernel(exact=False, inline=True)
-def passes(acc: Any, turns: Any, t: float, end: float, nodes: Any, first: float, last: float) -> None:
-    """Note a calm window, whose velocity runs from `first` to `last`."""
-    touch(acc, t, nodes[AT, 0], first)
-    rest_seen(acc, t, first, nodes[REFERENCE_SPEED, 0])
+def passes(
+    acc: Any, turns: Any, t: float, width: float, nodes: Any, k: int, quarters: int, first: float, last: float
+) -> None:  # fmt: skip
+    """Note some calm quarters of a window, from k on, over which the velocity runs from `first` to `last`."""
+    begin = t + 0.25 * width * k
+    touch(acc, begin, nodes[AT, k], first)
+    rest_seen(acc, begin, first, nodes[REFERENCE_SPEED, k])
     confirm(acc, turns, last, in_second_half(acc, t))
-    for i in range(1, 5):
+    for i in range(k + 1, k + quarters + 1):
         follow_reference(acc, nodes[REFERENCE_SPEED, i])
-    if acc[SETTLE_BAND] > 0.0 and abs(nodes[ERROR, 2]) > acc[SETTLE_BAND]:
-        acc[OUTSIDE_LAST] = end
+    # The node in the middle, or at the end of a quarter.
+    if acc[SETTLE_BAND] > 0.0 and abs(nodes[ERROR, k + (quarters + 1) // 2]) > acc[SETTLE_BAND]:
+        acc[OUTSIDE_LAST] = begin + 0.25 * width * quarters
     acc[LAST_VELOCITY] = last
 
 
@@ -217,7 +246,7 @@ def creeps(acc: Any, nodes: Any, free: Free) -> bool:
     velocity is all that happens."""
     if acc[SETTLE_BAND] > 0.0:
         return False
-    slowest, fastest = bounds(nodes, REFERENCE_SPEED)
+    slowest, fastest = bounds(nodes, REFERENCE_SPEED, 0, 4)
     if slowest <= MOVING and fastest >= -MOVING:
         return False
     sway = math.sqrt(free.square * free.position * free.position + free.velocity * free.velocity)

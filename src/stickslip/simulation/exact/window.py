@@ -36,10 +36,14 @@ from stickslip.simulation.exact.scan import (
     Free,
     bulge,
     calm,
+    count_events,
+    creeps,
     farther,
     looked_through,
     passes,
+    peak_of,
     reach,
+    turns_while_creeping,
 )
 
 TINY = 1e-300
@@ -49,7 +53,7 @@ A_RADIAN = 5.0
 """Steps in which a radian of ringing is looked through that makes a peak; fewer where it is a part of one."""
 FINE = 0.5e-3
 """Step in which reversals, standstills and settling are looked for, s."""
-STEPS = 12.0
+STEPS = 12
 """Fewest steps of a window that is looked through."""
 
 
@@ -82,15 +86,12 @@ def window(acc: Any, turns: Any, t: float, width: float, nodes: Any) -> None:
     """Add a window whose nodes show all of the motion."""
     low, high = extremes(nodes, 0.25 * width)
     fine = acc[WINDOW] <= MAX_WINDOW
-    events = fine and not calm(acc, nodes, 0.0, 0.0)
     second = add(acc, t, width, sums(nodes), nodes[ERROR, 4])
     reached(acc, second, low, high, abs(nodes[SPEED, 4]), abs(nodes[MOTOR, 4]))
-    may = Farthest(
-        False, reach(nodes, SPEED) > acc[V_MAX], reach(nodes, MOTOR) > acc[TM_MAX], events
-    )  # fmt: skip
-    if may.speed or may.motor or events:
-        count = math.ceil(max(STEPS, width / FINE if events else 0.0))
-        looked_through(acc, turns, t, width, nodes, 0.0, 1.0, UNMOVED, NO_FREE, 0.0, 0.0, count, may, second)
+    if reach(nodes, SPEED) > acc[V_MAX]:
+        acc[V_MAX] = max(acc[V_MAX], peak_of(nodes, SPEED, width, STEPS))
+    if reach(nodes, MOTOR) > acc[TM_MAX]:
+        acc[TM_MAX] = max(acc[TM_MAX], peak_of(nodes, MOTOR, width, STEPS))
     if not fine:
         return
     if width <= MAX_WINDOW:
@@ -98,8 +99,20 @@ def window(acc: Any, turns: Any, t: float, width: float, nodes: Any) -> None:
     else:
         total, acc[LOW_PASS] = high_passed(quartic(nodes, SPEED), NO_RINGING, width, False, acc[LOW_PASS])
         add_high_pass(acc, total, second)
-    if not events:
-        passes(acc, turns, t, t + width, nodes, nodes[SPEED, 0], nodes[SPEED, 4])
+    if calm(acc, nodes, 0, 4, 0.0, 0.0):
+        passes(acc, turns, t, width, nodes, 0, 4, nodes[SPEED, 0], nodes[SPEED, 4])
+    elif creeps(acc, nodes, NO_FREE):
+        steps = math.ceil(max(STEPS, width / FINE))
+        turns_while_creeping(acc, t, width, nodes, 0.0, 1.0, UNMOVED, NO_FREE, steps)
+    else:
+        steps = math.ceil(max(STEPS, width / FINE) / 4.0)
+        for k in range(4):
+            if calm(acc, nodes, k, 1, 0.0, 0.0):
+                passes(acc, turns, t, width, nodes, k, 1, nodes[SPEED, k], nodes[SPEED, k + 1])
+            else:
+                count_events(
+                    acc, turns, t, width, nodes, 0.25 * k, 0.25, UNMOVED, NO_FREE, steps, second
+                )  # fmt: skip
 
 
 @kernel(exact=False)
@@ -111,7 +124,7 @@ def ringing_window(
     events = False
     if fine:
         energy = ring.square * ring.p0 * ring.p0 + ring.q0 * ring.q0
-        events = not calm(acc, nodes, math.sqrt(energy / ring.square), math.sqrt(energy) / width)
+        events = not calm(acc, nodes, 0, 4, math.sqrt(energy / ring.square), math.sqrt(energy) / width)
     second = add(acc, t, width, with_ringing(nodes, ring, share, width), nodes[ERROR, 4] - ring.p1)
     look_through(acc, turns, t, width, nodes, lin, m, ring, share, events, second)
     if fine:
@@ -119,7 +132,7 @@ def ringing_window(
         add_high_pass(acc, passed, second)
         if not events:
             first, last = nodes[SPEED, 0] + ring.q0 / width, nodes[SPEED, 4] + ring.q1 / width
-            passes(acc, turns, t, t + width, nodes, first, last)
+            passes(acc, turns, t, width, nodes, 0, 4, first, last)
 
 
 @kernel(exact=False, inline=True)
@@ -141,11 +154,18 @@ def look_through(
     p = ring.p0
     v = ring.q0 / width
     parts = 1 if width * stiff * A_RADIAN <= 2.0 * STEPS else 4
+    if parts > 1 and not events:
+        shows, _ = shown(acc, nodes, 0, 4, more, stiff * p, v, stiff, share, False, second)
+        if shows < 0.0:
+            return
     for k in range(parts):
-        shows, may = shown(acc, nodes, k, 4 // parts, more, stiff * p, v, stiff, share, events, second)
+        sway = math.sqrt(lin.square * p * p + v * v)
+        quiet = parts > 1 and events and calm(acc, nodes, k, 1, sway / stiff, sway)
+        here = events and not quiet
+        shows, may = shown(acc, nodes, k, 4 // parts, more, stiff * p, v, stiff, share, here, second)
         if shows >= 0.0:
             long = width / parts
-            count = max(STEPS / parts, long / FINE if events else 0.0)
+            count = max(STEPS / parts, long / FINE if here else 0.0)
             if shows > SMALL:
                 # A cubic between two steps misses a crest by the fourth power of their length.
                 count = max(count, long * stiff * A_RADIAN * math.sqrt(math.sqrt(min(shows, 1.0))))
@@ -157,7 +177,10 @@ def look_through(
                 may, second,
             )  # fmt: skip
         if parts > 1:
+            before = nodes[SPEED, k] + v
             p, v = free_motion(m, p, v)
+            if quiet:
+                passes(acc, turns, t, width, nodes, k, 1, before, nodes[SPEED, k + 1] + v)
 
 
 @kernel(exact=False, inline=True)
