@@ -1,16 +1,4 @@
-"""The scalar subset: the Python in which laws, references and filters are written, and its translation.
-
-A function of the subset works on numbers: arithmetic, comparisons, ``if``/``else``, ``for i in range(n)``,
-local names, ``math`` functions, other functions of the subset, and the fields of its structured arguments
-(``p.fc``, ``z.force[i]``, ``len(p.k)``). It runs as it stands in Python. `lower` rewrites the fields into
-elements of flat arrays (``p[3]``), which is what numba compiles and what C export will read.
-
-A structure may hold parts (`Layout.parts`). A function that is called with one (``step(v, z.friction, p.friction)``) is
-translated once more for that part: its fields are those of the whole with the part's name before theirs
-(``z.friction_force``).
-
-A construct outside the subset is refused with file, line and what to write instead.
-"""
+"""The translation of one function of the scalar subset: what is allowed in it, and what its fields become."""
 
 from __future__ import annotations
 
@@ -19,19 +7,16 @@ import inspect
 import math
 import textwrap
 import types
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from stickslip.binding import NEGATIVE, negative
 from stickslip.errors import LawError, suggestion
-from stickslip.returning import MUST, gives, missing_return
-from stickslip.spec import Field, Law, Surroundings
+from stickslip.subset.layout import Layout
 
-__all__ = ["COUNT", "Layout", "law_layouts", "lower", "named"]
+__all__ = ["Names", "Target", "Translator", "View", "parsed"]
 
-COUNT = "elements_"
-"""The name of the number of elements."""
 BUILTINS = {"abs", "min", "max", "range", "len", "float", "int"}
 MATH = {
     "exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
@@ -68,102 +53,7 @@ REMEDY: dict[type[ast.AST], str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
-    """Where the fields of a structured argument lie in its flat array."""
-
-    scalars: tuple[str, ...]
-    blocks: tuple[str, ...] = ()
-    counted: bool = False
-    """The array holds its numbers of elements after its scalars (parameters do, states ask the parameters)."""
-    pers: tuple[str, ...] = ()
-    """What each block has a value per; empty: elements."""
-    parts: tuple[str, ...] = ()
-    """What the names of fields of each part begin with: ``z.law.force`` is the field ``law_force`` of the part
-    ``law_``."""
-
-    @staticmethod
-    def of(fields: Sequence[Field], *, counted: bool, parts: tuple[str, ...] = ()) -> Layout:
-        """Scalars in order, then one block per field that has a value per element."""
-        mixed = any(f.per_element and f.par.per != "element" for f in fields)
-        return Layout(
-            tuple(f.name for f in fields if not f.per_element),
-            tuple(f.name for f in fields if f.per_element),
-            counted,
-            tuple(f.par.per for f in fields if f.per_element) if mixed else (),
-            parts,
-        )
-
-    def per(self, block: int) -> str:
-        """What a block has a value per."""
-        return self.pers[block] if self.pers else "element"
-
-    @property
-    def counts(self) -> tuple[str, ...]:
-        """What the numbers after the scalars count."""
-        return tuple(dict.fromkeys(map(self.per, range(len(self.blocks)))))
-
-
-def law_layouts(law: Law) -> dict[str, Layout]:
-    """The layouts of a law's structured arguments, by argument name."""
-    state = Layout.of(law.state_fields, counted=False)
-    return {
-        "p": Layout.of(law.fields, counted=True),
-        "z": state,
-        "dz": state,
-        "g": state,
-        "u": Layout(Surroundings._fields),
-    }
-
-
-def lower(
-    entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout], given: Collection[str] = ()
-) -> dict[str, ast.FunctionDef]:
-    """Translate functions and everything they call into functions on flat arrays.
-
-    Parameters
-    ----------
-    entries : mapping
-        Name in the result to function.
-    layouts : mapping
-        Argument name to layout, for the structured arguments.
-    given : collection of str
-        Functions that whoever runs the text supplies; they are called by their name with an underscore before it.
-
-    Returns
-    -------
-    dict of str to ast.FunctionDef
-        Callees first. Names of callees start with an underscore.
-
-    Raises
-    ------
-    LawError
-        With file, line and what to write instead.
-    """
-    done: dict[str, ast.FunctionDef] = {}
-    names = _Names(frozenset(given))
-    for name, function in entries.items():
-        _translate(names.of(name, _Target(function)), _Target(function), layouts, done, names, (), flat=True)
-    return done
-
-
-def named(
-    entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout], given: Collection[str] = ()
-) -> dict[str, ast.FunctionDef]:
-    """Check functions and everything they call, and keep their fields by name (``p.k[i]``).
-
-    Arguments, order and errors as in `lower`. Constants of the file are numbers in the result; the number of
-    elements is the name ``elements_``, of points ``points_`` and so on. This is what export writes in other
-    languages.
-    """
-    done: dict[str, ast.FunctionDef] = {}
-    names = _Names(frozenset(given))
-    for name, function in entries.items():
-        _translate(names.of(name, _Target(function)), _Target(function), layouts, done, names, (), flat=False)
-    return done
-
-
-@dataclass(frozen=True, slots=True)
-class _View:
+class View:
     """What an argument stands for: the fields of the structure `base` whose names begin with `prefix`."""
 
     base: str
@@ -172,7 +62,7 @@ class _View:
 
 
 @dataclass(frozen=True, eq=False)
-class _Target:
+class Target:
     """A function to translate; one for v < 0 reads the parameters that hold there.
 
     ``views`` are the arguments that stand for another structure than their name says, or for a part of one;
@@ -182,20 +72,20 @@ class _Target:
 
     function: Callable[..., Any]
     negative: bool = False
-    views: tuple[tuple[str, _View], ...] = ()
+    views: tuple[tuple[str, View], ...] = ()
     part: str = ""
     numbers: tuple[str, ...] = ()
 
 
 @dataclass
-class _Names:
+class Names:
     """One name per function translated: files may use the same name for different functions. Those of functions that
     are given are not translated."""
 
     given: frozenset[str]
     taken: dict[str, Any] = field(default_factory=dict[str, Any])
 
-    def of(self, wanted: str, target: _Target) -> str:
+    def of(self, wanted: str, target: Target) -> str:
         name, count = wanted + (NEGATIVE if target.negative else ""), 1
         views = tuple((name, view.base, view.prefix) for name, view in target.views)
         code = getattr(target.function, "__code__", target.function)
@@ -206,60 +96,8 @@ class _Names:
         return name
 
 
-def _translate(
-    name: str,
-    target: _Target,
-    layouts: Mapping[str, Layout],
-    done: dict[str, ast.FunctionDef],
-    names: _Names,
-    stack: tuple[str, ...],
-    *,
-    flat: bool,
-) -> None:
-    if name in done:
-        return
-    function = target.function
-    tree, where = _parsed(function)
-    if name in stack:
-        raise LawError(f"{where.at(tree)}: {function.__name__} calls itself; use a `for` loop instead")
-    if found := missing_return(tree, must=not stack and name.strip("_") in MUST):
-        raise LawError(
-            f"{where.at(found)}: {function.__name__}() goes on here without returning a number; end every path with "
-            "`return` and a number"
-        )
-    arguments = [a.arg for a in tree.args.args]
-    structures = [a for a in arguments if a in layouts and a not in target.numbers]
-    views = {a: _View(a, "", layouts[a]) for a in structures} | dict(target.views)
-    translator = _Translator(where, layouts, arguments, views, function.__globals__, flat, names, target)
-    translator.rename(tree)
-    body = [s for s in (translator.visit(statement) for statement in tree.body) if s is not None]
-    if flat:
-        # Once at the top: the compiler cannot know that writing to a state leaves the parameters alone.
-        body[:0] = [translator.counted(per) for per in translator.counts]
-    for callee, called in translator.calls.items():
-        _translate(callee, called, layouts, done, names, (*stack, name), flat=flat)
-    for callee, node in translator.read.items():
-        if not gives(done[callee]):
-            what = translator.calls[callee].function.__name__
-            raise translator.refuse(
-                node, f"the value of {what}(), which returns none,", "let it return a number"
-            )
-    given = [ast.arg(name) for name in dict.fromkeys(map(translator.given_as, arguments))]
-    arguments = ast.arguments([], given, None, [], [], None, [])
-    if not flat:
-        body = [*_docstring(tree), *body]
-    done[name] = ast.fix_missing_locations(
-        ast.FunctionDef(name=name, args=arguments, body=body or [ast.Pass()], decorator_list=[])
-    )
-
-
-def _docstring(tree: ast.FunctionDef) -> list[ast.stmt]:
-    text = ast.get_docstring(tree)
-    return [ast.Expr(ast.Constant(text))] if text else []
-
-
 @dataclass
-class _Place:
+class Place:
     file: str
     first_line: int
 
@@ -267,7 +105,7 @@ class _Place:
         return f"{self.file}, line {self.first_line + getattr(node, 'lineno', 1) - 1}"
 
 
-def _parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, _Place]:
+def parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, Place]:
     try:
         lines, first = inspect.getsourcelines(function)
     except (OSError, TypeError) as error:
@@ -276,23 +114,23 @@ def _parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, _Place]:
             f"the source of {name!r} cannot be read; write the law in a file of its own"
         ) from error
     tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
-    where = _Place(inspect.getsourcefile(function) or "<unknown>", max(first, 1))
+    where = Place(inspect.getsourcefile(function) or "<unknown>", max(first, 1))
     if not isinstance(tree, ast.FunctionDef):
         raise LawError(f"{where.at(tree)}: a law's function is a `def`; write it as one")
     return tree, where
 
 
 @dataclass
-class _Translator(ast.NodeTransformer):
-    where: _Place
+class Translator(ast.NodeTransformer):
+    where: Place
     layouts: Mapping[str, Layout]
     arguments: list[str]
-    views: Mapping[str, _View]
+    views: Mapping[str, View]
     scope: dict[str, Any]
     flat: bool
-    names: _Names
-    target: _Target
-    calls: dict[str, _Target] = field(default_factory=dict[str, _Target])
+    names: Names
+    target: Target
+    calls: dict[str, Target] = field(default_factory=dict[str, Target])
     locals: set[str] = field(default_factory=set[str])
     counts: dict[str, None] = field(default_factory=dict[str, None])
     read: dict[str, ast.Call] = field(default_factory=dict[str, ast.Call])
@@ -446,9 +284,9 @@ class _Translator(ast.NodeTransformer):
         node.args = self.passed(node, target)
         return node
 
-    def aimed(self, node: ast.Call, function: Callable[..., Any]) -> _Target:
+    def aimed(self, node: ast.Call, function: Callable[..., Any]) -> Target:
         """The callee, for the parts of structures that it is called with."""
-        views: list[tuple[str, _View]] = []
+        views: list[tuple[str, View]] = []
         numbers: list[str] = []
         for formal, actual in zip(inspect.signature(function).parameters, node.args):
             view = self.view(self.positive(actual))
@@ -459,9 +297,9 @@ class _Translator(ast.NodeTransformer):
         negative = self.negative or any(map(self.is_negative, node.args))
         prefixes = [view.prefix for _, view in views if view.prefix]
         part = max(prefixes, key=len, default=self.target.part)
-        return _Target(function, negative, tuple(views), part, tuple(numbers))
+        return Target(function, negative, tuple(views), part, tuple(numbers))
 
-    def passed(self, node: ast.Call, target: _Target) -> list[ast.expr]:
+    def passed(self, node: ast.Call, target: Target) -> list[ast.expr]:
         """The arguments of a call; a structure of which several parts are meant is passed once."""
         views, out, bases = dict(target.views), list[ast.expr](), dict[str, str]()
         for formal, actual in zip(inspect.signature(target.function).parameters, node.args):
@@ -494,16 +332,16 @@ class _Translator(ast.NodeTransformer):
 
     # ---- structured arguments --------------------------------------------------------------------------
 
-    def view(self, node: ast.expr) -> _View | None:
+    def view(self, node: ast.expr) -> View | None:
         """What an expression stands for as a whole: a structure or a part of one; None for a number."""
         if isinstance(node, ast.Name):
             return self.views.get(node.id)
         if not isinstance(node, ast.Attribute) or (owner := self.view(node.value)) is None:
             return None
         prefix = f"{owner.prefix}{node.attr}_"
-        return _View(owner.base, prefix, owner.layout) if prefix in owner.layout.parts else None
+        return View(owner.base, prefix, owner.layout) if prefix in owner.layout.parts else None
 
-    def structure(self, node: ast.Attribute) -> tuple[_View, str]:
+    def structure(self, node: ast.Attribute) -> tuple[View, str]:
         """What the field belongs to, and its whole name."""
         view = self.view(node.value)
         if view is None:
@@ -526,7 +364,7 @@ class _Translator(ast.NodeTransformer):
         self.counts[per] = None
         return ast.Name(f"{per}s_", ast.Load())
 
-    def counting(self) -> _View | None:
+    def counting(self) -> View | None:
         """The structure that holds the numbers of elements."""
         return next((view for view in self.views.values() if view.layout.counted), None)
 
