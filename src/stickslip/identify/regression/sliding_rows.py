@@ -162,9 +162,24 @@ class SlidingRows:
         )  # fmt: skip
 
     def torque(self, skew: float) -> Array:
-        """The torque that acted, if the recorded one lies `skew` seconds behind it, N·m (N), shape (n,)."""
-        (drive,) = seen(self.signals.drive, self.window.weights(0, late=skew))
+        """The torque that acted, if the recorded one lies `skew` seconds behind it, N·m (N), shape (n,).
+
+        A torque that is held after its row acts spread over the row, one that is a mean was so before: seen through a
+        window whose variance is greater, or less, by that of the spread, it goes with the motion.
+        """
+        window = replace(self.window, width=math.sqrt(self.window.width**2 + self.spread(skew)))
+        (drive,) = seen(self.signals.drive, window.weights(0, late=skew))
         return drive[self.places] - self.signals.loss * self.speed
+
+    def spread(self, skew: float) -> float:
+        """Variance of the time over which a row's torque acts, s²; below 0 where the column is a mean.
+
+        Of an even spread that begins (a hold) or ends (a mean) at the row, and whose middle lies `skew` off it: over a
+        row at most. A skew of two rows or more is a delay, which says nothing of a spread.
+        """
+        row, off = self.signals.period, abs(skew)
+        middle = max(0.0, min(off, 0.5 * row, row - 0.5 * off))
+        return math.copysign(middle**2 / 3.0, -skew)
 
     def around(self, order: float) -> Array:
         """Cosine and sine of `order` cycles a radian (m) of position, as seen through the window, shape (n, 2)."""
