@@ -82,7 +82,7 @@ class Signals(NamedTuple):
 
 
 def friction(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
-    """The friction law that a control law holds; a controller puts its ``step`` here. N·m."""
+    """The friction law that a control law holds; a controller puts its ``sampled`` or ``step`` here. N·m."""
     return 0.0
 
 
@@ -186,7 +186,7 @@ class ControlLaw(Configurable):
 
     def holding(self, name: str, law: Law) -> Callable[..., float]:
         """The function of that name with a friction law's functions in their places, in the chosen options too."""
-        held = {"friction": law.step, "friction_steady": law.steady}
+        held = {"friction": law.sampled or law.step, "friction_steady": law.steady}
         options = {replaces: bound(function, held) for replaces, function in self.option_scope().items()}
         return bound(self.written[name], {**options, **held})
 

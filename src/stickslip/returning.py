@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 __all__ = ["MUST", "gives", "missing_return"]
 
-MUST = frozenset({"step", "rate", "steady", "holding", "stored", "sliding", "sample", "guarded"})
+MUST = frozenset({"step", "sampled", "rate", "steady", "holding", "stored", "sliding", "sample", "guarded"})
 """Functions whose number is the answer; what others write, they write into their arguments."""
 
 

@@ -9,6 +9,8 @@ Argument order, everywhere: velocity, time step, state ``z``, parameters ``p``, 
 ``step(v0, v1, dt, z, p, u)``          torque at the end of a step; advances ``z`` in place. The velocity
                                        runs from ``v0`` to ``v1`` (linearly). Stable for any ``dt``; with
                                        ``dt = 0`` the torque now, the state as it was
+``sampled(v0, v1, dt, z, p, u)``       `step` as controllers take it, where that differs: their velocity may jump
+                                       from one sample to the next (``v0 = v1``, held)
 ``rate(v, z, p, u, dz)``               torque now; writes the time derivative of every state but the modes
 ``guards(v, z, p, u, g)``              writes one value per mode; a mode is left when its value rises to zero
 ``switch(v, z, p, u, g)``              changes the modes whose value in ``g`` is not negative
@@ -80,9 +82,8 @@ __all__ = [
 
 
 FUNCTIONS = (
-    "step", "rate", "guards", "switch", "steady", "holding", "check", "modes", "velocity_scale", "rest_band",
-    "is_passive",
-    "stored",
+    "step", "sampled", "rate", "guards", "switch", "steady", "holding", "check", "modes", "velocity_scale",
+    "rest_band", "is_passive", "stored",
 )  # fmt: skip
 """A law's functions, all of which may call the chosen options."""
 
@@ -308,7 +309,7 @@ class Law(Configurable):
         ``Annotated[tuple[float, ...], Par(...)]`` fields. Fields of the chosen options are added to them.
     State : type or None
         As ``Params``, for the internal state.
-    step, rate, guards, switch, steady, holding, check, modes, stored, rest_band : callable or None
+    step, sampled, rate, guards, switch, steady, holding, check, modes, stored, rest_band : callable or None
         Its functions; only ``step`` must be there.
     variants : dict
         Laws that `having` has made of it; not for callers.
@@ -341,6 +342,7 @@ class Law(Configurable):
     source: tuple[str, ...]
     example: Mapping[str, Any]
     State: type | None = None
+    sampled: Callable[..., float] | None = None
     rate: Callable[..., float] | None = None
     guards: Callable[..., None] | None = None
     switch: Callable[..., None] | None = None
@@ -383,6 +385,8 @@ class Law(Configurable):
         for name, joined in (("check", first_complaint), ("velocity_scale", least)):
             parts[name] = joined([f for f in (parts[name], *(getattr(o, name) for o in chosen)) if f])
         for wraps in distinct([o.wraps for o in chosen]):
+            if parts["sampled"] and "step" in wraps:
+                parts["sampled"] = wrapped("step", parts["sampled"], wraps["step"], scope)
             parts.update({n: wrapped(n, parts[n], w, scope) for n, w in wraps.items() if parts.get(n)})
         if not all(o.keeps_elements for o in chosen):
             parts["modes"] = None

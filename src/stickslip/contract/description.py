@@ -14,7 +14,7 @@ from stickslip.subset import law_layouts, lower
 
 __all__ = ["bounds", "description", "subset"]
 
-FUNCTIONS = ("step", "rate", "guards", "switch", "steady", "holding", "stored")
+FUNCTIONS = ("step", "sampled", "rate", "guards", "switch", "steady", "holding", "stored")
 
 
 def description(law: Law) -> Verdict:

@@ -162,6 +162,23 @@ def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
     return torque
 
 
+def sampled(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
+    """Torque at the end of a controller's sample, N·m; as `step`, but for a velocity that is held.
+
+    Held, the velocity jumps between samples, and a sticking element may find itself beyond the curve: it broke away
+    somewhere on the way there, and is put on the curve, as where it breaks away inside the sample.
+    """
+    if v0 == v1 and v0 != 0.0 and dt > 0.0:
+        direction = math.copysign(1.0, v0)
+        s = sliding(v0, p)
+        for i in range(len(p.k)):
+            load = load_of(direction, z.force[i])
+            if z.mode[i] * direction <= 0.0 and load > p.alpha[i] * s:
+                z.mode[i] = direction
+                z.force[i] = math.copysign(p.alpha[i] * s, z.force[i])
+    return step(v0, v1, dt, z, p, u)
+
+
 def check(p: Any) -> str:
     """The shares make up the whole curve (thesis eq. 2.19)."""
     total = math.fsum(p.alpha)
@@ -199,6 +216,7 @@ LAW = Law(
         "vs": 0.01,
     },
     State=State,
+    sampled=sampled,
     rate=rate,
     guards=guards,
     switch=switch,
