@@ -29,8 +29,6 @@ BRIEF = {  # always run; the others are slow
     "PD + Makkar adaptive", "PD + FF LuGre gradient gain", "Lee-Kim delta .5", "PD + FF LuGre .9 scale adapted",
 }  # fmt: skip
 APART = {
-    ("PD + GMS3 observer on v_f k=1", "low_x0.7_exact"): "0.67 % off the reference, whose bar is 0.03 %",
-    ("PID + dither .2", "high_x1_exact"): "0.108 % off the reference, whose bar is 0.01 %",
     ("PD + LuGre observer k=10", "coarse"): "1.3 % above the widened band",
 }
 """What is not as in the reference, and by how much: open."""

@@ -28,6 +28,7 @@ __all__ = [
     "heaviest",
     "rest",
     "sign",
+    "stays_below",
     "turn",
 ]
 
@@ -68,6 +69,26 @@ def heaviest(axis: Any, springs: Any, moved: float, direction: float) -> float:
             load = abs(force) if axis.literal else direction * force
             most = max(most, load / springs[i].share)
     return most
+
+
+@kernel(exact=False)
+def stays_below(
+    axis: Any, parameters: Any, most: float, v0: float, v1: float, a0: float, a1: float, d: float, way: float
+) -> bool:
+    """Whether loads of at most `most` N·m cannot meet the curve in a piece of d s between two velocities of one sign.
+
+    For a curve that rises or falls throughout the velocities of the piece; its tangents bound these where the
+    acceleration changes its sign.
+    """
+    if most < axis.lowest:
+        return True
+    fastest, slowest = max(way * v0, way * v1), min(way * v0, way * v1)
+    if a0 * a1 < 0.0:
+        bulge = 0.5 * d * max(abs(a0), abs(a1))
+        fastest, slowest = fastest + bulge, slowest - bulge
+    if most >= curve_at(axis.curve, axis.breakaway, parameters, way * fastest):
+        return False
+    return most < curve_at(axis.curve, axis.breakaway, parameters, way * max(slowest, 0.0))
 
 
 @kernel(exact=False)

@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulation.sampled.modes import break_away, heaviest, sign, turn
+from stickslip.simulation.sampled.modes import break_away, heaviest, sign, stays_below, turn
 from stickslip.simulation.sampled.order_eight import attempt
 from stickslip.simulation.sampled.rates import BENDS, FOLLOWS, Slip, curve_at, rates, slip_of
 
@@ -20,8 +20,10 @@ SHORTEST = 1e-13
 """Of the sample time: a step that must be shorter does not exist."""
 UNSEEN = 0.1
 """Of the tolerance of a step: what a bristle may move on beyond its turn without the turn being located."""
-LOOKS = 8
-"""Places in a step at which the loads of sticking elements are looked at."""
+LOOKS = 4
+"""Pieces of a step in which loads of sticking elements are first compared with the curve."""
+FINEST = 1e-6
+"""Of the sample time: what a load may be above the curve for without being seen."""
 ROOT_STEPS = 60
 ARRIVED = 1e-14
 """rad/s, relative above 1 rad/s: a velocity at its goal."""
@@ -45,29 +47,14 @@ def slip(axis: Any, z: Any, springs: Any, parameters: Any, left: float) -> float
     h = min(left, z.next)
     if z.spring > 0.0:
         h = min(h, math.sqrt(axis.inertia / z.spring))
-    h, trial = accepted(axis, z, m, min(h, axis.longest))
-    a1, _, _ = rates(m, trial[0], trial[1], trial[2])
-    turns = False
-    if way * trial[1] < edge:
-        if axis.kind == BENDS and 2.0 * abs(trial[1]) * h <= UNSEEN * axis.local:
-            z.direction = sign(trial[1])
-        else:
-            h, trial = arrival(m, v0, z.slipping, a0, h, trial, a1, way, edge, axis.local / axis.sample_time)
-            turns = True
-    elif way * a0 < 0.0 < way * a1:
-        low = lowest_at(v0, a0, trial[1], a1, h, way)
-        if way * hermite(v0, a0, trial[1], a1, h, low) < edge + 0.1 * abs(v0 - trial[1]):
-            h, trial = low, attempt(m, v0, z.slipping, low)
-            if way * trial[1] < edge:
-                a1, _, _ = rates(m, trial[0], trial[1], trial[2])
-                h, trial = arrival(
-                    m, v0, z.slipping, a0, h, trial, a1, way, edge, axis.local / axis.sample_time
-                )
-                turns = True
-    breaks = False
-    if z.spring > 0.0:
-        h, trial, breaks = next_break(axis, z, springs, parameters, m, a0, h, trial)
-        turns = turns and not breaks and way * trial[1] < edge + 1e-9
+    h = min(h, axis.longest)
+    while True:
+        h, trial = accepted(axis, z, m, h)
+        h, trial, turns, breaks = ended(axis, z, springs, parameters, m, a0, h, trial)
+        if trial[4] <= axis.local or z.failed:
+            break
+        # Cut where the axis turns, the step meets the curve's peak there, which the whole one had jumped over unseen.
+        h = z.next = shorter(axis, z, h, trial[4])
     z.moved, z.velocity, z.slipping = z.moved + trial[0], trial[1], trial[2]
     z.relaxed += trial[3]
     z.acceleration, _, _ = rates(m, trial[0], trial[1], trial[2])
@@ -75,7 +62,36 @@ def slip(axis: Any, z: Any, springs: Any, parameters: Any, left: float) -> float
         break_away(axis, z, springs, parameters, way)
     elif turns:
         turn(axis, z, springs, parameters)
+    elif axis.kind == BENDS and way * trial[1] < edge:
+        z.direction = sign(trial[1])
     return h
+
+
+@kernel(exact=False)
+def ended(
+    axis: Any, z: Any, springs: Any, parameters: Any, m: Slip, a0: float, h: float, trial: Trial
+) -> tuple[float, Trial, bool, bool]:
+    """Cut an accepted step where something ends; whether the axis turns there, and whether an element breaks away."""
+    way, edge, v0 = z.direction, axis.layer, z.velocity
+    near = axis.local / axis.sample_time
+    a1, _, _ = rates(m, trial[0], trial[1], trial[2])
+    turns = breaks = False
+    if way * trial[1] < edge:
+        if axis.kind != BENDS or 2.0 * abs(trial[1]) * h > UNSEEN * axis.local:
+            h, trial = arrival(m, v0, z.slipping, a0, h, trial, a1, way, edge, near)
+            turns = True
+    elif way * a0 < 0.0 < way * a1:
+        low = lowest_at(v0, a0, trial[1], a1, h, way)
+        if way * hermite(v0, a0, trial[1], a1, h, low) < edge + 0.1 * abs(v0 - trial[1]):
+            h, trial = low, attempt(m, v0, z.slipping, low)
+            if way * trial[1] < edge:
+                a1, _, _ = rates(m, trial[0], trial[1], trial[2])
+                h, trial = arrival(m, v0, z.slipping, a0, h, trial, a1, way, edge, near)
+                turns = True
+    if z.spring > 0.0:
+        h, trial, breaks = next_break(axis, z, springs, parameters, m, a0, h, trial)
+        turns = turns and not breaks and way * trial[1] < edge + 1e-9
+    return h, trial, turns, breaks
 
 
 @kernel(exact=False)
@@ -106,11 +122,9 @@ def accepted(axis: Any, z: Any, m: Slip, h: float) -> tuple[float, Trial]:
     cut = h < z.next
     trial = attempt(m, z.velocity, z.slipping, h)
     while not trial[4] <= axis.local:
-        z.rejected += 1
         cut = False
-        h *= max(0.1, 0.9 * eighth_root(axis.local / trial[4])) if trial[4] < math.inf else 0.1
-        if h < SHORTEST * axis.sample_time:
-            z.failed = 1
+        h = shorter(axis, z, h, trial[4])
+        if z.failed:
             break
         trial = attempt(m, z.velocity, z.slipping, h)
     grown = 4.0
@@ -119,6 +133,16 @@ def accepted(axis: Any, z: Any, m: Slip, h: float) -> tuple[float, Trial]:
     # A step that the end of the sample has cut says nothing against a longer one.
     z.next = max(z.next, h * grown) if cut else h * grown
     return h, trial
+
+
+@kernel(exact=False)
+def shorter(axis: Any, z: Any, h: float, error: float) -> float:
+    """How long a step may be that was wrong by `error` with h."""
+    z.rejected += 1
+    h *= max(0.1, 0.9 * eighth_root(axis.local / error)) if error < math.inf else 0.1
+    if h < SHORTEST * axis.sample_time:
+        z.failed = 1
+    return h
 
 
 @kernel(exact=False, inline=True)
@@ -202,6 +226,22 @@ def quintic(d: float, v0: float, a0: float, v1: float, a1: float, h: float, t: f
     return t * (v0 + 0.5 * t * a0) + x * x * x * (c3 + x * (c4 + x * c5))
 
 
+@kernel(exact=False, inline=True)
+def within(
+    d: float, v0: float, a0: float, v1: float, a1: float, h: float, t: float
+) -> tuple[float, float, float]:
+    """Displacement, velocity and acceleration after t of a step of h, by the `quintic`."""
+    x = t / h
+    p, q = d - h * (v0 + 0.5 * h * a0), h * (v1 - v0 - h * a0)
+    r = h * h * (a1 - a0)
+    c3 = 10.0 * p - 4.0 * q + 0.5 * r
+    c4 = -15.0 * p + 7.0 * q - r
+    c5 = 6.0 * p - 3.0 * q + 0.5 * r
+    moved = t * (v0 + 0.5 * t * a0) + x * x * x * (c3 + x * (c4 + x * c5))
+    v = v0 + t * a0 + x * x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)) / h
+    return moved, v, a0 + x * (6.0 * c3 + x * (12.0 * c4 + x * 20.0 * c5)) / (h * h)
+
+
 @kernel(exact=False)
 def next_break(
     axis: Any, z: Any, springs: Any, parameters: Any, m: Slip, a0: float, h: float, trial: Trial
@@ -212,24 +252,23 @@ def next_break(
     end = heaviest(axis, springs, z.moved + trial[0], way)
     if max(start, end) < axis.lowest:
         return h, trial, False
-    a1, _, _ = rates(m, trial[0], trial[1], trial[2])
-    before, now = -math.inf, start - curve_at(axis.curve, axis.breakaway, parameters, v0)
-    if now >= 0.0 and way * v0 > 0.0:
+    if way * v0 > 0.0 and start >= curve_at(axis.curve, axis.breakaway, parameters, v0):
         return 0.0, (0.0, v0, z.slipping, 0.0, 0.0), True
-    for i in range(1, LOOKS + 1):
-        t = h * i / LOOKS
-        after = end - curve_at(axis.curve, axis.breakaway, parameters, trial[1])
-        if i < LOOKS:
-            after = looked(axis, z, springs, parameters, a0, a1, h, trial, t)
-        if after >= 0.0:
-            return located(axis, z, springs, parameters, m, a0, a1, h, trial, h * (i - 1) / LOOKS, t)
-        if before > -math.inf and now > before and now >= after:
-            bend = before - 2.0 * now + after
-            top = h * (i - 1 + 0.5 * (before - after) / bend) / LOOKS
-            if looked(axis, z, springs, parameters, a0, a1, h, trial, top) >= 0.0:
-                low = h * (i - 2) / LOOKS
-                return located(axis, z, springs, parameters, m, a0, a1, h, trial, low, top)
-        before, now = now, after
+    a1, _, _ = rates(m, trial[0], trial[1], trial[2])
+    t, d = 0.0, h / LOOKS
+    load0, w0, b0 = start, v0, a0
+    while t < h:
+        d = min(d, h - t)
+        moved, w1, b1 = within(trial[0], v0, a0, trial[1], a1, h, t + d)
+        load1 = heaviest(axis, springs, z.moved + moved, way)
+        if load1 >= axis.lowest and load1 >= curve_at(axis.curve, axis.breakaway, parameters, w1):
+            return located(axis, z, springs, parameters, m, a0, a1, h, trial, t, t + d)
+        below = stays_below(axis, parameters, max(load0, load1), w0, w1, b0, b1, d, way)
+        if below or d <= FINEST * axis.sample_time:
+            t, load0, w0, b0 = t + d, load1, w1, b1
+            d *= 2.0
+        else:
+            d *= 0.5
     return h, trial, False
 
 
@@ -238,9 +277,8 @@ def looked(
     axis: Any, z: Any, springs: Any, parameters: Any, a0: float, a1: float, h: float, trial: Trial, t: float
 ) -> float:
     """How far the heaviest load lies above the curve t into a step, by its quintic, N·m."""
-    moved = z.moved + quintic(trial[0], z.velocity, a0, trial[1], a1, h, t)
-    v = hermite(z.velocity, a0, trial[1], a1, h, t)
-    load = heaviest(axis, springs, moved, z.direction)
+    moved, v, _ = within(trial[0], z.velocity, a0, trial[1], a1, h, t)
+    load = heaviest(axis, springs, z.moved + moved, z.direction)
     return load - curve_at(axis.curve, axis.breakaway, parameters, v)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from stickslip.jit import kernel
 from stickslip.simulation.exact.flow import Linear, flow, free_motion, linear
-from stickslip.simulation.sampled.modes import break_away, floor_below, heaviest, sign
+from stickslip.simulation.sampled.modes import break_away, floor_below, heaviest, sign, stays_below
 from stickslip.simulation.sampled.rates import curve_at
 
 __all__ = ["stick"]
@@ -18,6 +18,8 @@ __all__ = ["stick"]
 PHASE = 0.5
 """rad of the oscillation between two looks at the loads."""
 ROOT_STEPS = 60
+FINEST = 1e-6
+"""Of the sample time: what a load may be above the curve for without being seen."""
 
 
 @kernel(exact=False)
@@ -96,31 +98,57 @@ def first_break(
     m = flow(lin, pace)
     e, w = off, v
     way = sign(w) if w != 0.0 else sign(-e)
-    before, now = -math.inf, excess(axis, springs, parameters, goal + e, w, way)
-    if now >= 0.0:
+    if excess(axis, springs, parameters, goal + e, w, way) >= 0.0:
         return 0.0, way
     for i in range(count):
         next_e, next_w = free_motion(m, e, w)
-        end = pace * (i + 1)
+        begin, end = pace * i, pace * (i + 1)
         if next_w * way < 0.0:
             # The loads peak where the axis turns: look there, from the side it comes from.
-            top = turning_time(lin, off, v, pace * i, end, way)
-            if excess_after(axis, springs, parameters, lin, goal, off, v, top, way) >= 0.0:
-                return bracketed(axis, springs, parameters, lin, goal, off, v, pace * i, top, way), way
-            way, before = -way, -math.inf
-            now = excess_after(axis, springs, parameters, lin, goal, off, v, top, way)
-        after = excess(axis, springs, parameters, goal + next_e, next_w, way)
-        if after >= 0.0:
-            return bracketed(axis, springs, parameters, lin, goal, off, v, pace * i, end, way), way
-        if before > -math.inf and now > before and now >= after:
-            bend = before - 2.0 * now + after
-            crest = now - (after - before) * (after - before) / (8.0 * bend)
-            top = pace * (i + 0.5 * (before - after) / bend)
-            if crest > 0.0 and excess_after(axis, springs, parameters, lin, goal, off, v, top, way) >= 0.0:
-                begin = pace * (i - 1)
-                return bracketed(axis, springs, parameters, lin, goal, off, v, begin, top, way), way
-        e, w, before, now = next_e, next_w, now, after
+            top = turning_time(lin, off, v, begin, end, way)
+            top_e, top_w = free_motion(flow(lin, top), off, v)
+            low, high = meeting(
+                axis, springs, parameters, lin, goal, off, v, begin, top, e, w, top_e, top_w, way
+            )
+            if high > 0.0:
+                return bracketed(axis, springs, parameters, lin, goal, off, v, low, high, way), way
+            way, begin, e, w = -way, top, top_e, top_w
+        low, high = meeting(
+            axis, springs, parameters, lin, goal, off, v, begin, end, e, w, next_e, next_w, way
+        )
+        if high > 0.0:
+            return bracketed(axis, springs, parameters, lin, goal, off, v, low, high, way), way
+        e, w = next_e, next_w
     return left, 0.0
+
+
+@kernel(exact=False)
+def meeting(
+    axis: Any, springs: Any, parameters: Any, lin: Linear, goal: float, off: float, v: float,
+    begin: float, end: float, e0: float, w0: float, e1: float, w1: float, way: float,
+) -> tuple[float, float]:  # fmt: skip
+    """A piece of the time between begin and end at whose end the heaviest load is above the curve; ends in 0 if none.
+
+    Halved until nothing can happen in it: just before the axis turns, the curve may dip under the load and rise again.
+    """
+    t, d = begin, end - begin
+    load0 = heaviest(axis, springs, goal + e0, way)
+    while t < end:
+        load1 = heaviest(axis, springs, goal + e1, way)
+        if load1 >= axis.lowest and load1 >= curve_at(axis.curve, axis.breakaway, parameters, w1):
+            return t, t + d
+        a0 = -lin.square * e0 - 2.0 * lin.decay * w0
+        a1 = -lin.square * e1 - 2.0 * lin.decay * w1
+        below = stays_below(axis, parameters, max(load0, load1), w0, w1, a0, a1, d, way)
+        if below or d <= FINEST * axis.sample_time:
+            t, e0, w0, load0 = t + d, e1, w1, load1
+            d *= 2.0
+        else:
+            d *= 0.5
+        d = min(d, end - t)
+        if d > 0.0:
+            e1, w1 = free_motion(flow(lin, t + d), off, v)
+    return 0.0, 0.0
 
 
 @kernel(exact=False)
