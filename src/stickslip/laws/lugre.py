@@ -130,6 +130,28 @@ def step(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
     return p.sigma0 * z.z + damping(v1, p) * dz + viscous(v1, p)
 
 
+def sampled(v0: float, v1: float, dt: float, z: Any, p: Any, u: Any) -> float:
+    """Torque at the end of a controller's sample, N·m; as `step`, in fewer operations where the velocity is held.
+
+    exp takes half the time of expm1, and 1 - exp(-x) is as exact where the bristle goes more than half the way.
+    """
+    if v0 != v1:
+        return step(v0, v1, dt, z, p, u)
+    s = sliding(v1, p)
+    exponent = p.sigma0 * dt * abs(v1) / s
+    gain = 1.0  # the nearest number, far on
+    if exponent <= 0.7:
+        gain = -math.expm1(-exponent)
+    elif exponent < 40.0:
+        gain = 1.0 - math.exp(-exponent)
+    z.z = z.z * (1.0 - gain) + math.copysign(s, v1) * gain / p.sigma0
+    torque = p.sigma0 * z.z
+    damped = damping(v1, p)
+    if damped != 0.0:
+        torque += damped * (v1 - p.sigma0 * abs(v1) / s * z.z)
+    return torque + viscous(v1, p)
+
+
 def stored(z: Any, p: Any) -> float:
     """Energy of the bristles, J."""
     return 0.5 * p.sigma0 * z.z * z.z
@@ -170,6 +192,7 @@ LAW = Law(
         "vs": 0.01,
     },  # Table 4
     State=State,
+    sampled=sampled,
     rate=rate,
     steady=steady,
     modes=modes,
