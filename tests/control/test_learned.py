@@ -8,9 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stickslip.errors import ParameterError
+import stickslip as ss
+from stickslip.errors import InputError, ParameterError
 from stickslip.spec import Surroundings
-from support.golden_rows import ROWS
+from support.golden_rows import INERTIA, ROWS
 
 DATA = np.load(f"{__file__.rpartition('/control/')[0]}/data/control_golden.npz")
 INPUTS = np.column_stack([DATA[name] for name in ("qm", "qd", "vd", "ad")])
@@ -70,3 +71,16 @@ def test_what_does_not_fit_is_refused():
 
 def test_what_does_not_learn_has_nothing_to_keep():
     assert ROWS["PD + DOB 400"].learned(ROWS["PD + DOB 400"].state()) == {}
+
+
+def test_only_integrators_that_sample_run_what_learns():
+    plant, motion = (
+        ss.RigidAxis(INERTIA, ss.Model("coulomb", fc=0.285)),
+        ss.Reference("sine", amplitude=0.05, frequency=4.0),
+    )
+    controller = ROWS["PD + FF LuGre .9 scale adapted + DOB 200 residual"]
+    for integrator in ("exact", "adaptive", "fixed"):
+        with pytest.raises(InputError, match=r"sampled|sample time"):
+            ss.simulate(plant, controller, motion, 0.3, integrator=integrator)
+    found = ss.simulate(plant, controller, motion, 0.3, integrator="sampled").meta["learned"]
+    assert found["feedforward_scale"]["uncertainty"] > 0.0
