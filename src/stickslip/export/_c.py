@@ -188,11 +188,6 @@ class _C(Language):
             out += [f"{pad}}} else {{", *self.block(node.orelse, depth + 1)]
         return [*out, f"{pad}}}"]
 
-    def else_if(self, node: ast.If) -> ast.If | None:
-        """The condition that is all there is to the other branch."""
-        only = node.orelse[0] if len(node.orelse) == 1 else None
-        return only if isinstance(only, ast.If) and id(only) not in self.facts.opened else None
-
     def loop(self, node: ast.For, depth: int) -> list[str]:
         assert isinstance(node.target, ast.Name)
         assert isinstance(node.iter, ast.Call)

@@ -26,7 +26,6 @@ from stickslip.model import Model
 
 __all__ = ["TARGET", "Bam", "read", "write"]
 
-STRIBECK_KEYS = {"friction_stribeck": "N·m", "dtheta_stribeck": "rad/s", "alpha": "-"}
 KEYS = {
     "friction_base": "N·m, Coulomb torque",
     "friction_stribeck": "N·m, above it at rest",

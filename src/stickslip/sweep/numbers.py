@@ -31,7 +31,6 @@ __all__ = ["as_columns", "belongs", "poles", "value_of", "varied"]
 Array = np.ndarray[Any, np.dtype[np.float64]]
 FAMILIES = ("axis", "machine", "friction", "law", "controller", "reference")
 POLES = ("bandwidth_hz", "damping")
-SETTINGS = ("gain", "filter_hz", *POLES, *Gains._fields, "torque_limit", "sample_time")
 ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 
 

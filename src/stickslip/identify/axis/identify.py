@@ -156,16 +156,33 @@ def identify_axis(
         try:
             found = estimated(chosen, own, evidence, notes)
             if automatic and not per_direction and nothing_more(found, {*free, *frozen, *(values or {})}):
-                simplest = plugins.law(AUTOMATIC[0])
-                said = [*notes, SIMPLEST.format(law=chosen.name, simplest=simplest.name)]
-                found = estimated(simplest, options_of(simplest, options, [simplest]), evidence, said)
+                return simplest_of(chosen, options, evidence, notes)
             return found
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."
-    result = output_error(evidence.experiments, axis, chosen, evidence.inverse, profiles=profiles, **own)
+    return by_output_error(chosen, own, evidence, notes, profiles=profiles, lacking=lacking)
+
+
+def simplest_of(
+    law: Law, options: dict[str, Any], evidence: Evidence, notes: Sequence[str]
+) -> Identification:
+    """The simplest law in place of one whose additional parameters the record does not determine."""
+    simplest = plugins.law(AUTOMATIC[0])
+    said = [*notes, SIMPLEST.format(law=law.name, simplest=simplest.name)]
+    return estimated(simplest, options_of(simplest, options, [simplest]), evidence, said)
+
+
+def by_output_error(
+    law: Law, own: dict[str, Any], evidence: Evidence, notes: Sequence[str], *, profiles: bool, lacking: str
+) -> Identification:
+    """A law fitted by the output error; ``lacking`` says why the prediction error cannot be had, where it was asked
+    for."""
+    result = output_error(
+        evidence.experiments, evidence.axis, law, evidence.inverse, profiles=profiles, **own
+    )
     found = assembled(
         result, result.estimates, result.fit.correlation, evidence.inverse, evidence.validation,
-        evidence.candidates, notes,
+        evidence.candidates, list(notes),
     )  # fmt: skip
     return noted(found, narrow_note(result, ask=not lacking), *filter(None, [lacking]))
 

@@ -184,21 +184,16 @@ def recommend(
         If there is no inertia, friction's level is not identified, the drive is too weak for the motion, or the linear
         controller alone cannot be simulated or is unstable.
     """
-    j = inertia if inertia is not None else found.axis.get("inertia")
-    unit = found.unit("kg·m²")
-    if j is None:
-        raise InputError(f"{found.path} holds no inertia; give --inertia in {unit}")
-    if not 0.0 < j < math.inf:
-        raise InputError(f"inertia = {j:g} {unit} must be greater than 0; give another one with --inertia")
+    j = inertia_of(found, inertia)
     drive = with_motion(found, drive)
     refuse_unknown(found)
     refuse_weak(found, drive)
-    linear, start = drive.loop(float(j)), float(drive.path.position[0])
+    linear, start = drive.loop(j), float(drive.path.position[0])
     if not found.law_estimates[0]:
         axes = confirm = 0  # Nothing of the friction would be drawn.
     laws = laws_of(cautious(found))
     offset = float(found.axis.get("offset", 0.0) or 0.0)
-    fed = float(j) if feed_inertia and not linear.answers_to_acceleration else 0.0
+    fed = j if feed_inertia and not linear.answers_to_acceleration else 0.0
     settings = [replace(setting, offset=offset) for setting in settings_of(laws, drive, fed)]
     # Each with the linear controller alone; then leads, the guard and the gains beyond.
     more = (axes + 1) * (len(LEADS) + 1 + len(BEYOND)) + (confirm + 1) * (3 + len(BEYOND))
@@ -208,7 +203,7 @@ def recommend(
     def drawn(count: int, seed: int) -> Bench:
         own = drive.given  # Only of a loop that somebody runs is it known that it holds the axis.
         plants = plants_of(
-            found, float(j), (TRIES if own else 1) * count, seed, start, inertia is not None, drive.machine
+            found, j, (TRIES if own else 1) * count, seed, start, inertia is not None, drive.machine
         )
         return (Bench.held(plants, count, linear, drive, laws, account.one) if own
                 else Bench(list(plants), linear, drive, laws, account.one))  # fmt: skip
@@ -216,23 +211,11 @@ def recommend(
     bench, others = drawn(axes, seed), drawn(confirm, seed + 1)
     first = held(found, bench.before(0), drive)
     # By the axes of the confirmation, if there are more of them: what is said is then the same for any `axes`.
-    rung = rings_alone(max(others, bench, key=lambda b: len(b.plants)), float(j), found.unit("N·m"))
-    candidates: list[Candidate] = []
-    for setting in settings:
-        candidates.append(bench.judged(setting))
-        account.tried(len(candidates))
-    chosen, rejected, unsafe = confirmed(candidates, bench, others)
-    unsafe += [c.setting for c in candidates if c.unsafe]
-    candidates = [rejected.get(c.setting, c) for c in candidates]
-    margin, unsafe_gain = math.nan, math.inf
-    if chosen:
-        beyond = [on_both(replace(chosen.setting, gain=gain), bench, others) for gain in BEYOND]
-        candidates += beyond
-        unsafe += [c.setting for c in beyond if c.unsafe]
-        margin, unsafe_gain = margin_of(chosen.setting, unsafe, [c.setting for c in beyond if not c.unsafe])
+    rung = rings_alone(max(others, bench, key=lambda b: len(b.plants)), j, found.unit("N·m"))
+    chosen, candidates, margin, unsafe_gain = picked(settings, bench, others, account)
     beside, hunts = (), ""
     if compensators:
-        belief = belief_of(found.model, drive, float(j))
+        belief = belief_of(found.model, drive, j)
         beside = tried_beside(compensators, belief, bench, others, fed, offset)
         hunts = limit_cycle(chosen.setting.on(linear, laws[chosen.setting.law]), bench, 0) if chosen else ""
     account.end()
@@ -243,8 +226,25 @@ def recommend(
     return Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, linear.values(),
         first.moving["position_rms_rad"], margin, unsafe_gain, tuple(candidates), len(bench.plants),
-        tuple(notes), drive, rung, float(j), beside, hunts,
+        tuple(notes), drive, rung, j, beside, hunts,
     )  # fmt: skip
+
+
+def inertia_of(found: Identified, given: float | None) -> float:
+    """The inertia that was given, else the model's, kg·m².
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is not greater than 0.
+    """
+    j = given if given is not None else found.axis.get("inertia")
+    unit = found.unit("kg·m²")
+    if j is None:
+        raise InputError(f"{found.path} holds no inertia; give --inertia in {unit}")
+    if not 0.0 < j < math.inf:
+        raise InputError(f"inertia = {j:g} {unit} must be greater than 0; give another one with --inertia")
+    return float(j)
 
 
 def with_motion(found: Identified, drive: Drive) -> Drive:
@@ -309,6 +309,26 @@ def settings_of(laws: dict[str, Model], drive: Drive, inertia: float) -> Iterato
         for deadband in (0.0, drive.deadband(DEADBAND)) if drive.encoder_counts else (0.0,):
             for gain in GAINS:
                 yield Setting(law, "feedback", gain, deadband=deadband, inertia_feedforward=inertia)
+
+
+def picked(
+    settings: Sequence[Setting], bench: Bench, others: Bench, account: Account
+) -> tuple[Candidate | None, list[Candidate], float, float]:
+    """The setting to switch on, or None; all candidates, gains beyond its own too; its margin, and the lowest gain that
+    is not safe."""
+    candidates: list[Candidate] = []
+    for setting in settings:
+        candidates.append(bench.judged(setting))
+        account.tried(len(candidates))
+    chosen, rejected, unsafe = confirmed(candidates, bench, others)
+    unsafe += [c.setting for c in candidates if c.unsafe]
+    candidates = [rejected.get(c.setting, c) for c in candidates]
+    if chosen is None:
+        return None, candidates, math.nan, math.inf
+    beyond = [on_both(replace(chosen.setting, gain=gain), bench, others) for gain in BEYOND]
+    unsafe += [c.setting for c in beyond if c.unsafe]
+    margin, unsafe_gain = margin_of(chosen.setting, unsafe, [c.setting for c in beyond if not c.unsafe])
+    return chosen, [*candidates, *beyond], margin, unsafe_gain
 
 
 def alike(one: Setting, other: Setting) -> bool:
