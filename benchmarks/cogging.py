@@ -39,7 +39,7 @@ from stickslip.rigs.loop_sample import Control
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.cogging import Cogging
 from stickslip.rigs.virtual import VirtualRig
-from stickslip.simulation.machine import step
+from stickslip.simulation.machine import places
 
 NOISIER, COARSER = 4.0, 16
 """Of the machines without cogging: how often noise and steps of the encoder are greater."""
@@ -90,8 +90,8 @@ class Watched(VirtualRig):
             part = slice(done, done + EVERY)
             count = super().exchange_block(control, setpoints[part], rows[part])
             done += count
-            time = memory[step.TICK] * self.sample_time + memory[step.PAUSED]
-            self.seen.append((float(time), float(memory[step.FRICTION])))
+            time = memory[places.TICK] * self.sample_time + memory[places.PAUSED]
+            self.seen.append((float(time), float(memory[places.FRICTION])))
             if count < len(rows[part]):
                 break
         return done

@@ -15,15 +15,15 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.simulation.machine.layout import lay_out_machine, look, run, wait
+from stickslip.simulation.machine.layout import TOLERANCE, lay_out_machine, look, run, wait
 
 J = 4.2757e-4
 STIFF = Model("lugre", sigma0=2e4, sigma1=0.1, fs=0.335, fc=0.285, vs=0.01, sigma2=0.018)
 
 
-def moved(m, torques, substeps=0, laid=None):
+def moved(m, torques, tolerance=TOLERANCE, laid=None):
     """Measured rows, one per torque."""
-    laid = laid or lay_out_machine(m, substeps)
+    laid = laid or lay_out_machine(m, tolerance)
     rows = np.zeros((len(torques), 6))
     run(
         laid.numbers, laid.matrix, laid.memory, laid.parameters, laid.surroundings, laid.step, laid.holding,
@@ -33,8 +33,8 @@ def moved(m, torques, substeps=0, laid=None):
 
 
 @pytest.mark.parametrize("friction", ["thesis", "stiff"])
-def test_converges_to_the_adaptive_integrator_in_its_own_sub_step(friction):
-    """A torque by constants that breaks away, slides, reverses and sticks; halving the sub-step quarters the error."""
+def test_converges_to_the_adaptive_integrator_with_its_tolerance(friction):
+    """A torque by constants that breaks away, slides, reverses and sticks."""
     m = machine("ideal") if friction == "thesis" else Machine("stiff", J, Contact(STIFF))
     model = m.clutch
     scale = 1e9  # torque = kp (reference - position): held as long as the reference is, the position's part is 1e-9
@@ -52,12 +52,12 @@ def test_converges_to_the_adaptive_integrator_in_its_own_sub_step(friction):
     wanted = np.interp(np.arange(0.01, 0.5, 0.01), truth.time[grid], truth["position"][grid])
     torques = np.repeat(levels, 100)
     errors = []
-    for substeps in (8, 16, 32, 64):
-        rows = moved(m, torques, substeps)
+    for tolerance in (1e-5, 1e-6, 1e-7, 1e-10):
+        rows = moved(m, torques, tolerance)
         errors.append(float(np.max(np.abs(rows[9:-1:10, 1] - wanted))))
     assert errors[-1] < 2e-6
-    assert errors[1] < 0.35 * errors[0]
-    assert errors[2] < 0.35 * errors[1]
+    assert errors[0] > errors[1] > errors[2] > errors[3]
+    assert errors[2] < 0.1 * errors[0]
 
 
 @pytest.mark.parametrize("name", ["thesis-dry", "thesis-grease"])

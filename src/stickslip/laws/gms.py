@@ -105,28 +105,33 @@ def advance(v0: float, v1: float, dt: float, z: Any, p: Any) -> None:
     direction = 1.0
     if vm < 0.0:
         direction = -1.0
-    s0 = sliding(v0, p)
     s1 = sliding(v1, p)
-    rate_of_slip = p.c * dt / 6.0 * (1.0 / s0 + 4.0 / sliding(vm, p) + 1.0 / s1)
+    s0 = 0.0  # with the rate of slip, of use only where something slips
+    rate_of_slip = 0.0
     for i in range(len(p.k)):
         part = 1.0
-        start = s0
         if z.mode[i] * direction < 0.0:
             z.mode[i] = 0.0
         if z.mode[i] == 0.0:
-            gap0 = p.alpha[i] * s0 - load_of(direction, z.force[i])
             stuck = z.force[i] + p.k[i] * vm * dt
             gap1 = p.alpha[i] * s1 - load_of(direction, stuck)
             if gap1 > 0.0:
                 z.force[i] = stuck
                 part = 0.0
-            else:
+        if part > 0.0:
+            if s0 == 0.0:
+                s0 = sliding(v0, p)
+                rate_of_slip = p.c * dt / 6.0 * (1.0 / s0 + 4.0 / sliding(vm, p) + 1.0 / s1)
+            start = s0
+            if z.mode[i] == 0.0:
+                stuck = z.force[i] + p.k[i] * vm * dt
+                gap0 = p.alpha[i] * s0 - load_of(direction, z.force[i])
+                gap1 = p.alpha[i] * s1 - load_of(direction, stuck)
                 z.mode[i] = direction
                 if gap0 > 0.0:
                     part = gap1 / (gap1 - gap0)
                     z.force[i] = z.force[i] + (1.0 - part) * (stuck - z.force[i])
                     start = s0 + (1.0 - part) * (s1 - s0)
-        if part > 0.0:
             exponent = part * rate_of_slip
             gain = -math.expm1(-exponent)
             if exponent > 1e-4:

@@ -119,6 +119,13 @@ class Flow:
     held: Array
     rising: Array
 
+    def doubled(self) -> Flow:
+        """The flow over twice as long a step."""
+        return Flow(
+            self.moved @ self.moved, self.moved @ self.held + self.held,
+            0.5 * (self.moved @ self.rising + self.held + self.rising),
+        )  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False)
 class StateSpace:

@@ -6,7 +6,8 @@ from typing import Any
 
 from stickslip.jit import kernel
 from stickslip.rigs.loop_sample import Control, decide, finished
-from stickslip.simulation.machine.step import plant_of, sample
+from stickslip.simulation.machine.places import plant_of
+from stickslip.simulation.machine.step import sample
 
 __all__ = ["run_block"]
 

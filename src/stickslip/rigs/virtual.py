@@ -19,7 +19,7 @@ from stickslip.machines.machine import IMPERFECTIONS, Machine
 from stickslip.rigs._virtual import run_block
 from stickslip.rigs.loop_sample import Control
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
-from stickslip.simulation.machine import step as place
+from stickslip.simulation.machine import places as place
 from stickslip.simulation.machine.layout import lay_out_machine, look, run, wait
 
 __all__ = ["RIG", "VirtualRig", "virtual_rig"]
@@ -41,13 +41,11 @@ class VirtualRig:
     ----------
     machine : Machine
         With or without some of its imperfections (`Machine.without`).
-    substeps : int
-        Of a sample; 0 lets the machine choose.
     """
 
-    def __init__(self, machine: Machine, *, substeps: int = 0) -> None:
+    def __init__(self, machine: Machine) -> None:
         self.machine = machine
-        self.laid = lay_out_machine(machine, substeps)
+        self.laid = lay_out_machine(machine)
         given = machine.limits
         current = machine.amplifier.torque_constant * machine.amplifier.current_limit
         torque = given.get("torque", current if math.isfinite(current) else TORQUE)

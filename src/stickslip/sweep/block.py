@@ -15,9 +15,8 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.simulation import case_arrays
 from stickslip.simulation.accuracy import LOOSER, PERTURBATIONS
 from stickslip.simulation.closed_loop import REASONS, integrator_for, prepare
-from stickslip.simulation.machine.layout import lay_out_machine
+from stickslip.simulation.machine.layout import TOLERANCE
 from stickslip.simulation.machine.loop import simulate_machine
-from stickslip.simulation.machine.step import SUBSTEPS
 from stickslip.simulation.many import batch, simd_batch
 from stickslip.simulation.metrics import metrics as read_meter
 from stickslip.study.planned_run import PlannedRun
@@ -280,7 +279,7 @@ def _alone(
     try:
         run = varied(planned, values)
         if isinstance(run.axis, Machine):
-            return _on_machine(run, run.axis, metrics, FINER if perturbation else 0)
+            return _on_machine(run, run.axis, metrics, FINER * TOLERANCE if perturbation else TOLERANCE)
         case = _laid_out(run)
         name, integrate, _ = integrator_for(case, run.numerics.integrator)
     except ParameterError as error:
@@ -300,14 +299,13 @@ def _alone(
 
 
 def _on_machine(
-    run: PlannedRun, machine: Machine, metrics: Sequence[str], finer: int
+    run: PlannedRun, machine: Machine, metrics: Sequence[str], tolerance: float
 ) -> tuple[list[float], str, str]:
-    """The same of a machine; `finer` times its sub-steps, 0 for its own choice."""
-    parts = finer * int(lay_out_machine(machine).numbers[SUBSTEPS])
+    """The same of a machine; its sub-steps keep the tolerance."""
     try:
         record = simulate_machine(
             machine, run.control, run.motion, run.duration,
-            output=np.zeros(1), slip_rule=run.rule, substeps=parts,
+            output=np.zeros(1), slip_rule=run.rule, tolerance=tolerance,
         )  # fmt: skip
     except SimulationError as error:
         return [np.nan] * len(metrics), f"ended at {error.time:.6g} s: {error}", "machine"

@@ -24,9 +24,10 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.rigs.loop_sample import COLUMNS, Control, control_of, decide, finished
 from stickslip.rigs.rig import Limits, setpoints
-from stickslip.simulation.machine import step as places
+from stickslip.simulation.machine import places
 from stickslip.simulation.machine.layout import look
-from stickslip.simulation.machine.step import plant_of, sample
+from stickslip.simulation.machine.places import plant_of
+from stickslip.simulation.machine.step import sample
 
 __all__ = ["AT_REST", "Drive", "Plant", "Trial", "dangers", "rings", "run"]
 

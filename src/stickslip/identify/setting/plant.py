@@ -18,7 +18,7 @@ from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.machines.rigid import RigidAxis
-from stickslip.simulation.machine import step as places
+from stickslip.simulation.machine import places
 from stickslip.simulation.machine.layout import lay_out_machine
 
 __all__ = ["Plant", "arrays_of", "stand_at"]
@@ -81,6 +81,7 @@ def arrays_of(plant: RigidAxis, sample_time: float, counts: float) -> tuple[Any,
     waves = [(0.0, -own.offset, 0.0), *own.waves]
     numbers = np.concatenate([laid.numbers, np.array(waves).ravel()])
     numbers[places.COGS] += float(len(waves))
+    numbers[places.WAVES] = max(numbers[places.WAVES], *(abs(order) for order, _, _ in waves))
     return (
         numbers, laid.matrix, laid.memory, laid.parameters, laid.surroundings, laid.step, laid.holding,
     )  # fmt: skip

@@ -35,9 +35,10 @@ from stickslip.simulation.case_arrays import UNITS as OF_AXES_UNITS
 from stickslip.simulation.case_arrays import ruled, ruled_in, slip_rules
 from stickslip.simulation.compiled_controller import Sampled, compiled
 from stickslip.simulation.fixed.loop import NUDGE
-from stickslip.simulation.machine import step
-from stickslip.simulation.machine.layout import Laid, lay_out_machine, look
-from stickslip.simulation.machine.step import Plant, axis_itself, plant_of, sample
+from stickslip.simulation.machine import places as at
+from stickslip.simulation.machine.layout import TOLERANCE, Laid, lay_out_machine, look
+from stickslip.simulation.machine.places import Plant, plant_of
+from stickslip.simulation.machine.step import axis_itself, sample
 from stickslip.simulation.metrics import metrics, settle_band_of
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout
@@ -70,7 +71,7 @@ def simulate_machine(
     initial: tuple[float, float] = (0.0, 0.0),
     metered: bool = True,
     check: bool = False,
-    substeps: int = 0,
+    tolerance: float = TOLERANCE,
 ) -> Record:
     """Run a machine; arguments, record and errors as of `stickslip.simulate`.
 
@@ -79,10 +80,10 @@ def simulate_machine(
     output : float or array
         Spacing of the record's rows, s, a whole number of samples; or times of samples.
     check : bool
-        Whether the run is repeated with half the sub-steps' length (the noise is the same): ``meta["accuracy"]`` then
+        Whether the run is repeated at a hundredth of the tolerance (the noise is the same): ``meta["accuracy"]`` then
         says by how much both differ at most, ``error_rad``.
-    substeps : int
-        Of a sample; 0 lets the machine choose.
+    tolerance : float
+        Error in position that a sub-step may make by the end of its sample, rad.
 
     Returns
     -------
@@ -95,16 +96,16 @@ def simulate_machine(
     )
     control, told = sampled_on(controller, machine, slip_rule)
     places = rows_at(output, machine.sample_time, duration)
-    runs = [_run(own, control, reference, duration, places, initial, substeps)]
-    substeps_taken = int(runs[0].laid.numbers[step.SUBSTEPS])
+    runs = [_run(own, control, reference, duration, places, initial, tolerance)]
+    substeps = int(runs[0].laid.memory[at.TAKEN])
     if check and runs[0].code == 0:
-        runs.append(_run(own, control, reference, duration, places, initial, 2 * substeps_taken))
+        runs.append(_run(own, control, reference, duration, places, initial, 0.01 * tolerance))
     meta: dict[str, Any] = {
         "what": "simulation", "version": stickslip.__version__, "integrator": "machine", "slip_rule": slip_rule,
         "slip_rules": slip_rules(friction=own.contact.friction, **told.pop("laws")),
         "duration": duration, "ended": runs[0].ended, "inertia": machine.inertia,
         "friction": own.contact.friction.as_dict(), "machine": machine.as_dict(), "reference": reference.as_dict(),
-        "sample_time": machine.sample_time, "counts": {"samples": runs[0].samples, "substeps": substeps_taken}, **told,
+        "sample_time": machine.sample_time, "counts": {"samples": runs[0].samples, "substeps": substeps}, **told,
     }  # fmt: skip
     if learned := after(controller, runs[0].state, machine.sample_time):
         meta["learned"] = learned
@@ -200,10 +201,10 @@ class _Ran:
 
 def _run(
     machine: Machine, control: Sampled, reference: Reference, duration: float,
-    places: np.ndarray[Any, np.dtype[np.int64]], initial: tuple[float, float], substeps: int,
+    places: np.ndarray[Any, np.dtype[np.int64]], initial: tuple[float, float], tolerance: float,
 ) -> _Ran:  # fmt: skip
     """One run from rest in the contact."""
-    laid = lay_out_machine(machine, substeps)
+    laid = lay_out_machine(machine, tolerance)
     start_at(laid, initial)
     samples = math.floor(duration / machine.sample_time * (1.0 + 1e-12))
     own = control._replace(memory=control.memory.copy(), state=control.state.copy())
@@ -243,8 +244,8 @@ def _run(
 def start_at(laid: Laid, initial: tuple[float, float]) -> None:
     """Every inertia at this position, rad, and velocity, rad/s."""
     n, memory = laid.numbers, laid.memory
-    for place in {int(n[k]) for k in (step.ROTOR, step.SHAFT, step.DISK)} | {int(n[step.MODE])} - {0}:
-        memory[step.HEAD + place], memory[step.HEAD + place + 1] = initial
+    for place in {int(n[k]) for k in (at.ROTOR, at.SHAFT, at.DISK)} | {int(n[at.MODE])} - {0}:
+        memory[at.HEAD + place], memory[at.HEAD + place + 1] = initial
 
 
 # ---- the loop ---------------------------------------------------------------------------------------------------
@@ -263,7 +264,7 @@ def drive(
 ) -> int:  # fmt: skip
     """Controller and machine, sample by sample; `counts` gets the samples run and the rows written."""
     plant = plant_of(numbers, matrix, memory, parameters, surroundings, law, holding)
-    period = plant.numbers[step.SAMPLE]
+    period = plant.numbers[at.SAMPLE]
     begin, end, motion, nodes = np.zeros(ENDS), np.zeros(ENDS), np.zeros(3), np.zeros((SIGNALS, 5))
     now(plant, measured, begin)
     for k in range(samples + 1):
@@ -282,7 +283,7 @@ def drive(
         gather(accumulator, turns, k * period, period, begin, end, profile, reference, motion, nodes)
         begin[:] = end
         counts[0] = k + 1
-        if plant.memory[step.TRIPPED] != 0.0:
+        if plant.memory[at.TRIPPED] != 0.0:
             return TRIPPED
     close_standstill(accumulator, samples * period)
     return 0
