@@ -33,6 +33,11 @@ APART = {
 """What is not as in the reference, and by how much: open."""
 BRANCHES = {("sliding mode phi .5", "high_x1.3_exact")}
 """A start 1e-10 rad away moves the error by 0.2 %, so that rounding (the processor) decides; compared by the median."""
+RINGING = [
+    ("PD + dither .2", 1.3, 1e6, 6.9138e-3, 6.9157e-3), ("PID + dither .2", 1.3, 1e6, 0.29231e-3, 0.29269e-3),
+    ("PD + dither .2", 0.7, COUNTS, 1.0484e-3, 1.0512e-3),
+]  # fmt: skip
+"""Well-conditioned rows of the reference's table with an encoder (bands in rad), whose contact rings all the time."""
 STARTS = (0.0, 1e-12, -1e-12, 1e-11, -1e-11, 1e-10, -1e-10, 1e-9, -1e-9)
 """Rad; those by which the reference states its error bar, and between."""
 
@@ -94,8 +99,23 @@ def test_loops_with_encoder_and_delay_lie_in_the_band_of_the_reference(row):
     controller = ROWS[row]
     if "aligned" in row:  # the reference's knows of the delay
         controller = controller.with_values({"observer_delay": 1.0})
-    machine = Machine("thesis", INERTIA, Contact(axis(1.0)), encoder=Encoder(counts=COUNTS), delay=1.0)
-    phases = MORE_PHASES.get(row, PHASES)
-    starts = [(((k + 0.5) / phases - 0.5) * 2.0 * math.pi / COUNTS, 0.0) for k in range(phases)]
-    errors = [error_of(ss.simulate(machine, controller, LOW, 5.0, metered=False, initial=s)) for s in starts]
-    assert 0.9 * low <= np.median(errors) <= 1.1 * high
+    found = median_over_phases(controller, 1.0, COUNTS, 1.0, MORE_PHASES.get(row, PHASES))
+    assert 0.9 * low <= found <= 1.1 * high
+
+
+def median_over_phases(controller, scale, counts, delay, phases):
+    """Of the error RMS over the encoder's phases, rad: the same machine, begun at other places within a count."""
+    machine = Machine("thesis", INERTIA, Contact(axis(scale)), encoder=Encoder(counts=counts), delay=delay)
+    starts = [(((k + 0.5) / phases - 0.5) * 2.0 * math.pi / counts, 0.0) for k in range(phases)]
+    return np.median(
+        [error_of(ss.simulate(machine, controller, LOW, 5.0, metered=False, initial=s)) for s in starts]
+    )
+
+
+@pytest.mark.parametrize(("row", "scale", "counts", "low", "high"), RINGING)
+def test_a_machine_whose_contact_rings_is_that_of_the_reference(row, scale, counts, low, high):
+    """Dither makes it ring at 1.3 kHz, all the time; sub-steps that were not exact for a contact that sticks gave 8.11
+    instead of 6.91 mrad, and 0.485 instead of 0.293."""
+    delay = 1.0 if counts == COUNTS else 0.0
+    found = median_over_phases(ROWS[row], scale, counts, delay, PHASES)
+    assert 0.997 * low <= found <= 1.003 * high

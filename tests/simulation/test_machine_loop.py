@@ -152,6 +152,17 @@ def test_what_does_not_fit_a_machine_is_said(more: Any, controller: ss.Controlle
         ss.simulate(ideal(ss.Model("gms", **PLANT)), controller, SINE, 0.1, **more)
 
 
+def test_the_tolerance_of_a_run_is_that_of_its_sub_steps() -> None:
+    smooth = DRY.without("encoder-counts", "encoder-noise", "current-noise", "converters")
+    coarse, fine = (
+        ss.simulate(smooth, helped(ss.Feedforward, "gms"), SINE, 0.3, tolerance=tolerance).meta["counts"]
+        for tolerance in (1e-8, 1e-12)
+    )
+    assert fine["substeps"] > 2 * coarse["substeps"]
+    with pytest.raises(ParameterError, match="tolerance = 0 rad must be greater than 0"):
+        ss.simulate(smooth, ss.Controller(GAINS), SINE, 0.3, tolerance=0.0)
+
+
 def test_a_duration_of_nothing_is_refused() -> None:
     with pytest.raises(ParameterError, match="duration"):
         ss.simulate(DRY, ss.Controller(GAINS), SINE, math.nan)

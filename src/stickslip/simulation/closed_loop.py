@@ -47,6 +47,8 @@ MOST_STEPS = 1e9
 """Of a fixed length"""
 SAMPLE = 100.0
 """Bytes that the schedule of one sample takes while it is made"""
+ON_A_MACHINE = 100.0
+"""Tolerances that a sub-step of a machine may be wrong by; what its loop sees is coarser by far."""
 SHORTEST = 1e-9
 """s, of a run: one-sided limits are taken a thousandth of it beside kinks and ends."""
 
@@ -92,8 +94,7 @@ def simulate(
     ----------
     axis : RigidAxis or Machine
         A machine (`stickslip.load_machine`) runs with all its imperfections under the controller sampled at the
-        machine's rate; ``integrator``, ``tolerance`` and ``time_step`` are then of no account
-        (`stickslip.simulation.machine.loop`).
+        machine's rate; ``integrator`` and ``time_step`` are then of no account (`stickslip.simulation.machine.loop`).
     controller : Controller or SampledController
     reference : Reference
     duration : float
@@ -101,7 +102,8 @@ def simulate(
     integrator : {"auto", "exact", "adaptive", "sampled", "fixed"}
         "auto" takes the first that can run the case.
     tolerance : float
-        Position error that a well-conditioned run may gather, rad (exact, adaptive and sampled).
+        Position error that a well-conditioned run may gather, rad (exact, adaptive and sampled). A machine's sub-steps
+        are each within a hundred times that.
     time_step : float
         Longest step of the fixed integrator, s; it runs controllers in continuous time.
     slip_rule : {"signed", "literal"}, optional
@@ -138,6 +140,7 @@ def simulate(
         If the run diverges, leaves the finite numbers or switches without end; it says when and why, and its
         ``record`` holds what was computed.
     """
+    _insist_on_tolerance(tolerance)
     if isinstance(axis, Machine):
         check_machine_run(
             axis, controller, duration, output, integrator, initial=initial, slip_rule=slip_rule
@@ -146,6 +149,7 @@ def simulate(
         return machine_loop.simulate_machine(
             axis, controller, reference, duration,
             output=output, slip_rule=slip_rule, initial=initial, metered=metered, check=check,
+            tolerance=ON_A_MACHINE * tolerance,
         )  # fmt: skip
     case = prepare(
         axis, controller, reference, duration,
@@ -223,8 +227,7 @@ def prepare(
     metered: bool = True,
 ) -> Case:
     """Check the arguments of `simulate` and lay the loop out for an integrator's ``run``."""
-    if not (math.isfinite(tolerance) and tolerance > 0.0):
-        raise ParameterError(f"simulate: tolerance = {tolerance:g} rad must be greater than 0")
+    _insist_on_tolerance(tolerance)
     check_run(duration, initial, controller.sample_time)
     return lay_out(
         axis, controller, reference, float(duration),
@@ -276,6 +279,11 @@ def check_run(duration: float, initial: tuple[float, float], sample_time: float)
             SAMPLE * samples, f"simulate: {samples:.3g} steps of sample_time = {sample_time:g} s",
             "use a longer one or a shorter duration",
         )  # fmt: skip
+
+
+def _insist_on_tolerance(tolerance: float) -> None:
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise ParameterError(f"simulate: tolerance = {tolerance:g} rad must be greater than 0")
 
 
 def _insist_on_steps(name: str, step: float, duration: float) -> None:

@@ -103,7 +103,7 @@ def simulate_machine(
     meta: dict[str, Any] = {
         "what": "simulation", "version": stickslip.__version__, "integrator": "machine", "slip_rule": slip_rule,
         "slip_rules": slip_rules(friction=own.contact.friction, **told.pop("laws")),
-        "duration": duration, "ended": runs[0].ended, "inertia": machine.inertia,
+        "tolerance": tolerance, "duration": duration, "ended": runs[0].ended, "inertia": machine.inertia,
         "friction": own.contact.friction.as_dict(), "machine": machine.as_dict(), "reference": reference.as_dict(),
         "sample_time": machine.sample_time, "counts": {"samples": runs[0].samples, "substeps": substeps}, **told,
     }  # fmt: skip
