@@ -28,9 +28,11 @@ SPRINGS = 4
 
 # ---- what changes ---------------------------------------------------------------------------------------------
 (
-    TICK, PENDING, TRIPPED, WARMTH, FRICTION, BEARING_NOW, PAUSED, LEVEL, SPRING, SCALE, REST, RATE, TAKEN, SEARCH,
+    TICK, PENDING, TRIPPED, WARMTH, FRICTION, BEARING_NOW, PAUSED, LEVEL, SPRING, SCALE, REST, RATE, TAKEN, RIPPLE,
 ) = range(14)  # fmt: skip
+COG, SEARCH = RIPPLE + 5, RIPPLE + 10
 HEAD = SEARCH + len(ROOT.scalars)
+# From RIPPLE and from COG on an angle, value, slope and bend there of ripple and cogging, and whether they are known.
 # From SEARCH on what the root finder keeps; from HEAD on: the linear state (SIZE), the law's state (STATES), the law's
 # state after the sub-step that is tried and in its middle, a work vector (SIZE).
 

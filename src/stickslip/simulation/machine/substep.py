@@ -27,6 +27,7 @@ from stickslip.simulation.machine.places import (
     BEARING_K,
     BEARING_NOW,
     COARSEST,
+    COG,
     COGS,
     DISK,
     FINEST,
@@ -46,6 +47,7 @@ from stickslip.simulation.machine.places import (
     RATE,
     RESOLVING,
     REST,
+    RIPPLE,
     ROTOR,
     SAMPLE,
     SCALE,
@@ -82,6 +84,8 @@ STEADY = 0.25
 """Of the velocity, that a sub-step which does not resolve the contact's spring may change it by."""
 WAVE = 0.3
 """rad of the fastest ripple or cogging in a sub-step, which takes it at its middle."""
+NEAR = 0.02
+"""rad of the fastest ripple or cogging, within which both follow a parabola to a millionth of themselves."""
 CUT = 2.0
 """Tolerances: a sub-step that is wrong by that is halved."""
 X, INVERSE, ENOUGH = (ROOT.scalars.index(name) for name in ("x", "inverse", "enough"))
@@ -138,6 +142,24 @@ def harmonics(n: Any, first: int, count: int, angle: float) -> float:
     return total
 
 
+@kernel()
+def near(n: Any, memory: Any, kept: int, first: int, count: int, angle: float) -> float:
+    """The same from value, slope and bend at a kept angle, which are made anew where the angle has left it."""
+    away = angle - memory[kept]
+    if abs(away) * n[WAVES] > NEAR or memory[kept + 4] == 0.0:
+        value, slope, bend, away = 0.0, 0.0, 0.0, 0.0
+        for i in range(count):
+            at = first + 3 * i
+            phase = n[at] * angle + n[at + 2]
+            cosine = n[at + 1] * math.cos(phase)
+            value += cosine
+            slope -= n[at] * n[at + 1] * math.sin(phase)
+            bend -= n[at] * n[at] * cosine
+        memory[kept], memory[kept + 1], memory[kept + 2], memory[kept + 3] = angle, value, slope, bend
+        memory[kept + 4] = 1.0
+    return memory[kept + 1] + away * (memory[kept + 2] + 0.5 * away * memory[kept + 3])
+
+
 @kernel(inline=True)
 def rolled(n: Any, torque: float, distance: float) -> float:
     """The bearings' Coulomb torque after a displacement in one direction (Dahl 1968, exact)."""
@@ -160,10 +182,11 @@ def attempt(plant: Plant, drive: float, factor: float, spring: int, level: int) 
     memory[SEARCH + ENOUGH] = UNBALANCE / float(1 << level)
     scale, cog, bearing = factor, 0.0, 0.0
     if n[HARMONICS] > 0.0:
-        scale *= 1.0 + harmonics(n, NUMBERS, int(n[HARMONICS]), memory[disk] + 0.5 * h * memory[disk + 1])
+        angle = memory[disk] + 0.5 * h * memory[disk + 1]
+        scale *= 1.0 + near(n, memory, RIPPLE, NUMBERS, int(n[HARMONICS]), angle)
     if n[COGS] > 0.0:
         first = NUMBERS + 3 * int(n[HARMONICS])
-        cog = harmonics(n, first, int(n[COGS]), memory[rotor] + 0.5 * h * memory[rotor + 1])
+        cog = near(n, memory, COG, first, int(n[COGS]), memory[rotor] + 0.5 * h * memory[rotor + 1])
     if n[BEARING] > 0.0:
         bearing = rolled(n, memory[BEARING_NOW], 0.5 * h * memory[shaft + 1])
     memory[SCALE] = scale
