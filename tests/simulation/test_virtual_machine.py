@@ -12,6 +12,7 @@ from stickslip.control.linear import Gains
 from stickslip.machines.contact import Contact
 from stickslip.machines.files import machine
 from stickslip.machines.machine import Machine
+from stickslip.machines.motor import Amplifier
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
@@ -147,3 +148,19 @@ def test_singular_viscous_term_settles():
     m = machine("thesis-grease").without("current-noise", "encoder-counts", "encoder-noise", "converters")
     rows = moved(m, np.concatenate([np.full(200, 0.5), np.zeros(3000)]))
     assert np.ptp(rows[-500:, 1]) < 1e-6
+
+
+@pytest.mark.parametrize("law", ["coulomb", "static"])
+def test_a_contact_that_holds_lets_go_within_a_sample_when_the_torque_has_grown(law):
+    """Behind a current loop: the torque passes the level in the middle of a sample; at rest before, closed form."""
+    level, torque, corner = 0.2, 0.3, 150.0
+    values = {"fc": level, "sigma2": 0.0} | ({"fs": level} if law == "static" else {})
+    m = Machine("late", J, Contact(Model(law, **values)), amplifier=Amplifier(1.0, bandwidth=corner))
+    rate = 2.0 * np.pi * corner
+    leaves = -np.log(1.0 - level / torque) / rate
+    assert 1e-3 < leaves < 2e-3
+    rows = moved(m, np.full(20, torque))
+    t = 1e-3 * np.arange(1, 21) - leaves
+    gap = torque - level  # what is left to grow when it lets go: J dv/dt = gap (1 - exp(-rate t))
+    way = gap / J * (0.5 * t**2 - t / rate + (1.0 - np.exp(-rate * t)) / rate**2)
+    assert rows[:, 1] == pytest.approx(np.where(t > 0.0, way, 0.0), abs=1e-6)

@@ -333,12 +333,18 @@ def with_rest(plant: Plant, block: int, half: int, middle: float, speed: float, 
     v0, start = memory[disk + 1], memory[SCALE] * memory[FRICTION]
     first, last = gain(plant, block, 1, IN_FIRST), gain(plant, block, 1, IN_LAST)
     if v0 == 0.0:
-        side = 1.0 if base > 0.0 else -1.0
+        mean = base / (first + last)
+        early = speed / (gain(plant, half, 1, IN_FIRST) + gain(plant, half, 1, IN_LAST))
+        # At both ends, where the load grows evenly.
+        soon, late = 2.0 * early - mean, 3.0 * mean - 2.0 * early
+        side = 1.0 if late > 0.0 else -1.0
         held = held_at_rest(plant, side)
-        if abs(base) <= (first + last) * held:
-            return rests(plant, block, h, base / (first + last), base / (first + last), trial)
-        both = gain(plant, half, 1, IN_FIRST) + gain(plant, half, 1, IN_LAST)
-        if abs(speed) <= both * held:
+        if max(abs(mean), abs(late)) <= held:
+            rests(plant, block, h, mean, mean, trial)
+            memory[REST] = late
+            memory[HEAD + size + 3 * states + int(n[DISK])] = memory[disk]
+            return 0.0
+        if side * soon <= held and h * PARTS > 1.5 * n[SAMPLE]:
             return CUT
         start = side * held
     free = base - first * start
