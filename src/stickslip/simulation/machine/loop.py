@@ -91,9 +91,10 @@ def simulate_machine(
         ``meta["machine"]`` says which machine ran, and what was switched off; ``meta["learned"]`` what the controller
         has learned (`stickslip.control.learned`); there is no energy balance.
     """
-    own = replace(
-        machine, contact=replace(machine.contact, friction=ruled(machine.contact.friction, slip_rule))
-    )
+    own = machine
+    if slip_rule is not None:
+        friction = ruled(machine.contact.friction, slip_rule)
+        own = replace(machine, contact=replace(machine.contact, friction=friction))
     control, told = sampled_on(controller, machine, slip_rule)
     places = rows_at(output, machine.sample_time, duration)
     runs = [_run(own, control, reference, duration, places, initial, tolerance)]
