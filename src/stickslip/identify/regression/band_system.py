@@ -36,6 +36,7 @@ RISE, DEEPEST = -0.05, 2.0  # of Fc: bounds of A
 
 # Standard deviations of what no law holds, in parts of Fc.
 CURVE, AFTER, UNEVEN, LAGGING, AROUND = 0.002, 0.01, 0.03, 0.013, 0.005
+UNEVEN_FALL = 0.003  # of the fall of friction, which differs by direction as its level does
 LEANING, LEANS = (
     3,
     0.02,
@@ -117,7 +118,9 @@ def small_columns(records: Sequence[SlidingRows], fc: float, orders: Sequence[fl
     for scale in np.geomspace(slow, 0.5 * top, 4)[1:].tolist():
         slowly = np.exp(-speed / scale)
         columns += [pull * slowly, side * np.abs(pull) * slowly]
-        std += [LAGGING] * 2
+        # A fall that is not the same in both directions: the constant torque is half the difference of the levels.
+        columns.append(slowly)
+        std += [LAGGING, LAGGING, UNEVEN_FALL]
     for order in orders:
         columns += list(np.concatenate([r.around(order) for r in records]).T)
         std += [AROUND] * 2
