@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.machines.drivetrain import exponential
 from stickslip.simulation.case_arrays import (
     INERTIA,
     MAX_STEP,
@@ -56,8 +57,6 @@ SETTLED = 0.1
 """Of the torque that bends a bristle by the tolerance of a step: it then is bent as in steady sliding."""
 LEVEL = 1e-15
 """Of the curve, by which it may still vary where it counts as level."""
-TERMS = 14
-"""Of the series of exp(x): for |x| < 1/2 what is left out is below 1e-16."""
 
 
 def general_axis(case: Case) -> tuple[Any, Any, Any]:
@@ -190,19 +189,3 @@ def glide_of(a: Any) -> Array:
     if a["level"] > 0.0:  # else nothing slips against anything
         rate[2, 2], rate[2, 4] = -attraction / a["level"], attraction
     return exponential(rate * float(a["sample_time"]))[:3, 1:]
-
-
-def exponential(x: Array) -> Array:
-    """exp of a small matrix: the series of a part of it, squared.
-
-    SciPy solves equations for it, at which OpenBLAS wakes a thread and, where other programs keep the cores busy, waits
-    for it for milliseconds.
-    """
-    halvings = max(0, math.frexp(float(np.abs(x).sum(axis=1).max()))[1] + 1)
-    part, unit = x * 0.5**halvings, np.eye(len(x))
-    found = unit
-    for order in range(TERMS, 0, -1):
-        found = unit + part @ found / order
-    for _ in range(halvings):
-        found = found @ found
-    return found
