@@ -16,10 +16,10 @@ from scipy.linalg import expm
 import stickslip as ss
 from stickslip import plugins
 from stickslip.errors import Divergence, InputError
+from stickslip.machines.drivetrain import exponential
 from stickslip.simulation.case_arrays import DONE
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.sampled import engine as sampled
-from stickslip.simulation.sampled.axis import exponential
 
 J, TIME = 3.8623e-4, 1e-3
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
