@@ -1,0 +1,80 @@
+"""Compilation: the only package that imports numba.
+
+Kernels (the loops of the engines) are compiled once and cached in a folder named after the content of the
+package's own kernels, so that a cached kernel is never older than any function it calls. Laws and references
+are translated by `stickslip.subset` to a file named after its own content, compiled to functions with one C
+signature each, and handed to kernels as addresses: a kernel is compiled once, whatever laws it runs.
+"""
+
+from stickslip.jit.addresses import (
+    call_guarded,
+    call_guards,
+    call_holding,
+    call_profile,
+    call_rate,
+    call_sample,
+    call_step,
+    call_switch,
+    call_value,
+    pointer,
+    pointer_at,
+)
+from stickslip.jit.entries import (
+    LawPointers,
+    compile_entry,
+    compile_inner,
+    compiled_guarded,
+    compiled_kernels,
+    compiled_law,
+    compiled_notice,
+    compiled_profile,
+    compiled_sample,
+    compiled_step,
+    entries_of,
+    flat,
+    kernel,
+)
+from stickslip.jit.kept import cache_folder, loaded
+from stickslip.jit.simd import (
+    compile_inlined,
+    compile_lanes,
+    compiled_lanes,
+    exponential,
+    exponential_less_one,
+    select,
+)
+
+__all__ = [
+    "LawPointers",
+    "cache_folder",
+    "call_guarded",
+    "call_guards",
+    "call_holding",
+    "call_profile",
+    "call_rate",
+    "call_sample",
+    "call_step",
+    "call_switch",
+    "call_value",
+    "compile_entry",
+    "compile_inlined",
+    "compile_inner",
+    "compile_lanes",
+    "compiled_guarded",
+    "compiled_kernels",
+    "compiled_lanes",
+    "compiled_law",
+    "compiled_notice",
+    "compiled_profile",
+    "compiled_sample",
+    "compiled_step",
+    "entries_of",
+    "exponential",
+    "exponential_less_one",
+    "flat",
+    "kernel",
+    "loaded",
+    "pointer",
+    "pointer_at",
+    "select",
+]
