@@ -39,7 +39,6 @@ from stickslip.rigs.loop_sample import Control
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.cogging import Cogging
 from stickslip.rigs.virtual import VirtualRig
-from stickslip.simulation.machine import places
 
 NOISIER, COARSER = 4.0, 16
 """Of the machines without cogging: how often noise and steps of the encoder are greater."""
@@ -85,13 +84,13 @@ class Watched(VirtualRig):
 
     def exchange_block(self, control: Control, setpoints: Values, rows: Values) -> int:
         """Samples of the loop in short blocks, after each of which the contact is looked at."""
-        done, memory = 0, self.laid.memory
+        done, now = 0, self.laid.now
         while done < len(setpoints):
             part = slice(done, done + EVERY)
             count = super().exchange_block(control, setpoints[part], rows[part])
             done += count
-            time = memory[places.TICK] * self.sample_time + memory[places.PAUSED]
-            self.seen.append((float(time), float(memory[places.FRICTION])))
+            time = now["tick"] * self.sample_time + now["paused"]
+            self.seen.append((float(time), float(now["friction"])))
             if count < len(rows[part]):
                 break
         return done

@@ -13,7 +13,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.identify.setting.candidate_run import UNLIMITED, follow
-from stickslip.identify.setting.plant import arrays_of
+from stickslip.identify.setting.plant import laid_out
 from stickslip.machines.contact import Bearings, Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
@@ -158,15 +158,15 @@ def moving():
 def test_an_hour_at_rest_leaves_what_was_learned(row):
     controller = ROWS[row]
     control = control_of(controller, UNLIMITED, 1e-3)
-    arrays = arrays_of(ss.RigidAxis(INERTIA, friction()), 1e-3, COUNTS)
-    look(*arrays, control.measured)
+    laid = laid_out(ss.RigidAxis(INERTIA, friction()), 1e-3, COUNTS)
+    look(laid, control.measured)
 
     def run(position, velocity):
         path = setpoints(
             len(position), position=position, velocity=velocity, acceleration=0.0 * velocity, closed=1.0
         )
         positions = np.empty(len(path))
-        assert follow(*arrays, control, path, np.empty(len(COLUMNS)), positions) == len(path)
+        assert follow(laid, control, path, np.empty(len(COLUMNS)), positions) == len(path)
         return positions
 
     run(*moving())

@@ -10,7 +10,7 @@ import pytest
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import INPUTS, Chain, Drivetrain, LinearContact
 from stickslip.machines.files import machine
-from stickslip.simulation.machine import places
+from stickslip.simulation.machine import plant
 from stickslip.simulation.machine.layout import contact_spring, lay_out_machine
 
 FREQUENCY = np.array([0.5, 20.0, 290.0, 310.0, 800.0, 2750.0, 6000.0])
@@ -83,8 +83,8 @@ def test_the_virtual_machine_moves_by_this_flow(without):
     m = machine("thesis-grease").without(*without)
     laid, system = lay_out_machine(m), m.linear().state_space()
     n = len(system.states)
-    blocks = laid.matrix.reshape(-1, places.LEVELS, n, n + places.INPUTS)
-    for level in (0, 3, places.FINEST):
+    blocks = laid.matrix.reshape(-1, plant.LEVELS, n, n + plant.INPUTS)
+    for level in (0, 3, plant.FINEST):
         rows, flow = blocks[0, level], system.over(m.sample_time / 2**level)
         assert rows[:, :n] == pytest.approx(flow.moved, rel=1e-9, abs=1e-12)
         assert rows[:, n : n + 3] == pytest.approx(flow.held[:, :3], rel=1e-9, abs=1e-12)
@@ -98,11 +98,11 @@ def test_a_sticking_contact_is_a_spring_of_the_flow(without):
     stiff = contact_spring(m)
     system = m.linear(LinearContact(stiff)).state_space()
     n = len(system.states)
-    rows = laid.matrix.reshape(-1, places.LEVELS, n, n + places.INPUTS)[places.SPRINGS, 3]
+    rows = laid.matrix.reshape(-1, plant.LEVELS, n, n + plant.INPUTS)[plant.SPRINGS, 3]
     assert rows[:, :n] == pytest.approx(system.over(m.sample_time / 8).moved, rel=1e-8, abs=1e-9)
     angles = np.array([name.startswith("angle") or name == "mode" for name in system.states], dtype=float)
     # At rest about any angle it stays: what the spring pulls is taken back.
-    assert rows[:, :n] @ (3.0 * angles) + 3.0 * rows[:, n + places.IN_ANGLE] == pytest.approx(
+    assert rows[:, :n] @ (3.0 * angles) + 3.0 * rows[:, n + plant.IN_ANGLE] == pytest.approx(
         3.0 * angles, abs=1e-9
     )
 

@@ -26,10 +26,7 @@ def moved(m, torques, tolerance=TOLERANCE, laid=None):
     """Measured rows, one per torque."""
     laid = laid or lay_out_machine(m, tolerance)
     rows = np.zeros((len(torques), 6))
-    run(
-        laid.numbers, laid.matrix, laid.memory, laid.parameters, laid.surroundings, laid.step, laid.holding,
-        np.asarray(torques, dtype=np.float64), rows,
-    )  # fmt: skip
+    run(laid, np.asarray(torques, dtype=np.float64), rows)
     return rows
 
 
@@ -112,19 +109,10 @@ def test_pause_advances_drift_and_cools():
     m = machine("thesis-dry")
     laid = lay_out_machine(m)
     moved(m, np.full(3000, 0.45), laid=laid)
-    warm = laid.memory[3]
+    warm = float(laid.now["warmth"])
     wait(laid, 600.0)
     row = np.zeros(6)
-    look(
-        laid.numbers,
-        laid.matrix,
-        laid.memory,
-        laid.parameters,
-        laid.surroundings,
-        laid.step,
-        laid.holding,
-        row,
-    )
+    look(laid, row)
     assert row[0] == pytest.approx(603.0)
     assert row[4] - 20.0 == pytest.approx((warm - 20.0) * np.exp(-1.0), rel=1e-9)
 

@@ -18,6 +18,7 @@ from stickslip.jit.addresses import (
     call_value,
     pointer,
     pointer_at,
+    record_at,
 )
 from stickslip.jit.entries import (
     LawPointers,
@@ -33,6 +34,7 @@ from stickslip.jit.entries import (
     entries_of,
     flat,
     kernel,
+    spliced,
 )
 from stickslip.jit.kept import cache_folder, loaded
 from stickslip.jit.simd import (
@@ -76,5 +78,7 @@ __all__ = [
     "loaded",
     "pointer",
     "pointer_at",
+    "record_at",
     "select",
+    "spliced",
 ]

@@ -6,19 +6,16 @@ from typing import Any
 
 from stickslip.jit import kernel
 from stickslip.rigs.loop_sample import Control, decide, finished
-from stickslip.simulation.machine.places import plant_of
+from stickslip.simulation.machine.plant import Laid, plant_of
 from stickslip.simulation.machine.step import sample
 
 __all__ = ["run_block"]
 
 
 @kernel()
-def run_block(
-    numbers: Any, matrix: Any, memory: Any, parameters: Any, surroundings: Any, law: int, holding: int,
-    control: Control, setpoints: Any, rows: Any,
-) -> int:  # fmt: skip
+def run_block(laid: Laid, control: Control, setpoints: Any, rows: Any) -> int:
     """`stickslip.rigs.rig.BlockRig.exchange_block` on a machine; returns how many samples were run."""
-    plant = plant_of(numbers, matrix, memory, parameters, surroundings, law, holding)
+    plant = plant_of(laid)
     for k in range(setpoints.shape[0]):
         torque = decide(control, setpoints[k], rows[k])
         sample(plant, torque, control.measured)

@@ -19,7 +19,6 @@ from stickslip.machines.machine import IMPERFECTIONS, Machine
 from stickslip.rigs._virtual import run_block
 from stickslip.rigs.loop_sample import Control
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
-from stickslip.simulation.machine import places as place
 from stickslip.simulation.machine.layout import lay_out_machine, look, run, wait
 
 __all__ = ["RIG", "VirtualRig", "virtual_rig"]
@@ -55,10 +54,6 @@ class VirtualRig:
             following_error=given.get("following_error", math.inf), stop_time=given.get("stop_time", 0.02),
         )  # fmt: skip
         self._one, self._row = np.zeros(1), np.zeros((1, len(Measurement._fields)))
-        laid = self.laid
-        self._plant = (
-            laid.numbers, laid.matrix, laid.memory, laid.parameters, laid.surroundings, laid.step, laid.holding,
-        )  # fmt: skip
 
     @property
     def name(self) -> str:
@@ -85,18 +80,18 @@ class VirtualRig:
 
     def open(self) -> Measurement:
         """Measure, with zero torque; a machine that was closed goes on where it stood."""
-        look(*self._plant, self._row[0])
+        look(self.laid, self._row[0])
         return self._measured()
 
     def exchange(self, torque: float) -> Measurement:
         """One sample with a torque, N·m."""
         self._one[0] = torque
-        run(*self._plant, self._one, self._row)
+        run(self.laid, self._one, self._row)
         return self._measured()
 
     def exchange_block(self, control: Control, setpoints: Array, rows: Array) -> int:
         """Samples of the loop, compiled."""
-        return run_block(*self._plant, control, setpoints, rows)
+        return run_block(self.laid, control, setpoints, rows)
 
     def pause(self, seconds: float) -> Measurement:
         """Zero torque until the axis rests, then the clock alone.
@@ -112,7 +107,7 @@ class VirtualRig:
         rows = np.zeros((max(1, round(SETTLE / self.sample_time)), len(Measurement._fields)))
         width = len(rows) * self.sample_time
         while left >= width and (left > seconds - LONGEST_SETTLE or self.speed > AT_REST):
-            run(*self._plant, np.zeros(len(rows)), rows)
+            run(self.laid, np.zeros(len(rows)), rows)
             left -= width
             if self.speed < 1e-3 * AT_REST:
                 break
@@ -121,12 +116,12 @@ class VirtualRig:
 
     def close(self) -> None:
         """Nothing to disconnect; torque that was on its way is dropped."""
-        self.laid.memory[place.PENDING] = 0.0
+        self.laid.now["pending"] = 0.0
 
     @property
     def speed(self) -> float:
         """Of the friction disk, rad/s, as no sensor shows it."""
-        return abs(float(self.laid.memory[place.HEAD + int(self.laid.numbers[place.DISK]) + 1]))
+        return abs(float(self.laid.axis[int(self.laid.machine["disk"]) + 1]))
 
     def _measured(self) -> Measurement:
         return Measurement(*(float(x) for x in self._row[0]))

@@ -17,16 +17,15 @@ from stickslip.control.linear import Cascade, Gains, place
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
 from stickslip.identify.motion import HOLD, Motion, sinusoid
-from stickslip.identify.setting.plant import Plant, arrays_of, stand_at
+from stickslip.identify.setting.plant import Plant, laid_out
 from stickslip.identify.setting.swings import above, repeats, reversals, turns
 from stickslip.jit import kernel
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.rigs.loop_sample import COLUMNS, Control, control_of, decide, finished
 from stickslip.rigs.rig import Limits, setpoints
-from stickslip.simulation.machine import places
-from stickslip.simulation.machine.layout import look
-from stickslip.simulation.machine.places import plant_of
+from stickslip.simulation.machine.layout import look, stand_at
+from stickslip.simulation.machine.plant import Laid, plant_of
 from stickslip.simulation.machine.step import sample
 
 __all__ = ["AT_REST", "Drive", "Plant", "Trial", "dangers", "rings", "run"]
@@ -320,9 +319,9 @@ def followed(
 ) -> tuple[Array | None, Array]:
     """As `simulated`, and the state in which it leaves the controller's laws."""
     control = control_of(controller, UNLIMITED, controller.sample_time)
-    arrays = arrays_of(plant, controller.sample_time, controller.encoder_counts)
-    stand_at(start, arrays[0], arrays[2])
-    look(*arrays, control.measured)
+    laid = laid_out(plant, controller.sample_time, controller.encoder_counts)
+    stand_at(laid, start)
+    look(laid, control.measured)
     path = setpoints(
         len(reference),
         position=reference[:, 0],
@@ -331,21 +330,17 @@ def followed(
         closed=1.0,
     )
     positions = np.empty(len(path))
-    done = follow(*arrays, control, path, np.empty(len(COLUMNS)), positions)
+    done = follow(laid, control, path, np.empty(len(COLUMNS)), positions)
     ended = done == len(path) and bool(np.all(np.isfinite(positions)))
     return positions if ended else None, control.state
 
 
 @kernel()
-def follow(
-    numbers: Any, matrix: Any, memory: Any, parameters: Any, surroundings: Any, law: int, holding: int,
-    control: Control, path: Any, row: Any, positions: Any,
-) -> int:  # fmt: skip
+def follow(laid: Laid, control: Control, path: Any, row: Any, positions: Any) -> int:
     """The loop of `stickslip.rigs._virtual.run_block`, that keeps the axis's own positions; how many samples ran."""
-    plant = plant_of(numbers, matrix, memory, parameters, surroundings, law, holding)
-    shaft = places.HEAD + int(numbers[places.SHAFT])
+    plant = plant_of(laid)
     for k in range(path.shape[0]):
-        positions[k] = memory[shaft]
+        positions[k] = plant.axis[plant.machine.shaft]
         torque = decide(control, path[k], row)
         sample(plant, torque, control.measured)
         if finished(control):

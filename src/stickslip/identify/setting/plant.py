@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -18,10 +17,9 @@ from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.machines.rigid import RigidAxis
-from stickslip.simulation.machine import places
-from stickslip.simulation.machine.layout import lay_out_machine
+from stickslip.simulation.machine.layout import Laid, lay_out_machine
 
-__all__ = ["Plant", "arrays_of", "stand_at"]
+__all__ = ["Plant", "laid_out"]
 
 
 @dataclass(frozen=True)
@@ -73,21 +71,14 @@ class Plant(RigidAxis):
         )  # fmt: skip
 
 
-def arrays_of(plant: RigidAxis, sample_time: float, counts: float) -> tuple[Any, ...]:
-    """Arrays of a machine at rest that is this axis, as the machine engine takes them."""
+def laid_out(plant: RigidAxis, sample_time: float, counts: float) -> Laid:
+    """A machine at rest that is this axis, as the machine engine takes it."""
     own = plant if isinstance(plant, Plant) else Plant(plant.inertia, plant.friction)
     laid = lay_out_machine(own.built(sample_time, counts))
     laid.surroundings[1], laid.surroundings[2] = plant.load, plant.temperature
-    waves = [(0.0, -own.offset, 0.0), *own.waves]
-    numbers = np.concatenate([laid.numbers, np.array(waves).ravel()])
-    numbers[places.COGS] += float(len(waves))
-    numbers[places.WAVES] = max(numbers[places.WAVES], *(abs(order) for order, _, _ in waves))
-    return (
-        numbers, laid.matrix, laid.memory, laid.parameters, laid.surroundings, laid.step, laid.holding,
-    )  # fmt: skip
-
-
-def stand_at(position: float, numbers: Any, memory: Any) -> None:
-    """Put the whole machine at rest at a position, rad: its inertias, and what the encoder shows."""
-    for place in (places.ROTOR, places.SHAFT, places.DISK, places.MODE):
-        memory[places.HEAD + int(numbers[place])] = position
+    n = laid.machine
+    beside = [(0.0, -own.offset, 0.0), *own.waves]
+    known = laid.waves[: 3 * int(n["ripples"] + n["cogs"])]
+    n["cogs"] += len(beside)
+    n["order"] = max(n["order"], *(abs(order) for order, _, _ in beside))
+    return laid._replace(waves=np.concatenate([known, np.array(beside).ravel()]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,28 @@ import numpy as np
 from stickslip.jit import compiled_law, flat, kernel
 from stickslip.machines.drivetrain import INPUTS, Flow, StateSpace
 from stickslip.machines.machine import Machine
-from stickslip.simulation.machine import places as at
-from stickslip.simulation.machine.places import FINEST, LEVELS, SPRINGS, plant_of
+from stickslip.simulation.machine.plant import (
+    FINEST,
+    IN_ANGLE,
+    IN_BEARING,
+    IN_COG,
+    IN_FIRST,
+    IN_LAST,
+    IN_MOTOR,
+    LEVELS,
+    MACHINE,
+    NOW,
+    SPRINGS,
+    Laid,
+    plant_of,
+)
+from stickslip.simulation.machine.plant import INPUTS as COLUMNS
 from stickslip.simulation.machine.step import measure, sample
+from stickslip.simulation.root import ROOT
 from stickslip.simulation.root import compiled as root
 from stickslip.spec import Surroundings
 
-__all__ = ["CHANNELS", "Laid", "lay_out_machine", "look", "run", "wait"]
+__all__ = ["CHANNELS", "Laid", "lay_out_machine", "look", "run", "stand_at", "wait"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -34,19 +49,6 @@ ROUNDING, LEAST = 1e-8, 0.1
 """Of a velocity above 0.1 rad/s, to which ends that enclose a jump approach."""
 TOLERANCE = 1e-7
 """rad, in position, which one sub-step may be wrong by at the end of the sample."""
-
-
-@dataclass(frozen=True, eq=False)
-class Laid:
-    """Flat arrays: what `stickslip.simulation.machine.step.plant_of` makes a `Plant` of; ``memory`` changes."""
-
-    numbers: Array
-    matrix: Array
-    memory: Array
-    parameters: Array
-    surroundings: Array
-    step: int
-    holding: int
 
 
 def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE) -> Laid:
@@ -66,20 +68,22 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE) -> Laid:
     resolving = halvings(machine.sample_time * math.sqrt(stiff / disk_of(machine)) / RESOLVED)
     unresolved = resolving > UNRESOLVABLE
     places, matrix = transition(machine, 0.0 if unresolved else stiff)
-    numbers = numbers_of(machine, states, places, tolerance)
-    numbers[at.STIFFNESS], numbers[at.UNRESOLVED] = stiff, float(unresolved)
-    numbers[at.RESOLVING] = min(resolving, UNRESOLVABLE)
+    numbers, memory = np.zeros(1, MACHINE), np.zeros(1, NOW)
+    n, now = numbers[0], memory[0]
+    write_numbers(n, machine, places, tolerance)
+    n["states"], n["stiffness"], n["unresolved"] = states, stiff, unresolved
+    n["resolving"] = min(resolving, UNRESOLVABLE)
     if unresolved:
-        numbers[at.COARSEST] = UNRESOLVABLE
-    memory = np.zeros(at.HEAD + 2 * places["size"] + 3 * states)
-    memory[at.WARMTH] = machine.contact.heat.ambient
-    memory[at.SCALE] = 1.0
-    memory[at.SPRING] = 0.0 if unresolved or stiff == 0.0 else SPRINGS
-    root.ready(memory[at.SEARCH : at.HEAD], 1.0, ROUNDING, LEAST, 1.0)
-    memory[at.HEAD + places["size"] : at.HEAD + places["size"] + states] = state[:states]
+        n["coarsest"] = UNRESOLVABLE
+    now["warmth"], now["scale"] = machine.contact.heat.ambient, 1.0
+    now["spring"] = 0 if unresolved or stiff == 0.0 else SPRINGS
+    search, contact = np.zeros(len(ROOT.scalars)), np.zeros(max(3 * states, 1))
+    root.ready(search, 1.0, ROUNDING, LEAST, 1.0)
+    contact[:states] = state[:states]
     return Laid(
-        numbers, matrix, memory, flat(model.law.pack(model.parameters)),
-        np.array(Surroundings()), pointers.step, pointers.holding,
+        numbers.view(np.float64), memory.view(np.float64), waves_of(machine), matrix, search,
+        np.zeros(2 * places["size"]), contact, flat(model.law.pack(model.parameters)), np.array(Surroundings()),
+        pointers.step, pointers.holding,
     )  # fmt: skip
 
 
@@ -114,7 +118,7 @@ def transition(machine: Machine, stiff: float) -> tuple[dict[str, int], Array]:
         "lag": place_of("torque", system), "mode": place_of("mode", system), "size": len(system.states),
     }  # fmt: skip
     size = places["size"]
-    out = np.zeros((SPRINGS + 1 if stiff > 0.0 else 1, LEVELS, size, size + at.INPUTS))
+    out = np.zeros((SPRINGS + 1 if stiff > 0.0 else 1, LEVELS, size, size + COLUMNS))
     for part in range(out.shape[0]):
         spring = stiff * part / SPRINGS
         a = system.a.copy()
@@ -130,11 +134,11 @@ def columns(out: Array, flow: Flow, spring: float) -> None:
     """Write one flow as `stickslip.simulation.machine.substep` reads it."""
     size = out.shape[0]
     out[:, :size] = flow.moved
-    for column, source in ((at.IN_MOTOR, "command"), (at.IN_COG, "motor"), (at.IN_BEARING, "encoder")):
+    for column, source in ((IN_MOTOR, "command"), (IN_COG, "motor"), (IN_BEARING, "encoder")):
         out[:, size + column] = flow.held[:, INPUTS.index(source)]
     held, rising = flow.held[:, INPUTS.index("load")], flow.rising[:, INPUTS.index("load")]
-    out[:, size + at.IN_FIRST], out[:, size + at.IN_LAST] = held - rising, rising
-    out[:, size + at.IN_ANGLE] = spring * held
+    out[:, size + IN_FIRST], out[:, size + IN_LAST] = held - rising, rising
+    out[:, size + IN_ANGLE] = spring * held
 
 
 def place_of(name: str, system: StateSpace) -> int:
@@ -142,41 +146,39 @@ def place_of(name: str, system: StateSpace) -> int:
     return system.states.index(name) if name in system.states else 0
 
 
-def numbers_of(machine: Machine, states: int, places: dict[str, int], tolerance: float) -> Array:
-    """The fixed numbers of a machine, in the order of `stickslip.simulation.machine.places`."""
+def write_numbers(n: Any, machine: Machine, places: dict[str, int], tolerance: float) -> None:
+    """Fill in a machine's `MACHINE`, but for what its contact's stiffness decides."""
     amplifier, encoder, sensor = machine.amplifier, machine.encoder, machine.sensor
     contact, heat, bearings = machine.contact, machine.contact.heat, machine.contact.bearings
-    ripple, cogging = contact.ripple, machine.cogging
-    n = np.zeros(at.NUMBERS + 3 * (len(ripple.order) + len(cogging.order)))
     values = {
-        at.SAMPLE: machine.sample_time, at.SIZE: places["size"], at.STATES: states,
-        at.KT: amplifier.torque_constant, at.LIMIT: min(amplifier.current_limit, 1e300),
-        at.COMMAND_STEP: amplifier.command.step, at.MONITOR_STEP: amplifier.monitor.step,
-        at.CURRENT_NOISE: amplifier.current_noise, at.MONITOR_NOISE: amplifier.monitor_noise,
-        at.DELAY: math.floor(math.ldexp(machine.delay, FINEST) + 0.5), at.LAGS: places["lag"], at.SEED: machine.seed,
-        at.COUNT: 2.0 * math.pi / encoder.counts if encoder.counts > 0.0 else 0.0,
-        at.JITTER: encoder.noise, at.MODE: places["mode"], at.MODE_SHARE: encoder.mode_share,
-        at.SENSOR_STEP: sensor.converter.step, at.SENSOR_NOISE: sensor.noise,
-        at.MAX_SPEED: min(encoder.max_speed, 1e300), at.DRIFT: contact.drift.change,
-        at.DRIFT_TIME: contact.drift.time, at.KAPPA: heat.coefficient, at.T_REFERENCE: heat.reference,
-        at.T_AMBIENT: heat.ambient, at.HEATING: heat.resistance,
-        at.HEAT_KEPT: math.exp(-machine.sample_time / heat.time), at.HEAT_TIME: heat.time,
-        at.BEARING: bearings.coulomb, at.BEARING_K: bearings.stiffness, at.ROTOR: places["rotor"],
-        at.SHAFT: places["shaft"], at.DISK: places["disk"], at.HARMONICS: len(ripple.order),
-        at.COGS: len(cogging.order), at.VISCOUS: bearings.viscous,
-        at.DRIFT_BEGIN: contact.drift.begin, at.COARSEST: halvings(bearing_parts(machine)),
-        at.WEIGHT: 2.0 / 3.0 * machine.sample_time / (disk_of(machine) * tolerance), at.STRAY: 1.0 / tolerance,
-        at.WAVES: max((abs(order) for order in (*ripple.order, *cogging.order)), default=0.0),
+        **places, "ripples": len(contact.ripple.order), "cogs": len(machine.cogging.order),
+        "coarsest": halvings(bearing_parts(machine)), "seed": machine.seed,
+        "delay": math.floor(math.ldexp(machine.delay, FINEST) + 0.5), "sample_time": machine.sample_time,
+        "torque_constant": amplifier.torque_constant, "current_limit": min(amplifier.current_limit, 1e300),
+        "command_step": amplifier.command.step, "monitor_step": amplifier.monitor.step,
+        "current_noise": amplifier.current_noise, "monitor_noise": amplifier.monitor_noise,
+        "count": 2.0 * math.pi / encoder.counts if encoder.counts > 0.0 else 0.0, "encoder_noise": encoder.noise,
+        "mode_share": encoder.mode_share, "max_speed": min(encoder.max_speed, 1e300),
+        "sensor_step": sensor.converter.step, "sensor_noise": sensor.noise, "drift": contact.drift.change,
+        "drift_time": contact.drift.time, "drift_begin": contact.drift.begin, "heat_coefficient": heat.coefficient,
+        "heat_reference": heat.reference, "ambient": heat.ambient, "heating": heat.resistance,
+        "heat_kept": math.exp(-machine.sample_time / heat.time), "heat_time": heat.time,
+        "bearing": bearings.coulomb, "bearing_stiffness": bearings.stiffness, "viscous": bearings.viscous,
+        "weight": 2.0 / 3.0 * machine.sample_time / (disk_of(machine) * tolerance), "stray": 1.0 / tolerance,
+        "order": max((abs(o) for o in (*contact.ripple.order, *machine.cogging.order)), default=0.0),
     }  # fmt: skip
-    for place, value in values.items():
-        n[place] = value
+    for name, value in values.items():
+        n[name] = value
+
+
+def waves_of(machine: Machine) -> Array:
+    """Order, amplitude and phase of every harmonic: the contact's ripple, then the cogging."""
     rows = [
         (order, amplitude, phase + order * machine.start_angle)
-        for part in (ripple, cogging)
+        for part in (machine.contact.ripple, machine.cogging)
         for order, amplitude, phase in zip(part.order, part.amplitude, part.phase, strict=True)
     ]
-    n[at.NUMBERS :] = np.array(rows, dtype=np.float64).ravel()
-    return n
+    return flat(np.array(rows, dtype=np.float64).ravel())
 
 
 def bearing_parts(machine: Machine) -> float:
@@ -192,29 +194,28 @@ def bearing_parts(machine: Machine) -> float:
 
 
 @kernel()
-def run(
-    numbers: Any, matrix: Any, memory: Any, parameters: Any, surroundings: Any, law: int, holding: int,
-    torques: Any, rows: Any,
-) -> None:  # fmt: skip
+def run(laid: Laid, torques: Any, rows: Any) -> None:
     """One sample per torque; what is measured after it goes to the rows."""
-    plant = plant_of(numbers, matrix, memory, parameters, surroundings, law, holding)
+    plant = plant_of(laid)
     for k in range(torques.size):
         sample(plant, torques[k], rows[k])
 
 
 @kernel()
-def look(
-    numbers: Any, matrix: Any, memory: Any, parameters: Any, surroundings: Any, law: int, holding: int,
-    row: Any,
-) -> None:  # fmt: skip
+def look(laid: Laid, row: Any) -> None:
     """Measure without moving."""
-    plant = plant_of(numbers, matrix, memory, parameters, surroundings, law, holding)
-    measure(plant, 0.0, 1.0, row)
+    measure(plant_of(laid), 0.0, 1.0, row)
 
 
 def wait(laid: Laid, seconds: float) -> None:
     """Let the clock pass with zero torque at rest: drift goes on, the contact cools, nothing moves."""
-    n, m = laid.numbers, laid.memory
-    m[at.PAUSED] += seconds
-    kept = math.exp(-seconds / n[at.HEAT_TIME])
-    m[at.WARMTH] = n[at.T_AMBIENT] + (m[at.WARMTH] - n[at.T_AMBIENT]) * kept
+    n, now = laid.machine, laid.now
+    now["paused"] += seconds
+    now["warmth"] = n["ambient"] + (now["warmth"] - n["ambient"]) * math.exp(-seconds / n["heat_time"])
+
+
+def stand_at(laid: Laid, position: float, velocity: float = 0.0) -> None:
+    """Every inertia, and what the encoder shows, at this position, rad, and velocity, rad/s; the contact unloaded."""
+    n = laid.machine
+    for place in {int(n[k]) for k in ("rotor", "shaft", "disk")} | {int(n["mode"])} - {0}:
+        laid.axis[place], laid.axis[place + 1] = position, velocity

@@ -35,9 +35,8 @@ from stickslip.simulation.case_arrays import UNITS as OF_AXES_UNITS
 from stickslip.simulation.case_arrays import ruled, ruled_in, slip_rules
 from stickslip.simulation.compiled_controller import Sampled, compiled
 from stickslip.simulation.fixed.loop import NUDGE
-from stickslip.simulation.machine import places as at
-from stickslip.simulation.machine.layout import TOLERANCE, Laid, lay_out_machine, look
-from stickslip.simulation.machine.places import Plant, plant_of
+from stickslip.simulation.machine.layout import TOLERANCE, lay_out_machine, look, stand_at
+from stickslip.simulation.machine.plant import Laid, Plant, plant_of
 from stickslip.simulation.machine.step import axis_itself, sample
 from stickslip.simulation.metrics import metrics, settle_band_of
 from stickslip.spec import Surroundings
@@ -98,7 +97,7 @@ def simulate_machine(
     control, told = sampled_on(controller, machine, slip_rule)
     places = rows_at(output, machine.sample_time, duration)
     runs = [_run(own, control, reference, duration, places, initial, tolerance)]
-    substeps = int(runs[0].laid.memory[at.TAKEN])
+    substeps = int(runs[0].laid.now["taken"])
     if check and runs[0].code == 0:
         runs.append(_run(own, control, reference, duration, places, initial, 0.01 * tolerance))
     meta: dict[str, Any] = {
@@ -206,26 +205,17 @@ def _run(
 ) -> _Ran:  # fmt: skip
     """One run from rest in the contact."""
     laid = lay_out_machine(machine, tolerance)
-    start_at(laid, initial)
+    stand_at(laid, *initial)
     samples = math.floor(duration / machine.sample_time * (1.0 + 1e-12))
     own = control._replace(memory=control.memory.copy(), state=control.state.copy())
     measured = np.zeros(6)
-    plant = (
-        laid.numbers,
-        laid.matrix,
-        laid.memory,
-        laid.parameters,
-        laid.surroundings,
-        laid.step,
-        laid.holding,
-    )
-    look(*plant, measured)
+    look(laid, measured)
     rows = np.zeros((places.size, len(COLUMNS)))
     accumulator = new_meter(samples * machine.sample_time, settle_band_of(reference, duration))
     turns, counts = np.zeros((4096, 2)), np.zeros(2, dtype=np.int64)
     around, kind = np.array(Surroundings()), reference.kind
     code = drive(
-        *plant, own, compiled_profile(kind.name, kind.profile, Layout.of(kind.fields, counted=True)),
+        laid, own, compiled_profile(kind.name, kind.profile, Layout.of(kind.fields, counted=True)),
         flat(kind.pack(reference.parameters)), around,
         samples, places, measured, rows, accumulator, turns, counts,
     )  # fmt: skip
@@ -242,13 +232,6 @@ def _run(
     )
 
 
-def start_at(laid: Laid, initial: tuple[float, float]) -> None:
-    """Every inertia at this position, rad, and velocity, rad/s."""
-    n, memory = laid.numbers, laid.memory
-    for place in {int(n[k]) for k in (at.ROTOR, at.SHAFT, at.DISK)} | {int(n[at.MODE])} - {0}:
-        memory[at.HEAD + place], memory[at.HEAD + place + 1] = initial
-
-
 # ---- the loop ---------------------------------------------------------------------------------------------------
 
 AT, SPEED, FRICTION, MOTOR, COMPENSATING, ENDS = range(6)
@@ -259,13 +242,12 @@ TRIPPED, NO_NUMBER = 1, 2
 
 @kernel()
 def drive(
-    numbers: Any, matrix: Any, memory: Any, parameters: Any, surroundings: Any, law: int, holding: int,
-    control: Sampled, profile: int, reference: Any, around: Any, samples: int, places: Any, measured: Any, rows: Any,
-    accumulator: Any, turns: Any, counts: Any,
+    laid: Laid, control: Sampled, profile: int, reference: Any, around: Any, samples: int, places: Any,
+    measured: Any, rows: Any, accumulator: Any, turns: Any, counts: Any,
 ) -> int:  # fmt: skip
     """Controller and machine, sample by sample; `counts` gets the samples run and the rows written."""
-    plant = plant_of(numbers, matrix, memory, parameters, surroundings, law, holding)
-    period = plant.numbers[at.SAMPLE]
+    plant = plant_of(laid)
+    period = plant.machine.sample_time
     begin, end, motion, nodes = np.zeros(ENDS), np.zeros(ENDS), np.zeros(3), np.zeros((SIGNALS, 5))
     now(plant, measured, begin)
     for k in range(samples + 1):
@@ -284,7 +266,7 @@ def drive(
         gather(accumulator, turns, k * period, period, begin, end, profile, reference, motion, nodes)
         begin[:] = end
         counts[0] = k + 1
-        if plant.memory[at.TRIPPED] != 0.0:
+        if plant.now.tripped != 0:
             return TRIPPED
     close_standstill(accumulator, samples * period)
     return 0

@@ -15,48 +15,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel
-from stickslip.simulation.machine.places import (
-    BEARING_NOW,
-    COMMAND_STEP,
-    COUNT,
-    CURRENT_NOISE,
-    DELAY,
-    DISK,
-    DRIFT,
-    DRIFT_BEGIN,
-    DRIFT_TIME,
-    FINEST,
-    FRICTION,
-    HARMONICS,
-    HEAD,
-    HEAT_KEPT,
-    HEATING,
-    JITTER,
-    KAPPA,
-    KT,
-    LAGS,
-    LIMIT,
-    MAX_SPEED,
-    MODE,
-    MODE_SHARE,
-    MONITOR_NOISE,
-    MONITOR_STEP,
-    NUMBERS,
-    PAUSED,
-    PENDING,
-    SAMPLE,
-    SEED,
-    SENSOR_NOISE,
-    SENSOR_STEP,
-    SHAFT,
-    T_AMBIENT,
-    T_REFERENCE,
-    TICK,
-    TRIPPED,
-    VISCOUS,
-    WARMTH,
-    Plant,
-)
+from stickslip.simulation.machine.plant import FINEST, Plant
 from stickslip.simulation.machine.substep import cross, harmonics
 
 OVERSPEED = 33792.0  # 8400h of CiA 402: velocity speed controller
@@ -74,10 +33,10 @@ def mixed(x: Any) -> Any:
 
 
 @kernel()
-def gaussian(seed: float, tick: float, channel: int) -> float:
+def gaussian(seed: int, tick: int, channel: int) -> float:
     """A standard normal number for this sample and channel (Box and Muller 1958)."""
-    key = mixed(np.uint64(np.int64(seed)) + np.uint64(0x9E3779B97F4A7C15))
-    key = mixed(key + np.uint64(np.int64(tick)) * np.uint64(0x9E3779B97F4A7C15))
+    key = mixed(np.uint64(seed) + np.uint64(0x9E3779B97F4A7C15))
+    key = mixed(key + np.uint64(tick) * np.uint64(0x9E3779B97F4A7C15))
     key = mixed(key + np.uint64(channel))
     first = (np.float64(key >> np.uint64(11)) + 0.5) * 1.1102230246251565e-16
     second = np.float64(mixed(key) >> np.uint64(11)) * 1.1102230246251565e-16
@@ -96,21 +55,21 @@ def converted(x: float, step: float) -> float:
 @kernel()
 def sample(plant: Plant, torque: float, measured: Any) -> None:
     """Let a torque command (N·m) act for a sample, and measure."""
-    n, memory = plant.numbers, plant.memory
-    x, tick = HEAD, memory[TICK]
-    demand = converted(torque / n[KT], n[COMMAND_STEP])
-    demand = min(max(demand, -n[LIMIT]), n[LIMIT])
-    before, memory[PENDING] = memory[PENDING], demand
-    noise = n[CURRENT_NOISE] * gaussian(n[SEED], tick, 0) if n[CURRENT_NOISE] > 0.0 else 0.0
-    on = n[KT] if memory[TRIPPED] == 0.0 else 0.0
-    late, old, new = int(n[DELAY]), on * (before + noise), on * (demand + noise)
-    factor = state_factor(n, tick * n[SAMPLE] + memory[PAUSED], memory[WARMTH])
+    n, now = plant.machine, plant.now
+    tick, x = now.tick, plant.axis
+    demand = converted(torque / n.torque_constant, n.command_step)
+    demand = min(max(demand, -n.current_limit), n.current_limit)
+    before, now.pending = now.pending, demand
+    noise = n.current_noise * gaussian(n.seed, tick, 0) if n.current_noise > 0.0 else 0.0
+    on = n.torque_constant if now.tripped == 0 else 0.0
+    late, old, new = n.delay, on * (before + noise), on * (demand + noise)
+    factor = state_factor(n, tick * n.sample_time + now.paused, now.warmth)
     power = cross(plant, old, new, late, factor)
-    if abs(memory[x + int(n[SHAFT]) + 1]) > n[MAX_SPEED] or not math.isfinite(memory[x + int(n[DISK])]):
-        memory[TRIPPED] = 1.0
-    warm = n[T_AMBIENT] + n[HEATING] * max(factor * power, 0.0)
-    memory[WARMTH] = warm + (memory[WARMTH] - warm) * n[HEAT_KEPT]
-    memory[TICK] = tick + 1.0
+    if abs(x[n.shaft + 1]) > n.max_speed or not math.isfinite(x[n.disk]):
+        now.tripped = 1
+    warm = n.ambient + n.heating * max(factor * power, 0.0)
+    now.warmth = warm + (now.warmth - warm) * n.heat_kept
+    now.tick = tick + 1
     measure(plant, new if late < 1 << FINEST else old, factor, measured)
 
 
@@ -118,53 +77,51 @@ def sample(plant: Plant, torque: float, measured: Any) -> None:
 def state_factor(n: Any, time: float, temperature: float) -> float:
     """What drift and temperature make of friction."""
     factor = 1.0
-    if n[DRIFT] != 0.0:
-        factor -= n[DRIFT] * math.expm1(-max(time - n[DRIFT_BEGIN], 0.0) / n[DRIFT_TIME])
-    if n[KAPPA] != 0.0:
-        factor *= math.exp(n[KAPPA] * (temperature - n[T_REFERENCE]))
+    if n.drift != 0.0:
+        factor -= n.drift * math.expm1(-max(time - n.drift_begin, 0.0) / n.drift_time)
+    if n.heat_coefficient != 0.0:
+        factor *= math.exp(n.heat_coefficient * (temperature - n.heat_reference))
     return factor
 
 
 @kernel()
 def measure(plant: Plant, drive: float, factor: float, measured: Any) -> None:
     """Write time, position, motor torque, sensor torque, temperature and status as the sensors see them now."""
-    n, memory = plant.numbers, plant.memory
-    x, tick = HEAD, memory[TICK]
-    shaft, mode = int(n[SHAFT]), int(n[MODE])
-    angle = memory[x + shaft]
-    if mode > 0:
-        angle += n[MODE_SHARE] * (memory[x + mode] - angle)
-    if n[JITTER] > 0.0:
-        angle += n[JITTER] * gaussian(n[SEED], tick, 1)
-    current = (memory[x + int(n[LAGS])] if n[LAGS] > 0.0 else drive) / n[KT]
-    if n[MONITOR_NOISE] > 0.0:
-        current += n[MONITOR_NOISE] * gaussian(n[SEED], tick, 2)
+    n, now = plant.machine, plant.now
+    tick, x = now.tick, plant.axis
+    angle = x[n.shaft]
+    if n.mode > 0:
+        angle += n.mode_share * (x[n.mode] - angle)
+    if n.encoder_noise > 0.0:
+        angle += n.encoder_noise * gaussian(n.seed, tick, 1)
+    current = (x[n.lag] if n.lag > 0 else drive) / n.torque_constant
+    if n.monitor_noise > 0.0:
+        current += n.monitor_noise * gaussian(n.seed, tick, 2)
     sensor = contact_torque(plant, factor)
-    if n[SENSOR_NOISE] > 0.0:
-        sensor += n[SENSOR_NOISE] * gaussian(n[SEED], tick, 3)
-    measured[0] = tick * n[SAMPLE] + memory[PAUSED]
-    measured[1] = converted(angle, n[COUNT])
-    measured[2] = n[KT] * converted(current, n[MONITOR_STEP])
-    measured[3] = converted(sensor, n[SENSOR_STEP])
-    measured[4] = memory[WARMTH]
-    measured[5] = OVERSPEED if memory[TRIPPED] != 0.0 else 0.0
+    if n.sensor_noise > 0.0:
+        sensor += n.sensor_noise * gaussian(n.seed, tick, 3)
+    measured[0] = tick * n.sample_time + now.paused
+    measured[1] = converted(angle, n.count)
+    measured[2] = n.torque_constant * converted(current, n.monitor_step)
+    measured[3] = converted(sensor, n.sensor_step)
+    measured[4] = now.warmth
+    measured[5] = OVERSPEED if now.tripped != 0 else 0.0
 
 
 @kernel(inline=True)
 def contact_torque(plant: Plant, factor: float) -> float:
     """Friction of the contact now, with its ripple and what drift and temperature make of it, N·m."""
-    n, memory = plant.numbers, plant.memory
+    n, now = plant.machine, plant.now
     ripple = 1.0
-    if n[HARMONICS] > 0.0:
-        ripple += harmonics(n, NUMBERS, int(n[HARMONICS]), memory[HEAD + int(n[DISK])])
-    return factor * ripple * memory[FRICTION]
+    if n.ripples > 0:
+        ripple += harmonics(plant.waves, 0, n.ripples, plant.axis[n.disk])
+    return factor * ripple * now.friction
 
 
 @kernel()
 def axis_itself(plant: Plant, out: Any) -> None:
     """Position and velocity at the encoder's inertia, and all friction that acts, as no sensor shows them."""
-    n, memory = plant.numbers, plant.memory
-    factor = state_factor(n, memory[TICK] * n[SAMPLE] + memory[PAUSED], memory[WARMTH])
-    shaft = HEAD + int(n[SHAFT])
-    out[0], out[1] = memory[shaft], memory[shaft + 1]
-    out[2] = contact_torque(plant, factor) + memory[BEARING_NOW] + n[VISCOUS] * memory[shaft + 1]
+    n, now = plant.machine, plant.now
+    factor = state_factor(n, now.tick * n.sample_time + now.paused, now.warmth)
+    out[0], out[1] = plant.axis[n.shaft], plant.axis[n.shaft + 1]
+    out[2] = contact_torque(plant, factor) + now.bearing + n.viscous * out[1]
