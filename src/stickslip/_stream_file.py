@@ -87,12 +87,13 @@ class StreamFile:
     def foreign(self) -> str:
         """What another process did to the file, in a word; empty where nothing shows."""
         if not self.lost:
-            found = os.fstat(self._file)
+            # Head before size: cut in between, the head alone would seem to be overwritten.
+            head, found = os.pread(self._file, HEAD.size, 0), os.fstat(self._file)
             if found.st_nlink == 0:
                 self.lost = "removed"
             elif found.st_size < self._size:
                 self.lost = "shortened"
-            elif os.pread(self._file, HEAD.size, 0) != self._head():
+            elif head != self._head():
                 self.lost = "overwritten"
         return self.lost
 
