@@ -67,6 +67,8 @@ class Part:
     failure: str = ""
     errors: list[tuple[float, float]] = field(default_factory=list[Any])
     """Force error, and that of plain regression: on the part itself, then on the others."""
+    controlled: bool = False
+    """Whether plain regression finds a friction below 0: the torque is what a controller makes of the velocity."""
     seconds: float = 0.0
 
 
@@ -162,6 +164,7 @@ def identified(task: tuple[str, ServoAxis, list[Experiment], int, bool]) -> Part
             n: (plain[p], QUANTILE * float(plain.robust_std[plain.names.index(p)]))
             for n, p in NAMES.items() if plain.has(p)
         }  # fmt: skip
+        part.controlled = any(part.plain[n][0] < -part.plain[n][1] for n in ("fc", "sigma2"))
     except StickslipError as error:
         plain, part.failure = None, f"plain: {error}"
     try:
@@ -217,7 +220,7 @@ def told(sets: dict[str, list[Part]]) -> None:
     plain_agree: dict[str, list[bool]] = defaultdict(list)
     kept: dict[str, list[bool]] = defaultdict(list)
     stable: list[bool] = []
-    ratios: dict[str, list[tuple[float, str]]] = {"training": [], "held out": []}
+    ratios: dict[str, list[tuple[float, str, bool]]] = {"training": [], "held out": []}
     for name, parts in sets.items():
         print(f"\n{name}: {', '.join(p.law or '-' for p in parts)}")
         for p in parts:
@@ -233,7 +236,7 @@ def told(sets: dict[str, list[Part]]) -> None:
             print("  force error / plain: " + " ".join(f"{100 * a:.2f}/{100 * b:.2f}" for a, b in p.errors))
             for k, (a, b) in enumerate(p.errors):
                 if math.isfinite(a / b):
-                    ratios["training" if k == 0 else "held out"].append((a / b, p.name))
+                    ratios["training" if k == 0 else "held out"].append((a / b, p.name, p.controlled))
         if all(p.law for p in parts):
             stable.append(len({p.law for p in parts}) == 1)
         for a, b in itertools.combinations(parts, 2):
@@ -266,8 +269,9 @@ def told(sets: dict[str, list[Part]]) -> None:
         if of:
             worst = sorted(of)[::-1]
             over = [x for x in worst if x[0] > MORE]
-            print(f"force error over {MORE} of plain, {title}: {len(over)} of {len(of)}; "
-                  f"{', '.join(f'{x:.2f} ({n})' for x, n in over[:8])}")  # fmt: skip
+            print(f"force error over {MORE} of plain, {title}: {len(over)} of {len(of)}, "
+                  f"{sum(c for _, _, c in over)} of them where plain's friction is below 0; "
+                  f"{', '.join(f'{x:.2f} ({n})' for x, n, _ in over[:8])}")  # fmt: skip
 
 
 def main() -> None:

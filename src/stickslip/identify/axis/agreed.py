@@ -201,7 +201,7 @@ def agreed(
         )
     if found.doubt:
         out = tuple(replace(e, identified=False, verdict=found.doubt) if e.identified else e for e in out)
-        notes.append(f"Nothing is identified: {found.doubt}. Record gentler motion.")
+        notes.append(f"Nothing is identified: {found.doubt}.")
     return out, notes
 
 

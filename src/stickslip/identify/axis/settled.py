@@ -62,6 +62,12 @@ KEPT = (
     "Inertia and friction stay those of certain sliding: within its intervals nothing comes near the force error of "
     "plain least squares, whose numbers it refutes (what play and reversals do is in them)."
 )
+CONTROLLER = (
+    "Plain least squares leaves less of the torque, {plain:.3g} % against {own:.3g} %, with {names} below 0, which "
+    "no friction is: such a torque is made from the velocity by a controller. Record moves under position control."
+)
+SURE = 3.0
+"""Standard deviations below 0 from which on a friction of plain least squares is one that cannot be."""
 TURNS = 5
 """Rounds in which curve and levels are brought together."""
 
@@ -242,16 +248,29 @@ def settled(
             (moved, less), where = followed or (chosen, error), "within"
             notes = [] if followed else [KEPT]
         if less < error:
-            chosen, asked = moved, set(held)
+            chosen, error, before, asked = moved, less, error, set(held)
             notes = [
                 f"Of the values {where} their intervals those are given that explain the whole record best, reversals "
                 f"included: relative force error {100.0 * less:.3g} %, at the middle of the intervals "
-                f"{100.0 * error:.3g} %."
+                f"{100.0 * before:.3g} %."
             ]
+    notes += made_by_a_controller(inverse, error)
     out = (placed(e, chosen, inverse, e.name in asked) for e in estimates)
     if refuted_by is None:
         return tuple(out), notes
     return tuple(told_alone(e, values["fc"]) if e.name == "fc" else e for e in out), notes
+
+
+def made_by_a_controller(inverse: InverseDynamics, error: float) -> list[str]:
+    """That plain least squares explains more by a friction that cannot be, in a sentence; nothing where it does not.
+
+    Under proportional speed control the torque falls with the velocity, whatever the friction.
+    """
+    below = [n for n in ("fc", "fv") if inverse[n] < -SURE * inverse.robust_std[inverse.names.index(n)]]
+    if not below or error <= ALIKE * inverse.relative_error:
+        return []
+    names = " and ".join({"fc": "Coulomb friction", "fv": "viscous friction"}[n] for n in below)
+    return [CONTROLLER.format(plain=100.0 * inverse.relative_error, own=100.0 * error, names=names)]
 
 
 def told_alone(e: Estimate, own: float) -> Estimate:

@@ -49,6 +49,17 @@ LEVEL_UNTOLD = (
     "extrapolated: friction may still fall at the highest recorded speeds, and viscous friction is not told apart "
     "from it"
 )
+APART = (
+    "the axis does not follow its torque as one inertia does: what its acceleration needs is unsure to {share:.2g} of "
+    "Fc; record gentler motion"
+)
+UNMOVED = (
+    "the torque shows neither the pendulum's inertia nor its weight, which move it all the same: it is what a "
+    "controller makes of the velocity (bang-bang, energy shaping), not what friction needs; record moves under "
+    "position control"
+)
+SWUNG = 0.5
+"""rad that a pendulum must swing for its weight to be looked for in the torque."""
 QUANTILE = 1.96
 ROTATED = {"gravity_sin", "gravity_cos"}
 
@@ -117,12 +128,16 @@ class Regression:
         inertia, level = self.numbers["inertia"], abs(self.numbers["fc"].value)
         usual = float(np.sqrt(np.mean(stacked(self.rows, "fixed")[:, 0] ** 2)))
         unsure = QUANTILE * inertia.std * usual
-        if unsure <= UNSURE * level:
-            return ""
-        return (
-            f"the axis does not follow its torque as one inertia does: what its acceleration needs is unsure to "
-            f"{unsure / max(level, 1e-300):.2g} of Fc"
-        )
+        if unsure > UNSURE * level:
+            return APART.format(share=unsure / max(level, 1e-300))
+        swings = self.numbers.keys() >= ROTATED and np.ptp(stacked(self.rows, "position")) >= SWUNG
+        unseen = ("inertia", *sorted(ROTATED))
+        return UNMOVED if swings and not any(self.above_chance(n) for n in unseen) else ""
+
+    def above_chance(self, name: str) -> bool:
+        """Whether a number differs from 0 by more than its interval."""
+        low, high = self.interval(name)
+        return low > 0.0 or high < 0.0
 
     @property
     def level_doubt(self) -> str:
