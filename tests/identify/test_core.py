@@ -204,6 +204,23 @@ def test_correlated_residuals_widen_the_interval() -> None:
     )
 
 
+def test_correlations_of_what_is_hardly_told_apart_stay_within_one() -> None:
+    """Two parameters whose columns differ by 1e-10 of themselves, with correlated residuals."""
+    rng = np.random.default_rng(3)
+    x = np.linspace(0.0, 1.0, 400)
+    noise = np.convolve(rng.normal(0.0, 0.01, x.size), np.full(5, 0.2), mode="same")
+    vector = Vector(Model("coulomb", fc=0.3, sigma2=0.01))
+
+    def residuals(u: np.ndarray) -> np.ndarray:
+        return np.sin(x + 1.0) * float(np.sum(u)) + 1e-10 * x * float(u[0]) + noise
+
+    found = fit(residuals, vector, noise=None, profiles=False, lags=10)
+    correlation = found.correlation
+    assert np.array_equal(correlation, correlation.T)
+    assert np.diag(correlation) == pytest.approx(1.0, abs=1e-12)
+    assert np.all(np.abs(correlation) <= 1.0 + 1e-12)
+
+
 def test_criteria_prefer_the_true_order_and_cross_validation_agrees() -> None:
     x = np.linspace(-1.0, 1.0, 40)
     y = 1.0 + x + 3.0 * x**2 + np.random.default_rng(6).normal(0.0, 0.1, x.size)

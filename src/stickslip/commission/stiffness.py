@@ -166,8 +166,8 @@ def within_total(found: Identification, spread: float) -> tuple[list[Estimate], 
     """Stiffnesses and shares of the elements, given their sums; with their correlation.
 
     One loop hardly tells the elements apart, but it does tell their total stiffness, and their shares add up to 1. As a
-    normal distribution of the logarithms: the fit's own, where it set limits, and no element beyond the total, given
-    that the sums, linear around the estimate, are known.
+    normal distribution of the logarithms: the fit's own, where it set limits; else each by itself, and no element beyond
+    the total; given that the sums, linear around the estimate, are known.
 
     Parameters
     ----------
@@ -187,7 +187,9 @@ def within_total(found: Identification, spread: float) -> tuple[list[Estimate], 
     std = np.array([own_spread(e, t) for e, t in zip(own, total.tolist(), strict=True)])
     places = [known[n] for n in kept]
     matrix = found.correlation[np.ix_(places, places)]
-    prior = std[:, None] * np.where(np.isfinite(matrix), matrix, np.eye(len(own))) * std[None, :]
+    # What has no limits is cut to the total: how it went with the others beyond that says nothing of it here.
+    told = np.all(np.isfinite(matrix), axis=1) & [e.lower > 0.0 and math.isfinite(e.upper) for e in own]
+    prior = std[:, None] * np.where(told & told[:, None], matrix, np.eye(len(own))) * std[None, :]
     # Weights of the logarithms in those of both sums.
     sums = np.array([np.where(k_rows, value / total, 0.0), np.where(k_rows, 0.0, value / total)])
     gain = prior @ sums.T @ np.linalg.pinv(sums @ prior @ sums.T, hermitian=True)

@@ -25,13 +25,18 @@ FARTHEST = 12.0
 
 def inverse_information(jacobian: Array) -> tuple[Array, Any]:
     """Inverse of J'J and, per coordinate, whether the data determine it at all to first order."""
+    root, seen = inverse_root(jacobian)
+    return root @ root.T, seen
+
+
+def inverse_root(jacobian: Array) -> tuple[Array, Any]:
+    """R with R R' = inverse of J'J, and what `inverse_information` says of each coordinate."""
     size = np.linalg.norm(jacobian, axis=0)
     weights = np.where(size > 0.0, size, 1.0)
     _, s, vt = np.linalg.svd(jacobian / weights, full_matrices=False)
     kept = s > 1e-13 * max(float(s[0]) if s.size else 0.0, 1e-300)
-    inverse = (vt[kept].T / s[kept] ** 2) @ vt[kept]
     lost = np.sum(vt[~kept] ** 2, axis=0) + (vt.shape[0] < vt.shape[1]) * (1.0 - np.sum(vt**2, axis=0))
-    return inverse / np.outer(weights, weights), (lost < 1e-8) & (size > 0.0)
+    return vt[kept].T / s[kept] / weights[:, None], (lost < 1e-8) & (size > 0.0)
 
 
 def long_run(scores: Array, lags: int) -> Array:

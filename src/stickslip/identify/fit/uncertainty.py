@@ -25,7 +25,7 @@ from stickslip.identify.fit.levenberg_marquardt import (
 )
 from stickslip.identify.fit.noise import Noise, as_noise, noise_of_fit, quantile
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
-from stickslip.identify.fit.profile import Profiles, inverse_information, long_run, profiles_of
+from stickslip.identify.fit.profile import Profiles, inverse_root, long_run, profiles_of
 
 __all__ = ["Fit", "fit", "verdict_on"]
 
@@ -183,21 +183,19 @@ def follow_profiles(
 
 def covariance_of(vector: Vector, best: Optimum, noise: Noise, lags: int) -> tuple[Array, Array]:
     """Covariance and correlation of the free values."""
-    inverse, seen = inverse_information(best.jacobian)
+    root, seen = inverse_root(best.jacobian)
     if lags > 0:
-        inner = long_run(best.jacobian * best.residuals[:, None], lags)
-        spread = inverse @ inner @ inverse
+        inner = root.T @ long_run(best.jacobian * best.residuals[:, None], lags) @ root
+        sizes, ways = np.linalg.eigh(0.5 * (inner + inner.T))
+        root = root @ (ways * np.sqrt(np.maximum(sizes, 0.0)))
     else:
-        spread = inverse * noise.std**2
-    spread[~seen, :] = spread[:, ~seen] = math.nan
+        root = root * noise.std
     change = vector.jacobian(best.u)
-    covariance = np.zeros((change.shape[0], change.shape[0]))
-    for i in range(change.shape[0]):
-        for j in range(change.shape[0]):
-            used = np.outer(change[i], change[j]) != 0.0
-            covariance[i, j] = float(np.sum(np.where(used, np.outer(change[i], change[j]) * spread, 0.0)))
-    variance = np.diag(covariance)  # where one is negative, rounding decides
-    std = np.sqrt(np.where(variance >= 0.0, variance, np.nan))
+    moved = change @ root
+    moved[np.any(change[:, ~seen] != 0.0, axis=1)] = math.nan
+    # As squares: where the data hardly tell two values apart, rounding would make correlations beyond 1.
+    covariance = moved @ moved.T
+    std = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance / np.outer(std, std)
     return covariance, correlation
