@@ -165,9 +165,9 @@ def with_stiffness(found: Identification, record: Record, resolution: float) -> 
 def within_total(found: Identification, spread: float) -> tuple[list[Estimate], Array]:
     """Stiffnesses and shares of the elements, given their sums; with their correlation.
 
-    One loop hardly tells the elements apart, but it does tell their total stiffness, and their shares add up to 1. As a
-    normal distribution of the logarithms: the fit's own, where it set limits; else each by itself, and no element beyond
-    the total; given that the sums, linear around the estimate, are known.
+    One loop hardly tells the elements apart, but it does tell their total stiffness, and their shares add up to 1. As
+    a normal distribution of the logarithms: the fit's own, where it set limits; else each by itself, and no element
+    beyond the total; given that the sums, linear around the estimate, are known.
 
     Parameters
     ----------
