@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,6 +45,7 @@ TENSION, FAR = (
     6.0,
 )  # standard deviations: viscous friction below 0 at most; above 0, where the bound does nothing
 MEMORY = 3.0  # rows over which it is correlated at least
+MOVES = 0.3  # of a torque over the position, by which it moves what accelerates where its orders are not told apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +152,23 @@ def fit_band(
         )
         torque = system.torque(at)
         candidates = system.candidates(torque, at)
-    return summed_up(system, torque, candidates, weight, at, stribeck, len(orders), pendulum)
+    out = summed_up(system, torque, candidates, weight, at, stribeck, len(orders), pendulum)
+    if not (blurred and orders):
+        return out
+    most_likely = candidates[int(np.argmax(weight))]
+    return replace(out, numbers=out.numbers | {"inertia": beside_waves(out, system, torque, most_likely)})
+
+
+def beside_waves(found: BandFit, system: System, torque: Array, candidate: Candidate) -> Number:
+    """The inertia where a torque over the position was found whose orders the way is too short to tell apart.
+
+    The loop answers that torque, so that it accelerates the axis in step with what the motor gives: what of it goes to
+    a wrong order passes for inertia.
+    """
+    waves = slice(system.core - 2 * len(found.harmonics), system.core)
+    around = system.residual(torque, candidate) + system.columns[:, waves] @ candidate.values[waves]
+    inertia, size = found.numbers["inertia"], float(np.linalg.norm(around)) / system.scale[INERTIA]
+    return Number(inertia.value, math.hypot(inertia.std, MOVES * size))
 
 
 def brakes(values: Array, covariance: Array) -> tuple[Array, Array]:

@@ -22,8 +22,9 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 MOST = 8
 HIGHEST_ORDER, PARTS = 60, 40
-WHOLE_TURN = 0.75
-"""Of a turn, from which on orders are whole numbers a turn; below, halves of the way travelled."""
+WHOLE_TURN = 0.5
+"""Of a turn, from which on orders are whole numbers a turn; below, halves of the way travelled: here both lie as
+densely."""
 OWN = 0.05
 """Part of a harmonic that no other column explains, at least."""
 SURE = 8.0
