@@ -76,7 +76,7 @@ def test_a_train_keeps_its_springs_and_gets_the_drawn_inertia_and_friction():
 
 
 def test_drawn_axes_stand_at_other_angles_of_the_machine():
-    found = replace(identified(), misfit={"force_rms": 0.01})
+    found = replace(identified(), misfit={"sliding_rms_Nm": 0.01})
     drawn = list(plants_of(found, INERTIA, 4, 1, machine=DRY))
     assert drawn[0].machine is DRY
     assert len({p.machine.start_angle for p in drawn}) == len({p.machine.seed for p in drawn}) == 5

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.regression import Regression, regress_axis
 from stickslip.machines.servo import ServoAxis
@@ -60,3 +61,11 @@ def test_moves_tell_inertia_beside_cogging_on_a_short_way_too(logs: Any) -> None
     log = logs.draw(820016, "held", 1000, "p-pi", "steps", "cogging")
     low, high = told(log).interval("inertia")
     assert low < log.truth["inertia"] < high < 1.2 * low
+
+
+def test_an_identification_says_how_much_torque_it_leaves_cogging_among_it(logs: Any) -> None:
+    log = logs.draw(97, "held", 1000, "p-pi", "staircase", "cogging", orders=(4, 12, 24))
+    found = identify_axis([Experiment("log", log.time, log.position, log.torque)], AXIS, ["coulomb"])
+    cogging = math.sqrt(0.5 * float((log.machine.sizes[:, 0] ** 2).sum()))
+    assert found.misfit["sliding_rms_Nm"] == pytest.approx(cogging, rel=0.3)
+    assert found.misfit_unit("sliding_rms_Nm") == "N·m"

@@ -21,7 +21,6 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.uncertainty import RATIO, verdict_on
-from stickslip.identify.regression.bands import rough
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import FALLS, QUANTILE, Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
@@ -281,10 +280,7 @@ def as_good(inverse: InverseDynamics, found: Regression, times: float = AS_GOOD)
         "offset": inverse.offset,
     }
     gravity = {n: inverse[n] for n in ("gravity_sin", "gravity_cos") if inverse.has(n)}
-    own = {n: x.value for n, x in found.numbers.items()}
-    if found.shows_a_fall and not rough(found.bands[0]):
-        own |= {"vs": found.vs.value}
-    return found.widened == 1.0 and found.left_by(values | gravity) <= times * found.left_by(own)
+    return found.widened == 1.0 and found.left_by(values | gravity) <= times * found.left
 
 
 def held_together(

@@ -58,6 +58,8 @@ def assembled(
     if inverse is not None and inverse.has("fc"):
         misfit["force_relative"] = force_error(inverse, result.model, named)
         misfit["inverse_dynamics_relative"] = inverse.relative_error
+    if sliding is not None:
+        misfit["sliding_rms_Nm"] = sliding.left
     if validation:
         misfit |= {f"held_out_{k}": v for k, v in result.held_out(validation).items()}
         if inverse is not None and inverse.has("fc"):

@@ -23,7 +23,7 @@ from stickslip.errors import InputError
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.band_fit import BandFit, Number
-from stickslip.identify.regression.bands import calmed, follows, in_bands
+from stickslip.identify.regression.bands import calmed, follows, in_bands, rough
 from stickslip.identify.regression.sliding_rows import SlidingRows, narrowest_width, signals_of
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
@@ -121,6 +121,15 @@ class Regression:
             falls = np.exp(-((speed / values["vs"]) ** 2))
             known = known + (values["fs"] - values["fc"]) * falls * np.sign(speed)
         return float(np.sqrt(np.mean((torque - known) ** 2)))
+
+    @property
+    def left(self) -> float:
+        """RMS of the torque that its own numbers leave in those rows, N·m (N), a torque over the position among it; a
+        fall of friction that shows is taken for one where little else is left."""
+        own = {name: n.value for name, n in self.numbers.items()}
+        if self.shows_a_fall and not rough(self.bands[0]):
+            own |= {"vs": self.vs.value}
+        return self.left_by(own)
 
     @property
     def doubt(self) -> str:

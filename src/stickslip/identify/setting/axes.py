@@ -35,6 +35,8 @@ WAVELENGTHS = (1e-3, 5e-2)
 """m (linear)"""
 WAVES = 3
 """At most so many at once."""
+LEFT = ("sliding_rms_Nm", "sliding_rms_N")
+"""What an identification leaves of the torque where the axis slides for certain: as large they are at most (RMS)."""
 BREAKAWAY = (3e-5, 3e-3)
 """rad (a tenth of it in m), displacement at which a contact without springs in its law is taken to break away."""
 LOST = 0.5
@@ -89,9 +91,7 @@ def plants_of(
     identified = told.value if told else inertia
     known_to = GIVEN if given and told and not told.identified else math.inf
     rng = np.random.default_rng(seed)
-    misfit = next(
-        (v for k, v in found.misfit.items() if k in ("force_rms", "drive_rms") and math.isfinite(v)), 0.0
-    )
+    misfit = next((found.misfit[k] for k in LEFT if math.isfinite(found.misfit.get(k, math.nan))), 0.0)
     drawn = draw_models(
         found.model, found.estimates, found.correlation, count, seed, plausible(found.estimates, seed)
     )

@@ -76,6 +76,14 @@ def notes_on(
     if chosen is None:
         reasons = sorted({r for c in candidates for r in c.refused}) or ["none reduces the error by 5 %"]
         yield f"No compensator is recommended: {', '.join(reasons)}."
+        # Of those that go beyond the best estimate, which is simulated first.
+        left = [c.errors[0] for c in candidates if len(c.errors) > 1 and c.errors[0] < 1.0]
+        if unknown and left:
+            yield (
+                f"On the best estimate {100.0 * min(left):.0f} % of the error would be left; other axes that the "
+                f"record allows decide, since it does not tell {', '.join(unknown)}: what to record for them stands in "
+                "the model file (measure_next)."
+            )
         return
     stiffer = [c for c in candidates if c.setting.kind == "feedback" and c.setting.gain == 1.0 and c.unsafe]
     if stiffer:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.setting.candidate_run import Drive, Trial
 from stickslip.identify.setting.candidates import breakaway, resistance
@@ -42,14 +43,15 @@ def refuse_weak(found: Identified, drive: Drive) -> None:
 
 
 def refuse_unknown(found: Identified) -> None:
-    """Refuse a law whose level the record does not tell: what is fed forward would be one choice among many.
+    """Refuse a law whose level the record does not tell to a factor of `RATIO`: what is fed forward would be one choice
+    among many. A setting that helps on every axis within that factor is none.
 
     Raises
     ------
     InputError
     """
     levels = [e for e in found.law_estimates[0] if e.unit in ("N·m", "N")]
-    if levels and not any(e.identified for e in levels):
+    if levels and not any(e.identified or 0.0 < e.upper <= RATIO * e.lower for e in levels):
         listed = ", ".join(f"{e.name} {e.value:.3g} [{e.lower:.3g}, {e.upper:.3g}]" for e in levels)
         raise InputError(
             f"{found.path}: the record does not determine the friction level ({listed} {levels[0].unit}, not "
