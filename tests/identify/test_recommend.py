@@ -291,8 +291,8 @@ def test_the_linear_controller_alone_is_judged_first_and_its_ringing_is_no_feedf
     assert max(few.reduction[0], many.reduction[0]) <= min(few.reduction[1], many.reduction[1])
 
 
-@pytest.mark.parametrize(("springs", "ringing"), [(False, 7), (True, 1)])
-def test_every_rigid_contact_rings_about_a_coarse_count_and_none_with_springs(
+@pytest.mark.parametrize(("springs", "ringing"), [(False, 6), (True, 1)])
+def test_every_rigid_contact_of_a_prompt_drive_rings_about_a_coarse_count_and_none_with_springs(
     springs: bool, ringing: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not springs:
@@ -303,7 +303,9 @@ def test_every_rigid_contact_rings_about_a_coarse_count_and_none_with_springs(
     bench = recommending.Bench(plants, linear, drive, {})
     # Compared by identity: two axes may have the same numbers.
     rung = [plant for plant, _ in bench.ringing()]
-    assert [any(p is r for r in rung) for p in plants] == [p.friction.law.name == "stribeck" for p in plants]
+    # Under a quarter of a sample of delay it swings by half a thousandth of a count, a quarter of what it does without.
+    rigid = [p.friction.law.name == "stribeck" and p.delay < 0.2 for p in plants]
+    assert [any(p is r for r in rung) for p in plants] == rigid
     said = rings_alone(bench, INERTIA, "N·m")
     assert said.startswith(f"at rest on {ringing} of 7 axes: a count of the encoder makes it push 0.15 N·m")
 
