@@ -16,13 +16,13 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.fit.smooth import Window, seen
-from stickslip.identify.regression.band_fit import BandFit, fit_band
+from stickslip.identify.regression.band_fit import BandFit, Number, fit_band
 from stickslip.identify.regression.orders import candidate_orders, goes_round, shown_orders
 from stickslip.identify.regression.sliding_rows import FEWEST, Signals, SlidingRows, sliding_rows
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["Bands", "calmed", "follows", "in_bands", "rough"]
+__all__ = ["QUANTILE", "ROTATED", "Bands", "calmed", "follows", "in_bands", "rough", "together"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -32,7 +32,8 @@ ROUGH, WIDER = 0.05, (1.6, 2.6, 4.1, 6.6, 10.0)
 """Misfit in the first band, in parts of Fc, from which on wider windows are tried; how much wider. What play does to a
 sum of motor and load falls with the square of the width."""
 FALLS = 0.5
-"""Part of the first band's misfit that the last may leave, for still wider windows to be worth a look."""
+"""Part of the first band's misfit that the last may leave, for still wider windows to be worth a look; and that wider
+windows may leave which are rough as well."""
 LEVELS = 18
 """Stribeck velocities that are averaged over, from `SLOWEST` to `FASTEST` of the highest speed."""
 SLOWEST, FASTEST = 1e-3, 3.0
@@ -46,6 +47,10 @@ may be left out for that; and how much farther they are left out."""
 BACKGROUND = 12
 """Lowest orders of a torque over the position that is small, but may be there."""
 QUANTILE = 1.96
+TELLING, NARROW = 4.0, 0.1
+"""A band tells of a number where its standard deviation is at most so many times the smallest, or that part of the
+value."""
+ROTATED = {"gravity_sin", "gravity_cos"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,30 +81,69 @@ def rough(band: BandFit) -> bool:
 
 
 def calmed(found: Bands, signals: Sequence[Signals], width: float, *ask: Any) -> Bands:
-    """What was found; where its first band is rough, what the narrowest windows show that are not, if they tell
-    as much.
+    """What was found; where its first band is rough, what wider windows show, if they tell as much.
+
+    The narrowest windows that are not rough; else, of those that leave half as much, the ones in which the level of
+    friction is surest.
 
     Play that opens while the motor slides (the drive brakes, the load runs ahead, meets the other flank and rebounds)
     moves the load against the motor by no more than the play: seen through a window, the torque of that falls with
     the square of its width, that of inertia and friction does not.
     """
+    if not rough(found.fits[0]):
+        return found
+    tried: dict[float, Bands] = {}
     for wider in worth_a_look(found):
-        try:
-            other = in_bands(signals, wider * width, *ask)
-        except InputError:
+        other = seen_wider(signals, wider, width, *ask)
+        if other is None:
             break
-        if len(other.fits) < 2:
-            break
+        tried[wider] = other
         if not rough(other.fits[0]):
-            return replace(other, widened=wider) if tells_as_much(other.fits[0], found.fits[0]) else found
-    return found
+            if tells_as_much(other.fits[0], found.fits[0]) or as_sure(other, found):
+                return other
+            break
+    return surest(found, tried, signals, width, *ask)
+
+
+def surest(
+    found: Bands, tried: Mapping[float, Bands], signals: Sequence[Signals], width: float, *ask: Any
+) -> Bands:
+    """Of all wider windows that leave half as much and tell as much, those in which the level of friction is surest;
+    what was found where there are none."""
+    most = FALLS * found.fits[0].misfit
+    best = found
+    for wider in WIDER if found.fits[-1].misfit <= most else ():
+        other = tried.get(wider) or seen_wider(signals, wider, width, *ask)
+        if other is None:
+            break
+        surer = as_sure(other, found) and level_of(other).std <= level_of(best).std
+        if surer and other.fits[0].misfit <= most:
+            best = other
+    return best
+
+
+def seen_wider(signals: Sequence[Signals], wider: float, width: float, *ask: Any) -> Bands | None:
+    """What windows so many times wider show; nothing where they are too wide for two bands."""
+    try:
+        other = in_bands(signals, wider * width, *ask)
+    except InputError:
+        return None
+    return replace(other, widened=wider) if len(other.fits) > 1 else None
+
+
+def level_of(found: Bands) -> Number:
+    """The level of friction that all bands tell together, N·m (N)."""
+    return together("fc", found.fits)
+
+
+def as_sure(other: Bands, than: Bands) -> bool:
+    """Whether all bands together tell inertia and the level of friction as surely."""
+    return all(together(n, other.fits).std <= together(n, than.fits).std for n in ("inertia", "fc"))
 
 
 def worth_a_look(found: Bands) -> tuple[float, ...]:
     """Of the wider windows, those in which the bands at hand do not say already that as much is left."""
     fits = found.fits
-    if not rough(fits[0]):
-        return ()
     known = {wider for wider, fit in zip(BANDS[1:], fits[1:], strict=False) if rough(fit)}
     falls = not known or fits[-1].misfit <= FALLS * fits[0].misfit
     return tuple(w for w in WIDER if w not in known and (falls or w in BANDS))
@@ -223,3 +267,27 @@ def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:
         if np.any(fixed[:, 2] * side > 0.0)
     ]
     return min(MARGIN * last, *most)
+
+
+# ---- what the bands say together ------------------------------------------------------------
+
+
+def together(name: str, bands: Sequence[BandFit]) -> Number:
+    """One number of all bands that tell of it: their mean, and their spread beside each one's own."""
+    numbers = [b.numbers[name] for b in bands]
+    least = min(n.std for n in numbers)
+    signed = name in ROTATED or name in ("skew", "offset")
+    told = [n for n in numbers if n.std <= max(TELLING * least, 0.0 if signed else NARROW * abs(n.value))]
+    found = mixed(told)
+    against = [
+        n for n in numbers
+        if n not in told and abs(n.value - found.value) > QUANTILE * math.hypot(n.std, found.std)
+    ]  # fmt: skip
+    return mixed([*told, *against]) if against else found
+
+
+def mixed(numbers: Sequence[Number]) -> Number:
+    """Their mean, with the spread of what each says."""
+    value = math.fsum(n.value for n in numbers) / len(numbers)
+    variance = math.fsum(n.std**2 + (n.value - value) ** 2 for n in numbers) / len(numbers)
+    return Number(value, math.sqrt(variance))

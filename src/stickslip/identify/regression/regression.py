@@ -23,7 +23,7 @@ from stickslip.errors import InputError
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.band_fit import BandFit, Number
-from stickslip.identify.regression.bands import calmed, follows, in_bands, rough
+from stickslip.identify.regression.bands import QUANTILE, ROTATED, calmed, follows, in_bands, rough, together
 from stickslip.identify.regression.sliding_rows import SlidingRows, narrowest_width, signals_of
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
@@ -34,9 +34,6 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SKEW_ROWS, SKEW_TIME = 1.0, 1e-3
 """Rows, or s if longer, by which a torque column usually lies off at most (one standard deviation)."""
-TELLING, NARROW = 4.0, 0.1
-"""A band tells of a number where its standard deviation is at most so many times the smallest, or that part of the
-value."""
 UNSURE = 0.3
 """Part of Fc to which the torque that accelerates must be known for friction to be believed."""
 GIVEN = 0.05
@@ -49,6 +46,11 @@ LEVEL_UNTOLD = (
     "extrapolated: friction may still fall at the highest recorded speeds, and viscous friction is not told apart "
     "from it"
 )
+LEVEL_ROUGH, ROUGHLY = (
+    "motor and load do not move as one even in the windows in which they do so best, and it is unsure to {share:.0%} "
+    "there; identified means at most {most:.0%}",
+    0.1,
+)
 APART = (
     "the axis does not follow its torque as one inertia does: what its acceleration needs is unsure to {share:.2g} of "
     "Fc; record gentler motion"
@@ -60,8 +62,6 @@ UNMOVED = (
 )
 SWUNG = 0.5
 """rad that a pendulum must swing for its weight to be looked for in the torque."""
-QUANTILE = 1.96
-ROTATED = {"gravity_sin", "gravity_cos"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,12 +152,15 @@ class Regression:
     def level_doubt(self) -> str:
         """Why the level that friction falls to with velocity is not told; empty where it is.
 
-        Where a fall is not excluded and viscous friction not told apart from its end, level and slope are one number at
-        the highest speeds: the level is extrapolated, however narrow half of its value would seem.
+        Windows that had to be widened and are rough still show play, of which its interval knows a part. Where a fall
+        is not excluded and viscous friction not told apart from its end, level and slope are one number at the highest
+        speeds: the level is extrapolated, however narrow half of its value would seem.
         """
         level, (low, high) = self.numbers["fc"], self.interval("sigma2")
-        sure = QUANTILE * level.std <= LEVEL * abs(level.value)
-        if sure or self.falls <= EXCLUDED or 0.0 < high <= RATIO * low:
+        share = QUANTILE * level.std / max(abs(level.value), 1e-300)
+        if share > ROUGHLY and self.widened > 1.0 and rough(self.bands[0]):
+            return LEVEL_ROUGH.format(share=share, most=ROUGHLY)
+        if share <= LEVEL or self.falls <= EXCLUDED or 0.0 < high <= RATIO * low:
             return ""
         return LEVEL_UNTOLD
 
@@ -233,27 +236,6 @@ def regress_axis(
         numbers, bands, seen.orders, falls, vs, float(np.quantile(speed, 0.01)), float(np.max(speed)), period,
         seen.rows, seen.widened,
     )  # fmt: skip
-
-
-def together(name: str, bands: Sequence[BandFit]) -> Number:
-    """One number of all bands that tell of it: their mean, and their spread beside each one's own."""
-    numbers = [b.numbers[name] for b in bands]
-    least = min(n.std for n in numbers)
-    signed = name in ROTATED or name in ("skew", "offset")
-    told = [n for n in numbers if n.std <= max(TELLING * least, 0.0 if signed else NARROW * abs(n.value))]
-    found = mixed(told)
-    against = [
-        n for n in numbers
-        if n not in told and abs(n.value - found.value) > QUANTILE * math.hypot(n.std, found.std)
-    ]  # fmt: skip
-    return mixed([*told, *against]) if against else found
-
-
-def mixed(numbers: Sequence[Number]) -> Number:
-    """Their mean, with the spread of what each says."""
-    value = math.fsum(n.value for n in numbers) / len(numbers)
-    variance = math.fsum(n.std**2 + (n.value - value) ** 2 for n in numbers) / len(numbers)
-    return Number(value, math.sqrt(variance))
 
 
 def fall_of(bands: Sequence[BandFit]) -> tuple[float, Number]:
