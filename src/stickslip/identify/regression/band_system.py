@@ -271,8 +271,9 @@ class System:
         # Whole pieces tell level and slope of friction: where many of them refute the misfit's say, they decide.
         # Of acceleration, jerk and offset a piece holds too little.
         most = refuted_above(begins.size - c.columns.size)
-        decided = np.isin(c.columns, (VISCOUS, COULOMB))
-        least = np.where(decided, np.minimum(least, most * plain), least)
+        if math.isfinite(most):
+            decided = np.isin(c.columns, (VISCOUS, COULOMB))
+            least = np.where(decided, np.minimum(least, most * plain), least)
         noise[np.diag_indices_from(noise)] = np.maximum(plain, least)
         share = np.full(c.columns.size, SYSTEMATIC)
         share[[INERTIA, JERK]] = STIFF, LATE
