@@ -22,7 +22,7 @@ from stickslip.identify.regression.sliding_rows import FEWEST, Signals, SlidingR
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["QUANTILE", "ROTATED", "Bands", "calmed", "follows", "in_bands", "rough", "together"]
+__all__ = ["QUANTILE", "ROTATED", "Bands", "calmed", "follows", "in_bands", "rough", "telling", "together"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -272,15 +272,20 @@ def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:
 # ---- what the bands say together ------------------------------------------------------------
 
 
-def together(name: str, bands: Sequence[BandFit]) -> Number:
-    """One number of all bands that tell of it: their mean, and their spread beside each one's own."""
+def telling(name: str, bands: Sequence[BandFit]) -> list[Number]:
+    """What the bands that tell of a number say."""
     numbers = [b.numbers[name] for b in bands]
     least = min(n.std for n in numbers)
     signed = name in ROTATED or name in ("skew", "offset")
-    told = [n for n in numbers if n.std <= max(TELLING * least, 0.0 if signed else NARROW * abs(n.value))]
+    return [n for n in numbers if n.std <= max(TELLING * least, 0.0 if signed else NARROW * abs(n.value))]
+
+
+def together(name: str, bands: Sequence[BandFit]) -> Number:
+    """One number of all bands that tell of it: their mean, and their spread beside each one's own."""
+    told = telling(name, bands)
     found = mixed(told)
     against = [
-        n for n in numbers
+        n for n in (b.numbers[name] for b in bands)
         if n not in told and abs(n.value - found.value) > QUANTILE * math.hypot(n.std, found.std)
     ]  # fmt: skip
     return mixed([*told, *against]) if against else found
