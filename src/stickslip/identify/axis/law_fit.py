@@ -154,8 +154,12 @@ def beside_plain(
     estimates: Sequence[Estimate], model: Model, inverse: InverseDynamics, sliding: Regression
 ) -> tuple[tuple[Estimate, ...], list[str]]:
     """The estimates settled beside the plain inverse dynamics, as far as certain sliding does not refute it."""
+    if as_good(inverse, sliding, ALIKE):
+        return settled(estimates, model, inverse)
     own = {n: (low, high) for n, (_, low, high) in sliding_values(sliding).items()}
-    return settled(estimates, model, inverse, None if as_good(inverse, sliding, ALIKE) else own)
+    # Refuted by less than half, it is still in the intervals of the estimates.
+    both = {e.name: (e.lower, e.upper) for e in estimates} if as_good(inverse, sliding) else None
+    return settled(estimates, model, inverse, own, both)
 
 
 def with_values(

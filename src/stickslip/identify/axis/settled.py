@@ -202,6 +202,7 @@ def settled(
     model: Model,
     inverse: InverseDynamics | None,
     refuted_by: Mapping[str, tuple[float, float]] | None = None,
+    at_most: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[tuple[Estimate, ...], list[str]]:
     """The estimates, what is not identified chosen so that the record's torque is explained best; and what to say.
 
@@ -216,6 +217,9 @@ def settled(
     refuted_by : mapping, optional
         Intervals of certain sliding by name, where that refutes it: it then has no weight in an identified value, and
         none leaves these for it, however wide the estimate's own is so as to hold both.
+    at_most : mapping, optional
+        Wider intervals, where it is refuted by little: as far as a value may go where within the others nothing comes
+        near the force error of the inverse dynamics.
     """
     by_name = {e.name: e for e in estimates}
     if inverse is None or model.law.steady is None or not set(PLAIN) <= by_name.keys():
@@ -244,7 +248,8 @@ def settled(
             moved, less, where = own.moved(chosen, free, held, level)
         else:
             narrow = {n: shared_part(b, refuted_by.get(n, b)) for n, b in held.items()}
-            followed = own.followed(chosen, free, narrow, level)
+            wide = {n: shared_part(at_most.get(n, b), b) for n, b in held.items()} if at_most else narrow
+            followed = own.followed(chosen, free, narrow, level) or own.followed(chosen, free, wide, level)
             (moved, less), where = followed or (chosen, error), "within"
             notes = [] if followed else [KEPT]
         if less < error:
