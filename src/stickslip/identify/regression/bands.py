@@ -117,7 +117,8 @@ def surest(
         if other is None:
             break
         surer = as_sure(other, found) and level_of(other).std <= level_of(best).std
-        if surer and other.fits[0].misfit <= most:
+        # An inertia that one width alone tells is contradicted by none.
+        if surer and other.fits[0].misfit <= most and len(telling("inertia", other.fits)) > 1:
             best = other
     return best
 
