@@ -22,7 +22,7 @@ from stickslip.identify.regression.sliding_rows import FEWEST, Signals, SlidingR
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["QUANTILE", "ROTATED", "Bands", "calmed", "follows", "in_bands", "rough", "telling", "together"]
+__all__ = ["QUANTILE", "ROTATED", "Bands", "calmed", "follows", "in_bands", "rough", "together"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -117,8 +117,11 @@ def surest(
         if other is None:
             break
         surer = as_sure(other, found) and level_of(other).std <= level_of(best).std
-        # An inertia that one width alone tells is contradicted by none.
-        if surer and other.fits[0].misfit <= most and len(telling("inertia", other.fits)) > 1:
+        # In rough windows a number that one width alone tells is contradicted by none.
+        confirmed = not rough(other.fits[0]) or all(
+            len(telling(n, other.fits)) > 1 for n in ("inertia", "fc")
+        )
+        if surer and confirmed and other.fits[0].misfit <= most:
             best = other
     return best
 

@@ -30,7 +30,6 @@ from stickslip.identify.regression.bands import (
     follows,
     in_bands,
     rough,
-    telling,
     together,
 )
 from stickslip.identify.regression.sliding_rows import SlidingRows, narrowest_width, signals_of
@@ -57,7 +56,6 @@ LEVEL_UNTOLD = (
 )
 STILL_ROUGH = "motor and load do not move as one even in the windows in which they do so best, and "
 UNSURE_THERE, ROUGHLY = "it is unsure to {share:.0%} there; identified means at most {most:.0%}", 0.1
-ONE_WIDTH = "windows of one width alone tell it"
 APART = (
     "the axis does not follow its torque as one inertia does: what its acceleration needs is unsure to {share:.2g} of "
     "Fc; record gentler motion"
@@ -165,11 +163,8 @@ class Regression:
         """
         level, (low, high) = self.numbers["fc"], self.interval("sigma2")
         share = QUANTILE * level.std / max(abs(level.value), 1e-300)
-        if self.widened > 1.0 and rough(self.bands[0]):
-            if share > ROUGHLY:
-                return STILL_ROUGH + UNSURE_THERE.format(share=share, most=ROUGHLY)
-            if len(telling("fc", self.bands)) == 1:
-                return STILL_ROUGH + ONE_WIDTH
+        if share > ROUGHLY and self.widened > 1.0 and rough(self.bands[0]):
+            return STILL_ROUGH + UNSURE_THERE.format(share=share, most=ROUGHLY)
         if share <= LEVEL or self.falls <= EXCLUDED or 0.0 < high <= RATIO * low:
             return ""
         return LEVEL_UNTOLD
