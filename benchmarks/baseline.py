@@ -19,6 +19,7 @@ from stickslip.simulation._forcing import CELL_SIZE
 from stickslip.simulation.case_arrays import FROM_MEASUREMENT, FROM_REFERENCE, KI, SOURCE, Case
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.exact.kernel import LONGEST_STEP, SAFETY, solve
+from stickslip.simulation.exact.state import PLAN
 
 Positions = np.ndarray[Any, np.dtype[np.float64]]
 Run = Callable[..., Positions]
@@ -78,7 +79,7 @@ class Loop:
     def __init__(self, function: Any, values: Positions, ready: exact.Prepared, control: bool) -> None:
         self.function, self.values, self.control = function, values, control
         self.cells, self.grid = ready.cells, ready.case.grid
-        self.count = int(ready.plan[exact.col.CELLS])
+        self.count = int(ready.plan.view(PLAN)["cells"][0])
         self.breaks = ready.breaks if self.count else ready.breaks[-1:].copy()
         assert self.cells.size == max(1, CELL_SIZE * self.count)
 

@@ -20,7 +20,7 @@ from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.exact import ringing as closed
 from stickslip.simulation.exact.flow import flow, linear
-from stickslip.simulation.exact.state import FIRST_STEPS
+from stickslip.simulation.exact.state import PLAN
 from stickslip.simulation.metrics import metrics
 
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
@@ -94,7 +94,7 @@ def test_metrics_are_those_of_short_steps(reference, plant, compensator):
     controller = Controller(PD.linear, compensator)
     case = prepare(RigidAxis(INERTIA, plant), controller, reference, 0.6, tolerance=1e-9, output=0.6)
     long, short = exact.prepare(case), exact.prepare(case)
-    short.parameters[MAX_STEP], short.plan[FIRST_STEPS] = 2e-5, math.inf
+    short.parameters[MAX_STEP], short.plan.view(PLAN)["first_steps"] = 2e-5, math.inf
     ours, truth = long.record(), short.record()
     assert ours.code == truth.code == DONE
     assert ours.counts["steps"] <= 0.9 * truth.counts["steps"]

@@ -29,9 +29,11 @@ SIGNATURES = {
 
 
 def _pointer(typingctx: Any, array: Any, offset: Any) -> Any:
-    """The address of ``array[offset]``; the array is contiguous, or an address itself."""
+    """The address of ``array[offset]``; the array is contiguous, an address itself, or a record of numbers."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        if isinstance(array, types.Record):
+            return builder.gep(builder.bitcast(arguments[0], ir.DoubleType().as_pointer()), [arguments[1]])
         if isinstance(array, types.CPointer):
             return builder.gep(arguments[0], [arguments[1]])
         struct = context.make_array(signature.args[0])(context, builder, arguments[0])

@@ -15,38 +15,10 @@ from stickslip.jit import kernel
 from stickslip.simulation.case_arrays import INERTIA
 from stickslip.simulation.exact.flow import Linear, linear, relaxed, upper_terms
 from stickslip.simulation.exact.state import (
-    ADDED,
-    BASE,
     BENDS,
-    BRISTLE,
-    DAMPING,
-    DS,
-    DS_END,
-    EVEN_BASE,
-    EVEN_DAMPING,
-    EVEN_STIFFNESS,
-    FLOOR,
     FOLLOWS,
-    KIND,
-    LAG,
-    POSITION,
-    Q_END,
-    Q_MID,
-    S_END,
-    S_MID,
-    SCALE,
-    SIDE_SIZE,
-    SIGMA,
-    SLIPPING,
-    SPRING,
-    SPRING_OFFSET,
-    VARIES,
-    VELOCITY,
-    VISCOUS,
-    WEIGHT,
-    Q,
-    S,
     curve_slope,
+    side_of,
     sides_of,
     sliding,
 )
@@ -60,126 +32,123 @@ FARTHEST_LAG = 100.0
 
 
 @kernel(exact=False, inline=True)
-def bend(parameters: Any, plan: Any, sides: Any, loop: Any, h: float) -> Linear:
+def bend(parameters: Any, plan: Any, sides: Any, now: Any, h: float) -> Linear:
     """Take the flow anew for a step of about h: springs of bristles, dampers of curves."""
-    theta = loop[POSITION]
-    v = loop[VELOCITY]
-    total = loop[EVEN_STIFFNESS]
-    damping = loop[EVEN_DAMPING]
-    loop[BASE] = loop[EVEN_BASE]
+    theta = now.position
+    v = now.velocity
+    total = now.even_stiffness
+    damping = now.even_damping
+    now.base = now.even_base
     bristles = False
-    least = max(STIFF * parameters[INERTIA] / (h * h), loop[FLOOR])
-    for side in range(sides_of(plan)):
-        w = sides[side * SIDE_SIZE + WEIGHT]
-        if sides[side * SIDE_SIZE + KIND] == BENDS and sides[side * SIDE_SIZE + SLIPPING] > 0.0:
-            g = bend_bristle(parameters, plan, sides, loop, side, h, total, least)
+    least = max(STIFF * parameters[INERTIA] / (h * h), now.floor)
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        w = side.weight
+        if side.kind == BENDS and side.slipping > 0.0:
+            g = bend_bristle(parameters, plan, sides, now, side, h, total, least)
             total += w * g
-            damping += w * sides[side * SIDE_SIZE + LAG] * g
-            loop[BASE] -= w * g * theta
+            damping += w * side.lag * g
+            now.base -= w * g * theta
             bristles = True
-        elif (
-            sides[side * SIDE_SIZE + KIND] == FOLLOWS
-            and sides[side * SIDE_SIZE + SLIPPING] > 0.0
-            and sides[side * SIDE_SIZE + VARIES] > 0.0
-        ):
-            goal = sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA]
+        elif side.kind == FOLLOWS and side.slipping > 0.0 and side.varies != 0:
+            goal = side.slipping * now.sigma
             b = goal * curve_slope(parameters, plan, sides, side, v)
-            sides[side * SIDE_SIZE + S] = goal * sliding(parameters, plan, sides, side, v) - b * v
-            sides[side * SIDE_SIZE + DS] = 0.0
-            sides[side * SIDE_SIZE + DAMPING] = sides[side * SIDE_SIZE + VISCOUS] + b
+            side.force = goal * sliding(parameters, plan, sides, side, v) - b * v
+            side.force_rate = 0.0
+            side.damping = side.viscous + b
             damping += w * b
-    loop[ADDED] = 0.0
-    floor = loop[FLOOR]
+    now.added = 0.0
+    floor = now.floor
     if not bristles:
         floor = max(floor, abs(damping) / (FARTHEST_LAG * h))
     if abs(total) < floor:
-        loop[ADDED] = 2.0 * floor
-    return linear(parameters[INERTIA], damping, total + loop[ADDED])
+        now.added = 2.0 * floor
+    return linear(parameters[INERTIA], damping, total + now.added)
 
 
 @kernel(exact=False, inline=True)
 def bend_bristle(
-    parameters: Any, plan: Any, sides: Any, loop: Any, side: int, h: float, total: float, least: float
+    parameters: Any, plan: Any, sides: Any, now: Any, side: Any, h: float, total: float, least: float
 ) -> float:  # fmt: skip
     """Divide a bristle's force; returns its spring. ``total`` is the stiffness of all the rest."""
-    theta = loop[POSITION]
-    v = loop[VELOCITY]
-    w = sides[side * SIDE_SIZE + WEIGHT]
-    k = sides[side * SIDE_SIZE + BRISTLE]
-    force = sides[side * SIDE_SIZE + S] + sides[side * SIDE_SIZE + SPRING] * theta
-    force += sides[side * SIDE_SIZE + SPRING_OFFSET]
-    scale = sides[side * SIDE_SIZE + SCALE]
+    theta = now.position
+    v = now.velocity
+    w = side.weight
+    k = side.bristle
+    force = side.force + side.spring * theta
+    force += side.spring_offset
+    scale = side.scale
     steep = curve_slope(parameters, plan, sides, side, v) if abs(v) < FLAT * scale else 0.0
     s = sliding(parameters, plan, sides, side, v)
-    filled = loop[SIGMA] * force / s
-    decay = k * loop[SIGMA] * v / s
+    filled = now.sigma * force / s
+    decay = k * now.sigma * v / s
     # What is relaxed away within the step follows the velocity, not the position.
     g = k * (1.0 - filled * (1.0 - v * steep / s)) / (1.0 + 0.5 * decay * h)
     if abs(total + w * g) < least:
         g = (math.copysign(least, total + w * g) - total) / w
-    sides[side * SIDE_SIZE + SPRING] = g
-    sides[side * SIDE_SIZE + SPRING_OFFSET] = -g * theta
-    sides[side * SIDE_SIZE + S] = force
-    sides[side * SIDE_SIZE + DS] = (k - g) * v - decay * force
-    sides[side * SIDE_SIZE + Q] = decay
-    sides[side * SIDE_SIZE + DAMPING] = sides[side * SIDE_SIZE + VISCOUS] + sides[side * SIDE_SIZE + LAG] * g
+    side.spring = g
+    side.spring_offset = -g * theta
+    side.force = force
+    side.force_rate = (k - g) * v - decay * force
+    side.decay = decay
+    side.damping = side.viscous + side.lag * g
     return g
 
 
 @kernel(exact=False, inline=True)
 def bristle_terms(
-    parameters: Any, plan: Any, sides: Any, loop: Any, side: int, h: float, theta_mid: float, v_mid: float,
+    parameters: Any, plan: Any, sides: Any, now: Any, side: Any, h: float, theta_mid: float, v_mid: float,
     theta_end: float, v_end: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Advance what is left of a bristle's force along the motion; returns its two upper coefficients."""
-    k = sides[side * SIDE_SIZE + BRISTLE] * loop[SIGMA]
-    g = sides[side * SIDE_SIZE + SPRING]
-    rest = sides[side * SIDE_SIZE + BRISTLE] - g
-    d0 = sides[side * SIDE_SIZE + DS]
+    k = side.bristle * now.sigma
+    g = side.spring
+    rest = side.bristle - g
+    d0 = side.force_rate
     decay_mid = k * v_mid / sliding(parameters, plan, sides, side, v_mid)
     decay_end = k * v_end / sliding(parameters, plan, sides, side, v_end)
-    goal_mid = rest * v_mid - decay_mid * g * (theta_mid - loop[POSITION])
-    goal_end = rest * v_end - decay_end * g * (theta_end - loop[POSITION])
-    middle, end, slope = relaxed(goal_mid, goal_end, sides[side * SIDE_SIZE + S], d0, decay_mid, decay_end, h)
-    sides[side * SIDE_SIZE + Q_MID] = decay_mid
-    sides[side * SIDE_SIZE + Q_END] = decay_end
-    sides[side * SIDE_SIZE + S_MID] = middle
-    sides[side * SIDE_SIZE + S_END] = end
-    sides[side * SIDE_SIZE + DS_END] = slope
-    return upper_terms(sides[side * SIDE_SIZE + S], d0, end, slope, 1.0 / h)
+    goal_mid = rest * v_mid - decay_mid * g * (theta_mid - now.position)
+    goal_end = rest * v_end - decay_end * g * (theta_end - now.position)
+    middle, end, slope = relaxed(goal_mid, goal_end, side.force, d0, decay_mid, decay_end, h)
+    side.decay_mid = decay_mid
+    side.decay_end = decay_end
+    side.force_mid = middle
+    side.force_end = end
+    side.force_rate_end = slope
+    return upper_terms(side.force, d0, end, slope, 1.0 / h)
 
 
 @kernel(exact=False, inline=True)
 def bristle_rate(
-    parameters: Any, plan: Any, sides: Any, loop: Any, side: int, theta: float, v: float, force: float
+    parameters: Any, plan: Any, sides: Any, now: Any, side: Any, theta: float, v: float, force: float
 ) -> float:  # fmt: skip
     """Rate of what is left of a bristle's force, N·m/s."""
-    g = sides[side * SIDE_SIZE + SPRING]
-    k = sides[side * SIDE_SIZE + BRISTLE]
-    decay = k * loop[SIGMA] * v / sliding(parameters, plan, sides, side, v)
-    return (k - g) * v - decay * (force + g * (theta - loop[POSITION]))
+    g = side.spring
+    k = side.bristle
+    decay = k * now.sigma * v / sliding(parameters, plan, sides, side, v)
+    return (k - g) * v - decay * (force + g * (theta - now.position))
 
 
 @kernel(exact=False, inline=True)
 def curve_terms(
-    parameters: Any, plan: Any, sides: Any, loop: Any, side: int, h: float, v_mid: float, v_end: float
+    parameters: Any, plan: Any, sides: Any, now: Any, side: Any, h: float, v_mid: float, v_end: float
 ) -> tuple[float, float]:  # fmt: skip
     """What is left of a force on the curve, in the middle and at the end; returns its two upper coefficients."""
-    middle = curve_rest(parameters, plan, sides, loop, side, v_mid)
-    end = curve_rest(parameters, plan, sides, loop, side, v_end)
-    sides[side * SIDE_SIZE + S_MID] = middle
-    sides[side * SIDE_SIZE + S_END] = end
+    middle = curve_rest(parameters, plan, sides, now, side, v_mid)
+    end = curve_rest(parameters, plan, sides, now, side, v_end)
+    side.force_mid = middle
+    side.force_end = end
     # The cubic that starts flat and goes through both.
     inverse = 1.0 / h
-    m = middle - sides[side * SIDE_SIZE + S]
-    e = end - sides[side * SIDE_SIZE + S]
-    sides[side * SIDE_SIZE + DS_END] = (4.0 * e - 8.0 * m) * inverse
+    m = middle - side.force
+    e = end - side.force
+    side.force_rate_end = (4.0 * e - 8.0 * m) * inverse
     return (8.0 * m - e) * inverse * inverse, (2.0 * e - 8.0 * m) * inverse * inverse * inverse
 
 
 @kernel(exact=False, inline=True)
-def curve_rest(parameters: Any, plan: Any, sides: Any, loop: Any, side: int, v: float) -> float:
+def curve_rest(parameters: Any, plan: Any, sides: Any, now: Any, side: Any, v: float) -> float:
     """A force on the curve, less what the flow's damper takes."""
-    b = sides[side * SIDE_SIZE + DAMPING] - sides[side * SIDE_SIZE + VISCOUS]
-    goal = sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA]
+    b = side.damping - side.viscous
+    goal = side.slipping * now.sigma
     return goal * sliding(parameters, plan, sides, side, v) - b * v

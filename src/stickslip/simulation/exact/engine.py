@@ -46,7 +46,7 @@ from stickslip.simulation.case_arrays import (
     StepBudget,
 )
 from stickslip.simulation.exact import state as col
-from stickslip.simulation.exact.kernel import AT_ELEMENTS, AT_LOOP, AT_SIDES, LONGEST_STEP, solve
+from stickslip.simulation.exact.kernel import AT_NOW, AT_SIDES, LONGEST_STEP, solve
 from stickslip.simulation.metrics import settle_band_of
 from stickslip.spec import Bristle, Elements, Law, Option
 from stickslip.waiting import Reached, watched
@@ -131,7 +131,7 @@ class Prepared:
     Attributes
     ----------
     parameters, plan, cells, breaks : arrays
-        What the kernel reads: `exact.state` names the entries.
+        What the kernel reads; `plan` holds the bytes of an `exact.state.PLAN`.
     work : array
         What the kernel works on, as it begins.
     """
@@ -156,7 +156,7 @@ class Prepared:
         out = np.empty((self.case.grid.size, 2))
         work = self.work.copy()
         code = self._solve(self.plan, work, out, NOTHING, NOTHING_1, NOTHING, light=True)
-        return out[: int(work[col.GRID_WRITTEN])], code, float(work[AT_LOOP])
+        return out[: int(counted(work)["grid_written"])], code, time_of(work)
 
     def record(self) -> Outcome:
         """Run with all rows, and the metrics if the case wants them."""
@@ -165,23 +165,21 @@ class Prepared:
             new_meter(duration, settle_band_of(self.case.reference, duration)) if metered else np.zeros(SIZE)
         )
         turns = np.zeros((TURNS if metered else 0, 2))
-        rows = np.empty((int(self.plan[col.ROWS]), len(COLUMNS)))
+        rows = np.empty((int(self.plan.view(col.PLAN)[0]["rows"]), len(COLUMNS)))
         plan, work = self.plan.copy(), self.work.copy()
 
         def stop() -> None:
-            plan[col.FIRST_STEPS] = -math.inf
+            plan.view(col.PLAN)[0]["first_steps"] = -math.inf
 
         code = watched(
             lambda: self._solve(plan, work, NOTHING, rows, acc, turns, full=True, metered=metered),
-            lambda: Reached(float(work[AT_LOOP]), duration, float(work[col.STEPS])), stop,
+            lambda: Reached(time_of(work), duration, float(counted(work)["steps"])), stop,
         )  # fmt: skip
-        time = float(work[AT_LOOP])
+        time, count = time_of(work), counted(work)
         if metered:
             close_standstill(acc, time)
-        named = {
-            "steps": int(work[col.STEPS]), "rejected": int(work[col.REJECTED]), "events": int(work[col.EVENTS]),
-        }  # fmt: skip
-        return Outcome(rows[: int(work[col.ROWS_WRITTEN])].copy(), code, time, acc, turns, named)
+        named = {name: int(count[name]) for name in ("steps", "rejected", "events")}
+        return Outcome(rows[: int(count["rows_written"])].copy(), code, time, acc, turns, named)
 
     def _solve(
         self, plan: Array, work: Array, out: Array, rows: Array, acc: Array, turns: Array, *, light: bool = False,
@@ -192,6 +190,16 @@ class Prepared:
             NODES.copy(), light, full, metered,
         )  # fmt: skip
         return int(code)
+
+
+def counted(work: Array) -> Any:
+    """The counts of a run by name; a view."""
+    return work[: col.COUNT_SIZE].view(col.COUNT)[0]
+
+
+def time_of(work: Array) -> float:
+    """The time that a run has come to, s."""
+    return float(work[AT_NOW : AT_NOW + col.NOW_SIZE].view(col.NOW)["time"][0])
 
 
 def prepare(case: Case) -> Prepared:
@@ -209,66 +217,59 @@ def prepare(case: Case) -> Prepared:
     members = [(case.plant, 1.0)]
     if feedback:
         members.append((case.compensator, -case.numbers[GAIN]))
-    plan = np.zeros(col.PLAN_SIZE)
-    blocks = [case.numbers]
-    finite: list[list[float]] = []
-    sides = np.zeros((len(members), col.SIDE_SIZE))
+    blocks, finite, sides = [case.numbers], list[tuple[float, float]](), np.zeros(2, col.SIDE)
     for i, (side, weight) in enumerate(members):
         e = side.elements
         assert e is not None
-        plan[col.CURVE_0 + 2 * i] = 0 if e.constant_curve else side.pointers.sliding
-        plan[col.PARAMETERS_0 + 2 * i] = sum(b.size for b in blocks)
-        plan[col.LITERAL_0 + i] = 1.0 if is_literal(side) else 0.0
+        into = sides[i]
+        into["curve"] = 0 if e.constant_curve else side.pointers.sliding
+        into["law"] = sum(b.size for b in blocks)
+        into["literal"] = is_literal(side)
         blocks.append(side.parameters)
+        into["first"] = len(finite)
         if isinstance(e, Elements):
-            finite += [
-                [k, a] + [0.0] * (col.ELEMENT_SIZE - 2)
-                for k, a in zip(e.stiffness, e.share, strict=True)
-                if math.isfinite(k)
-            ]
-        if i == 0:
-            plan[col.FIRST_1] = len(finite)
-        fill_side(sides[i], side, e, weight)
-    plan[col.SHARED] = 1.0 if feedback and share_curve(case.plant, case.compensator) else 0.0
-    plan[col.ELEMENTS], plan[col.SIDES] = len(finite), len(members)
-    plan[col.PROFILE], plan[col.PROFILE_PARAMETERS] = case.profile, sum(b.size for b in blocks)
-    blocks.append(case.reference_parameters)
+            finite += [(k, a) for k, a in zip(e.stiffness, e.share, strict=True) if math.isfinite(k)]
+        into["last"] = len(finite)
+        fill_side(into, side, e, weight)
+    elements = np.zeros(len(finite), col.ELEMENT)
+    elements["stiffness"], elements["share"] = [k for k, _ in finite], [a for _, a in finite]
     cells, kinks = feedforward(case) if case.numbers[SOURCE] == FROM_REFERENCE else (NO_CELLS, [])
-    plan[col.CELLS], plan[col.GRID_ROWS], plan[col.ROWS] = (
-        len(cells),
-        case.grid.size,
-        case.grid.size + EVENT_ROWS,
-    )
-    plan[col.FIRST_STEPS], plan[col.STEP_RATE] = STEPS.pace(case)
-    plan[col.SPACING] = even_spacing(case.grid)
-    damping = case.numbers[KD] + float(np.sum(sides[:, col.WEIGHT] * sides[:, col.VISCOUS]))
+    plan = np.zeros(1, col.PLAN)
+    plan["profile"], plan["reference"] = case.profile, sum(b.size for b in blocks)
+    blocks.append(case.reference_parameters)
+    plan["sides"], plan["elements"], plan["cells"] = len(members), len(finite), len(cells)
+    plan["shared"] = feedback and share_curve(case.plant, case.compensator)
+    plan["grid_rows"], plan["rows"] = case.grid.size, case.grid.size + EVENT_ROWS
+    plan["first_steps"], plan["step_rate"] = STEPS.pace(case)
+    plan["spacing"] = even_spacing(case.grid)
+    damping = case.numbers[KD] + float(np.sum(sides["weight"] * sides["viscous"]))
     inertia = case.axis.inertia
-    plan[col.STIFFNESS_FLOOR] = max(0.01 * damping * damping / inertia, 0.01 * inertia / LONGEST_STEP**2)
-    work = np.zeros(AT_ELEMENTS + col.ELEMENT_SIZE * len(finite))
-    work[AT_SIDES : AT_SIDES + sides.size] = sides.ravel()
-    work[AT_ELEMENTS:] = [x for element in finite for x in element]
+    plan["stiffness_floor"] = max(0.01 * damping * damping / inertia, 0.01 * inertia / LONGEST_STEP**2)
+    work = np.concatenate([np.zeros(AT_SIDES), sides.view(np.float64), elements.view(np.float64)])
     breaks = merged(case.breaks, kinks)
-    return Prepared(case, flat(np.concatenate(blocks)), plan, flat(cells.ravel()), breaks, work)
+    return Prepared(
+        case, flat(np.concatenate(blocks)), plan.view(np.float64), flat(cells.ravel()), breaks, work
+    )
 
 
-def fill_side(into: Array, side: Side, e: Elements | Bristle, weight: float) -> None:
+def fill_side(into: Any, side: Side, e: Elements | Bristle, weight: float) -> None:
     """Write the constants of one side."""
-    into[col.WEIGHT], into[col.VISCOUS], into[col.BREAKAWAY] = weight, e.viscous, e.breakaway
-    into[col.SCALE] = 0.0 if e.constant_curve else e.velocity_scale
-    into[col.LOWEST] = lowest(side, e)
-    into[col.KEPT : col.KEPT + 4] = math.nan
+    into["weight"], into["viscous"], into["breakaway"] = weight, e.viscous, e.breakaway
+    into["scale"] = 0.0 if e.constant_curve else e.velocity_scale
+    into["lowest"] = lowest(side, e)
+    into["velocity"] = into["velocity_before"] = math.nan
     if isinstance(e, Bristle):
-        into[col.KIND], into[col.VARIES] = col.BENDS, 1.0
-        into[col.BRISTLE], into[col.LAG] = e.stiffness, e.damping / e.stiffness
+        into["kind"], into["varies"] = col.BENDS, 1
+        into["bristle"], into["lag"] = e.stiffness, e.damping / e.stiffness
         return
-    into[col.KIND] = col.FOLLOWS if math.isinf(e.attraction) else col.RELAXES
-    into[col.ATTRACTION] = e.attraction
-    into[col.VARIES] = 0.0 if e.constant_curve and math.isinf(e.attraction) else 1.0
+    into["kind"] = col.FOLLOWS if math.isinf(e.attraction) else col.RELAXES
+    into["attraction"] = e.attraction
+    into["varies"] = 0 if e.constant_curve and math.isinf(e.attraction) else 1
     rigid = sum(a for k, a in zip(e.stiffness, e.share, strict=True) if math.isinf(k))
     if math.isinf(e.slope):
-        into[col.RIGID] = rigid
+        into["rigid"] = rigid
     else:
-        into[col.STEEP], into[col.STEEPNESS], into[col.LAYER] = rigid, e.slope, layer_of(side, e)
+        into["steep"], into["steepness"], into["layer"] = rigid, e.slope, layer_of(side, e)
 
 
 def torque_beyond(side: Side, e: Elements, v: float) -> float:

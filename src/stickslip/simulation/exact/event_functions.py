@@ -10,24 +10,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stickslip.jit import kernel, pointer
+from stickslip.jit import kernel
 from stickslip.simulation.exact.state import (
-    ELEMENT_SIZE,
-    INSIDE,
-    LAYER,
-    LITERAL_0,
-    LOAD_AT_0,
-    LOAD_SLOPE,
-    LOWEST,
-    NARROW,
-    SCALE,
-    SIDE_SIZE,
-    SIGMA,
-    STICKING,
-    TOP,
-    TOP_NEXT,
-    WATCHED,
-    first_of,
+    element_of,
+    side_of,
     sides_of,
     sliding,
 )
@@ -52,35 +38,33 @@ def load_of(literal: bool, direction: float, force: float) -> float:
 
 
 @kernel(exact=False, inline=True)
-def heaviest(plan: Any, elements: Any, sides: Any, side: int, theta: float, v: float) -> float:
+def heaviest(elements: Any, side: Any, theta: float, v: float) -> float:
     """Largest load per share among a side's sticking elements, N·m."""
     top = -1e300
-    first = first_of(plan, side)
-    literal = plan[LITERAL_0 + side] > 0.0
     direction = 1.0 if v >= 0.0 else -1.0
-    for i in range(first, first + int(sides[side * SIDE_SIZE + STICKING])):
-        e = pointer(elements, i * ELEMENT_SIZE)
-        load = load_of(literal, direction, e[LOAD_AT_0] + e[LOAD_SLOPE] * theta)
+    for i in range(side.first, side.first + side.sticking):
+        e = element_of(elements, i)
+        load = load_of(side.literal != 0, direction, e.load_at_0 + e.load_slope * theta)
         if load > top:
             top = load
     return top
 
 
 @kernel(exact=False, inline=True)
-def mode_ends(sides: Any, loop: Any, side: int, v: float) -> float:
+def mode_ends(now: Any, side: Any, i: int, v: float) -> float:
     """How far the velocity is beyond where it ends a mode: at a reversal, or at the edge of a steep layer."""
     g = -1e9
-    if side == 0 and loop[WATCHED] > 0.0:
-        g = -VELOCITY_WEIGHT * (loop[SIGMA] * v - loop[NARROW] + NOISE)
-    if sides[side * SIDE_SIZE + INSIDE] > 0.0:
-        g = max(g, VELOCITY_WEIGHT * (abs(v) - sides[side * SIDE_SIZE + LAYER]))
+    if i == 0 and now.watched != 0:
+        g = -VELOCITY_WEIGHT * (now.sigma * v - now.narrow + NOISE)
+    if side.inside != 0:
+        g = max(g, VELOCITY_WEIGHT * (abs(v) - side.layer))
     return g
 
 
 @kernel(exact=False, inline=True)
-def beyond_limit(parameters: Any, plan: Any, sides: Any, side: int, top: float, v: float) -> float:
+def beyond_limit(parameters: Any, plan: Any, sides: Any, side: Any, top: float, v: float) -> float:
     """How far a side's largest load is beyond the limit; the curve is asked for where its least level is in reach."""
-    limit = sides[side * SIDE_SIZE + LOWEST]
+    limit = side.lowest
     if top > limit:
         # At rest, rounding would ask for the curve at ever other velocities.
         limit = sliding(parameters, plan, sides, side, v if abs(v) > BARELY else math.copysign(BARELY, v))
@@ -88,59 +72,66 @@ def beyond_limit(parameters: Any, plan: Any, sides: Any, side: int, top: float, 
 
 
 @kernel(exact=False, inline=True)
-def trigger(
-    parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, theta: float, v: float
-) -> float:
+def trigger(parameters: Any, plan: Any, elements: Any, sides: Any, now: Any, theta: float, v: float) -> float:
     """The largest event function at a state: not negative where a mode ends."""
     g = -1e9
-    for side in range(sides_of(plan)):
-        g = max(g, mode_ends(sides, loop, side, v))
-        if sides[side * SIDE_SIZE + STICKING] > 0.0:
-            top = heaviest(plan, elements, sides, side, theta, v)
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        g = max(g, mode_ends(now, side, i, v))
+        if side.sticking != 0:
+            top = heaviest(elements, side, theta, v)
             g = max(g, beyond_limit(parameters, plan, sides, side, top, v))
     return g
 
 
 @kernel(exact=False, inline=True)
-def trigger_at_node(parameters: Any, plan: Any, sides: Any, loop: Any, v: float) -> float:
+def trigger_at_node(parameters: Any, plan: Any, sides: Any, now: Any, v: float) -> float:
     """`trigger` at the next node, which is weighed."""
     g = -1e9
-    for side in range(sides_of(plan)):
-        g = max(g, mode_ends(sides, loop, side, v))
-        if sides[side * SIDE_SIZE + STICKING] > 0.0:
-            g = max(g, beyond_limit(parameters, plan, sides, side, sides[side * SIDE_SIZE + TOP_NEXT], v))
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        g = max(g, mode_ends(now, side, i, v))
+        if side.sticking != 0:
+            g = max(g, beyond_limit(parameters, plan, sides, side, side.top_next, v))
     return g
 
 
 @kernel(exact=False, inline=True)
 def stays(parameters: Any, plan: Any, sides: Any, v: float) -> bool:
     """Whether the loads at the next node are within the limit at v: up to there, while the motion slows down."""
-    for side in range(sides_of(plan)):
-        if (
-            sides[side * SIDE_SIZE + STICKING] > 0.0
-            and beyond_limit(parameters, plan, sides, side, sides[side * SIDE_SIZE + TOP_NEXT], v) >= 0.0
-        ):
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        if side.sticking != 0 and beyond_limit(parameters, plan, sides, side, side.top_next, v) >= 0.0:
             return False
     return True
 
 
 @kernel(exact=False, inline=True)
-def weigh(plan: Any, elements: Any, sides: Any, theta: float, v: float, column: int) -> bool:
-    """Write each side's largest load at a state to `column`; returns whether one is near its limit there or at TOP."""
+def weigh(plan: Any, elements: Any, sides: Any, theta: float, v: float) -> bool:
+    """Note each side's largest load at the next node; returns whether one is near its limit there or here."""
     near = False
-    for side in range(sides_of(plan)):
-        if sides[side * SIDE_SIZE + STICKING] > 0.0:
-            top = heaviest(plan, elements, sides, side, theta, v)
-            sides[side * SIDE_SIZE + column] = top
-            near = near or max(top, sides[side * SIDE_SIZE + TOP]) > sides[side * SIDE_SIZE + LOWEST]
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        if side.sticking != 0:
+            top = heaviest(elements, side, theta, v)
+            side.top_next = top
+            near = near or max(top, side.top) > side.lowest
     return near
 
 
 @kernel(exact=False, inline=True)
 def pass_on(plan: Any, sides: Any) -> None:
     """Stand at the next node."""
-    for side in range(sides_of(plan)):
-        sides[side * SIDE_SIZE + TOP] = sides[side * SIDE_SIZE + TOP_NEXT]
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        side.top = side.top_next
+
+
+@kernel(exact=False, inline=True)
+def weigh_here(plan: Any, elements: Any, sides: Any, now: Any) -> None:
+    """Note each side's largest load where the loop stands."""
+    weigh(plan, elements, sides, now.position, now.velocity)
+    pass_on(plan, sides)
 
 
 @kernel(exact=False, inline=True)
@@ -157,11 +148,12 @@ def passes_turn(
 ) -> bool:  # fmt: skip
     """Whether a sticking element may be loaded beyond its limit where the velocity passes zero; ends are given."""
     peak = farthest(width, theta0, v0, theta1, v1)
-    for side in range(sides_of(plan)):
-        if sides[side * SIDE_SIZE + STICKING] > 0.0:
-            before = heaviest(plan, elements, sides, side, peak, v0)
-            after = heaviest(plan, elements, sides, side, theta1, v1)
-            lowest = sides[side * SIDE_SIZE + LOWEST]
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        if side.sticking != 0:
+            before = heaviest(elements, side, peak, v0)
+            after = heaviest(elements, side, theta1, v1)
+            lowest = side.lowest
             if before > lowest and before > sliding(parameters, plan, sides, side, math.copysign(BARELY, v0)):
                 return True
             if after > lowest and after > sliding(parameters, plan, sides, side, math.copysign(BARELY, v1)):
@@ -187,16 +179,17 @@ def looks(
     rises = v0 * v1 >= 0.0 and a0 * v1 > 0.0 and a1 * v1 > 0.0
     parts = 1
     peak = farthest(width, theta0, v0, theta1, v1)
-    for side in range(sides_of(plan)):
-        if sides[side * SIDE_SIZE + STICKING] == 0.0:
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        if side.sticking == 0:
             continue
-        lowest = sides[side * SIDE_SIZE + LOWEST]
-        if jump > STILL and v0 * v1 < 0.0 and heaviest(plan, elements, sides, side, peak, v0) > lowest:
+        lowest = side.lowest
+        if jump > STILL and v0 * v1 < 0.0 and heaviest(elements, side, peak, v0) > lowest:
             parts = LOOKS_AT_TURN
-        seen = LOOK * sides[side * SIDE_SIZE + SCALE]
+        seen = LOOK * side.scale
         if jump > seen > 0.0:
-            top0 = sides[side * SIDE_SIZE + TOP]
-            top1 = sides[side * SIDE_SIZE + TOP_NEXT]
+            top0 = side.top
+            top1 = side.top_next
             top = max(top0, top1)
             if top > lowest and not (rises and top0 <= top1):
                 lowest = sliding(parameters, plan, sides, side, fastest)

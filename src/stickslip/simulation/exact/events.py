@@ -37,36 +37,10 @@ from stickslip.simulation.exact.segment import (
     state_at,
 )
 from stickslip.simulation.exact.state import (
-    ATTRACTION,
     BENDS,
-    ELEMENT_SIZE,
-    ELEMENTS,
-    EXPONENT,
-    FORCE,
-    INSIDE,
-    KIND,
-    LAYER,
-    LITERAL_0,
-    NARROW,
-    OFFSET,
-    POSITION,
-    Q_END,
-    Q_MID,
     RELAXES,
-    S_NOW,
-    S_START,
-    SHARE,
-    SIDE_SIZE,
-    SIGMA,
-    SLIPPING,
-    SLIPS,
-    STIFFNESS,
-    TOP_NEXT,
-    VELOCITY,
-    WATCHED,
-    Q,
-    S,
-    first_of,
+    element_of,
+    side_of,
     sides_of,
     sliding,
 )
@@ -85,13 +59,13 @@ SIMULTANEOUS = 1e-14
 
 @kernel(exact=False, inline=True)
 def grazing(
-    lin: Linear, loop: Any, segment: Any, x0: float, x1: float, v1: float, a0: float, a1: float
+    lin: Linear, now: Any, segment: Any, x0: float, x1: float, v1: float, a0: float, a1: float
 ) -> float:
     """Time in [x0, x1] at which the velocity has dipped through zero, else NONE; a0, a1 are accelerations there."""
-    sigma = loop[SIGMA]
+    sigma = now.sigma
     a0 = sigma * a0
     a1 = sigma * a1
-    edge = loop[NARROW]
+    edge = now.narrow
     if not (a0 < 0.0 and a1 > 0.0 and sigma * v1 > edge and sigma * v1 - edge < -a0 * segment[LENGTH]):
         return NONE
     c = cubic_of(segment)
@@ -115,7 +89,7 @@ def grazing(
 
 @kernel(exact=False, inline=True)
 def between(
-    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, segment: Any, left: float,
+    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, now: Any, segment: Any, left: float,
     theta: float, v: float, g_left: float, width: float, parts: int, slows: bool, tol: float,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Look for an event at the ends of `parts` parts of [left, left + width], but for the last; the end is weighed.
@@ -131,10 +105,10 @@ def between(
         p, q = free_motion(m, p, q)
         x = left + step
         theta, v = moved(c, UNMOVED, x, p, q)
-        g = trigger(parameters, plan, elements, sides, loop, theta, v)
+        g = trigger(parameters, plan, elements, sides, now, theta, v)
         if g >= 0.0:
             event = locate(
-                lin, parameters, plan, elements, sides, loop, segment, left, g_left, x, g, theta, v, tol
+                lin, parameters, plan, elements, sides, now, segment, left, g_left, x, g, theta, v, tol
             )
             return event, left, g_left
         left = x
@@ -146,21 +120,21 @@ def between(
 
 @kernel(exact=False, inline=True)
 def find(
-    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, segment: Any, tol: float
+    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, now: Any, segment: Any, tol: float
 ) -> float:  # fmt: skip
     """Time of the first event inside the segment, or NONE."""
     c = cubic_of(segment)
     half = 0.5 * segment[LENGTH]
     left = 0.0
-    theta = loop[POSITION]
-    v = loop[VELOCITY]
-    watched = loop[WATCHED] > 0.0
+    theta = now.position
+    v = now.velocity
+    watched = now.watched != 0
     g_left = -NEAR
     for node in range(1, 3):
         right = half * node
         theta_right = segment[POSITION_MID] if node == 1 else segment[POSITION_END]
         v_right = segment[VELOCITY_MID] if node == 1 else segment[VELOCITY_END]
-        near = weigh(plan, elements, sides, theta_right, v_right, TOP_NEXT)
+        near = weigh(plan, elements, sides, theta_right, v_right)
         turns = v * v_right < 0.0 and abs(v_right - v) > STILL
         if watched or near or turns:
             a = acceleration(lin, c, right - half, theta, v)
@@ -168,17 +142,15 @@ def find(
         else:
             a = a_right = 0.0
         if watched:
-            dip = grazing(lin, loop, segment, left, right, v_right, a, a_right)
+            dip = grazing(lin, now, segment, left, right, v_right, a, a_right)
             if dip > 0.0:
                 theta, v = state_at(lin, segment, dip)
-                g = trigger(parameters, plan, elements, sides, loop, theta, v)
+                g = trigger(parameters, plan, elements, sides, now, theta, v)
                 return locate(
-                    lin, parameters, plan, elements, sides, loop, segment, left, g_left, dip, g, theta, v, tol
+                    lin, parameters, plan, elements, sides, now, segment, left, g_left, dip, g, theta, v, tol
                 )
         elif turns and passes_turn(parameters, plan, elements, sides, half, theta, v, theta_right, v_right):
-            event = at_turn(
-                lin, parameters, plan, elements, sides, loop, segment, left, right, v, g_left, tol
-            )
+            event = at_turn(lin, parameters, plan, elements, sides, now, segment, left, right, v, g_left, tol)
             if event >= 0.0:
                 return event
         if near or turns:
@@ -186,17 +158,17 @@ def find(
             if parts > 1:
                 slows = v * v_right >= 0.0 and a * v < 0.0 and a_right * v_right < 0.0
                 event, left, g_left = between(
-                    lin, parameters, plan, elements, sides, loop, segment, left, theta, v, g_left, half, parts,
+                    lin, parameters, plan, elements, sides, now, segment, left, theta, v, g_left, half, parts,
                     slows, tol,
                 )  # fmt: skip
                 if event >= 0.0:
                     return event
-        g = trigger_at_node(parameters, plan, sides, loop, v_right)
+        g = trigger_at_node(parameters, plan, sides, now, v_right)
         if g >= 0.0:
             if left == 0.0:
-                g_left = trigger(parameters, plan, elements, sides, loop, theta, v)
+                g_left = trigger(parameters, plan, elements, sides, now, theta, v)
             return locate(
-                lin, parameters, plan, elements, sides, loop, segment, left, g_left, right, g, theta_right,
+                lin, parameters, plan, elements, sides, now, segment, left, g_left, right, g, theta_right,
                 v_right, tol,
             )  # fmt: skip
         pass_on(plan, sides)
@@ -206,7 +178,7 @@ def find(
 
 @kernel(exact=False)
 def locate(
-    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, segment: Any, low: float,
+    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, now: Any, segment: Any, low: float,
     g_low: float, high: float, g_high: float, theta: float, v: float, tol: float,
 ) -> float:  # fmt: skip
     """Root of `trigger` in [low, high], from its far side: regula falsi (Anderson and Björck), then bisection.
@@ -228,7 +200,7 @@ def locate(
         if turn > 10 or not low < x < high:
             x = 0.5 * (low + high)
         theta, v = state_at(lin, segment, x)
-        miss = trigger(parameters, plan, elements, sides, loop, theta, v) - margin
+        miss = trigger(parameters, plan, elements, sides, now, theta, v) - margin
         if miss >= -margin:
             if side == 1:
                 low_miss *= 1.0 - miss / high_miss if miss < high_miss else 0.5
@@ -249,13 +221,13 @@ def locate(
 
 @kernel(exact=False)
 def at_turn(
-    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, segment: Any, low: float,
+    lin: Linear, parameters: Any, plan: Any, elements: Any, sides: Any, now: Any, segment: Any, low: float,
     high: float, v_low: float, g_low: float, tol: float,
 ) -> float:  # fmt: skip
     """Time of an event on either side of the reversal in [low, high], or NONE."""
     left = low
     x = high
-    theta = loop[POSITION]
+    theta = now.position
     for _ in range(MOST_HALVINGS):
         x = 0.5 * (low + high)
         theta, v = state_at(lin, segment, x)
@@ -266,12 +238,12 @@ def at_turn(
         if high - low < SIMULTANEOUS:
             break
     before = math.copysign(BARELY, v_low)
-    g = trigger(parameters, plan, elements, sides, loop, theta, before)
+    g = trigger(parameters, plan, elements, sides, now, theta, before)
     if g >= 0.0:
         return locate(
-            lin, parameters, plan, elements, sides, loop, segment, left, g_low, x, g, theta, before, tol
+            lin, parameters, plan, elements, sides, now, segment, left, g_low, x, g, theta, before, tol
         )
-    if trigger(parameters, plan, elements, sides, loop, theta, -before) < 0.0:
+    if trigger(parameters, plan, elements, sides, now, theta, -before) < 0.0:
         return NONE
     segment[POSITION_EVENT] = theta
     segment[VELOCITY_EVENT] = -before
@@ -282,93 +254,89 @@ def at_turn(
 def add_exponents(plan: Any, sides: Any, h: float, x: float) -> None:
     """Add the decay C int 1/s dt of slipping elements over the first x of a segment of length h."""
     f = x / h
-    for side in range(sides_of(plan)):
-        if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and sides[side * SIDE_SIZE + KIND] == RELAXES:
-            attraction = sides[side * SIDE_SIZE + ATTRACTION]
-            q0 = sides[side * SIDE_SIZE + Q]
-            bend = 2.0 * (q0 + sides[side * SIDE_SIZE + Q_END]) - 4.0 * sides[side * SIDE_SIZE + Q_MID]
-            slope = sides[side * SIDE_SIZE + Q_END] - q0 - bend
-            sides[side * SIDE_SIZE + EXPONENT] += attraction * x * (q0 + f * (0.5 * slope + f * bend / 3.0))
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        if side.slipping > 0.0 and side.kind == RELAXES:
+            attraction = side.attraction
+            q0 = side.decay
+            bend = 2.0 * (q0 + side.decay_end) - 4.0 * side.decay_mid
+            slope = side.decay_end - q0 - bend
+            side.exponent += attraction * x * (q0 + f * (0.5 * slope + f * bend / 3.0))
 
 
 @kernel(exact=False, inline=True)
-def settle_forces(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> None:
+def settle_forces(parameters: Any, plan: Any, elements: Any, sides: Any, now: Any) -> None:
     """Write every element's force where the loop stands, before modes change."""
-    for side in range(sides_of(plan)):
-        if sides[side * SIDE_SIZE + KIND] == BENDS:
-            sides[side * SIDE_SIZE + S] = sides[side * SIDE_SIZE + S_NOW]
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        if side.kind == BENDS:
+            side.force = side.force_now
             continue
-        decay = math.exp(-sides[side * SIDE_SIZE + EXPONENT])
-        moves = sides[side * SIDE_SIZE + KIND] == RELAXES
-        s = 0.0 if moves else sliding(parameters, plan, sides, side, loop[VELOCITY])
-        for i in range(first_of(plan, side), first_of(plan, side + 1)):
-            if elements[i * ELEMENT_SIZE + SLIPS] == 0.0:
-                elements[i * ELEMENT_SIZE + FORCE] = (
-                    elements[i * ELEMENT_SIZE + OFFSET]
-                    + elements[i * ELEMENT_SIZE + STIFFNESS] * loop[POSITION]
-                )
+        decay = math.exp(-side.exponent)
+        moves = side.kind == RELAXES
+        s = 0.0 if moves else sliding(parameters, plan, sides, side, now.velocity)
+        for j in range(side.first, side.last):
+            e = element_of(elements, j)
+            if e.slips == 0:
+                e.force = e.offset + e.stiffness * now.position
             elif moves:
-                part = elements[i * ELEMENT_SIZE + SHARE] / sides[side * SIDE_SIZE + SLIPPING]
-                gained = sides[side * SIDE_SIZE + S_NOW] - decay * sides[side * SIDE_SIZE + S_START]
-                elements[i * ELEMENT_SIZE + FORCE] = (
-                    decay * elements[i * ELEMENT_SIZE + FORCE] + part * gained
-                )
+                part = e.share / side.slipping
+                gained = side.force_now - decay * side.force_start
+                e.force = decay * e.force + part * gained
             else:
-                elements[i * ELEMENT_SIZE + FORCE] = elements[i * ELEMENT_SIZE + SHARE] * loop[SIGMA] * s
+                e.force = e.share * now.sigma * s
 
 
 @kernel(exact=False, inline=True)
-def switch(parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any) -> None:
+def switch(parameters: Any, plan: Any, elements: Any, sides: Any, now: Any) -> None:
     """Change the modes that end here: stick at a reversal, slip where the limit is reached."""
-    v = loop[VELOCITY]
-    settle_forces(parameters, plan, elements, sides, loop)
-    for side in range(sides_of(plan)):
-        enter_or_leave(sides, loop, side, v)
-    if loop[WATCHED] > 0.0 and loop[SIGMA] * v <= 1e-9 * abs(v):
-        for i in range(int(plan[ELEMENTS])):
-            elements[i * ELEMENT_SIZE + SLIPS] = 0.0
-        if loop[SIGMA] * v > 0.0:
-            loop[VELOCITY] = 0.0
-        if not set_off(plan, elements, sides, parameters, loop):
-            loop[SIGMA] = -loop[SIGMA]
+    v = now.velocity
+    settle_forces(parameters, plan, elements, sides, now)
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        enter_or_leave(sides, now, side, v)
+    if now.watched != 0 and now.sigma * v <= 1e-9 * abs(v):
+        for i in range(plan.elements):
+            element_of(elements, i).slips = 0
+        if now.sigma * v > 0.0:
+            now.velocity = 0.0
+        if not set_off(plan, elements, sides, parameters, now):
+            now.sigma = -now.sigma
         # Where the curve rises with the velocity, what stuck before may be loaded beyond it in the new direction.
-        if loop[SIGMA] != 0.0:
-            v = loop[SIGMA] * max(loop[SIGMA] * loop[VELOCITY], BARELY)
-            break_away(parameters, plan, elements, sides, loop, v, loop[SIGMA])
+        if now.sigma != 0.0:
+            v = now.sigma * max(now.sigma * now.velocity, BARELY)
+            break_away(parameters, plan, elements, sides, now, v, now.sigma)
         return
-    break_away(parameters, plan, elements, sides, loop, v, 1.0 if v >= 0.0 else -1.0)
+    break_away(parameters, plan, elements, sides, now, v, 1.0 if v >= 0.0 else -1.0)
 
 
 @kernel(exact=False, inline=True)
 def break_away(
-    parameters: Any, plan: Any, elements: Any, sides: Any, loop: Any, v: float, direction: float
+    parameters: Any, plan: Any, elements: Any, sides: Any, now: Any, v: float, direction: float
 ) -> None:
     """Let the sticking elements slip whose load in `direction` is at its limit."""
-    for side in range(sides_of(plan)):
-        first = first_of(plan, side)
-        last = first_of(plan, side + 1)
-        if first == last:
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        if side.first == side.last:
             continue
         s = sliding(parameters, plan, sides, side, v)
-        for i in range(first, last):
-            load = load_of(plan[LITERAL_0 + side] > 0.0, direction, elements[i * ELEMENT_SIZE + FORCE])
-            if (
-                elements[i * ELEMENT_SIZE + SLIPS] == 0.0
-                and load >= elements[i * ELEMENT_SIZE + SHARE] * s - ROUNDING
-            ):
-                elements[i * ELEMENT_SIZE + SLIPS] = 1.0
-                loop[SIGMA] = direction
+        for j in range(side.first, side.last):
+            e = element_of(elements, j)
+            load = load_of(side.literal != 0, direction, e.force)
+            if e.slips == 0 and load >= e.share * s - ROUNDING:
+                e.slips = 1
+                now.sigma = direction
 
 
 @kernel(exact=False)
-def enter_or_leave(sides: Any, loop: Any, side: int, v: float) -> None:
+def enter_or_leave(sides: Any, now: Any, side: Any, v: float) -> None:
     """Pass the edge of a steep layer if the axis stands there."""
-    edge = sides[side * SIDE_SIZE + LAYER]
+    edge = side.layer
     if edge == 0.0:
         return
-    if sides[side * SIDE_SIZE + INSIDE] > 0.0:
+    if side.inside != 0:
         if abs(v) >= (1.0 - ON_EDGE) * edge:
-            sides[side * SIDE_SIZE + INSIDE] = 0.0
-            loop[SIGMA] = 1.0 if v > 0.0 else -1.0
-    elif loop[SIGMA] * v <= (1.0 + ON_EDGE) * edge:
-        sides[side * SIDE_SIZE + INSIDE] = 1.0
+            side.inside = 0
+            now.sigma = 1.0 if v > 0.0 else -1.0
+    elif now.sigma * v <= (1.0 + ON_EDGE) * edge:
+        side.inside = 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stickslip.jit import kernel, pointer
+from stickslip.jit import kernel, pointer, record_at
 from stickslip.simulation.case_arrays import (
     DIVERGED,
     DONE,
@@ -25,7 +25,7 @@ from stickslip.simulation.case_arrays import (
     VELOCITY_LIMIT,
 )
 from stickslip.simulation.exact.bristle import bend
-from stickslip.simulation.exact.event_functions import weigh
+from stickslip.simulation.exact.event_functions import weigh_here
 from stickslip.simulation.exact.events import find
 from stickslip.simulation.exact.flow import FLOW, Linear, kept_flow
 from stickslip.simulation.exact.metering import measure
@@ -39,25 +39,13 @@ from stickslip.simulation.exact.segment import (
     shows,
 )
 from stickslip.simulation.exact.state import (
-    BENT,
-    COUNTS,
+    COUNT,
+    COUNT_SIZE,
     EDGE,
-    EVENTS,
-    FIRST_STEPS,
-    GRID_ROWS,
-    GRID_WRITTEN,
-    HELD,
-    LOOP_SIZE,
-    POSITION,
-    REJECTED,
+    NOW,
+    NOW_SIZE,
+    PLAN,
     SIDE_SIZE,
-    STEP_RATE,
-    STEPS,
-    STORM_COUNT,
-    STORM_SINCE,
-    TIME,
-    TOP,
-    VELOCITY,
     arrange,
 )
 from stickslip.simulation.exact.step import NOT_CONVERGED, correct, look_ahead
@@ -83,8 +71,8 @@ LEVEL = FLOW + 1
 flow over the grid's spacing, and that of a step that is cut short."""
 SPACED = LEVEL * (DEEPEST + 1)
 CUT = SPACED + FLOW
-AT_LOOP = COUNTS
-AT_SEGMENT = AT_LOOP + LOOP_SIZE
+AT_NOW = COUNT_SIZE
+AT_SEGMENT = AT_NOW + NOW_SIZE
 AT_CACHE = AT_SEGMENT + SEGMENT_SIZE
 AT_SIDES = AT_CACHE + CUT + FLOW
 AT_ELEMENTS = AT_SIDES + 2 * SIDE_SIZE
@@ -99,13 +87,13 @@ def growth_of(lin: Linear) -> float:
 
 @kernel(exact=False, inline=True)
 def move(
-    lin: Linear, parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, loop: Any, segment: Any,
+    lin: Linear, parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, now: Any, segment: Any,
     cache: Any, generation: int, count: Any, level: int, left: float, tol: float,
 ) -> int:  # fmt: skip
     """Take one step of at most `left`, shortened until it is accurate; returns its level, or -1."""
     growth = growth_of(lin)
     while True:
-        count[STEPS] += 1.0
+        count.steps += 1
         while level < DEEPEST and growth * min(left, cache[level * LEVEL + FLOW]) > MOST_GROWTH:
             level += 1
         h = cache[level * LEVEL + FLOW]
@@ -116,29 +104,29 @@ def move(
             kept[FLOW - 1] = 0.0
         # The one call: a flow over `left` of its own would be taken out of the loop, and computed at every step.
         half = kept_flow(lin, kept, generation, 0.5 * h)
-        look_ahead(parameters, plan, cells, loop, segment, h, tol)
-        error = correct(lin, parameters, plan, sides, loop, segment, half, h, tol)
+        look_ahead(parameters, plan, cells, now, segment, h, tol)
+        error = correct(lin, parameters, plan, sides, now, segment, half, h, tol)
         segment[ERROR] = error
         rings = lin.frequency * h > QUARTER_PERIODS and h > 2e-6 and shows(lin, segment, 2.0 * tol)
         if error <= tol and not rings:
             return level
         if level >= DEEPEST:
             return -1 if error >= NOT_CONVERGED else level
-        count[REJECTED] += 1.0
+        count.rejected += 1
         level += 1
         while level < DEEPEST and cache[level * LEVEL + FLOW] >= h:
             level += 1
 
 
 @kernel(exact=False, inline=True)
-def next_level(lin: Linear, loop: Any, segment: Any, cache: Any, level: int, tol: float) -> int:
+def next_level(lin: Linear, now: Any, segment: Any, cache: Any, level: int, tol: float) -> int:
     """A longer step after an accurate one that was not cut short."""
     h = segment[LENGTH]
     if h < 0.999 * cache[level * LEVEL + FLOW]:
         return level
     error = segment[ERROR]
     shortest = max(0, level - 3)
-    rounds = 3.0 if loop[BENT] > 0.0 else 2.0
+    rounds = 3.0 if now.bent != 0 else 2.0
     while level > shortest and error < 0.03 * tol and segment[ROUNDS] <= rounds:
         h *= 2.0
         if lin.frequency * h > QUARTER_PERIODS and shows(lin, segment, 2.0 * tol):
@@ -149,10 +137,10 @@ def next_level(lin: Linear, loop: Any, segment: Any, cache: Any, level: int, tol
 
 
 @kernel(exact=False)
-def ended(parameters: Any, loop: Any) -> int:
+def ended(parameters: Any, now: Any) -> int:
     """DONE, or why the run cannot go on."""
-    theta = abs(loop[POSITION])
-    v = abs(loop[VELOCITY])
+    theta = abs(now.position)
+    v = abs(now.velocity)
     if theta <= parameters[POSITION_LIMIT] and v <= parameters[VELOCITY_LIMIT]:
         return DONE
     if math.isfinite(theta) and math.isfinite(v):
@@ -161,20 +149,20 @@ def ended(parameters: Any, loop: Any) -> int:
 
 
 @kernel(exact=False)
-def storms(count: Any, loop: Any) -> bool:
+def storms(count: Any, now: Any) -> bool:
     """Whether more than STORM_EVENTS events came within STORM_TIME; looked at after so many events."""
-    if count[EVENTS] < loop[STORM_COUNT] + STORM_EVENTS:
+    if count.events < now.storm_count + STORM_EVENTS:
         return False
-    soon = loop[TIME] - loop[STORM_SINCE] < STORM_TIME
-    loop[STORM_COUNT] = count[EVENTS]
-    loop[STORM_SINCE] = loop[TIME]
+    soon = now.time - now.storm_since < STORM_TIME
+    now.storm_count = count.events
+    now.storm_since = now.time
     return soon
 
 
 @kernel(exact=False)
 def awaits(plan: Any, grid: Any, count: Any, t: float) -> bool:
     """Whether a time of the grid lies before t."""
-    return count[GRID_WRITTEN] < plan[GRID_ROWS] and grid[int(count[GRID_WRITTEN])] <= t + EDGE
+    return count.grid_written < plan.grid_rows and grid[count.grid_written] <= t + EDGE
 
 
 @kernel(exact=False)
@@ -189,14 +177,14 @@ def solve(
     events to ``row_array`` if `full`, metrics to ``acc`` and ``turns`` if `metered`.
     """
     parameters = pointer(parameter_array, 0)
-    plan = pointer(plan_array, 0)
+    plan = record_at(pointer(plan_array, 0), PLAN)
     cells = pointer(cell_array, 0)
     breaks = pointer(break_array, 0)
     grid = pointer(grid_array, 0)
     out = pointer(out_array, 0)
     rows = pointer(row_array, 0)
-    count = pointer(work, 0)
-    loop = pointer(work, AT_LOOP)
+    count = record_at(pointer(work, 0), COUNT)
+    now = record_at(pointer(work, AT_NOW), NOW)
     segment = pointer(work, AT_SEGMENT)
     cache = pointer(work, AT_CACHE)
     spaced = pointer(cache, SPACED)
@@ -212,60 +200,60 @@ def solve(
     for i in range(DEEPEST + 1):
         cache[i * LEVEL + FLOW] = h
         h *= 0.5
-    start(parameters, plan, cells, elements, sides, loop, breaks)
-    lin = arrange(parameters, plan, elements, sides, loop)
-    weigh(plan, elements, sides, loop[POSITION], loop[VELOCITY], TOP)
-    while loop[TIME] < parameters[DURATION] - EDGE:
-        left = breaks[next_break] - loop[TIME]
-        held = loop[HELD] > 0.0
+    start(parameters, plan, cells, elements, sides, now, breaks)
+    lin = arrange(parameters, plan, elements, sides, now)
+    weigh_here(plan, elements, sides, now)
+    while now.time < parameters[DURATION] - EDGE:
+        left = breaks[next_break] - now.time
+        held = now.held != 0
         if held:
-            event = rest(parameters, plan, cells, elements, sides, loop, segment, left)
+            event = rest(parameters, plan, cells, elements, sides, now, segment, left)
         else:
-            if loop[BENT] > 0.0:
-                lin = bend(parameters, plan, sides, loop, min(left, cache[level * LEVEL + FLOW]))
+            if now.bent != 0:
+                lin = bend(parameters, plan, sides, now, min(left, cache[level * LEVEL + FLOW]))
                 generation += 1
             level = move(
-                lin, parameters, plan, cells, elements, sides, loop, segment, cache, generation, count, level, left,
+                lin, parameters, plan, cells, elements, sides, now, segment, cache, generation, count, level, left,
                 tol,
             )  # fmt: skip
             if level < 0:
                 return NO_STEP
-            event = find(lin, parameters, plan, elements, sides, loop, segment, tol)
+            event = find(lin, parameters, plan, elements, sides, now, segment, tol)
         happens = event >= 0.0
         h = event if happens else segment[LENGTH]
-        if light and awaits(plan, grid, count, loop[TIME] + h):
-            write_grid(lin, plan, loop, segment, grid, count, out, h, 0.1 * tol, spaced, generation)
+        if light and awaits(plan, grid, count, now.time + h):
+            write_grid(lin, plan, now, segment, grid, count, out, h, 0.1 * tol, spaced, generation)
         if full:
-            write_rows(lin, parameters, plan, cells, sides, loop, segment, grid, count, rows, h)
-        if metered and not measure(lin, parameters, plan, cells, sides, loop, segment, h, acc, turns, nodes):
+            write_rows(lin, parameters, plan, cells, sides, now, segment, grid, count, rows, h)
+        if metered and not measure(lin, parameters, plan, cells, sides, now, segment, h, acc, turns, nodes):
             return TOO_FAST
         if happens:
-            cross(parameters, plan, cells, elements, sides, loop, segment, count, rows, h, tol, held, full)
+            cross(parameters, plan, cells, elements, sides, now, segment, count, rows, h, tol, held, full)
             slow_again = growth_of(lin) * FIRST_STEP > MOST_GROWTH
-            lin = arrange(parameters, plan, elements, sides, loop)
-            weigh(plan, elements, sides, loop[POSITION], loop[VELOCITY], TOP)
+            lin = arrange(parameters, plan, elements, sides, now)
+            weigh_here(plan, elements, sides, now)
             generation += 1
             level = after_event if slow_again else max(level, after_event)
         else:
-            finish_step(plan, sides, loop, segment, loop[TIME] + h, parameters[KI])
+            finish_step(plan, sides, now, segment, now.time + h, parameters[KI])
             if parameters[PERTURBATION] != 0.0:
-                perturbation(parameters, plan, elements, loop, h, tol, False)
-                weigh(plan, elements, sides, loop[POSITION], loop[VELOCITY], TOP)
+                perturbation(parameters, plan, elements, now, h, tol, False)
+                weigh_here(plan, elements, sides, now)
             if not held:
-                level = next_level(lin, loop, segment, cache, level, tol)
+                level = next_level(lin, now, segment, cache, level, tol)
         jumps = happens
         if h >= left - EDGE:
             following = min(next_break + 1, break_array.size - 1)
-            if pass_break(parameters, plan, cells, sides, loop, breaks[next_break], breaks[following]):
+            if pass_break(parameters, plan, cells, sides, now, breaks[next_break], breaks[following]):
                 jumps = True
             next_break = following
         if full and jumps:
-            row_after(parameters, plan, sides, loop, count, rows)
-        code = ended(parameters, loop)
+            row_after(parameters, plan, sides, now, count, rows)
+        code = ended(parameters, now)
         if code != DONE:
             return code
-        if storms(count, loop):
+        if storms(count, now):
             return STORM
-        if count[STEPS] > plan[FIRST_STEPS] + plan[STEP_RATE] * loop[TIME]:
+        if count.steps > plan.first_steps + plan.step_rate * now.time:
             return TOO_STIFF
     return DONE

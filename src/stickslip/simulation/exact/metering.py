@@ -47,21 +47,7 @@ from stickslip.simulation.exact.segment import (
     RATE_END,
     cubic_of,
 )
-from stickslip.simulation.exact.state import (
-    DAMPING,
-    GOAL,
-    GOAL_RATE,
-    JUMPED,
-    POSITION,
-    SIDE_SIZE,
-    SIDES,
-    SPRING,
-    TIME,
-    UNSEEN,
-    VELOCITY,
-    WEIGHT,
-    command,
-)
+from stickslip.simulation.exact.state import command, side_of
 from stickslip.simulation.exact.window import Shares, ringing_window, window
 
 LONGEST = 64e-3
@@ -83,11 +69,13 @@ def shares(parameters: Any, plan: Any, sides: Any) -> Shares:
     """The shares of the loop as its modes are."""
     spring = 0.0
     damping = 0.0
-    if plan[SIDES] > 1:
-        spring = -sides[SIDE_SIZE + WEIGHT] * sides[SIDE_SIZE + SPRING]
-        damping = -sides[SIDE_SIZE + WEIGHT] * sides[SIDE_SIZE + DAMPING]
+    contact = side_of(sides, 0)
+    if plan.sides > 1:
+        side = side_of(sides, 1)
+        spring = -side.weight * side.spring
+        damping = -side.weight * side.damping
     return Shares(
-        spring - parameters[KP], damping - parameters[KD], sides[SPRING], sides[DAMPING], spring, damping
+        spring - parameters[KP], damping - parameters[KD], contact.spring, contact.damping, spring, damping
     )
 
 
@@ -99,26 +87,26 @@ class Way(NamedTuple):
 
 
 @kernel(exact=False, inline=True)
-def way_of(loop: Any, segment: Any) -> Way:
+def way_of(now: Any, segment: Any) -> Way:
     """How the nodes of a segment get the reference.
 
     Where `exact.step.look_ahead` leaves out its middle, a cubic misses it by a small part of the tolerance.
     """
     g2, g3 = upper_terms(
-        loop[GOAL], loop[GOAL_RATE], segment[GOAL_END], segment[RATE_END], 1.0 / segment[LENGTH]
+        now.goal, now.goal_rate, segment[GOAL_END], segment[RATE_END], 1.0 / segment[LENGTH]
     )  # fmt: skip
-    return Way(loop[UNSEEN] > 0.0, (loop[GOAL], loop[GOAL_RATE], g2, g3))
+    return Way(now.unseen != 0, (now.goal, now.goal_rate, g2, g3))
 
 
 @kernel(exact=False, inline=True)
 def commanded(
-    parameters: Any, plan: Any, cells: Any, loop: Any, way: Way, x: float
+    parameters: Any, plan: Any, cells: Any, now: Any, way: Way, x: float
 ) -> tuple[float, float, float]:  # fmt: skip
     """Torque commanded by time alone, and the reference's position and velocity, at x inside the segment."""
     if way.even:
         goal, rate = moved(way.cubic, UNMOVED, x, 0.0, 0.0)
         return parameters[KP] * goal + parameters[KR] * rate, goal, rate
-    r, _, goal, rate = command(parameters, plan, cells, loop, loop[TIME] + x)
+    r, _, goal, rate = command(parameters, plan, cells, now, now.time + x)
     return r, goal, rate
 
 
@@ -158,27 +146,27 @@ def windows_of(lin: Linear, segment: Any, h: float, longest: float) -> float:
 
 
 @kernel(exact=False, inline=True)
-def slowly(loop: Any, segment: Any) -> bool:
+def slowly(now: Any, segment: Any) -> bool:
     """Whether the reference turns by less than 0.3 radian in a segment: its way leaves that of its mean velocity by a
     twelfth of the angle's square."""
     h = segment[LENGTH]
     if h > LONGEST * 1.001:
         return False
-    r0 = loop[GOAL_RATE]
+    r0 = now.goal_rate
     r1 = segment[RATE_END]
-    off = segment[GOAL_END] - loop[GOAL] - 0.5 * h * (r0 + r1)
+    off = segment[GOAL_END] - now.goal - 0.5 * h * (r0 + r1)
     return abs(off) <= 0.0075 * h * max(abs(r0), abs(r1))
 
 
 @kernel(exact=False)
 def measure(
-    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, h: float, acc: Any,
+    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, segment: Any, h: float, acc: Any,
     turns: Any, nodes: Any,
 ) -> bool:  # fmt: skip
     """Hand the first h of the segment to the meter, in windows of five nodes; False where they are too many."""
     if h < SHORTEST_WINDOW:
         return True
-    longest = LONGEST if slowly(loop, segment) else LONG_WINDOW
+    longest = LONGEST if slowly(now, segment) else LONG_WINDOW
     windows = math.ceil(windows_of(lin, segment, h, longest))
     fewest = math.ceil(h / longest * (1.0 - 1e-9))
     rings = windows > fewest and has_closed_form(lin, h / fewest)
@@ -194,12 +182,10 @@ def measure(
     p = segment[FREE_POSITION]
     v = segment[FREE_VELOCITY]
     share = shares(parameters, plan, sides)
-    way = way_of(loop, segment)
-    if loop[JUMPED] > 0.0:
-        fill(
-            parameters, plan, cells, sides, loop, segment, way, 0.0, loop[POSITION], loop[VELOCITY], nodes, 4
-        )
-        loop[JUMPED] = 0.0
+    way = way_of(now, segment)
+    if now.jumped != 0:
+        fill(parameters, plan, cells, sides, now, segment, way, 0.0, now.position, now.velocity, nodes, 4)
+        now.jumped = 0
     for w in range(windows):
         begin = w * width
         for j in range(SIGNALS):
@@ -209,31 +195,31 @@ def measure(
             for k in range(1, 5):
                 x = begin + 0.25 * width * k
                 theta, speed = moved(c, UNMOVED, x, 0.0, 0.0)
-                fill(parameters, plan, cells, sides, loop, segment, way, x, theta, speed, nodes, k)
+                fill(parameters, plan, cells, sides, now, segment, way, x, theta, speed, nodes, k)
             p0 = p
             v0 = v
             p, v = free_motion(twice(twice(m)), p0, v0)
             ring = ringing(lin, width, p0, v0, p, v)
-            ringing_window(acc, turns, loop[TIME] + begin, width, nodes, lin, m, ring, share)
+            ringing_window(acc, turns, now.time + begin, width, nodes, lin, m, ring, share)
             shift(nodes, 4, share, p, v)
         else:
             for k in range(1, 5):
                 x = begin + 0.25 * width * k
                 p, v = free_motion(m, p, v)
                 theta, speed = moved(c, UNMOVED, x, p, v)
-                fill(parameters, plan, cells, sides, loop, segment, way, x, theta, speed, nodes, k)
-            window(acc, turns, loop[TIME] + begin, width, nodes)
+                fill(parameters, plan, cells, sides, now, segment, way, x, theta, speed, nodes, k)
+            window(acc, turns, now.time + begin, width, nodes)
     return True
 
 
 @kernel(exact=False)
 def fill(
-    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, way: Way, x: float, theta: float,
+    parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, segment: Any, way: Way, x: float, theta: float,
     v: float, nodes: Any, k: int,
 ) -> None:  # fmt: skip
     """Write one node of every signal that the meter reads."""
-    r, goal, rate = commanded(parameters, plan, cells, loop, way, x)
-    tm, tf, th = torques_at(parameters, plan, sides, loop, segment, x, r, goal, rate, theta, v)
+    r, goal, rate = commanded(parameters, plan, cells, now, way, x)
+    tm, tf, th = torques_at(parameters, plan, sides, now, segment, x, r, goal, rate, theta, v)
     nodes[ERROR, k] = goal - theta
     nodes[ERROR_RATE, k] = rate - v
     nodes[AT, k] = theta

@@ -16,28 +16,7 @@ from stickslip.simulation.exact.segment import (
     slip_torque_at,
     state_at,
 )
-from stickslip.simulation.exact.state import (
-    DS,
-    EDGE,
-    GOAL,
-    GOAL_RATE,
-    GRID_ROWS,
-    GRID_WRITTEN,
-    INTEGRAL,
-    LAG,
-    POSITION,
-    ROWS,
-    ROWS_WRITTEN,
-    SIDE_SIZE,
-    SIDES,
-    SPACING,
-    TIME,
-    VELOCITY,
-    R,
-    S,
-    command,
-    torques,
-)
+from stickslip.simulation.exact.state import EDGE, command, side_of, torques
 
 ROW_SIZE = len(COLUMNS)
 
@@ -45,11 +24,11 @@ ROW_SIZE = len(COLUMNS)
 @kernel(exact=False, inline=True)
 def rows_until(plan: Any, grid: Any, row: int, end: float) -> int:
     """The first row after `row` whose time is after `end`; loops over a known number of rows are vectorised."""
-    rows = int(plan[GRID_ROWS])
+    rows = plan.grid_rows
     last = row
-    if plan[SPACING] > 0.0:
+    if plan.spacing > 0.0:
         # A guess that rounding may put one row off.
-        last = min(max(int((end - grid[0]) / plan[SPACING]), row), rows)
+        last = min(max(int((end - grid[0]) / plan.spacing), row), rows)
         if last > row and grid[last - 1] > end:
             last -= 1
     while last < rows and grid[last] <= end:
@@ -59,7 +38,7 @@ def rows_until(plan: Any, grid: Any, row: int, end: float) -> int:
 
 @kernel(exact=False)
 def write_grid(
-    lin: Linear, plan: Any, loop: Any, segment: Any, grid: Any, count: Any, out: Any, h: float, visible: float,
+    lin: Linear, plan: Any, now: Any, segment: Any, grid: Any, count: Any, out: Any, h: float, visible: float,
     spaced: Any, generation: int,
 ) -> None:  # fmt: skip
     """Write position and velocity at the grid's times inside the first h of the segment; the next one is inside.
@@ -67,10 +46,10 @@ def write_grid(
     On an even grid the free motion is carried from one time to the next by one matrix. A free motion that has
     died out (less than `visible` rad) is left out.
     """
-    row = int(count[GRID_WRITTEN])
-    last = rows_until(plan, grid, row, loop[TIME] + h + EDGE)
-    count[GRID_WRITTEN] = last
-    time = loop[TIME]
+    row = count.grid_written
+    last = rows_until(plan, grid, row, now.time + h + EDGE)
+    count.grid_written = last
+    time = now.time
     c0, c1, c2, c3 = cubic_of(segment)
     if lin.discriminant > 0.0 and not shows(lin, segment, visible):
         for i in range(row, last):
@@ -80,8 +59,8 @@ def write_grid(
         return
     x = grid[row] - time
     p, q = free_motion(flow(lin, x), segment[FREE_POSITION], segment[FREE_VELOCITY])
-    even = plan[SPACING] > 0.0
-    between = kept_flow(lin, spaced, generation, plan[SPACING]) if even and row + 1 < last else UNMOVED
+    even = plan.spacing > 0.0
+    between = kept_flow(lin, spaced, generation, plan.spacing) if even and row + 1 < last else UNMOVED
     for i in range(row, last):
         x = grid[i] - time
         if not even:
@@ -97,8 +76,8 @@ def put_row(
     event: float,
 ) -> None:  # fmt: skip
     """Write the next row, in the order of `case_arrays.COLUMNS`."""
-    row_at = pointer(rows, int(count[ROWS_WRITTEN]) * ROW_SIZE)
-    count[ROWS_WRITTEN] += 1.0
+    row_at = pointer(rows, count.rows_written * ROW_SIZE)
+    count.rows_written += 1
     row_at[0] = t
     row_at[1] = goal
     row_at[2] = rate
@@ -112,75 +91,76 @@ def put_row(
 
 @kernel(exact=False, inline=True)
 def signals(
-    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, x: float, theta: float, v: float
+    parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, segment: Any, x: float, theta: float, v: float
 ) -> tuple[float, float, float, float, float]:  # fmt: skip
     """Reference position and velocity; motor, friction and compensating torque at x inside the segment."""
-    r, _, goal, rate = command(parameters, plan, cells, loop, loop[TIME] + x)
-    tm, tf, th = torques_at(parameters, plan, sides, loop, segment, x, r, goal, rate, theta, v)
+    r, _, goal, rate = command(parameters, plan, cells, now, now.time + x)
+    tm, tf, th = torques_at(parameters, plan, sides, now, segment, x, r, goal, rate, theta, v)
     return goal, rate, tm, tf, th
 
 
 @kernel(exact=False, inline=True)
 def torques_at(
-    parameters: Any, plan: Any, sides: Any, loop: Any, segment: Any, x: float, r: float, goal: float, rate: float,
+    parameters: Any, plan: Any, sides: Any, now: Any, segment: Any, x: float, r: float, goal: float, rate: float,
     theta: float, v: float,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Motor, friction and compensating torque at x inside the segment, where the reference is known."""
-    s0 = slip_torque_at(sides, segment, 0, x)
-    s1 = slip_torque_at(sides, segment, 1, x) if plan[SIDES] > 1 else 0.0
-    integral = integral_at(parameters, loop, segment, x)
-    return torques(parameters, plan, sides, loop, r, goal, rate, integral, theta, v, s0, s1)
+    s0 = slip_torque_at(side_of(sides, 0), segment, x)
+    s1 = slip_torque_at(side_of(sides, 1), segment, x) if plan.sides > 1 else 0.0
+    integral = integral_at(parameters, now, segment, x)
+    return torques(parameters, plan, sides, now, r, goal, rate, integral, theta, v, s0, s1)
 
 
 @kernel(exact=False)
 def write_rows(
-    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, grid: Any, count: Any,
+    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, segment: Any, grid: Any, count: Any,
     rows: Any, h: float,
 ) -> None:  # fmt: skip
     """Write rows at the grid's times inside the first h of the segment."""
-    while count[GRID_WRITTEN] < plan[GRID_ROWS]:
-        t = grid[int(count[GRID_WRITTEN])]
-        x = t - loop[TIME]
+    while count.grid_written < plan.grid_rows:
+        t = grid[count.grid_written]
+        x = t - now.time
         if x > h + 1e-12:
             return
         theta, v = state_at(lin, segment, x)
-        goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, loop, segment, x, theta, v)
+        goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, now, segment, x, theta, v)
         put_row(rows, count, t, goal, rate, theta, v, tm, tf, th, 0.0)
-        count[GRID_WRITTEN] += 1.0
+        count.grid_written += 1
 
 
 @kernel(exact=False)
 def room_for_event(plan: Any, count: Any) -> bool:
     """Whether an event's rows still leave room for the rest of the grid."""
-    return count[ROWS_WRITTEN] + 2.0 + plan[GRID_ROWS] - count[GRID_WRITTEN] <= plan[ROWS]
+    return count.rows_written + 2.0 + plan.grid_rows - count.grid_written <= plan.rows
 
 
 @kernel(exact=False)
 def row_before(
-    parameters: Any, plan: Any, cells: Any, sides: Any, loop: Any, segment: Any, count: Any, rows: Any, x: float,
+    parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, segment: Any, count: Any, rows: Any, x: float,
     theta: float, v: float,
 ) -> None:  # fmt: skip
     """Write the row of an event at x, as the segment ends there."""
     if room_for_event(plan, count):
-        goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, loop, segment, x, theta, v)
-        put_row(rows, count, loop[TIME] + x, goal, rate, theta, v, tm, tf, th, 1.0)
+        goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, now, segment, x, theta, v)
+        put_row(rows, count, now.time + x, goal, rate, theta, v, tm, tf, th, 1.0)
 
 
 @kernel(exact=False)
-def row_after(parameters: Any, plan: Any, sides: Any, loop: Any, count: Any, rows: Any) -> None:
+def row_after(parameters: Any, plan: Any, sides: Any, now: Any, count: Any, rows: Any) -> None:
     """Write the row after an event if a torque has jumped."""
-    last = int(count[ROWS_WRITTEN]) - 1
+    last = count.rows_written - 1
     if last < 0 or not room_for_event(plan, count):
         return
-    s0 = sides[S] + sides[LAG] * sides[DS]
-    s1 = sides[SIDE_SIZE + S] + sides[SIDE_SIZE + LAG] * sides[SIDE_SIZE + DS] if plan[SIDES] > 1 else 0.0
-    goal = loop[GOAL]
-    rate = loop[GOAL_RATE]
-    theta = loop[POSITION]
-    v = loop[VELOCITY]
+    contact, side = side_of(sides, 0), side_of(sides, 1)
+    s0 = contact.force + contact.lag * contact.force_rate
+    s1 = side.force + side.lag * side.force_rate if plan.sides > 1 else 0.0
+    goal = now.goal
+    rate = now.goal_rate
+    theta = now.position
+    v = now.velocity
     tm, tf, th = torques(
-        parameters, plan, sides, loop, loop[R], goal, rate, loop[INTEGRAL], theta, v, s0, s1
+        parameters, plan, sides, now, now.command, goal, rate, now.integral, theta, v, s0, s1
     )  # fmt: skip
     before = pointer(rows, last * ROW_SIZE)
     if abs(tm - before[5]) + abs(tf - before[6]) + abs(th - before[7]) > 1e-6:
-        put_row(rows, count, loop[TIME], goal, rate, theta, v, tm, tf, th, 1.0)
+        put_row(rows, count, now.time, goal, rate, theta, v, tm, tf, th, 1.0)

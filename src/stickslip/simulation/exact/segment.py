@@ -7,20 +7,6 @@ from typing import Any
 from stickslip.jit import kernel
 from stickslip.simulation.case_arrays import KI
 from stickslip.simulation.exact.flow import Cubic, Linear, flow, hermite, hermite_slope, moved
-from stickslip.simulation.exact.state import (
-    DS,
-    DS_END,
-    GOAL,
-    INTEGRAL,
-    LAG,
-    LIFT,
-    POSITION,
-    S_END,
-    SIDE_SIZE,
-    SLIPPING,
-    VARIES,
-    S,
-)
 
 # ---- entries of `segment`: the motion over one accepted step -------------------------------------------------
 (
@@ -71,47 +57,47 @@ def state_at(lin: Linear, segment: Any, x: float) -> tuple[float, float]:
 
 
 @kernel(exact=False, inline=True)
-def slip_force_at(sides: Any, segment: Any, side: int, x: float) -> float:
+def slip_force_at(side: Any, segment: Any, x: float) -> float:
     """Slipping force of a side at x inside the segment."""
-    if sides[side * SIDE_SIZE + VARIES] == 0.0 or sides[side * SIDE_SIZE + SLIPPING] == 0.0:
-        return sides[side * SIDE_SIZE + S]
+    if side.varies == 0 or side.slipping == 0.0:
+        return side.force
     y = x * (segment[LENGTH] - x)
-    return sides[side * SIDE_SIZE + LIFT] * y * y + hermite(
-        sides[side * SIDE_SIZE + S],
-        sides[side * SIDE_SIZE + DS],
-        sides[side * SIDE_SIZE + S_END],
-        sides[side * SIDE_SIZE + DS_END],
+    return side.lift * y * y + hermite(
+        side.force,
+        side.force_rate,
+        side.force_end,
+        side.force_rate_end,
         segment[LENGTH],
         x,
     )
 
 
 @kernel(exact=False, inline=True)
-def slip_torque_at(sides: Any, segment: Any, side: int, x: float) -> float:
+def slip_torque_at(side: Any, segment: Any, x: float) -> float:
     """Torque of a side's slipping force at x inside the segment: a bristle's damping adds to the force."""
-    force = slip_force_at(sides, segment, side, x)
-    if sides[side * SIDE_SIZE + LAG] == 0.0 or sides[side * SIDE_SIZE + SLIPPING] == 0.0:
+    force = slip_force_at(side, segment, x)
+    if side.lag == 0.0 or side.slipping == 0.0:
         return force
     y = x * (segment[LENGTH] - x)
-    slope = 2.0 * sides[side * SIDE_SIZE + LIFT] * y * (segment[LENGTH] - 2.0 * x) + hermite_slope(
-        sides[side * SIDE_SIZE + S],
-        sides[side * SIDE_SIZE + DS],
-        sides[side * SIDE_SIZE + S_END],
-        sides[side * SIDE_SIZE + DS_END],
+    slope = 2.0 * side.lift * y * (segment[LENGTH] - 2.0 * x) + hermite_slope(
+        side.force,
+        side.force_rate,
+        side.force_end,
+        side.force_rate_end,
         segment[LENGTH],
         x,
     )
-    return force + sides[side * SIDE_SIZE + LAG] * slope
+    return force + side.lag * slope
 
 
 @kernel(exact=False, inline=True)
-def integral_at(parameters: Any, loop: Any, segment: Any, x: float) -> float:
+def integral_at(parameters: Any, now: Any, segment: Any, x: float) -> float:
     """Integral of the position error at x inside the segment, rad·s."""
     if parameters[KI] == 0.0:
         return 0.0
     return hermite(
-        loop[INTEGRAL],
-        loop[GOAL] - loop[POSITION],
+        now.integral,
+        now.goal - now.position,
         segment[INTEGRAL_END],
         segment[GOAL_END] - segment[POSITION_END],
         segment[LENGTH],

@@ -40,41 +40,10 @@ from stickslip.simulation.exact.segment import (
     slip_force_at,
 )
 from stickslip.simulation.exact.state import (
-    ADDED,
-    ATTRACTION,
-    BASE,
     BENDS,
-    CALM,
-    CELLS,
-    DR,
-    DS,
-    DS_END,
     FOLLOWS,
-    GOAL,
-    GOAL_RATE,
-    INTEGRAL,
-    KIND,
-    LAG,
-    LIFT,
-    NONLINEAR,
-    POSITION,
-    Q_END,
-    Q_MID,
-    S_END,
-    S_MID,
-    SCALE,
-    SEEN_LENGTH,
-    SIDE_SIZE,
-    SIGMA,
-    SLIPPING,
-    TIME,
-    UNSEEN,
-    VARIES,
-    VELOCITY,
-    WEIGHT,
-    R,
-    S,
     command,
+    side_of,
     sides_of,
     sliding,
 )
@@ -94,7 +63,7 @@ SHORT = 2e-8  # s
 STEEPEST = 1e5
 """Largest particular solution, rad: more would cost too many digits."""
 MOST_ROUNDS = 5
-MOST_UNSEEN = 4.0
+MOST_UNSEEN = 4
 BUMP = 8.0 / 15.0
 """Mean of x²(1 - x)² over its value in the middle."""
 LASTING = 5e-3
@@ -102,54 +71,54 @@ LASTING = 5e-3
 
 
 @kernel(exact=False, inline=True)
-def look_ahead(parameters: Any, plan: Any, cells: Any, loop: Any, segment: Any, h: float, tol: float) -> None:
+def look_ahead(parameters: Any, plan: Any, cells: Any, now: Any, segment: Any, h: float, tol: float) -> None:
     """Commanded torque and reference in the middle and at the end of the next h.
 
     Where the middle has lain on the cubic to a small part of the tolerance, the next few are taken from it.
     """
-    r, dr, goal, rate = command(parameters, plan, cells, loop, loop[TIME] + h)
+    r, dr, goal, rate = command(parameters, plan, cells, now, now.time + h)
     segment[R_END] = r
     segment[DR_END] = dr
     segment[GOAL_END] = goal
     segment[RATE_END] = rate
-    middle = 0.5 * (loop[R] + r) + 0.125 * h * (loop[DR] - dr)
-    if loop[UNSEEN] > 0.0 and h <= loop[SEEN_LENGTH]:
-        loop[UNSEEN] -= 1.0
+    middle = 0.5 * (now.command + r) + 0.125 * h * (now.command_rate - dr)
+    if now.unseen != 0 and h <= now.seen_length:
+        now.unseen -= 1
         segment[R_MID] = middle
         return
-    r, _, goal, rate = command(parameters, plan, cells, loop, loop[TIME] + 0.5 * h)
+    r, _, goal, rate = command(parameters, plan, cells, now, now.time + 0.5 * h)
     segment[R_MID] = r
     segment[GOAL_MID] = goal
     segment[RATE_MID] = rate
     # A torque m bends a free axis by less than m h²/8J.
     smooth = abs(r - middle) * h * h < 0.1 * tol * parameters[INERTIA]
-    loop[UNSEEN] = MOST_UNSEEN if smooth and plan[CELLS] == 0.0 and parameters[KI] == 0.0 else 0.0
-    loop[SEEN_LENGTH] = h
+    now.unseen = MOST_UNSEEN if smooth and plan.cells == 0.0 and parameters[KI] == 0.0 else 0
+    now.seen_length = h
 
 
 @kernel(exact=False, inline=True)
 def slip_terms(
-    parameters: Any, plan: Any, sides: Any, loop: Any, side: int, h: float, theta_mid: float, v_mid: float,
+    parameters: Any, plan: Any, sides: Any, now: Any, side: Any, h: float, theta_mid: float, v_mid: float,
     theta_end: float, v_end: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Advance the slipping force of a side along the motion; returns its two upper coefficients."""
-    kind = sides[side * SIDE_SIZE + KIND]
+    kind = side.kind
     if kind == BENDS:
-        return bristle_terms(parameters, plan, sides, loop, side, h, theta_mid, v_mid, theta_end, v_end)
+        return bristle_terms(parameters, plan, sides, now, side, h, theta_mid, v_mid, theta_end, v_end)
     if kind == FOLLOWS:
-        return curve_terms(parameters, plan, sides, loop, side, h, v_mid, v_end)
+        return curve_terms(parameters, plan, sides, now, side, h, v_mid, v_end)
     q_mid = 1.0 / sliding(parameters, plan, sides, side, v_mid)
     q_end = 1.0 / sliding(parameters, plan, sides, side, v_end)
-    attraction = sides[side * SIDE_SIZE + ATTRACTION]
-    goal = attraction * sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA]
-    s0 = sides[side * SIDE_SIZE + S]
-    d0 = sides[side * SIDE_SIZE + DS]
+    attraction = side.attraction
+    goal = attraction * side.slipping * now.sigma
+    s0 = side.force
+    d0 = side.force_rate
     middle, end, slope = relaxed(goal, goal, s0, d0, attraction * q_mid, attraction * q_end, h)
-    sides[side * SIDE_SIZE + Q_MID] = q_mid
-    sides[side * SIDE_SIZE + Q_END] = q_end
-    sides[side * SIDE_SIZE + S_MID] = middle
-    sides[side * SIDE_SIZE + S_END] = end
-    sides[side * SIDE_SIZE + DS_END] = slope
+    side.decay_mid = q_mid
+    side.decay_end = q_end
+    side.force_mid = middle
+    side.force_end = end
+    side.force_rate_end = slope
     return upper_terms(s0, d0, end, slope, 1.0 / h)
 
 
@@ -159,16 +128,17 @@ def hides_curve(plan: Any, sides: Any, v0: float, v1: float, v2: float) -> bool:
     jump = max(abs(v1 - v0), abs(v2 - v1))
     turns = v0 * v1 < 0.0 or v1 * v2 < 0.0
     slowest = 0.0 if turns else min(abs(v0), abs(v1), abs(v2))
-    for side in range(sides_of(plan)):
-        scale = sides[side * SIDE_SIZE + SCALE]
-        if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and jump > WIDEST * scale > 0.0 and slowest < 3.0 * scale:
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        scale = side.scale
+        if side.slipping > 0.0 and jump > WIDEST * scale > 0.0 and slowest < 3.0 * scale:
             return True
     return False
 
 
 @kernel(exact=False, inline=True)
 def slip_error(
-    lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, segment: Any
+    lin: Linear, parameters: Any, plan: Any, sides: Any, now: Any, segment: Any
 ) -> tuple[float, float]:  # fmt: skip
     """Errors of the slipping forces, N·m: at the end of the segment, and between its nodes.
 
@@ -176,47 +146,44 @@ def slip_error(
     """
     h = segment[LENGTH]
     c = cubic_of(segment)
-    a0 = acceleration(lin, c, 0.0, loop[POSITION], loop[VELOCITY])
+    a0 = acceleration(lin, c, 0.0, now.position, now.velocity)
     a1 = acceleration(lin, c, 0.5 * h, segment[POSITION_MID], segment[VELOCITY_MID])
-    v = 0.5 * (loop[VELOCITY] + segment[VELOCITY_MID]) + 0.0625 * h * (a0 - a1)
+    v = 0.5 * (now.velocity + segment[VELOCITY_MID]) + 0.0625 * h * (a0 - a1)
     total = 0.0
     between = 0.0
-    for side in range(sides_of(plan)):
-        kind = sides[side * SIDE_SIZE + KIND]
-        if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and kind == FOLLOWS:
-            if sides[side * SIDE_SIZE + VARIES] > 0.0:
-                between += curve_error(lin, parameters, plan, sides, loop, segment, side)
-        elif sides[side * SIDE_SIZE + SLIPPING] > 0.0:
-            sides[side * SIDE_SIZE + LIFT] = 0.0
-            force = slip_force_at(sides, segment, side, 0.25 * h)
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        kind = side.kind
+        if side.slipping > 0.0 and kind == FOLLOWS:
+            if side.varies != 0:
+                between += curve_error(lin, parameters, plan, sides, now, segment, side)
+        elif side.slipping > 0.0:
+            side.lift = 0.0
+            force = slip_force_at(side, segment, 0.25 * h)
             if kind == BENDS:
-                theta = 0.5 * (loop[POSITION] + segment[POSITION_MID])
-                theta += 0.0625 * h * (loop[VELOCITY] - segment[VELOCITY_MID])
-                slope = bristle_rate(parameters, plan, sides, loop, side, theta, v, force)
+                theta = 0.5 * (now.position + segment[POSITION_MID])
+                theta += 0.0625 * h * (now.velocity - segment[VELOCITY_MID])
+                slope = bristle_rate(parameters, plan, sides, now, side, theta, v, force)
                 middle = bristle_rate(
-                    parameters, plan, sides, loop, side, segment[POSITION_MID], segment[VELOCITY_MID],
-                    sides[side * SIDE_SIZE + S_MID],
+                    parameters, plan, sides, now, side, segment[POSITION_MID], segment[VELOCITY_MID],
+                    side.force_mid,
                 )  # fmt: skip
             else:
-                attraction = sides[side * SIDE_SIZE + ATTRACTION]
-                goal = attraction * sides[side * SIDE_SIZE + SLIPPING] * loop[SIGMA]
+                attraction = side.attraction
+                goal = attraction * side.slipping * now.sigma
                 slope = goal - attraction * force / sliding(parameters, plan, sides, side, v)
-                middle = goal - attraction * sides[side * SIDE_SIZE + Q_MID] * sides[side * SIDE_SIZE + S_MID]
-            parabola = (
-                0.375 * sides[side * SIDE_SIZE + DS]
-                + 0.75 * middle
-                - 0.125 * sides[side * SIDE_SIZE + DS_END]
-            )
-            sides[side * SIDE_SIZE + LIFT] = 16.0 / 3.0 * (slope - parabola) / (h * h * h)
-            off = abs(sides[side * SIDE_SIZE + WEIGHT] * (slope - parabola))
+                middle = goal - attraction * side.decay_mid * side.force_mid
+            parabola = 0.375 * side.force_rate + 0.75 * middle - 0.125 * side.force_rate_end
+            side.lift = 16.0 / 3.0 * (slope - parabola) / (h * h * h)
+            off = abs(side.weight * (slope - parabola))
             total += BRISTLE_SHARE * off if kind == BENDS else off
-            between += sides[side * SIDE_SIZE + LAG] * off
+            between += side.lag * off
     return h / 3.0 * total, between
 
 
 @kernel(exact=False, inline=True)
 def curve_error(
-    lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, segment: Any, side: int
+    lin: Linear, parameters: Any, plan: Any, sides: Any, now: Any, segment: Any, side: Any
 ) -> float:  # fmt: skip
     """How far a force on the curve lies from its cubic at three quarters, N·m."""
     h = segment[LENGTH]
@@ -224,14 +191,14 @@ def curve_error(
     a1 = acceleration(lin, c, 0.5 * h, segment[POSITION_MID], segment[VELOCITY_MID])
     a2 = acceleration(lin, c, h, segment[POSITION_END], segment[VELOCITY_END])
     v = 0.5 * (segment[VELOCITY_MID] + segment[VELOCITY_END]) + 0.0625 * h * (a1 - a2)
-    sides[side * SIDE_SIZE + LIFT] = 0.0
-    off = curve_rest(parameters, plan, sides, loop, side, v) - slip_force_at(sides, segment, side, 0.75 * h)
-    return abs(sides[side * SIDE_SIZE + WEIGHT] * off)
+    side.lift = 0.0
+    off = curve_rest(parameters, plan, sides, now, side, v) - slip_force_at(side, segment, 0.75 * h)
+    return abs(side.weight * off)
 
 
 @kernel(exact=False)
 def loop_terms(
-    lin: Linear, parameters: Any, loop: Any, segment: Any, impulse: float, h: float, theta_mid: float, v_mid: float,
+    lin: Linear, parameters: Any, now: Any, segment: Any, impulse: float, h: float, theta_mid: float, v_mid: float,
     theta_end: float, v_end: float,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Torque of the integral controller and of the added spring: upper coefficients and misfit in the middle.
@@ -239,19 +206,19 @@ def loop_terms(
     The integral of the position follows from the equation of motion itself: K int x = int p - D dx - J dv.
     """
     gain = parameters[KI]
-    added = loop[ADDED]
+    added = now.added
     travelled = (
-        impulse - lin.damping * (theta_end - loop[POSITION]) - lin.inertia * (v_end - loop[VELOCITY])
+        impulse - lin.damping * (theta_end - now.position) - lin.inertia * (v_end - now.velocity)
     ) * lin.compliance
-    reference_integral = h / 30.0 * (7.0 * (loop[GOAL] + segment[GOAL_END]) + 16.0 * segment[GOAL_MID])
-    reference_integral += h * h / 60.0 * (loop[GOAL_RATE] - segment[RATE_END])
-    segment[INTEGRAL_END] = loop[INTEGRAL] + reference_integral - travelled
-    e0 = loop[GOAL] - loop[POSITION]
+    reference_integral = h / 30.0 * (7.0 * (now.goal + segment[GOAL_END]) + 16.0 * segment[GOAL_MID])
+    reference_integral += h * h / 60.0 * (now.goal_rate - segment[RATE_END])
+    segment[INTEGRAL_END] = now.integral + reference_integral - travelled
+    e0 = now.goal - now.position
     e_mid = segment[GOAL_MID] - theta_mid
-    slopes = loop[GOAL_RATE] - loop[VELOCITY] - segment[RATE_MID] + v_mid
-    i_mid = loop[INTEGRAL] + 0.25 * h * (e0 + e_mid) + h * h / 48.0 * slopes
-    y0 = gain * loop[INTEGRAL] + added * loop[POSITION]
-    d0 = gain * e0 + added * loop[VELOCITY]
+    slopes = now.goal_rate - now.velocity - segment[RATE_MID] + v_mid
+    i_mid = now.integral + 0.25 * h * (e0 + e_mid) + h * h / 48.0 * slopes
+    y0 = gain * now.integral + added * now.position
+    d0 = gain * e0 + added * now.velocity
     y1 = gain * segment[INTEGRAL_END] + added * theta_end
     d1 = gain * (segment[GOAL_END] - theta_end) + added * v_end
     u2, u3 = upper_terms(y0, d0, y1, d1, 1.0 / h)
@@ -259,67 +226,68 @@ def loop_terms(
 
 
 @kernel(exact=False, inline=True)
-def commanded(lin: Linear, loop: Any, segment: Any, h: float) -> tuple[float, float, float, float, float]:
+def commanded(lin: Linear, now: Any, segment: Any, h: float) -> tuple[float, float, float, float, float]:
     """The commanded torque over the segment: three coefficients, its misfit in the middle, 1 or 0 if straight.
 
     Over very short segments the upper terms are rounding errors, or a kink that the particular solution blows
     up: there the forcing is a straight line.
     """
     inverse = 1.0 / h
-    r1 = loop[DR]
-    r2, r3 = upper_terms(loop[R], r1, segment[R_END], segment[DR_END], inverse)
-    misfit = segment[R_MID] - 0.5 * (loop[R] + segment[R_END]) - 0.125 * h * (r1 - segment[DR_END])
+    r1 = now.command_rate
+    r2, r3 = upper_terms(now.command, r1, segment[R_END], segment[DR_END], inverse)
+    misfit = segment[R_MID] - 0.5 * (now.command + segment[R_END]) - 0.125 * h * (r1 - segment[DR_END])
     lag = lin.damping * lin.compliance
     if h < SHORT or abs(r3 * lag * lag * lag) > STEEPEST * abs(lin.stiffness):
-        return (segment[R_END] - loop[R]) * inverse, 0.0, 0.0, misfit, 0.0
+        return (segment[R_END] - now.command) * inverse, 0.0, 0.0, misfit, 0.0
     return r1, r2, r3, misfit, 1.0
 
 
 @kernel(exact=False, inline=True)
-def tangents(parameters: Any, plan: Any, sides: Any, loop: Any) -> tuple[float, float]:
+def tangents(parameters: Any, plan: Any, sides: Any, now: Any) -> tuple[float, float]:
     """Torque at the start without the command, and its slope: slipping forces, integral and added spring."""
-    p0 = -loop[BASE]
+    p0 = -now.base
     p1 = 0.0
-    for side in range(sides_of(plan)):
-        lagging = sides[side * SIDE_SIZE + LAG] * sides[side * SIDE_SIZE + DS]
-        p0 -= sides[side * SIDE_SIZE + WEIGHT] * (sides[side * SIDE_SIZE + S] + lagging)
-        p1 -= sides[side * SIDE_SIZE + WEIGHT] * sides[side * SIDE_SIZE + DS]
-    if parameters[KI] != 0.0 or loop[ADDED] != 0.0:
-        p0 += parameters[KI] * loop[INTEGRAL] + loop[ADDED] * loop[POSITION]
-        p1 += parameters[KI] * (loop[GOAL] - loop[POSITION]) + loop[ADDED] * loop[VELOCITY]
+    for i in range(sides_of(plan)):
+        side = side_of(sides, i)
+        lagging = side.lag * side.force_rate
+        p0 -= side.weight * (side.force + lagging)
+        p1 -= side.weight * side.force_rate
+    if parameters[KI] != 0.0 or now.added != 0.0:
+        p0 += parameters[KI] * now.integral + now.added * now.position
+        p1 += parameters[KI] * (now.goal - now.position) + now.added * now.velocity
     return p0, p1
 
 
 @kernel(exact=False, inline=True)
 def correct(
-    lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, segment: Any, half: Matrix, h: float, tol: float
+    lin: Linear, parameters: Any, plan: Any, sides: Any, now: Any, segment: Any, half: Matrix, h: float, tol: float
 ) -> float:  # fmt: skip
     """Move the axis over h; fills `segment` and returns the error in position, rad (or NOT_CONVERGED)."""
     full = twice(half)
-    r1, r2, r3, command_misfit, bent = commanded(lin, loop, segment, h)
-    p0, p1 = tangents(parameters, plan, sides, loop)
+    r1, r2, r3, command_misfit, bent = commanded(lin, now, segment, h)
+    p0, p1 = tangents(parameters, plan, sides, now)
     # The cubic is lifted by the mean of the bump that it leaves out, so that the impulse is right.
-    p0 += loop[R] + bent * BUMP * command_misfit
+    p0 += now.command + bent * BUMP * command_misfit
     p1 += r1
     p2 = r2
     p3 = r3
     start = p0
     tangent = p1
     misfit = abs(command_misfit)
-    theta_end = loop[POSITION]
-    v_end = loop[VELOCITY]
+    theta_end = now.position
+    v_end = now.velocity
     rounds = 0
     while True:
         c = particular(lin, p0, p1, p2, p3)
-        free_position = loop[POSITION] - c[0]
-        free_velocity = loop[VELOCITY] - c[1]
+        free_position = now.position - c[0]
+        free_velocity = now.velocity - c[1]
         theta_mid, v_mid = moved(c, half, 0.5 * h, free_position, free_velocity)
         theta_before = theta_end
         v_before = v_end
         theta_end, v_end = moved(c, full, h, free_position, free_velocity)
-        if loop[NONLINEAR] == 0.0:
+        if now.nonlinear == 0:
             break
-        if rounds == 0 and hides_curve(plan, sides, loop[VELOCITY], v_mid, v_end):
+        if rounds == 0 and hides_curve(plan, sides, now.velocity, v_mid, v_end):
             return NOT_CONVERGED
         if rounds > 0:
             change = max(abs(theta_end - theta_before), 1e-3 * abs(v_end - v_before))
@@ -336,19 +304,18 @@ def correct(
         p2 = r2
         p3 = r3
         misfit = abs(command_misfit)
-        for side in range(sides_of(plan)):
-            if sides[side * SIDE_SIZE + SLIPPING] > 0.0 and sides[side * SIDE_SIZE + VARIES] > 0.0:
-                u2, u3 = slip_terms(
-                    parameters, plan, sides, loop, side, h, theta_mid, v_mid, theta_end, v_end
-                )
-                w = bent * sides[side * SIDE_SIZE + WEIGHT]
-                lag = sides[side * SIDE_SIZE + LAG]
+        for i in range(sides_of(plan)):
+            side = side_of(sides, i)
+            if side.slipping > 0.0 and side.varies != 0:
+                u2, u3 = slip_terms(parameters, plan, sides, now, side, h, theta_mid, v_mid, theta_end, v_end)
+                w = bent * side.weight
+                lag = side.lag
                 p1 -= 2.0 * w * lag * u2
                 p2 -= w * (u2 + 3.0 * lag * u3)
                 p3 -= w * u3
-        if parameters[KI] != 0.0 or loop[ADDED] != 0.0:
+        if parameters[KI] != 0.0 or now.added != 0.0:
             u2, u3, m = loop_terms(
-                lin, parameters, loop, segment, impulse, h, theta_mid, v_mid, theta_end, v_end
+                lin, parameters, now, segment, impulse, h, theta_mid, v_mid, theta_end, v_end
             )
             p0 += BUMP * m
             p2 += bent * u2
@@ -356,12 +323,12 @@ def correct(
             misfit += abs(m)
         rounds += 1
     remember(segment, c, h, free_position, free_velocity, theta_mid, v_mid, theta_end, v_end, rounds)
-    return error_of(lin, parameters, plan, sides, loop, segment, misfit)
+    return error_of(lin, parameters, plan, sides, now, segment, misfit)
 
 
 @kernel(exact=False, inline=True)
 def error_of(
-    lin: Linear, parameters: Any, plan: Any, sides: Any, loop: Any, segment: Any, misfit: float
+    lin: Linear, parameters: Any, plan: Any, sides: Any, now: Any, segment: Any, misfit: float
 ) -> float:  # fmt: skip
     """Error of the segment in position, rad; the forcing is wrong by `misfit` in the middle."""
     # A torque wrong by m in the middle moves a free axis by about m h²/20J, a spring by less than m/2K; of its
@@ -371,10 +338,10 @@ def error_of(
     light = h * abs(lin.square) * soft
     moves = min(h * (0.05 * light + 0.02 * lin.mobility), 0.5 * soft)
     error = misfit * moves
-    if loop[NONLINEAR] > 0.0:
-        bump, between = slip_error(lin, parameters, plan, sides, loop, segment)
+    if now.nonlinear != 0:
+        bump, between = slip_error(lin, parameters, plan, sides, now, segment)
         error += between * min(h * (0.1 * light + 0.25 * lin.mobility), 0.5 * soft)
         # What a slipping force is wrong by at the end stays for as long as it relaxes.
         slip = bump * (moves + 0.5 * min(LASTING * LASTING / lin.inertia, soft))
-        error += CALM_SHARE * slip if loop[CALM] > 0.0 else slip
+        error += CALM_SHARE * slip if now.calm != 0 else slip
     return error

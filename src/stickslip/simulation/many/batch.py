@@ -162,9 +162,10 @@ def prepare(case: Case, columns: Mapping[str, Array]) -> Batch:
         parameters[:, at : at + m.packed.shape[1]] = m.packed
         at += m.packed.shape[1]
     plans = np.tile(one.plan, (n, 1))
+    plan = plans.view(col.PLAN)[:, 0]
     if len(members) > 1:
-        plans[:, col.SHARED] = share_curves(*members)
-    plans[:, col.STIFFNESS_FLOOR] = _floors(numbers, members)
+        plan["shared"] = share_curves(*members)
+    plan["stiffness_floor"] = _floors(numbers, members)
     return Batch(case, parameters, plans, one.cells, one.breaks, _starts(one.work, numbers, members, n))
 
 
@@ -213,7 +214,7 @@ def _numbers(case: Case, columns: Mapping[str, Array], n: int) -> Array:
 def _floors(numbers: Array, members: Sequence[Member]) -> Array:
     """The least stiffness of each flow, N·m/rad (`exact.prepare`)."""
     weights = [np.ones(len(numbers)), -numbers[:, GAIN]]
-    torque = sum((w * m.columns[:, col.VISCOUS] for w, m in zip(weights, members)), np.zeros(len(numbers)))
+    torque = sum((w * m.columns["viscous"] for w, m in zip(weights, members)), np.zeros(len(numbers)))
     damping, inertia = numbers[:, KD] + torque, numbers[:, INERTIA]
     return np.maximum(0.01 * damping * damping / inertia, 0.01 * inertia / LONGEST_STEP**2)
 
@@ -221,11 +222,14 @@ def _floors(numbers: Array, members: Sequence[Member]) -> Array:
 def _starts(work: Array, numbers: Array, members: Sequence[Member], n: int) -> Array:
     """Sides and elements of every case, as its work begins."""
     starts = np.tile(work[AT_SIDES:], (n, 1))
-    element = AT_ELEMENTS - AT_SIDES
+    elements = starts[:, AT_ELEMENTS - AT_SIDES :].copy().view(col.ELEMENT)
     for i, m in enumerate(members):
-        m.columns[:, col.WEIGHT] = 1.0 if i == 0 else -numbers[:, GAIN]
-        starts[:, i * col.SIDE_SIZE : (i + 1) * col.SIDE_SIZE] = m.columns
-        for j in range(m.elements.shape[1]):
-            starts[:, element : element + 2] = m.elements[:, j]
-            element += col.ELEMENT_SIZE
+        of_one = work[AT_SIDES + i * col.SIDE_SIZE :][: col.SIDE_SIZE].view(col.SIDE)[0]
+        for name in ("curve", "law", "literal", "first", "last"):
+            m.columns[name] = of_one[name]
+        m.columns["weight"] = 1.0 if i == 0 else -numbers[:, GAIN]
+        starts[:, i * col.SIDE_SIZE : (i + 1) * col.SIDE_SIZE] = m.columns.view(np.float64).reshape(n, -1)
+        own = elements[:, of_one["first"] : of_one["last"]]
+        own["stiffness"], own["share"] = m.elements[:, :, 0], m.elements[:, :, 1]
+    starts[:, AT_ELEMENTS - AT_SIDES :] = elements.view(np.float64)
     return starts

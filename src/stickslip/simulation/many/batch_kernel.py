@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stickslip.jit import call_value, kernel, pointer
+from stickslip.jit import call_value, kernel, pointer, record_at
 from stickslip.simulation._meter import TURN_COUNT, close_standstill
-from stickslip.simulation.exact.kernel import AT_LOOP, AT_SIDES, solve
+from stickslip.simulation.exact.kernel import AT_NOW, AT_SIDES, solve
+from stickslip.simulation.exact.state import NOW
 from stickslip.simulation.metrics import limit_cycle
 
 BISECTIONS = 200
@@ -64,8 +65,8 @@ def solve_all(
             parameters[i], plans[i], cells, breaks, nothing_1, scratch, nothing, nothing, accs[i], turns, nodes,
             False, False, metered,
         )  # fmt: skip
-        for j in range(3):
-            ends[i, j] = scratch[AT_LOOP + j]
+        now = record_at(pointer(scratch, AT_NOW), NOW)
+        ends[i, 0], ends[i, 1], ends[i, 2] = now.time, now.position, now.velocity
         if metered:
             close_standstill(accs[i], ends[i, 0])
             cycles[i, 0], cycles[i, 1] = limit_cycle(turns[: int(accs[i, TURN_COUNT])], ends[i, 0])

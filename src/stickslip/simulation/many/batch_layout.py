@@ -35,15 +35,15 @@ class Member:
     side : Side
         Of the case that the others vary.
     packed : array, shape (n, parameters)
-    columns : array, shape (n, SIDE_SIZE)
-        Its row of `sides`; WEIGHT is left to the caller.
+    columns : array of SIDE, shape (n,)
+        Its side (`exact.state.SIDE`); its weight and what one loop's says are left to the caller.
     elements : array, shape (n, elements, 2)
         Stiffness and share of those of finite stiffness.
     """
 
     side: Side
     packed: Array
-    columns: Array
+    columns: Any
     elements: Array
 
     @property
@@ -138,7 +138,7 @@ def as_columns(base: Any, values: Mapping[str, Array]) -> Any:
 # ---- modes -------------------------------------------------------------------------------------------------
 
 
-def forms(side: Side, values: Mapping[str, Array], packed: Array, n: int) -> tuple[Array, Array]:
+def forms(side: Side, values: Mapping[str, Array], packed: Array, n: int) -> tuple[Any, Array]:
     """Sides and elements, as `exact.fill_side` has them for one case."""
     e = side.elements
     assert side.model is not None
@@ -148,32 +148,32 @@ def forms(side: Side, values: Mapping[str, Array], packed: Array, n: int) -> tup
     if address:
         curve_at(address, packed, 0.0, breakaway)
     f = columns_of(side, e, values, breakaway if address else None, n)
-    into = np.zeros((n, col.SIDE_SIZE))
-    into[:, col.VISCOUS], into[:, col.BREAKAWAY] = f["viscous"], f["breakaway"]
-    into[:, col.SCALE] = 0.0 if e.constant_curve else f["velocity_scale"]
-    into[:, col.LOWEST] = 0.999 * f["breakaway"]
+    into = np.zeros(n, col.SIDE)
+    into["viscous"], into["breakaway"] = f["viscous"], f["breakaway"]
+    into["scale"] = 0.0 if e.constant_curve else f["velocity_scale"]
+    into["lowest"] = 0.999 * f["breakaway"]
     if address:
         least = np.empty(n)
         least_of(address, packed, f["velocity_scale"], CURVE_SPEEDS, least)
-        into[:, col.LOWEST] = 0.99 * least
-    into[:, col.KEPT : col.KEPT + 4] = math.nan
+        into["lowest"] = 0.99 * least
+    into["velocity"] = into["velocity_before"] = math.nan
     if isinstance(e, Bristle):
-        into[:, col.KIND], into[:, col.VARIES] = col.BENDS, 1.0
-        into[:, col.BRISTLE], into[:, col.LAG] = f["stiffness"], f["damping"] / f["stiffness"]
+        into["kind"], into["varies"] = col.BENDS, 1
+        into["bristle"], into["lag"] = f["stiffness"], f["damping"] / f["stiffness"]
         return into, np.zeros((n, 0, 2))
-    into[:, col.KIND] = col.FOLLOWS if math.isinf(e.attraction) else col.RELAXES
-    into[:, col.ATTRACTION] = f["attraction"]
-    into[:, col.VARIES] = 0.0 if e.constant_curve and math.isinf(e.attraction) else 1.0
+    into["kind"] = col.FOLLOWS if math.isinf(e.attraction) else col.RELAXES
+    into["attraction"] = f["attraction"]
+    into["varies"] = 0 if e.constant_curve and math.isinf(e.attraction) else 1
     holds = np.isinf(e.stiffness)
     rigid = np.zeros(n)
     for i in np.flatnonzero(holds):
         rigid += f["share"][:, i]
     if math.isinf(e.slope):
-        into[:, col.RIGID] = rigid
+        into["rigid"] = rigid
     else:
         layer = np.empty(n)
         layers(address, packed, f["velocity_scale"], f["slope"], f["viscous"], rigid, layer)
-        into[:, col.STEEP], into[:, col.STEEPNESS], into[:, col.LAYER] = rigid, f["slope"], layer
+        into["steep"], into["steepness"], into["layer"] = rigid, f["slope"], layer
     return into, np.stack([f["stiffness"][:, ~holds], f["share"][:, ~holds]], axis=2)
 
 

@@ -269,14 +269,14 @@ def specialised(numbers: Array, members: Sequence[Member]) -> tuple[str, Numbers
     sizes: dict[str, Any] = {"LANES": LANES, "KIND_0": 0, "KIND_1": -1, "RIGID_0": False, "RIGID_1": False}
     curves: list[Curve] = []
     for i, m in enumerate(members):
-        kind, held = m.columns[0, col.KIND], m.columns[:, col.RIGID] + m.columns[:, col.STEEP]
+        kind, held = m.columns["kind"][0], m.columns["rigid"] + m.columns["steep"]
         if i == 0 and np.any(held > 0.0):
             raise Refused("an axis that rigid friction holds at rest needs its events")
         sizes[f"KIND_{i}"], sizes[f"RIGID_{i}"] = int(kind), bool(np.any(held > 0.0))
-        pull = m.columns[:, col.BRISTLE if kind == col.BENDS else col.ATTRACTION]
+        pull = m.columns["bristle" if kind == col.BENDS else "attraction"]
         sides["attraction"].append(kept.place(np.where(np.isfinite(pull), pull, 0.0)))
-        sides["viscous"].append(kept.place(m.columns[:, col.VISCOUS]))
-        sides["lag"].append(kept.place(m.columns[:, col.LAG]))
+        sides["viscous"].append(kept.place(m.columns["viscous"]))
+        sides["lag"].append(kept.place(m.columns["lag"]))
         sides["rigid"].append(kept.place(held))
         for j in range(m.elements.shape[1]):
             elements["stiffness"].append(kept.place(m.elements[:, j, 0]))
@@ -295,7 +295,7 @@ def curve_for(m: Member, kept: Numbers) -> Curve:
     if is_literal(m.side):
         raise Refused("slip rule 'literal' needs its events")
     if not m.curve:
-        return Curve(None, None, [kept.place(m.columns[:, col.BREAKAWAY])])
+        return Curve(None, None, [kept.place(m.columns["breakaway"])])
     places = [kept.place(m.packed[:, j]) for j in range(m.packed.shape[1])]
     return Curve(model.law, curve_of(m.side).function, places)
 
