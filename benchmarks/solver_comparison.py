@@ -18,14 +18,17 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from hybrid_loop import HybridLoop, laid_out
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.jit import call_guards, call_rate, call_switch, compiled_law, flat, kernel, pointer
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.adaptive.dormand_prince import NODES, TABLEAU
-from stickslip.simulation.adaptive.hybrid import EXTRA, LAWS, arrays_of, begin_side, events, rates, switch
+from stickslip.simulation.adaptive.hybrid import rates
+from stickslip.simulation.adaptive.layout import HEAD, Laid, loop_of
 from stickslip.simulation.adaptive.step import stages
+from stickslip.simulation.adaptive.switching import begin_side, events, switch
 from stickslip.simulation.closed_loop import prepare, simulate
 from stickslip.simulation.prescribed.open_loop import respond
 
@@ -82,23 +85,23 @@ def prescribed(
 
 
 @kernel()
-def closed(a: Any, w: Any, y: Any, h: float, n: int, order: int, position: Any) -> None:
+def closed(laid: Laid, h: float, n: int, order: int, position: Any) -> None:
     """The closed loop at a fixed step, modes tested at the end of each."""
-    size = y.shape[0]
-    k, end, error, u = np.zeros((8, size)), np.zeros(size), np.zeros(size), np.zeros(size)
-    g = np.zeros(size - LAWS + EXTRA)
-    begin_side(a, w, 0.0, h, y, k, 7)
+    loop = loop_of(laid)
+    y, end, size = loop.y, loop.end, loop.case.states
+    begin_side(loop, 0.0, h, y)
     for i in range(n):
         position[i] = y[0]
-        rates(a, w, i * h, y, k, 0)
+        rates(loop, i * h, y, loop.rates)
         if order == 1:
             for j in range(size):
-                end[j] = y[j] + h * k[0, j]
+                end[j] = y[j] + h * loop.rates[j]
         else:
-            stages(a, w, i * h, h, y, k, end, error, u)
-        y[:] = end
-        if events(a, w, (i + 1) * h, y, k, 7, g) >= 0.0:
-            switch(a, w, (i + 1) * h, y, k, 7, g)
+            stages(loop, i * h, h)
+        for j in range(size):
+            y[j] = end[j]
+        if events(loop, (i + 1) * h, y) >= 0.0:
+            switch(loop, (i + 1) * h, y)
         if not abs(y[0]) < 1e3:
             position[i:] = np.nan
             return
@@ -109,22 +112,19 @@ def bdf(case: Any, longest: float, times: Any, rtol: float = 1e-3) -> Any:
 
     It integrates position, velocity and the elements' torques; the modes are held between events.
     """
-    a, w = arrays_of(case)
-    n = case.plant.state.size // 2
-    full = np.concatenate([np.zeros(LAWS), case.plant.state])
-    moving = np.array([0, 1, *range(LAWS, LAWS + n)])
-    k, g = np.zeros((8, full.size)), np.zeros(full.size - LAWS + EXTRA)
+    loop, n = HybridLoop(case), case.plant.state.size // 2
+    full, g = loop.y.copy(), loop.due
+    moving = np.array([0, 1, *range(HEAD, HEAD + n)])
     out, t, end = np.full(times.size, np.nan), 0.0, float(times[-1])
-    begin_side(a, w, 0.0, 1e-6, full, k, 7)
+    loop.begin(0.0, 1e-6, full)
 
     def slope(now: float, state: Any) -> Any:
         full[moving] = state
-        rates(a, w, now, full, k, 0)
-        return k[0, moving]
+        return loop.rates(now, full)[moving]
 
     def due(now: float, state: Any) -> float:
         full[moving] = state
-        return events(a, w, now, full, k, 7, g)
+        return loop.events(now, full)
 
     due.terminal, due.direction = True, 1.0  # type: ignore[attr-defined]
     y = full[moving]
@@ -141,9 +141,9 @@ def bdf(case: Any, longest: float, times: Any, rtol: float = 1e-3) -> Any:
         if found.status != 1:
             break
         full[moving] = y
-        events(a, w, t, full, k, 7, g)
+        loop.events(t, full)
         g[g > -1e-9] = np.maximum(g[g > -1e-9], 0.0)  # the located root lies within rounding of zero
-        switch(a, w, t, full, k, 7, g)
+        loop.switch(t, full)
     return out
 
 
@@ -198,8 +198,7 @@ def closed_loop_rows() -> list[tuple[str, str, float, float]]:
             position = np.zeros(n)
 
             def run(order: int = order, h: float = h, n: int = n, position: Any = position) -> None:
-                a, w = arrays_of(case)
-                closed(a, w, np.concatenate([np.zeros(LAWS), case.plant.state]), h, n, order, position)
+                closed(laid_out(case), h, n, order, position)
 
             _, spent = timed(run)
             error = np.abs(position[:: round(1e-3 / h)] - truth).max()

@@ -40,8 +40,8 @@ from baseline import (
     ours,
     time_of,
 )
+from hybrid_loop import HybridLoop
 from stickslip.simulation.adaptive import engine as adaptive
-from stickslip.simulation.adaptive.hybrid import EXTRA, LAWS, arrays_of, begin_side, events, rates, switch
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
 from stickslip.study import study as studies
@@ -79,10 +79,7 @@ class Scipy:
 
     def __init__(self, case: Any, method: str) -> None:
         self.case, self.method = case, method
-        self.a, self.w = arrays_of(case)
-        numbers = case.numbers[[adaptive.POSITION_0, adaptive.VELOCITY_0]]
-        self.y = np.concatenate([numbers, np.zeros(LAWS - 2), case.plant.state, case.compensator.state])
-        self.k, self.g = np.zeros((8, self.y.size)), np.zeros(self.y.size - LAWS + EXTRA)
+        self.loop = HybridLoop(case)
 
     def event(self) -> Any:
         """The event function, as SciPy wants it."""
@@ -95,12 +92,11 @@ class Scipy:
 
     def rate(self, t: float, y: Any) -> Any:
         """The right-hand side."""
-        rates(self.a, self.w, t, np.ascontiguousarray(y), self.k, 0)
-        return self.k[0].copy()
+        return self.loop.rates(t, y)
 
     def due(self, t: float, y: Any) -> float:
         """The largest event function."""
-        return float(events(self.a, self.w, t, np.ascontiguousarray(y), self.k, 7, self.g))
+        return self.loop.events(t, y)
 
     def cross(self, t: float, y: Any, stop: float) -> float:
         """Go to the far side of a located event and change the modes there; returns the time."""
@@ -110,7 +106,7 @@ class Scipy:
             t += beyond
             beyond *= 2.0
         self.settle(t, y)
-        begin_side(self.a, self.w, t, 0.5 * (t + stop), y, self.k, 7)
+        self.loop.begin(t, 0.5 * (t + stop), y)
         return t
 
     def settle(self, t: float, y: Any) -> None:
@@ -118,7 +114,7 @@ class Scipy:
         for _ in range(9):
             if self.due(t, y) < 0.0:
                 break
-            switch(self.a, self.w, t, y, self.k, 7, self.g)
+            self.loop.switch(t, y)
 
     def jacobian(self, t: float, y: Any) -> Any:
         """Jacobian by differences of fixed size: SciPy's own steps grow without bound where a state changes nothing."""
@@ -131,13 +127,13 @@ class Scipy:
 
     def positions(self, tolerance: float) -> Any:
         """Position on the grid, from event to event."""
-        grid, out, t, y = self.case.grid, np.zeros(self.case.grid.size), 0.0, self.y.copy()
+        grid, out, t, y = self.case.grid, np.zeros(self.case.grid.size), 0.0, self.loop.y.copy()
         # The absolute tolerances keep the proportions that our adaptive integrator gives the states.
         atol = adaptive.tolerances(self.case)
         self.scale = atol / atol[0]
         atol = atol * (tolerance / atol[0])
         for stop in self.case.breaks:
-            begin_side(self.a, self.w, t, 0.5 * (t + stop), y, self.k, 7)
+            self.loop.begin(t, 0.5 * (t + stop), y)
             self.settle(t, y)
             while t < stop:
                 # The last time is where the next solve goes on.

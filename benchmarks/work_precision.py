@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
+from hybrid_loop import laid_out
 from solver_comparison import INERTIA, PLANT, bdf, closed, timed
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.report.plots import Curve, Panel, Style, draw
-from stickslip.simulation.adaptive.hybrid import LAWS, arrays_of
 from stickslip.simulation.closed_loop import prepare, simulate
 
 AXIS = RigidAxis(INERTIA, PLANT)
@@ -51,9 +51,7 @@ def explicit(order: int, step: float) -> Any:
     """Positions of explicit Euler or Dormand-Prince at a fixed step."""
     case = prepare(AXIS, CONTROL, REFERENCE, DURATION, output=TIMES, metered=False)
     position = np.zeros(round(DURATION / step))
-    a, w = arrays_of(case)
-    start = np.concatenate([np.zeros(LAWS), case.plant.state])
-    closed(a, w, start, step, position.size, order, position)
+    closed(laid_out(case), step, position.size, order, position)
     return position[:: round(1e-3 / step)]
 
 

@@ -21,6 +21,7 @@ from stickslip.jit.addresses import (
     record_at,
 )
 from stickslip.jit.entries import (
+    LAW,
     LawPointers,
     compile_entry,
     compile_inner,
@@ -47,6 +48,7 @@ from stickslip.jit.simd import (
 )
 
 __all__ = [
+    "LAW",
     "LawPointers",
     "cache_folder",
     "call_guarded",

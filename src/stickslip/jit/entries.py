@@ -87,6 +87,9 @@ class LawPointers(NamedTuple):
     holding: int
 
 
+LAW = np.dtype([(name, np.int64) for name in LawPointers._fields])
+"""The same as a record, for kernels."""
+
 _laws: dict[int, tuple[Law, LawPointers]] = {}
 
 

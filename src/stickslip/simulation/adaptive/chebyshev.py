@@ -9,10 +9,10 @@ to about 0.65 stages², so that a few stages go much further.
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from stickslip.jit import kernel
+from stickslip.jit import kernel, pointer
 from stickslip.simulation.adaptive.hybrid import rates
+from stickslip.simulation.adaptive.layout import Loop
 
 __all__ = ["chebyshev", "chebyshev_error", "stages_for"]
 
@@ -28,14 +28,13 @@ def stages_for(h: float, decay: float) -> int:
 
 
 @kernel()
-def chebyshev(
-    a: Any, w: Any, t: float, h: float, count: int, y: Any, k: Any, end: Any, older: Any, newer: Any
-) -> None:
-    """One step of `count` stages from y to `end`; row 0 of k holds the rates at its start, row 6 receives its end's.
+def chebyshev(loop: Loop, t: float, h: float, count: int) -> None:
+    """One step of `count` stages from y to ``end``; row 0 of the rates holds those at its start, row 6 its end's.
 
-    ``older`` and ``newer`` are scratch.
+    ``middle`` and ``error`` are scratch.
     """
-    n = y.shape[0]
+    n, y, k, older, newer = loop.case.states, loop.y, loop.rates, loop.middle, loop.error
+    inner = pointer(k, n)
     w0 = 1.0 + DAMPING / (count * count)
     # Chebyshev polynomials at w0 and their two derivatives by recurrence, first for the last stage ...
     t0, t1, d0, d1, s0, s1 = 1.0, w0, 0.0, 1.0, 0.0, 0.0
@@ -51,7 +50,7 @@ def chebyshev(
     weight = second * w1
     for j in range(n):
         older[j] = y[j]
-        newer[j] = y[j] + h * weight * k[0, j]
+        newer[j] = y[j] + h * weight * k[j]
     # Time of a stage over h.
     at_older, at_newer = 0.0, weight
     for _ in range(2, count + 1):
@@ -62,21 +61,22 @@ def chebyshev(
         b = s1 / (d1 * d1)
         mu, nu = 2.0 * b * w0 / b_newer, -b / b_older
         step = 2.0 * b * w1 / b_newer
-        rates(a, w, t + at_newer * h, newer, k, 1)
+        rates(loop, t + at_newer * h, newer, inner)
         for j in range(n):
-            rise = mu * (newer[j] - y[j]) + nu * (older[j] - y[j]) + step * h * (k[1, j] - a_newer * k[0, j])
+            rise = mu * (newer[j] - y[j]) + nu * (older[j] - y[j]) + step * h * (inner[j] - a_newer * k[j])
             older[j] = newer[j]
             newer[j] = y[j] + rise
         at = mu * at_newer + nu * at_older + step * (1.0 - a_newer)
         at_older, at_newer = at_newer, at
         b_older, b_newer = b_newer, b
     for j in range(n):
-        end[j] = newer[j]
-    rates(a, w, t + h, end, k, 6)
+        loop.end[j] = newer[j]
+    rates(loop, t + h, loop.end, pointer(k, 6 * n))
 
 
 @kernel()
-def chebyshev_error(h: float, y: Any, k: Any, end: Any, error: Any) -> None:
+def chebyshev_error(loop: Loop, h: float) -> None:
     """Estimate of the local error, third order."""
-    for j in range(y.shape[0]):
-        error[j] = 0.8 * (y[j] - end[j]) + 0.4 * h * (k[0, j] + k[6, j])
+    n, k = loop.case.states, loop.rates
+    for j in range(n):
+        loop.error[j] = 0.8 * (loop.y[j] - loop.end[j]) + 0.4 * h * (k[j] + k[6 * n + j])

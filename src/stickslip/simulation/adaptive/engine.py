@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.jit import kernel
+from stickslip.jit import kernel, pointer
 from stickslip.simulation._meter import (
     MAX_WINDOW,
     SIGNALS,
@@ -21,40 +21,10 @@ from stickslip.simulation._meter import (
     meter,
     new_meter,
 )
-from stickslip.simulation.adaptive.hybrid import (
-    COMPENSATION_TORQUE,
-    EXTRA,
-    FRICTION_TORQUE,
-    LAWS,
-    MOTOR_TORQUE,
-    OMEGA_D,
-    POSITION,
-    SEEN_VELOCITY,
-    THETA_D,
-    VELOCITY,
-    arrays_of,
-    begin_side,
-    events,
-    rates,
-    switch,
-)
-from stickslip.simulation.adaptive.step import (
-    EVENT,
-    FINAL,
-    FOURTH,
-    LOCAL,
-    NEXT,
-    SCRATCH,
-    SMOOTH,
-    STAGES,
-    STEP,
-    TAKEN,
-    TRIAL,
-    VALUE,
-    attempt,
-    dense,
-    note,
-)
+from stickslip.simulation.adaptive.hybrid import rates
+from stickslip.simulation.adaptive.layout import Laid, Loop, laid_out, loop_of, named
+from stickslip.simulation.adaptive.step import LOCAL, attempt, dense, note
+from stickslip.simulation.adaptive.switching import begin_side, events, switch, torques
 from stickslip.simulation.case_arrays import (
     COLUMNS,
     DIVERGED,
@@ -90,8 +60,6 @@ EVENT_ROWS = 20_000
 CREEP, STEEPEST = 1e-9, 1e6
 """Velocity (rad/s) at which a law's slope is taken, and the relaxation rate (1/s) that explicit steps can follow."""
 STEPS = StepBudget(1_000_000, 1_000_000, 2_000, 50_000_000)
-FIRST_STEPS, STEP_RATE, NOW = range(3)
-"""Of the pace: how many steps there may be, how many more for each second of the motion, and the time reached, s."""
 
 
 def can_run(case: Case) -> str:
@@ -115,27 +83,24 @@ def can_run(case: Case) -> str:
 def run(case: Case) -> Outcome:
     """Integrate the case; see `Outcome`."""
     numbers = case.numbers
-    y = np.concatenate(
-        [[numbers[POSITION_0], numbers[VELOCITY_0], 0.0, 0.0, 0.0], case.plant.state, case.compensator.state]
-    )
+    duration = float(numbers[DURATION])
+    laid = laid_out(case, tolerances(case), (float(numbers[POSITION_0]), float(numbers[VELOCITY_0])))
+    reached = laid.reached
+    reached["first_steps"], reached["step_rate"] = STEPS.pace(case)
     rows = np.empty((case.grid.size + EVENT_ROWS, len(COLUMNS)))
-    acc = new_meter(numbers[DURATION], settle_band_of(case.reference, float(numbers[DURATION])))
+    acc = new_meter(numbers[DURATION], settle_band_of(case.reference, duration))
     turns = np.empty((4096, 2))
-    counts, pace = np.zeros(4, dtype=np.int64), np.array([*STEPS.pace(case), 0.0])
-    arrays = (*arrays_of(case), y, tolerances(case), case.breaks, case.grid, rows, acc, turns, counts, pace)
 
     def stop() -> None:
-        pace[FIRST_STEPS] = -math.inf
+        reached["first_steps"] = -math.inf
 
     code = watched(
-        lambda: integrate(*arrays),
-        lambda: Reached(float(pace[NOW]), float(numbers[DURATION]), float(counts[0] + counts[1])), stop,
+        lambda: integrate(laid, case.breaks, case.grid, rows, acc, turns),
+        lambda: Reached(float(reached["time"]), duration, float(reached["steps"] + reached["rejected"])), stop,
     )  # fmt: skip
-    time = pace[NOW]
-    names = ("steps", "rejected", "events")
     return Outcome(
-        rows[: counts[3]], int(code), float(time), acc, turns[: int(acc[TURN_COUNT])],
-        {name: int(counts[i]) for i, name in enumerate(names)},
+        rows[: reached["rows"]], int(code), float(reached["time"]), acc, turns[: int(acc[TURN_COUNT])],
+        {name: int(reached[name]) for name in ("steps", "rejected", "events")},
     )  # fmt: skip
 
 
@@ -168,37 +133,36 @@ def tolerances(case: Case) -> Any:
 
 
 @kernel()
-def emit(a: Any, w: Any, t: float, y: Any, k: Any, rows: Any, n: int, event: float) -> int:
+def emit(loop: Loop, t: float, y: Any, rows: Any, n: int, event: float) -> int:
     """Write a row at t; returns the number of rows."""
     if n >= rows.shape[0]:
         return n
-    rates(a, w, t, y, k, SCRATCH)
+    torques(loop, t, y)
+    now = loop.now
     rows[n, 0] = t
-    rows[n, 1] = w[THETA_D]
-    rows[n, 2] = w[OMEGA_D]
-    rows[n, 3] = y[POSITION]
-    rows[n, 4] = w[SEEN_VELOCITY]
-    rows[n, 5] = w[MOTOR_TORQUE]
-    rows[n, 6] = w[FRICTION_TORQUE]
-    rows[n, 7] = w[COMPENSATION_TORQUE]
+    rows[n, 1] = now.reference.position
+    rows[n, 2] = now.reference.velocity
+    rows[n, 3] = named(y).position
+    rows[n, 4] = now.seen_velocity
+    rows[n, 5] = now.motor_torque
+    rows[n, 6] = now.friction_torque
+    rows[n, 7] = now.compensation_torque
     rows[n, 8] = event
     return n + 1
 
 
 @kernel()
-def measure(
-    a: Any, w: Any, t: float, h: float, y: Any, k: Any, end: Any, u: Any, nodes: Any, acc: Any, turns: Any,
-    smooth: bool, fourth: float,
-) -> None:  # fmt: skip
+def measure(loop: Loop, t: float, h: float, nodes: Any, acc: Any, turns: Any) -> None:
     """Hand an accepted step to the meter: its ends are noted, the nodes between come from the dense output.
 
     A smooth step, limited by stability alone, is short against every motion that it holds: parabolas do.
     """
+    smooth = loop.step.smooth != 0
     for i in range(1, 4):
         if i == 2 or not smooth:
-            dense(h, y, k, end, 0.25 * i, fourth, u)
-            rates(a, w, t + 0.25 * i * h, u, k, SCRATCH)
-            note(w, u, nodes, i)
+            dense(loop, h, 0.25 * i, loop.middle)
+            torques(loop, t + 0.25 * i * h, loop.middle)
+            note(loop, loop.middle, nodes, i)
     if smooth:
         for j in range(SIGNALS):
             nodes[j, 1] = 0.125 * (3.0 * nodes[j, 0] + 6.0 * nodes[j, 2] - nodes[j, 4])
@@ -209,116 +173,102 @@ def measure(
 
 
 @kernel()
-def settle(a: Any, w: Any, t: float, y: Any, k: Any, g: Any) -> int:
+def settle(loop: Loop, t: float) -> int:
     """Switch until no event is due at this moment; returns how many rounds it took (9 where it never ends)."""
     for i in range(9):
-        if events(a, w, t, y, k, SCRATCH, g) < 0.0:
+        if events(loop, t, loop.y) < 0.0:
             return i
-        switch(a, w, t, y, k, SCRATCH, g)
+        switch(loop, t, loop.y)
     return 9
 
 
 @kernel()
-def broken(a: Any, w: Any, y: Any) -> int:
+def broken(loop: Loop) -> int:
     """Whether the state is beyond every reasonable bound or no number; DONE where it is fine."""
-    for j in range(y.shape[0]):
-        if not np.isfinite(y[j]):
+    n, state = loop.numbers, named(loop.y)
+    for j in range(loop.case.states):
+        if not np.isfinite(loop.y[j]):
             return NOT_FINITE
-    if abs(y[POSITION]) > w[POSITION_LIMIT] or abs(y[VELOCITY]) > w[VELOCITY_LIMIT]:
+    if abs(state.position) > n[POSITION_LIMIT] or abs(state.velocity) > n[VELOCITY_LIMIT]:
         return DIVERGED
     return DONE
 
 
 @kernel()
-def cross(
-    a: Any, w: Any, t: float, stop: float, y: Any, k: Any, g: Any, rows: Any, written: int, room: int
-) -> tuple[int, int]:
+def cross(loop: Loop, t: float, stop: float, rows: Any, written: int, room: int) -> tuple[int, int]:
     """Switch at an event, with a row before and after it; returns the number of rows and of switching rounds."""
     if rows.shape[0] - written > room + 2:
-        written = emit(a, w, t, y, k, rows, written, 1.0)
-    events(a, w, t, y, k, SCRATCH, g)
-    switch(a, w, t, y, k, SCRATCH, g)
-    rounds = settle(a, w, t, y, k, g)
-    begin_side(a, w, t, 0.5 * (t + stop), y, k, SCRATCH)
+        written = emit(loop, t, loop.y, rows, written, 1.0)
+    events(loop, t, loop.y)
+    switch(loop, t, loop.y)
+    rounds = settle(loop, t)
+    begin_side(loop, t, 0.5 * (t + stop), loop.y)
     if rows.shape[0] - written > room + 2:
-        written = emit(a, w, t, y, k, rows, written, 1.0)
+        written = emit(loop, t, loop.y, rows, written, 1.0)
     return written, rounds
 
 
 @kernel()
-def integrate(
-    a: Any,
-    w: Any,
-    y: Any,
-    tolerance: Any,
-    breaks: Any,
-    grid: Any,
-    rows: Any,
-    acc: Any,
-    turns: Any,
-    counts: Any,
-    pace: Any,
-) -> int:
-    """Run the loop from rest to the last break. Returns how it ended; when is in the ``pace`` (see `NOW`).
-
-    ``counts`` receives steps, rejected steps, events and rows.
-    """
-    n = y.shape[0]
-    k, nodes, trial = np.zeros((STAGES + 1, n)), np.zeros((SIGNALS, 5)), np.zeros(TRIAL)
-    end, error, u, fast = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    g = np.zeros(n - LAWS + EXTRA)
-    longest = min(w[MAX_STEP], MAX_WINDOW)
+def integrate(laid: Laid, breaks: Any, grid: Any, rows: Any, acc: Any, turns: Any) -> int:
+    """Run the loop from rest to the last break. Returns how it ended; when is in the progress."""
+    loop = loop_of(laid)
+    n, y, reached, tried = loop.case.states, loop.y, loop.progress, loop.step
+    last, nodes = pointer(loop.rates, 6 * n), np.zeros((SIGNALS, 5))
+    longest = min(loop.numbers[MAX_STEP], MAX_WINDOW)
     t, written, out, code = 0.0, 0, 0, DONE
     storm_start, storm_events = 0.0, 0
-    trial[NEXT] = 1e-6
+    tried.next = 1e-6
     for b in range(breaks.shape[0]):
         stop = breaks[b]
-        begin_side(a, w, t, 0.5 * (t + stop), y, k, SCRATCH)
-        settle(a, w, t, y, k, g)
+        begin_side(loop, t, 0.5 * (t + stop), y)
+        settle(loop, t)
         if out < grid.shape[0] and grid[out] <= t:
-            written = emit(a, w, t, y, k, rows, written, 0.0)
+            written = emit(loop, t, y, rows, written, 0.0)
             out += 1
         fresh = True
-        trial[NEXT] = min(trial[NEXT], 1e-4)
+        tried.next = min(tried.next, 1e-4)
         while t < stop and code == DONE:
             if fresh:
-                rates(a, w, t, y, k, 0)
-                note(w, y, nodes, 0)
-                trial[VALUE] = -np.inf
+                rates(loop, t, y, loop.rates)
+                note(loop, y, nodes, 0)
+                tried.value = -np.inf
                 fresh = False
-            trial[NEXT] = min(trial[NEXT], longest)
-            code = attempt(a, w, t, stop, y, k, end, error, u, g, tolerance, nodes, trial, fast)
-            if code != DONE or trial[TAKEN] == 0.0:
-                counts[1] += 1
+            tried.next = min(tried.next, longest)
+            code = attempt(loop, t, stop, nodes)
+            if code != DONE or tried.taken == 0:
+                reached.rejected += 1
                 continue
-            step = trial[STEP]
-            counts[0] += 1
+            step = tried.length
+            reached.steps += 1
             while out < grid.shape[0] and grid[out] <= t + step:
-                dense(step, y, k, end, min(1.0, (grid[out] - t) / step), trial[FOURTH], u)
-                written = emit(a, w, grid[out], u, k, rows, written, 0.0)
+                dense(loop, step, min(1.0, (grid[out] - t) / step), loop.middle)
+                written = emit(loop, grid[out], loop.middle, rows, written, 0.0)
                 out += 1
-            if w[METERED] != 0.0:
-                measure(a, w, t, step, y, k, end, u, nodes, acc, turns, trial[SMOOTH] != 0.0, trial[FOURTH])
-            t = stop if trial[FINAL] else t + step
-            pace[NOW] = t
+            if loop.numbers[METERED] != 0.0:
+                measure(loop, t, step, nodes, acc, turns)
+            t = stop if tried.final != 0 else t + step
+            reached.time = t
             # Element by element: assigning slices would compile numpy's checks of shapes, seconds of it.
             for j in range(n):
-                y[j] = end[j]
-                k[0, j] = k[6, j]
-            code = broken(a, w, y)
-            if code == DONE and trial[EVENT]:
-                counts[2] += 1
+                y[j] = loop.end[j]
+                loop.rates[j] = last[j]
+            code = broken(loop)
+            if code == DONE and tried.event != 0:
+                reached.events += 1
                 storm_events += 1
-                written, rounds = cross(a, w, t, stop, y, k, g, rows, written, grid.shape[0] - out)
+                written, rounds = cross(loop, t, stop, rows, written, grid.shape[0] - out)
                 fresh = True
                 if t - storm_start > STORM_TIME:
                     storm_start, storm_events = t, 0
                 if storm_events > STORM_EVENTS or rounds == 9:
                     code = STORM
-            if code == DONE and counts[0] + counts[1] > pace[FIRST_STEPS] + pace[STEP_RATE] * t:
+            if (
+                code == DONE
+                and reached.steps + reached.rejected > reached.first_steps + reached.step_rate * t
+            ):
                 code = TOO_STIFF
         if code != DONE:
             break
     close_standstill(acc, t)
-    counts[3] = written
+    reached.rows = written
     return code
