@@ -19,7 +19,7 @@ from stickslip.simulation._forcing import CELL_SIZE
 from stickslip.simulation.case_arrays import FROM_MEASUREMENT, FROM_REFERENCE, KI, SOURCE, Case
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.exact.kernel import LONGEST_STEP, SAFETY, solve
-from stickslip.simulation.exact.state import PLAN
+from stickslip.simulation.exact.state import PLAN, Laid, Output
 
 Positions = np.ndarray[Any, np.dtype[np.float64]]
 Run = Callable[..., Positions]
@@ -98,29 +98,23 @@ class Loop:
 
 
 @kernel()
-def again(
-    times: int, parameters: Any, plan: Any, cells: Any, breaks: Any, grid: Any, fresh: Any, work: Any, out: Any,
-    nothing: Any, nodes: Any,
-) -> int:  # fmt: skip
+def again(times: int, laid: Laid, fresh: Any, output: Output) -> int:
     """Run the kernel of the exact integrator so many times; returns why it ended."""
     code = 0
     for _ in range(times):
-        work[:] = fresh
-        code = solve(
-            parameters, plan, cells, breaks, grid, work, out, nothing, nothing[:, 0], nothing, nodes, True, False, False
-        )  # fmt: skip
+        laid.work[:] = fresh
+        code = solve(laid, output, True, False, False)
     return code
 
 
 def ours(ready: exact.Prepared) -> Run:
     """The exact integrator's kernel on a prepared case."""
-    out, work, grid = np.empty((ready.case.grid.size, 2)), ready.work.copy(), ready.case.grid
-    nothing, nodes = np.zeros((1, 2)), exact.NODES.copy()
+    out, work = np.empty((ready.case.grid.size, 2)), ready.work.copy()
+    laid = Laid(ready.parameters, ready.plan, ready.cells, ready.breaks, ready.case.grid, work)
+    output = Output(out, exact.NOTHING, exact.NOTHING_1, exact.NOTHING, exact.NODES.copy())
 
     def run(times: int = 1) -> Positions:
-        again(
-            times, ready.parameters, ready.plan, ready.cells, ready.breaks, grid, ready.work, work, out, nothing, nodes
-        )  # fmt: skip
+        again(times, laid, ready.work, output)
         return out[:, 0]
 
     return run

@@ -12,7 +12,7 @@ from stickslip.model import Model, Reference
 from stickslip.simulation.case_arrays import COMPENSATOR_SCALE, PLANT_SCALE, STIFFNESS
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
-from stickslip.simulation.exact.kernel import AT_SIDES
+from stickslip.simulation.exact.state import AT_SIDES
 from stickslip.simulation.many import batch
 from stickslip.simulation.metrics import COARSE, metrics
 

@@ -14,14 +14,8 @@ from typing import Any
 from stickslip.jit import kernel
 from stickslip.simulation.case_arrays import INERTIA
 from stickslip.simulation.exact.flow import Linear, linear, relaxed, upper_terms
-from stickslip.simulation.exact.state import (
-    BENDS,
-    FOLLOWS,
-    curve_slope,
-    side_of,
-    sides_of,
-    sliding,
-)
+from stickslip.simulation.exact.forces import curve_slope, sliding
+from stickslip.simulation.exact.state import BENDS, FOLLOWS, Loop, side_of, sides_of
 
 FLAT = 5.0
 """Velocity, in parts of v_s, above which the slope of s(v) is not worth its price."""
@@ -32,8 +26,9 @@ FARTHEST_LAG = 100.0
 
 
 @kernel(exact=False, inline=True)
-def bend(parameters: Any, plan: Any, sides: Any, now: Any, h: float) -> Linear:
+def bend(loop: Loop, h: float) -> Linear:
     """Take the flow anew for a step of about h: springs of bristles, dampers of curves."""
+    parameters, now = loop.parameters, loop.now
     theta = now.position
     v = now.velocity
     total = now.even_stiffness
@@ -41,19 +36,19 @@ def bend(parameters: Any, plan: Any, sides: Any, now: Any, h: float) -> Linear:
     now.base = now.even_base
     bristles = False
     least = max(STIFF * parameters[INERTIA] / (h * h), now.floor)
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
         w = side.weight
         if side.kind == BENDS and side.slipping > 0.0:
-            g = bend_bristle(parameters, plan, sides, now, side, h, total, least)
+            g = bend_bristle(loop, side, h, total, least)
             total += w * g
             damping += w * side.lag * g
             now.base -= w * g * theta
             bristles = True
         elif side.kind == FOLLOWS and side.slipping > 0.0 and side.varies != 0:
             goal = side.slipping * now.sigma
-            b = goal * curve_slope(parameters, plan, sides, side, v)
-            side.force = goal * sliding(parameters, plan, sides, side, v) - b * v
+            b = goal * curve_slope(loop, side, v)
+            side.force = goal * sliding(loop, side, v) - b * v
             side.force_rate = 0.0
             side.damping = side.viscous + b
             damping += w * b
@@ -67,10 +62,9 @@ def bend(parameters: Any, plan: Any, sides: Any, now: Any, h: float) -> Linear:
 
 
 @kernel(exact=False, inline=True)
-def bend_bristle(
-    parameters: Any, plan: Any, sides: Any, now: Any, side: Any, h: float, total: float, least: float
-) -> float:  # fmt: skip
+def bend_bristle(loop: Loop, side: Any, h: float, total: float, least: float) -> float:
     """Divide a bristle's force; returns its spring. ``total`` is the stiffness of all the rest."""
+    now = loop.now
     theta = now.position
     v = now.velocity
     w = side.weight
@@ -78,8 +72,8 @@ def bend_bristle(
     force = side.force + side.spring * theta
     force += side.spring_offset
     scale = side.scale
-    steep = curve_slope(parameters, plan, sides, side, v) if abs(v) < FLAT * scale else 0.0
-    s = sliding(parameters, plan, sides, side, v)
+    steep = curve_slope(loop, side, v) if abs(v) < FLAT * scale else 0.0
+    s = sliding(loop, side, v)
     filled = now.sigma * force / s
     decay = k * now.sigma * v / s
     # What is relaxed away within the step follows the velocity, not the position.
@@ -97,16 +91,16 @@ def bend_bristle(
 
 @kernel(exact=False, inline=True)
 def bristle_terms(
-    parameters: Any, plan: Any, sides: Any, now: Any, side: Any, h: float, theta_mid: float, v_mid: float,
-    theta_end: float, v_end: float,
+    loop: Loop, side: Any, h: float, theta_mid: float, v_mid: float, theta_end: float, v_end: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Advance what is left of a bristle's force along the motion; returns its two upper coefficients."""
+    now = loop.now
     k = side.bristle * now.sigma
     g = side.spring
     rest = side.bristle - g
     d0 = side.force_rate
-    decay_mid = k * v_mid / sliding(parameters, plan, sides, side, v_mid)
-    decay_end = k * v_end / sliding(parameters, plan, sides, side, v_end)
+    decay_mid = k * v_mid / sliding(loop, side, v_mid)
+    decay_end = k * v_end / sliding(loop, side, v_end)
     goal_mid = rest * v_mid - decay_mid * g * (theta_mid - now.position)
     goal_end = rest * v_end - decay_end * g * (theta_end - now.position)
     middle, end, slope = relaxed(goal_mid, goal_end, side.force, d0, decay_mid, decay_end, h)
@@ -119,23 +113,20 @@ def bristle_terms(
 
 
 @kernel(exact=False, inline=True)
-def bristle_rate(
-    parameters: Any, plan: Any, sides: Any, now: Any, side: Any, theta: float, v: float, force: float
-) -> float:  # fmt: skip
+def bristle_rate(loop: Loop, side: Any, theta: float, v: float, force: float) -> float:
     """Rate of what is left of a bristle's force, N·m/s."""
+    now = loop.now
     g = side.spring
     k = side.bristle
-    decay = k * now.sigma * v / sliding(parameters, plan, sides, side, v)
+    decay = k * now.sigma * v / sliding(loop, side, v)
     return (k - g) * v - decay * (force + g * (theta - now.position))
 
 
 @kernel(exact=False, inline=True)
-def curve_terms(
-    parameters: Any, plan: Any, sides: Any, now: Any, side: Any, h: float, v_mid: float, v_end: float
-) -> tuple[float, float]:  # fmt: skip
+def curve_terms(loop: Loop, side: Any, h: float, v_mid: float, v_end: float) -> tuple[float, float]:
     """What is left of a force on the curve, in the middle and at the end; returns its two upper coefficients."""
-    middle = curve_rest(parameters, plan, sides, now, side, v_mid)
-    end = curve_rest(parameters, plan, sides, now, side, v_end)
+    middle = curve_rest(loop, side, v_mid)
+    end = curve_rest(loop, side, v_end)
     side.force_mid = middle
     side.force_end = end
     # The cubic that starts flat and goes through both.
@@ -147,8 +138,8 @@ def curve_terms(
 
 
 @kernel(exact=False, inline=True)
-def curve_rest(parameters: Any, plan: Any, sides: Any, now: Any, side: Any, v: float) -> float:
+def curve_rest(loop: Loop, side: Any, v: float) -> float:
     """A force on the curve, less what the flow's damper takes."""
     b = side.damping - side.viscous
-    goal = side.slipping * now.sigma
-    return goal * sliding(parameters, plan, sides, side, v) - b * v
+    goal = side.slipping * loop.now.sigma
+    return goal * sliding(loop, side, v) - b * v

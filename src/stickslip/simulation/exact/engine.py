@@ -8,8 +8,8 @@ Nothing is stepped over: break-aways and reversals are located on the exact flow
 position per step, rad.
 
 A law is taken as `Elements` or as a `Bristle` (LuGre, Dahl). `exact.flow` the flow, `exact.state` what is remembered,
-`exact.step` one step, `exact.segment` the motion inside it, `exact.bristle` bristles and curves,
-`exact.event_functions` what ends a mode, `exact.events` where, `exact.stiction` rest, `exact.output` rows and metrics,
+`exact.forces` torques, `exact.step` one step, `exact.segment` the motion inside it, `exact.bristle` bristles and
+curves, `exact.event_functions` what ends a mode, `exact.events` where, `exact.stiction` rest, `exact.output` rows,
 `exact.transition` what changes at an event, `exact.kernel` the loop, `_forcing` feedforward.
 """
 
@@ -46,7 +46,8 @@ from stickslip.simulation.case_arrays import (
     StepBudget,
 )
 from stickslip.simulation.exact import state as col
-from stickslip.simulation.exact.kernel import AT_NOW, AT_SIDES, LONGEST_STEP, solve
+from stickslip.simulation.exact.kernel import LONGEST_STEP, solve
+from stickslip.simulation.exact.state import AT_NOW, AT_SIDES, Laid, Output
 from stickslip.simulation.metrics import settle_band_of
 from stickslip.spec import Bristle, Elements, Law, Option
 from stickslip.waiting import Reached, watched
@@ -130,10 +131,8 @@ class Prepared:
 
     Attributes
     ----------
-    parameters, plan, cells, breaks : arrays
-        What the kernel reads; `plan` holds the bytes of an `exact.state.PLAN`.
-    work : array
-        What the kernel works on, as it begins.
+    parameters, plan, cells, breaks, work : arrays
+        See `exact.state.Laid`; each run works on a copy of `work`.
     """
 
     case: Case
@@ -155,7 +154,9 @@ class Prepared:
         """
         out = np.empty((self.case.grid.size, 2))
         work = self.work.copy()
-        code = self._solve(self.plan, work, out, NOTHING, NOTHING_1, NOTHING, light=True)
+        code = self._solve(
+            self.plan, work, Output(out, NOTHING, NOTHING_1, NOTHING, NODES.copy()), light=True
+        )
         return out[: int(counted(work)["grid_written"])], code, time_of(work)
 
     def record(self) -> Outcome:
@@ -167,12 +168,13 @@ class Prepared:
         turns = np.zeros((TURNS if metered else 0, 2))
         rows = np.empty((int(self.plan.view(col.PLAN)[0]["rows"]), len(COLUMNS)))
         plan, work = self.plan.copy(), self.work.copy()
+        output = Output(NOTHING, rows, acc, turns, NODES.copy())
 
         def stop() -> None:
             plan.view(col.PLAN)[0]["first_steps"] = -math.inf
 
         code = watched(
-            lambda: self._solve(plan, work, NOTHING, rows, acc, turns, full=True, metered=metered),
+            lambda: self._solve(plan, work, output, full=True, metered=metered),
             lambda: Reached(time_of(work), duration, float(counted(work)["steps"])), stop,
         )  # fmt: skip
         time, count = time_of(work), counted(work)
@@ -182,14 +184,11 @@ class Prepared:
         return Outcome(rows[: int(count["rows_written"])].copy(), code, time, acc, turns, named)
 
     def _solve(
-        self, plan: Array, work: Array, out: Array, rows: Array, acc: Array, turns: Array, *, light: bool = False,
-        full: bool = False, metered: bool = False,
+        self, plan: Array, work: Array, output: Output, *, light: bool = False, full: bool = False,
+        metered: bool = False,
     ) -> int:  # fmt: skip
-        code = solve(
-            self.parameters, plan, self.cells, self.breaks, self.case.grid, work, out, rows, acc, turns,
-            NODES.copy(), light, full, metered,
-        )  # fmt: skip
-        return int(code)
+        laid = Laid(self.parameters, plan, self.cells, self.breaks, self.case.grid, work)
+        return int(solve(laid, output, light, full, metered))
 
 
 def counted(work: Array) -> Any:

@@ -11,12 +11,8 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulation.exact.state import (
-    element_of,
-    side_of,
-    sides_of,
-    sliding,
-)
+from stickslip.simulation.exact.forces import sliding
+from stickslip.simulation.exact.state import Loop, element_of, side_of, sides_of
 
 NOISE = 1e-12
 """Velocities this small (rad/s) may be rounding errors of one that creeps to zero: no reversal yet."""
@@ -38,12 +34,12 @@ def load_of(literal: bool, direction: float, force: float) -> float:
 
 
 @kernel(exact=False, inline=True)
-def heaviest(elements: Any, side: Any, theta: float, v: float) -> float:
+def heaviest(loop: Loop, side: Any, theta: float, v: float) -> float:
     """Largest load per share among a side's sticking elements, N·m."""
     top = -1e300
     direction = 1.0 if v >= 0.0 else -1.0
     for i in range(side.first, side.first + side.sticking):
-        e = element_of(elements, i)
+        e = element_of(loop, i)
         load = load_of(side.literal != 0, direction, e.load_at_0 + e.load_slope * theta)
         if load > top:
             top = load
@@ -62,76 +58,77 @@ def mode_ends(now: Any, side: Any, i: int, v: float) -> float:
 
 
 @kernel(exact=False, inline=True)
-def beyond_limit(parameters: Any, plan: Any, sides: Any, side: Any, top: float, v: float) -> float:
+def beyond_limit(loop: Loop, side: Any, top: float, v: float) -> float:
     """How far a side's largest load is beyond the limit; the curve is asked for where its least level is in reach."""
     limit = side.lowest
     if top > limit:
         # At rest, rounding would ask for the curve at ever other velocities.
-        limit = sliding(parameters, plan, sides, side, v if abs(v) > BARELY else math.copysign(BARELY, v))
+        limit = sliding(loop, side, v if abs(v) > BARELY else math.copysign(BARELY, v))
     return top - limit
 
 
 @kernel(exact=False, inline=True)
-def trigger(parameters: Any, plan: Any, elements: Any, sides: Any, now: Any, theta: float, v: float) -> float:
+def trigger(loop: Loop, theta: float, v: float) -> float:
     """The largest event function at a state: not negative where a mode ends."""
     g = -1e9
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
-        g = max(g, mode_ends(now, side, i, v))
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        g = max(g, mode_ends(loop.now, side, i, v))
         if side.sticking != 0:
-            top = heaviest(elements, side, theta, v)
-            g = max(g, beyond_limit(parameters, plan, sides, side, top, v))
+            top = heaviest(loop, side, theta, v)
+            g = max(g, beyond_limit(loop, side, top, v))
     return g
 
 
 @kernel(exact=False, inline=True)
-def trigger_at_node(parameters: Any, plan: Any, sides: Any, now: Any, v: float) -> float:
+def trigger_at_node(loop: Loop, v: float) -> float:
     """`trigger` at the next node, which is weighed."""
     g = -1e9
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
-        g = max(g, mode_ends(now, side, i, v))
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        g = max(g, mode_ends(loop.now, side, i, v))
         if side.sticking != 0:
-            g = max(g, beyond_limit(parameters, plan, sides, side, side.top_next, v))
+            g = max(g, beyond_limit(loop, side, side.top_next, v))
     return g
 
 
 @kernel(exact=False, inline=True)
-def stays(parameters: Any, plan: Any, sides: Any, v: float) -> bool:
+def stays(loop: Loop, v: float) -> bool:
     """Whether the loads at the next node are within the limit at v: up to there, while the motion slows down."""
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
-        if side.sticking != 0 and beyond_limit(parameters, plan, sides, side, side.top_next, v) >= 0.0:
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        if side.sticking != 0 and beyond_limit(loop, side, side.top_next, v) >= 0.0:
             return False
     return True
 
 
 @kernel(exact=False, inline=True)
-def weigh(plan: Any, elements: Any, sides: Any, theta: float, v: float) -> bool:
+def weigh(loop: Loop, theta: float, v: float) -> bool:
     """Note each side's largest load at the next node; returns whether one is near its limit there or here."""
     near = False
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
         if side.sticking != 0:
-            top = heaviest(elements, side, theta, v)
+            top = heaviest(loop, side, theta, v)
             side.top_next = top
             near = near or max(top, side.top) > side.lowest
     return near
 
 
 @kernel(exact=False, inline=True)
-def pass_on(plan: Any, sides: Any) -> None:
+def pass_on(loop: Loop) -> None:
     """Stand at the next node."""
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
         side.top = side.top_next
 
 
 @kernel(exact=False, inline=True)
-def weigh_here(plan: Any, elements: Any, sides: Any, now: Any) -> None:
+def weigh_here(loop: Loop) -> None:
     """Note each side's largest load where the loop stands."""
-    weigh(plan, elements, sides, now.position, now.velocity)
-    pass_on(plan, sides)
+    now = loop.now
+    weigh(loop, now.position, now.velocity)
+    pass_on(loop)
 
 
 @kernel(exact=False, inline=True)
@@ -142,30 +139,26 @@ def farthest(width: float, theta0: float, v0: float, theta1: float, v1: float) -
 
 
 @kernel(exact=False, inline=True)
-def passes_turn(
-    parameters: Any, plan: Any, elements: Any, sides: Any, width: float, theta0: float, v0: float, theta1: float,
-    v1: float,
-) -> bool:  # fmt: skip
+def passes_turn(loop: Loop, width: float, theta0: float, v0: float, theta1: float, v1: float) -> bool:
     """Whether a sticking element may be loaded beyond its limit where the velocity passes zero; ends are given."""
     peak = farthest(width, theta0, v0, theta1, v1)
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
         if side.sticking != 0:
-            before = heaviest(elements, side, peak, v0)
-            after = heaviest(elements, side, theta1, v1)
+            before = heaviest(loop, side, peak, v0)
+            after = heaviest(loop, side, theta1, v1)
             lowest = side.lowest
-            if before > lowest and before > sliding(parameters, plan, sides, side, math.copysign(BARELY, v0)):
+            if before > lowest and before > sliding(loop, side, math.copysign(BARELY, v0)):
                 return True
-            if after > lowest and after > sliding(parameters, plan, sides, side, math.copysign(BARELY, v1)):
+            if after > lowest and after > sliding(loop, side, math.copysign(BARELY, v1)):
                 return True
     return False
 
 
 @kernel(exact=False, inline=True)
 def looks(
-    parameters: Any, plan: Any, elements: Any, sides: Any, width: float, theta0: float, v0: float, a0: float,
-    theta1: float, v1: float, a1: float,
-) -> int:  # fmt: skip
+    loop: Loop, width: float, theta0: float, v0: float, a0: float, theta1: float, v1: float, a1: float
+) -> int:
     """Number of parts of a segment at whose ends events are looked for; the segment's ends are given, and weighed.
 
     The load of a sticking element near its limit can cross it up and down between two nodes, since s(v) varies
@@ -179,12 +172,12 @@ def looks(
     rises = v0 * v1 >= 0.0 and a0 * v1 > 0.0 and a1 * v1 > 0.0
     parts = 1
     peak = farthest(width, theta0, v0, theta1, v1)
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
         if side.sticking == 0:
             continue
         lowest = side.lowest
-        if jump > STILL and v0 * v1 < 0.0 and heaviest(elements, side, peak, v0) > lowest:
+        if jump > STILL and v0 * v1 < 0.0 and heaviest(loop, side, peak, v0) > lowest:
             parts = LOOKS_AT_TURN
         seen = LOOK * side.scale
         if jump > seen > 0.0:
@@ -192,8 +185,8 @@ def looks(
             top1 = side.top_next
             top = max(top0, top1)
             if top > lowest and not (rises and top0 <= top1):
-                lowest = sliding(parameters, plan, sides, side, fastest)
-                lowest = min(lowest, sliding(parameters, plan, sides, side, -fastest))
+                lowest = sliding(loop, side, fastest)
+                lowest = min(lowest, sliding(loop, side, -fastest))
                 if top > lowest:
                     parts = max(parts, int(min(jump / seen, MOST_LOOKS)) + 1)
     return parts

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from stickslip.jit import kernel
 
 Matrix = tuple[float, float, float, float]
@@ -65,21 +67,24 @@ def flow(lin: Linear, x: float) -> Matrix:
     return e * (c + lin.decay * s), e * s, -e * lin.square * s, e * (c - lin.decay * s)
 
 
-FLOW = 5
-"""Entries of a kept flow: a matrix, and the generation of modes that it belongs to."""
+KEPT = np.dtype(
+    [
+        # How position and velocity follow from those before; the step over half of which, s.
+        *((name, np.float64) for name in ("pp", "pv", "vp", "vv", "step")),
+        # Of modes.
+        ("generation", np.int64),
+    ]
+)
+"""A flow that is kept as long as the modes are."""
 
 
 @kernel(exact=False, inline=True)
 def kept_flow(lin: Linear, kept: Any, generation: int, x: float) -> Matrix:
     """The flow over x, computed once for every set of modes: ``kept`` belongs to one x."""
-    if kept[4] != generation:
-        m = flow(lin, x)
-        kept[0] = m[0]
-        kept[1] = m[1]
-        kept[2] = m[2]
-        kept[3] = m[3]
-        kept[4] = generation
-    return kept[0], kept[1], kept[2], kept[3]
+    if kept.generation != generation:
+        kept.pp, kept.pv, kept.vp, kept.vv = flow(lin, x)
+        kept.generation = generation
+    return kept.pp, kept.pv, kept.vp, kept.vv
 
 
 @kernel(exact=False)

@@ -34,20 +34,14 @@ from stickslip.simulation.exact.flow import (
     twice,
     upper_terms,
 )
+from stickslip.simulation.exact.forces import Command, command
 from stickslip.simulation.exact.output import torques_at
 from stickslip.simulation.exact.ringing import (
     has_closed_form,
     ringing,
 )
-from stickslip.simulation.exact.segment import (
-    FREE_POSITION,
-    FREE_VELOCITY,
-    GOAL_END,
-    LENGTH,
-    RATE_END,
-    cubic_of,
-)
-from stickslip.simulation.exact.state import command, side_of
+from stickslip.simulation.exact.segment import cubic_of
+from stickslip.simulation.exact.state import Loop, side_of
 from stickslip.simulation.exact.window import Shares, ringing_window, window
 
 LONGEST = 64e-3
@@ -65,13 +59,14 @@ DIED_OUT = 1e-8
 
 
 @kernel(exact=False, inline=True)
-def shares(parameters: Any, plan: Any, sides: Any) -> Shares:
+def shares(loop: Loop) -> Shares:
     """The shares of the loop as its modes are."""
+    parameters = loop.parameters
     spring = 0.0
     damping = 0.0
-    contact = side_of(sides, 0)
-    if plan.sides > 1:
-        side = side_of(sides, 1)
+    contact = side_of(loop, 0)
+    if loop.plan.sides > 1:
+        side = side_of(loop, 1)
         spring = -side.weight * side.spring
         damping = -side.weight * side.damping
     return Shares(
@@ -87,27 +82,25 @@ class Way(NamedTuple):
 
 
 @kernel(exact=False, inline=True)
-def way_of(now: Any, segment: Any) -> Way:
+def way_of(loop: Loop) -> Way:
     """How the nodes of a segment get the reference.
 
     Where `exact.step.look_ahead` leaves out its middle, a cubic misses it by a small part of the tolerance.
     """
+    now, segment = loop.now, loop.segment
     g2, g3 = upper_terms(
-        now.goal, now.goal_rate, segment[GOAL_END], segment[RATE_END], 1.0 / segment[LENGTH]
+        now.goal, now.goal_rate, segment.goal_end, segment.rate_end, 1.0 / segment.length
     )  # fmt: skip
     return Way(now.unseen != 0, (now.goal, now.goal_rate, g2, g3))
 
 
 @kernel(exact=False, inline=True)
-def commanded(
-    parameters: Any, plan: Any, cells: Any, now: Any, way: Way, x: float
-) -> tuple[float, float, float]:  # fmt: skip
-    """Torque commanded by time alone, and the reference's position and velocity, at x inside the segment."""
+def commanded(loop: Loop, way: Way, x: float) -> Command:
+    """What time alone commands at x inside the segment; without the torque's rate where the reference is a cubic."""
     if way.even:
         goal, rate = moved(way.cubic, UNMOVED, x, 0.0, 0.0)
-        return parameters[KP] * goal + parameters[KR] * rate, goal, rate
-    r, _, goal, rate = command(parameters, plan, cells, now, now.time + x)
-    return r, goal, rate
+        return Command(loop.parameters[KP] * goal + loop.parameters[KR] * rate, 0.0, goal, rate)
+    return command(loop, loop.now.time + x)
 
 
 # ---- windows --------------------------------------------------------------------------------------------------
@@ -129,8 +122,8 @@ def windows_for(rate: float, speed: float, h: float) -> float:
 @kernel(exact=False, inline=True)
 def windows_of(lin: Linear, segment: Any, h: float, longest: float) -> float:
     """Windows, none longer than `longest`, whose nodes follow the first h of a segment."""
-    p = segment[FREE_POSITION]
-    q = segment[FREE_VELOCITY]
+    p = segment.free_position
+    q = segment.free_velocity
     if lin.discriminant > 0.0:
         rate = max(lin.frequency, lin.decay)
         most = windows_for(rate, abs(q) + rate * abs(p), h)
@@ -146,27 +139,26 @@ def windows_of(lin: Linear, segment: Any, h: float, longest: float) -> float:
 
 
 @kernel(exact=False, inline=True)
-def slowly(now: Any, segment: Any) -> bool:
+def slowly(loop: Loop) -> bool:
     """Whether the reference turns by less than 0.3 radian in a segment: its way leaves that of its mean velocity by a
     twelfth of the angle's square."""
-    h = segment[LENGTH]
+    now, segment = loop.now, loop.segment
+    h = segment.length
     if h > LONGEST * 1.001:
         return False
     r0 = now.goal_rate
-    r1 = segment[RATE_END]
-    off = segment[GOAL_END] - now.goal - 0.5 * h * (r0 + r1)
+    r1 = segment.rate_end
+    off = segment.goal_end - now.goal - 0.5 * h * (r0 + r1)
     return abs(off) <= 0.0075 * h * max(abs(r0), abs(r1))
 
 
 @kernel(exact=False)
-def measure(
-    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, segment: Any, h: float, acc: Any,
-    turns: Any, nodes: Any,
-) -> bool:  # fmt: skip
+def measure(lin: Linear, loop: Loop, h: float, acc: Any, turns: Any, nodes: Any) -> bool:
     """Hand the first h of the segment to the meter, in windows of five nodes; False where they are too many."""
+    now, segment = loop.now, loop.segment
     if h < SHORTEST_WINDOW:
         return True
-    longest = LONGEST if slowly(now, segment) else LONG_WINDOW
+    longest = LONGEST if slowly(loop) else LONG_WINDOW
     windows = math.ceil(windows_of(lin, segment, h, longest))
     fewest = math.ceil(h / longest * (1.0 - 1e-9))
     rings = windows > fewest and has_closed_form(lin, h / fewest)
@@ -179,12 +171,12 @@ def measure(
     width = h / windows
     c = cubic_of(segment)
     m = flow(lin, 0.25 * width)
-    p = segment[FREE_POSITION]
-    v = segment[FREE_VELOCITY]
-    share = shares(parameters, plan, sides)
-    way = way_of(now, segment)
+    p = segment.free_position
+    v = segment.free_velocity
+    share = shares(loop)
+    way = way_of(loop)
     if now.jumped != 0:
-        fill(parameters, plan, cells, sides, now, segment, way, 0.0, now.position, now.velocity, nodes, 4)
+        fill(loop, way, 0.0, now.position, now.velocity, nodes, 4)
         now.jumped = 0
     for w in range(windows):
         begin = w * width
@@ -195,7 +187,7 @@ def measure(
             for k in range(1, 5):
                 x = begin + 0.25 * width * k
                 theta, speed = moved(c, UNMOVED, x, 0.0, 0.0)
-                fill(parameters, plan, cells, sides, now, segment, way, x, theta, speed, nodes, k)
+                fill(loop, way, x, theta, speed, nodes, k)
             p0 = p
             v0 = v
             p, v = free_motion(twice(twice(m)), p0, v0)
@@ -207,27 +199,24 @@ def measure(
                 x = begin + 0.25 * width * k
                 p, v = free_motion(m, p, v)
                 theta, speed = moved(c, UNMOVED, x, p, v)
-                fill(parameters, plan, cells, sides, now, segment, way, x, theta, speed, nodes, k)
+                fill(loop, way, x, theta, speed, nodes, k)
             window(acc, turns, now.time + begin, width, nodes)
     return True
 
 
 @kernel(exact=False)
-def fill(
-    parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, segment: Any, way: Way, x: float, theta: float,
-    v: float, nodes: Any, k: int,
-) -> None:  # fmt: skip
+def fill(loop: Loop, way: Way, x: float, theta: float, v: float, nodes: Any, k: int) -> None:
     """Write one node of every signal that the meter reads."""
-    r, goal, rate = commanded(parameters, plan, cells, now, way, x)
-    tm, tf, th = torques_at(parameters, plan, sides, now, segment, x, r, goal, rate, theta, v)
-    nodes[ERROR, k] = goal - theta
-    nodes[ERROR_RATE, k] = rate - v
+    asked = commanded(loop, way, x)
+    motor, friction, compensating = torques_at(loop, x, asked, theta, v)
+    nodes[ERROR, k] = asked.position - theta
+    nodes[ERROR_RATE, k] = asked.velocity - v
     nodes[AT, k] = theta
     nodes[SPEED, k] = v
-    nodes[REFERENCE_SPEED, k] = rate
-    nodes[MOTOR, k] = tm
-    nodes[FRICTION, k] = tf
-    nodes[COMPENSATING, k] = th
+    nodes[REFERENCE_SPEED, k] = asked.velocity
+    nodes[MOTOR, k] = motor
+    nodes[FRICTION, k] = friction
+    nodes[COMPENSATING, k] = compensating
 
 
 @kernel(exact=False, inline=True)

@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from stickslip.jit import kernel, pointer
-from stickslip.simulation.case_arrays import COLUMNS
+from stickslip.jit import kernel
 from stickslip.simulation.exact.flow import UNMOVED, Linear, flow, free_motion, kept_flow
-from stickslip.simulation.exact.segment import (
-    FREE_POSITION,
-    FREE_VELOCITY,
-    cubic_of,
-    integral_at,
-    shows,
-    slip_torque_at,
-    state_at,
-)
-from stickslip.simulation.exact.state import EDGE, command, side_of, torques
-
-ROW_SIZE = len(COLUMNS)
+from stickslip.simulation.exact.forces import Command, Torques, command, torques
+from stickslip.simulation.exact.segment import cubic_of, integral_at, shows, slip_torque_at, state_at
+from stickslip.simulation.exact.state import EDGE, SPACED, Loop, kept_of, row_of, side_of
 
 
 @kernel(exact=False, inline=True)
-def rows_until(plan: Any, grid: Any, row: int, end: float) -> int:
+def rows_until(loop: Loop, row: int, end: float) -> int:
     """The first row after `row` whose time is after `end`; loops over a known number of rows are vectorised."""
+    plan, grid = loop.plan, loop.grid
     rows = plan.grid_rows
     last = row
     if plan.spacing > 0.0:
@@ -37,17 +26,16 @@ def rows_until(plan: Any, grid: Any, row: int, end: float) -> int:
 
 
 @kernel(exact=False)
-def write_grid(
-    lin: Linear, plan: Any, now: Any, segment: Any, grid: Any, count: Any, out: Any, h: float, visible: float,
-    spaced: Any, generation: int,
-) -> None:  # fmt: skip
+def write_grid(lin: Linear, loop: Loop, h: float, visible: float, generation: int) -> None:
     """Write position and velocity at the grid's times inside the first h of the segment; the next one is inside.
 
     On an even grid the free motion is carried from one time to the next by one matrix. A free motion that has
     died out (less than `visible` rad) is left out.
     """
+    plan, now, segment = loop.plan, loop.now, loop.segment
+    count, grid, out = loop.count, loop.grid, loop.motion
     row = count.grid_written
-    last = rows_until(plan, grid, row, now.time + h + EDGE)
+    last = rows_until(loop, row, now.time + h + EDGE)
     count.grid_written = last
     time = now.time
     c0, c1, c2, c3 = cubic_of(segment)
@@ -58,13 +46,15 @@ def write_grid(
             out[2 * i + 1] = c1 + x * (2.0 * c2 + x * 3.0 * c3)
         return
     x = grid[row] - time
-    p, q = free_motion(flow(lin, x), segment[FREE_POSITION], segment[FREE_VELOCITY])
+    p, q = free_motion(flow(lin, x), segment.free_position, segment.free_velocity)
     even = plan.spacing > 0.0
-    between = kept_flow(lin, spaced, generation, plan.spacing) if even and row + 1 < last else UNMOVED
+    between = UNMOVED
+    if even and row + 1 < last:
+        between = kept_flow(lin, kept_of(loop, SPACED), generation, plan.spacing)
     for i in range(row, last):
         x = grid[i] - time
         if not even:
-            p, q = free_motion(flow(lin, x), segment[FREE_POSITION], segment[FREE_VELOCITY])
+            p, q = free_motion(flow(lin, x), segment.free_position, segment.free_velocity)
         out[2 * i] = c0 + x * (c1 + x * (c2 + x * c3)) + p
         out[2 * i + 1] = c1 + x * (2.0 * c2 + x * 3.0 * c3) + q
         p, q = free_motion(between, p, q)
@@ -72,95 +62,72 @@ def write_grid(
 
 @kernel(exact=False)
 def put_row(
-    rows: Any, count: Any, t: float, goal: float, rate: float, theta: float, v: float, tm: float, tf: float, th: float,
-    event: float,
+    loop: Loop, t: float, asked: Command, theta: float, v: float, torque: Torques, event: float
 ) -> None:  # fmt: skip
-    """Write the next row, in the order of `case_arrays.COLUMNS`."""
-    row_at = pointer(rows, count.rows_written * ROW_SIZE)
-    count.rows_written += 1
-    row_at[0] = t
-    row_at[1] = goal
-    row_at[2] = rate
-    row_at[3] = theta
-    row_at[4] = v
-    row_at[5] = tm
-    row_at[6] = tf
-    row_at[7] = th
-    row_at[8] = event
+    """Write the next row."""
+    row = row_of(loop, loop.count.rows_written)
+    loop.count.rows_written += 1
+    row.time = t
+    row.position_reference, row.velocity_reference = asked.position, asked.velocity
+    row.position, row.velocity = theta, v
+    row.motor_torque, row.friction_torque, row.compensation_torque = torque
+    row.event = event
 
 
 @kernel(exact=False, inline=True)
-def signals(
-    parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, segment: Any, x: float, theta: float, v: float
-) -> tuple[float, float, float, float, float]:  # fmt: skip
-    """Reference position and velocity; motor, friction and compensating torque at x inside the segment."""
-    r, _, goal, rate = command(parameters, plan, cells, now, now.time + x)
-    tm, tf, th = torques_at(parameters, plan, sides, now, segment, x, r, goal, rate, theta, v)
-    return goal, rate, tm, tf, th
-
-
-@kernel(exact=False, inline=True)
-def torques_at(
-    parameters: Any, plan: Any, sides: Any, now: Any, segment: Any, x: float, r: float, goal: float, rate: float,
-    theta: float, v: float,
-) -> tuple[float, float, float]:  # fmt: skip
+def torques_at(loop: Loop, x: float, asked: Command, theta: float, v: float) -> Torques:
     """Motor, friction and compensating torque at x inside the segment, where the reference is known."""
-    s0 = slip_torque_at(side_of(sides, 0), segment, x)
-    s1 = slip_torque_at(side_of(sides, 1), segment, x) if plan.sides > 1 else 0.0
-    integral = integral_at(parameters, now, segment, x)
-    return torques(parameters, plan, sides, now, r, goal, rate, integral, theta, v, s0, s1)
+    segment = loop.segment
+    s0 = slip_torque_at(side_of(loop, 0), segment, x)
+    s1 = slip_torque_at(side_of(loop, 1), segment, x) if loop.plan.sides > 1 else 0.0
+    integral = integral_at(loop, x)
+    return torques(loop, asked, integral, theta, v, s0, s1)
 
 
 @kernel(exact=False)
-def write_rows(
-    lin: Linear, parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, segment: Any, grid: Any, count: Any,
-    rows: Any, h: float,
-) -> None:  # fmt: skip
+def write_rows(lin: Linear, loop: Loop, h: float) -> None:
     """Write rows at the grid's times inside the first h of the segment."""
-    while count.grid_written < plan.grid_rows:
-        t = grid[count.grid_written]
+    now, count = loop.now, loop.count
+    while count.grid_written < loop.plan.grid_rows:
+        t = loop.grid[count.grid_written]
         x = t - now.time
         if x > h + 1e-12:
             return
-        theta, v = state_at(lin, segment, x)
-        goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, now, segment, x, theta, v)
-        put_row(rows, count, t, goal, rate, theta, v, tm, tf, th, 0.0)
+        theta, v = state_at(lin, loop.segment, x)
+        asked = command(loop, now.time + x)
+        put_row(loop, t, asked, theta, v, torques_at(loop, x, asked, theta, v), 0.0)
         count.grid_written += 1
 
 
 @kernel(exact=False)
-def room_for_event(plan: Any, count: Any) -> bool:
+def room_for_event(loop: Loop) -> bool:
     """Whether an event's rows still leave room for the rest of the grid."""
-    return count.rows_written + 2.0 + plan.grid_rows - count.grid_written <= plan.rows
+    plan, count = loop.plan, loop.count
+    return count.rows_written + 2 + plan.grid_rows - count.grid_written <= plan.rows
 
 
 @kernel(exact=False)
-def row_before(
-    parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, segment: Any, count: Any, rows: Any, x: float,
-    theta: float, v: float,
-) -> None:  # fmt: skip
+def row_before(loop: Loop, x: float, theta: float, v: float) -> None:
     """Write the row of an event at x, as the segment ends there."""
-    if room_for_event(plan, count):
-        goal, rate, tm, tf, th = signals(parameters, plan, cells, sides, now, segment, x, theta, v)
-        put_row(rows, count, now.time + x, goal, rate, theta, v, tm, tf, th, 1.0)
+    if room_for_event(loop):
+        t = loop.now.time + x
+        asked = command(loop, t)
+        put_row(loop, t, asked, theta, v, torques_at(loop, x, asked, theta, v), 1.0)
 
 
 @kernel(exact=False)
-def row_after(parameters: Any, plan: Any, sides: Any, now: Any, count: Any, rows: Any) -> None:
+def row_after(loop: Loop) -> None:
     """Write the row after an event if a torque has jumped."""
-    last = count.rows_written - 1
-    if last < 0 or not room_for_event(plan, count):
+    now = loop.now
+    last = loop.count.rows_written - 1
+    if last < 0 or not room_for_event(loop):
         return
-    contact, side = side_of(sides, 0), side_of(sides, 1)
+    contact, side = side_of(loop, 0), side_of(loop, 1)
     s0 = contact.force + contact.lag * contact.force_rate
-    s1 = side.force + side.lag * side.force_rate if plan.sides > 1 else 0.0
-    goal = now.goal
-    rate = now.goal_rate
-    theta = now.position
-    v = now.velocity
-    tm, tf, th = torques(
-        parameters, plan, sides, now, now.command, goal, rate, now.integral, theta, v, s0, s1
-    )  # fmt: skip
-    before = pointer(rows, last * ROW_SIZE)
-    if abs(tm - before[5]) + abs(tf - before[6]) + abs(th - before[7]) > 1e-6:
-        put_row(rows, count, now.time, goal, rate, theta, v, tm, tf, th, 1.0)
+    s1 = side.force + side.lag * side.force_rate if loop.plan.sides > 1 else 0.0
+    asked = Command(now.command, now.command_rate, now.goal, now.goal_rate)
+    torque = torques(loop, asked, now.integral, now.position, now.velocity, s0, s1)
+    before = row_of(loop, last)
+    jump = abs(torque[0] - before.motor_torque) + abs(torque[1] - before.friction_torque)
+    if jump + abs(torque[2] - before.compensation_torque) > 1e-6:
+        put_row(loop, now.time, asked, now.position, now.velocity, torque, 1.0)

@@ -9,14 +9,13 @@ from the decay exp(-integral of C/s) when a mode changes. Where C is infinite, S
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.jit import call_profile, call_value, kernel, pointer, record_at, spliced
-from stickslip.simulation._forcing import CELL_SIZE
-from stickslip.simulation.case_arrays import GAIN, INERTIA, KD, KI, KP, KR
-from stickslip.simulation.exact.flow import Linear, linear
+from stickslip.jit import kernel, pointer, record_at, spliced
+from stickslip.simulation.case_arrays import COLUMNS
+from stickslip.simulation.exact.flow import KEPT
 
 PLAN = np.dtype(
     [
@@ -135,226 +134,146 @@ RELAXES, FOLLOWS, BENDS = range(3)
 """What `kind` says of the force of what slips: it relaxes towards the curve, is on the curve at once, or is that of a
 bristle (`exact.bristle` has the last two)."""
 
-PLAN_SIZE, COUNT_SIZE, NOW_SIZE, ELEMENT_SIZE, SIDE_SIZE = (
-    kind.itemsize // 8 for kind in (PLAN, COUNT, NOW, ELEMENT, SIDE)
+SEGMENT = np.dtype(
+    [
+        *((name, np.float64) for name in (
+            # s; coefficients of the particular solution; at its begin the free motion, rad and rad/s.
+            "length", "c0", "c1", "c2", "c3", "free_position", "free_velocity",
+            # The axis in the middle, at the end and at an event, rad and rad/s.
+            "position_mid", "velocity_mid", "position_end", "velocity_end", "position_event", "velocity_event",
+            # Commanded torque, N·m and N·m/s; the reference's position and velocity, rad and rad/s.
+            "command_mid", "command_end", "command_rate_end", "goal_mid", "rate_mid", "goal_end", "rate_end",
+            # rad·s of the error at the end; what the end may be wrong by, rad.
+            "integral_end", "error",
+        )),
+        # Of the corrector.
+        ("rounds", np.int64),
+    ]
+)  # fmt: skip
+"""The motion over one accepted step."""
+
+ROW = np.dtype([(name, np.float64) for name in COLUMNS])
+
+PLAN_SIZE, COUNT_SIZE, NOW_SIZE, ELEMENT_SIZE, SIDE_SIZE, SEGMENT_SIZE, ROW_SIZE, KEPT_SIZE = (
+    kind.itemsize // 8 for kind in (PLAN, COUNT, NOW, ELEMENT, SIDE, SEGMENT, ROW, KEPT)
 )
+DEEPEST = 24
+"""Steps are the longest one halved up to this many times, so that their flows are computed once per mode."""
+SPACED, CUT, FLOWS = range(DEEPEST + 1, DEEPEST + 4)
+"""Kept flows: over half of each of these steps, over the grid's spacing, and over half of a step that is cut short."""
+AT_NOW = COUNT_SIZE
+AT_SEGMENT = AT_NOW + NOW_SIZE
+AT_FLOWS = AT_SEGMENT + SEGMENT_SIZE
+AT_SIDES = AT_FLOWS + FLOWS * KEPT_SIZE
+AT_ELEMENTS = AT_SIDES + 2 * SIDE_SIZE
+"""Places in `work`; the counts begin it and the elements end it."""
 ASKED = NOW.names.index("asked_position") if NOW.names else 0
 
-IN_LAYER = 1e-4
-"""Stiffness added in a steep layer, over slope²/J."""
 EDGE = 1e-12
 """One-sided limits at a break are taken this far from it, s."""
 
 
+class Laid(NamedTuple):
+    """A loop laid out in arrays of float64, which a call takes at a tenth of the price of structures.
+
+    Attributes
+    ----------
+    parameters : array
+        `Case.numbers`, and the parameters of the laws and of the reference.
+    plan : array
+        The bytes of a `PLAN`.
+    cells : array
+        The feedforward torque (`stickslip.simulation._forcing`).
+    breaks, grid : array
+        Times that are stepped onto, and those of the rows, s; ascending.
+    work : array
+        What the kernels work on, as it begins; see `AT_ELEMENTS`.
+    """
+
+    parameters: Any
+    plan: Any
+    cells: Any
+    breaks: Any
+    grid: Any
+    work: Any
+
+
+class Output(NamedTuple):
+    """What a run writes.
+
+    Attributes
+    ----------
+    motion : array, shape (n, 2)
+        Position (rad) and velocity (rad/s) on the grid.
+    rows : array, shape (n, columns)
+        By `case_arrays.COLUMNS`, on the grid and at events.
+    acc, turns : array
+        The meter's (`stickslip.simulation._meter`).
+    nodes : array, shape (signals, 5)
+        Of a window of the meter; scratch.
+    """
+
+    motion: Any
+    rows: Any
+    acc: Any
+    turns: Any
+    nodes: Any
+
+
+class Loop(NamedTuple):
+    """What kernels read and write: records and addresses, since arrays in a tuple count references at every access."""
+
+    parameters: Any
+    plan: Any
+    cells: Any
+    grid: Any
+    count: Any
+    now: Any
+    segment: Any
+    flows: Any
+    sides: Any
+    elements: Any
+    motion: Any
+    rows: Any
+
+
 @spliced
-def side_of(sides: Any, i: int) -> Any:
+def loop_of(laid: Laid, output: Output) -> Loop:
+    """The addresses of arrays that outlive the call."""
+    work = laid.work
+    return Loop(
+        pointer(laid.parameters, 0), record_at(pointer(laid.plan, 0), PLAN), pointer(laid.cells, 0),
+        pointer(laid.grid, 0), record_at(pointer(work, 0), COUNT), record_at(pointer(work, AT_NOW), NOW),
+        record_at(pointer(work, AT_SEGMENT), SEGMENT), pointer(work, AT_FLOWS), pointer(work, AT_SIDES),
+        pointer(work, AT_ELEMENTS), pointer(output.motion, 0), pointer(output.rows, 0),
+    )  # fmt: skip
+
+
+@spliced
+def side_of(loop: Loop, i: int) -> Any:
     """Side 0, the plant's friction, or 1, that of a feedback compensator."""
-    return record_at(pointer(sides, i * SIDE_SIZE), SIDE)
+    return record_at(pointer(loop.sides, i * SIDE_SIZE), SIDE)
 
 
 @spliced
-def element_of(elements: Any, i: int) -> Any:
+def element_of(loop: Loop, i: int) -> Any:
     """An element of finite stiffness; those of a side lie together."""
-    return record_at(pointer(elements, i * ELEMENT_SIZE), ELEMENT)
+    return record_at(pointer(loop.elements, i * ELEMENT_SIZE), ELEMENT)
+
+
+@spliced
+def kept_of(loop: Loop, i: int) -> Any:
+    """A kept flow: of a step, SPACED or CUT."""
+    return record_at(pointer(loop.flows, i * KEPT_SIZE), KEPT)
+
+
+@spliced
+def row_of(loop: Loop, i: int) -> Any:
+    """A row of the output."""
+    return record_at(pointer(loop.rows, i * ROW_SIZE), ROW)
 
 
 @kernel(exact=False, inline=True)
-def sides_of(plan: Any) -> int:
+def sides_of(loop: Loop) -> int:
     """Number of sides, told to the compiler as one or two: it would gather and scatter them as vectors of many."""
-    return 2 if plan.sides > 1 else 1
-
-
-@kernel(exact=False, inline=True)
-def sliding(parameters: Any, plan: Any, sides: Any, side: Any, v: float) -> float:
-    """The sliding curve of a side, N·m; two values are kept, since middle and end are asked for again."""
-    own = side_of(sides, 0) if plan.shared != 0 else side
-    if own.curve == 0:
-        return own.breakaway
-    if own.velocity == v:
-        return own.level
-    if own.velocity_before == v:
-        return own.level_before
-    own.velocity_before = own.velocity
-    own.level_before = own.level
-    own.velocity = v
-    own.level = call_value(own.curve, v, pointer(parameters, own.law))
-    return own.level
-
-
-@kernel(exact=False, inline=True)
-def command(parameters: Any, plan: Any, cells: Any, now: Any, t: float) -> tuple[float, float, float, float]:
-    """Torque commanded by time alone, its slope, and the reference's position and velocity, at t.
-
-    kp theta_d + kr theta_d' + gain T_hat(t); ``cells`` hold the feedforward torque (`_forcing`).
-    """
-    t = min(max(t, now.edge_low), now.edge_high)
-    call_profile(plan.profile, t, pointer(parameters, plan.reference), pointer(now, ASKED))
-    goal = now.asked_position
-    rate = now.asked_velocity
-    r = parameters[KP] * goal + parameters[KR] * rate
-    dr = parameters[KP] * rate + parameters[KR] * now.asked_acceleration
-    last = plan.cells - 1
-    if last >= 0:
-        i = now.cell
-        while i < last and t >= cells[(i + 1) * CELL_SIZE]:
-            i += 1
-        while i > 0 and t < cells[i * CELL_SIZE]:
-            i -= 1
-        now.cell = i
-        cell = pointer(cells, i * CELL_SIZE)
-        x = (t - cell[0]) * cell[1]
-        r += parameters[GAIN] * (cell[2] + x * (cell[3] + x * (cell[4] + x * (cell[5] + x * cell[6]))))
-        slope = cell[3] + x * (2.0 * cell[4] + x * (3.0 * cell[5] + x * 4.0 * cell[6]))
-        dr += parameters[GAIN] * cell[1] * slope
-    return r, dr, goal, rate
-
-
-@kernel(exact=False, inline=True)
-def arrange(parameters: Any, plan: Any, elements: Any, sides: Any, now: Any) -> Linear:
-    """Set the loop up for the modes as they are: springs, slipping sums, flow.
-
-    Where the stiffness nearly vanishes, a spring is added (and taken off again by the corrector), so that the
-    cubic particular solution exists.
-    """
-    theta = now.position
-    v = now.velocity
-    total = parameters[KP]
-    damping = parameters[KD]
-    now.base = 0.0
-    now.bent = 0
-    now.narrow = 0.0
-    floor = plan.stiffness_floor
-    slips = False
-    sticks = False
-    now.nonlinear = 1 if parameters[KI] != 0.0 else 0
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
-        w = side.weight
-        side.damping = side.viscous
-        if side.kind == BENDS:
-            begin_bristle(side, theta, now.held)
-        else:
-            gather(elements, side, theta)
-            side.slipping += side.rigid * abs(now.sigma)
-        if side.steep > 0.0:
-            if side.inside != 0:
-                side.damping = side.steepness
-                # Over the moment that a crossing takes, this spring moves nothing.
-                steep = w * side.steepness
-                floor = max(floor, IN_LAYER * steep * steep / parameters[INERTIA])
-            else:
-                side.slipping += side.steep
-                now.narrow = max(now.narrow, side.layer)
-        damping += w * side.damping
-        total += w * side.spring
-        now.base += w * side.spring_offset
-        sticks = sticks or side.sticking != 0
-        if side.slipping > 0.0:
-            slips = True
-            begin_slip(parameters, plan, sides, now, side, v)
-            if side.varies != 0:
-                now.nonlinear = 1
-                if side.kind != RELAXES:
-                    now.bent = 1
-    now.watched = 1 if slips else 0
-    calm = not sticks and total > 0.0 and damping > 0.0 and parameters[KI] == 0.0 and now.bent == 0
-    now.calm = 1 if calm else 0
-    now.even_stiffness = total
-    now.even_damping = damping
-    now.even_base = now.base
-    now.floor = floor
-    now.added = 0.0
-    if abs(total) < floor:
-        now.added = 2.0 * floor
-        now.nonlinear = 1
-    return linear(parameters[INERTIA], damping, total + now.added)
-
-
-@kernel(exact=False, inline=True)
-def gather(elements: Any, side: Any, theta: float) -> None:
-    """Sum up the springs of the sticking elements, and shares and forces of the slipping ones."""
-    spring = 0.0
-    offset = 0.0
-    share = 0.0
-    force = 0.0
-    stuck = side.first
-    for i in range(side.first, side.last):
-        e = element_of(elements, i)
-        if e.slips != 0:
-            share += e.share
-            force += e.force
-        else:
-            e.offset = e.force - e.stiffness * theta
-            spring += e.stiffness
-            offset += e.offset
-            listed = element_of(elements, stuck)
-            listed.load_at_0 = e.offset / e.share
-            listed.load_slope = e.stiffness / e.share
-            stuck += 1
-    side.spring = spring
-    side.spring_offset = offset
-    side.sticking = stuck - side.first
-    side.slipping = share
-    side.force = force
-    side.force_start = force
-    side.force_now = force
-    side.exponent = 0.0
-    side.force_rate = 0.0
-
-
-@kernel(exact=False, inline=True)
-def begin_bristle(side: Any, theta: float, held: int) -> None:
-    """All of a bristle's force is slipping force, until `exact.bristle.bend` takes what follows the position."""
-    side.force += side.spring * theta + side.spring_offset
-    side.force_now = side.force
-    side.spring = 0.0
-    side.spring_offset = 0.0
-    side.force_rate = 0.0
-    side.slipping = 1.0 - held
-
-
-@kernel(exact=False, inline=True)
-def begin_slip(parameters: Any, plan: Any, sides: Any, now: Any, side: Any, v: float) -> None:
-    """Curve and slope of a side's slipping force at the start of a segment."""
-    kind = side.kind
-    if kind == RELAXES:
-        s = sliding(parameters, plan, sides, side, v)
-        side.decay = 1.0 / s
-        side.force_rate = side.attraction * (side.slipping * now.sigma - side.force / s)
-    elif kind == FOLLOWS:
-        s = sliding(parameters, plan, sides, side, v)
-        side.force = side.slipping * now.sigma * s
-        side.force_now = side.force
-
-
-@kernel(exact=False)
-def curve_slope(parameters: Any, plan: Any, sides: Any, side: Any, v: float) -> float:
-    """ds/dv by a central difference, one-sided at rest."""
-    d = 1e-4 * side.scale
-    low = v - d if abs(v) >= d else v
-    high = v + d if v >= 0.0 or abs(v) >= d else v
-    if low == v:
-        low, high = (v, v + d) if v >= 0.0 else (v - d, v)
-    return (sliding(parameters, plan, sides, side, high) - sliding(parameters, plan, sides, side, low)) / (
-        high - low
-    )
-
-
-@kernel(exact=False, inline=True)
-def torques(
-    parameters: Any, plan: Any, sides: Any, now: Any, r: float, goal: float, rate: float, integral: float,
-    theta: float, v: float, s_plant: float, s_compensator: float,
-) -> tuple[float, float, float]:  # fmt: skip
-    """Motor, friction and compensating torque, N·m."""
-    helped = r - parameters[KP] * goal - parameters[KR] * rate
-    if plan.sides > 1:
-        side = side_of(sides, 1)
-        model = side.spring * theta + side.spring_offset + s_compensator + side.damping * v
-        helped -= side.weight * model
-    motor = parameters[KP] * (goal - theta) + parameters[KR] * rate - parameters[KD] * v
-    motor += parameters[KI] * integral + helped
-    if now.held != 0:
-        return motor, motor, helped
-    contact = side_of(sides, 0)
-    friction = contact.spring * theta + contact.spring_offset + s_plant + contact.damping * v
-    return motor, friction, helped
+    return 2 if loop.plan.sides > 1 else 1

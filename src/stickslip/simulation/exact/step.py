@@ -21,32 +21,9 @@ from stickslip.simulation.exact.flow import (
     twice,
     upper_terms,
 )
-from stickslip.simulation.exact.segment import (
-    DR_END,
-    GOAL_END,
-    GOAL_MID,
-    INTEGRAL_END,
-    LENGTH,
-    POSITION_END,
-    POSITION_MID,
-    R_END,
-    R_MID,
-    RATE_END,
-    RATE_MID,
-    VELOCITY_END,
-    VELOCITY_MID,
-    cubic_of,
-    remember,
-    slip_force_at,
-)
-from stickslip.simulation.exact.state import (
-    BENDS,
-    FOLLOWS,
-    command,
-    side_of,
-    sides_of,
-    sliding,
-)
+from stickslip.simulation.exact.forces import command, sliding
+from stickslip.simulation.exact.segment import cubic_of, remember, slip_force_at
+from stickslip.simulation.exact.state import BENDS, FOLLOWS, Loop, side_of, sides_of
 
 NOT_CONVERGED = 1e9
 UNCHANGED, FINEST_CHANGE, ROUNDING, STALLED = 0.01, 1e-14, 4e-16, 1e-13
@@ -71,46 +48,41 @@ LASTING = 5e-3
 
 
 @kernel(exact=False, inline=True)
-def look_ahead(parameters: Any, plan: Any, cells: Any, now: Any, segment: Any, h: float, tol: float) -> None:
+def look_ahead(loop: Loop, h: float, tol: float) -> None:
     """Commanded torque and reference in the middle and at the end of the next h.
 
     Where the middle has lain on the cubic to a small part of the tolerance, the next few are taken from it.
     """
-    r, dr, goal, rate = command(parameters, plan, cells, now, now.time + h)
-    segment[R_END] = r
-    segment[DR_END] = dr
-    segment[GOAL_END] = goal
-    segment[RATE_END] = rate
-    middle = 0.5 * (now.command + r) + 0.125 * h * (now.command_rate - dr)
+    parameters, now, segment = loop.parameters, loop.now, loop.segment
+    end = command(loop, now.time + h)
+    segment.command_end, segment.command_rate_end, segment.goal_end, segment.rate_end = end
+    middle = 0.5 * (now.command + end.torque) + 0.125 * h * (now.command_rate - end.torque_rate)
     if now.unseen != 0 and h <= now.seen_length:
         now.unseen -= 1
-        segment[R_MID] = middle
+        segment.command_mid = middle
         return
-    r, _, goal, rate = command(parameters, plan, cells, now, now.time + 0.5 * h)
-    segment[R_MID] = r
-    segment[GOAL_MID] = goal
-    segment[RATE_MID] = rate
+    asked = command(loop, now.time + 0.5 * h)
+    segment.command_mid, segment.goal_mid, segment.rate_mid = asked.torque, asked.position, asked.velocity
     # A torque m bends a free axis by less than m h²/8J.
-    smooth = abs(r - middle) * h * h < 0.1 * tol * parameters[INERTIA]
-    now.unseen = MOST_UNSEEN if smooth and plan.cells == 0.0 and parameters[KI] == 0.0 else 0
+    smooth = abs(asked.torque - middle) * h * h < 0.1 * tol * parameters[INERTIA]
+    now.unseen = MOST_UNSEEN if smooth and loop.plan.cells == 0 and parameters[KI] == 0.0 else 0
     now.seen_length = h
 
 
 @kernel(exact=False, inline=True)
 def slip_terms(
-    parameters: Any, plan: Any, sides: Any, now: Any, side: Any, h: float, theta_mid: float, v_mid: float,
-    theta_end: float, v_end: float,
+    loop: Loop, side: Any, h: float, theta_mid: float, v_mid: float, theta_end: float, v_end: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Advance the slipping force of a side along the motion; returns its two upper coefficients."""
     kind = side.kind
     if kind == BENDS:
-        return bristle_terms(parameters, plan, sides, now, side, h, theta_mid, v_mid, theta_end, v_end)
+        return bristle_terms(loop, side, h, theta_mid, v_mid, theta_end, v_end)
     if kind == FOLLOWS:
-        return curve_terms(parameters, plan, sides, now, side, h, v_mid, v_end)
-    q_mid = 1.0 / sliding(parameters, plan, sides, side, v_mid)
-    q_end = 1.0 / sliding(parameters, plan, sides, side, v_end)
+        return curve_terms(loop, side, h, v_mid, v_end)
+    q_mid = 1.0 / sliding(loop, side, v_mid)
+    q_end = 1.0 / sliding(loop, side, v_end)
     attraction = side.attraction
-    goal = attraction * side.slipping * now.sigma
+    goal = attraction * side.slipping * loop.now.sigma
     s0 = side.force
     d0 = side.force_rate
     middle, end, slope = relaxed(goal, goal, s0, d0, attraction * q_mid, attraction * q_end, h)
@@ -123,13 +95,13 @@ def slip_terms(
 
 
 @kernel(exact=False, inline=True)
-def hides_curve(plan: Any, sides: Any, v0: float, v1: float, v2: float) -> bool:
+def hides_curve(loop: Loop, v0: float, v1: float, v2: float) -> bool:
     """Whether a slipping force would pass the bend of s(v) near rest unseen between start, middle and end."""
     jump = max(abs(v1 - v0), abs(v2 - v1))
     turns = v0 * v1 < 0.0 or v1 * v2 < 0.0
     slowest = 0.0 if turns else min(abs(v0), abs(v1), abs(v2))
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
         scale = side.scale
         if side.slipping > 0.0 and jump > WIDEST * scale > 0.0 and slowest < 3.0 * scale:
             return True
@@ -137,41 +109,37 @@ def hides_curve(plan: Any, sides: Any, v0: float, v1: float, v2: float) -> bool:
 
 
 @kernel(exact=False, inline=True)
-def slip_error(
-    lin: Linear, parameters: Any, plan: Any, sides: Any, now: Any, segment: Any
-) -> tuple[float, float]:  # fmt: skip
+def slip_error(lin: Linear, loop: Loop) -> tuple[float, float]:
     """Errors of the slipping forces, N·m: at the end of the segment, and between its nodes.
 
     Lobatto's rule takes dS/dt as a parabola; the error is judged by how far dS/dt lies from it at a quarter.
     """
-    h = segment[LENGTH]
+    now, segment = loop.now, loop.segment
+    h = segment.length
     c = cubic_of(segment)
     a0 = acceleration(lin, c, 0.0, now.position, now.velocity)
-    a1 = acceleration(lin, c, 0.5 * h, segment[POSITION_MID], segment[VELOCITY_MID])
-    v = 0.5 * (now.velocity + segment[VELOCITY_MID]) + 0.0625 * h * (a0 - a1)
+    a1 = acceleration(lin, c, 0.5 * h, segment.position_mid, segment.velocity_mid)
+    v = 0.5 * (now.velocity + segment.velocity_mid) + 0.0625 * h * (a0 - a1)
     total = 0.0
     between = 0.0
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
         kind = side.kind
         if side.slipping > 0.0 and kind == FOLLOWS:
             if side.varies != 0:
-                between += curve_error(lin, parameters, plan, sides, now, segment, side)
+                between += curve_error(lin, loop, side)
         elif side.slipping > 0.0:
             side.lift = 0.0
             force = slip_force_at(side, segment, 0.25 * h)
             if kind == BENDS:
-                theta = 0.5 * (now.position + segment[POSITION_MID])
-                theta += 0.0625 * h * (now.velocity - segment[VELOCITY_MID])
-                slope = bristle_rate(parameters, plan, sides, now, side, theta, v, force)
-                middle = bristle_rate(
-                    parameters, plan, sides, now, side, segment[POSITION_MID], segment[VELOCITY_MID],
-                    side.force_mid,
-                )  # fmt: skip
+                theta = 0.5 * (now.position + segment.position_mid)
+                theta += 0.0625 * h * (now.velocity - segment.velocity_mid)
+                slope = bristle_rate(loop, side, theta, v, force)
+                middle = bristle_rate(loop, side, segment.position_mid, segment.velocity_mid, side.force_mid)
             else:
                 attraction = side.attraction
                 goal = attraction * side.slipping * now.sigma
-                slope = goal - attraction * force / sliding(parameters, plan, sides, side, v)
+                slope = goal - attraction * force / sliding(loop, side, v)
                 middle = goal - attraction * side.decay_mid * side.force_mid
             parabola = 0.375 * side.force_rate + 0.75 * middle - 0.125 * side.force_rate_end
             side.lift = 16.0 / 3.0 * (slope - parabola) / (h * h * h)
@@ -182,73 +150,78 @@ def slip_error(
 
 
 @kernel(exact=False, inline=True)
-def curve_error(
-    lin: Linear, parameters: Any, plan: Any, sides: Any, now: Any, segment: Any, side: Any
-) -> float:  # fmt: skip
+def curve_error(lin: Linear, loop: Loop, side: Any) -> float:
     """How far a force on the curve lies from its cubic at three quarters, N·m."""
-    h = segment[LENGTH]
+    segment = loop.segment
+    h = segment.length
     c = cubic_of(segment)
-    a1 = acceleration(lin, c, 0.5 * h, segment[POSITION_MID], segment[VELOCITY_MID])
-    a2 = acceleration(lin, c, h, segment[POSITION_END], segment[VELOCITY_END])
-    v = 0.5 * (segment[VELOCITY_MID] + segment[VELOCITY_END]) + 0.0625 * h * (a1 - a2)
+    a1 = acceleration(lin, c, 0.5 * h, segment.position_mid, segment.velocity_mid)
+    a2 = acceleration(lin, c, h, segment.position_end, segment.velocity_end)
+    v = 0.5 * (segment.velocity_mid + segment.velocity_end) + 0.0625 * h * (a1 - a2)
     side.lift = 0.0
-    off = curve_rest(parameters, plan, sides, now, side, v) - slip_force_at(side, segment, 0.75 * h)
+    off = curve_rest(loop, side, v) - slip_force_at(side, segment, 0.75 * h)
     return abs(side.weight * off)
 
 
 @kernel(exact=False)
 def loop_terms(
-    lin: Linear, parameters: Any, now: Any, segment: Any, impulse: float, h: float, theta_mid: float, v_mid: float,
-    theta_end: float, v_end: float,
+    lin: Linear, loop: Loop, impulse: float, h: float, theta_mid: float, v_mid: float, theta_end: float, v_end: float,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Torque of the integral controller and of the added spring: upper coefficients and misfit in the middle.
 
     The integral of the position follows from the equation of motion itself: K int x = int p - D dx - J dv.
     """
-    gain = parameters[KI]
+    now, segment = loop.now, loop.segment
+    gain = loop.parameters[KI]
     added = now.added
     travelled = (
         impulse - lin.damping * (theta_end - now.position) - lin.inertia * (v_end - now.velocity)
     ) * lin.compliance
-    reference_integral = h / 30.0 * (7.0 * (now.goal + segment[GOAL_END]) + 16.0 * segment[GOAL_MID])
-    reference_integral += h * h / 60.0 * (now.goal_rate - segment[RATE_END])
-    segment[INTEGRAL_END] = now.integral + reference_integral - travelled
+    reference_integral = h / 30.0 * (7.0 * (now.goal + segment.goal_end) + 16.0 * segment.goal_mid)
+    reference_integral += h * h / 60.0 * (now.goal_rate - segment.rate_end)
+    segment.integral_end = now.integral + reference_integral - travelled
     e0 = now.goal - now.position
-    e_mid = segment[GOAL_MID] - theta_mid
-    slopes = now.goal_rate - now.velocity - segment[RATE_MID] + v_mid
+    e_mid = segment.goal_mid - theta_mid
+    slopes = now.goal_rate - now.velocity - segment.rate_mid + v_mid
     i_mid = now.integral + 0.25 * h * (e0 + e_mid) + h * h / 48.0 * slopes
     y0 = gain * now.integral + added * now.position
     d0 = gain * e0 + added * now.velocity
-    y1 = gain * segment[INTEGRAL_END] + added * theta_end
-    d1 = gain * (segment[GOAL_END] - theta_end) + added * v_end
+    y1 = gain * segment.integral_end + added * theta_end
+    d1 = gain * (segment.goal_end - theta_end) + added * v_end
     u2, u3 = upper_terms(y0, d0, y1, d1, 1.0 / h)
     return u2, u3, gain * i_mid + added * theta_mid - (0.5 * (y0 + y1) + 0.125 * h * (d0 - d1))
 
 
 @kernel(exact=False, inline=True)
-def commanded(lin: Linear, now: Any, segment: Any, h: float) -> tuple[float, float, float, float, float]:
+def commanded(lin: Linear, loop: Loop, h: float) -> tuple[float, float, float, float, float]:
     """The commanded torque over the segment: three coefficients, its misfit in the middle, 1 or 0 if straight.
 
     Over very short segments the upper terms are rounding errors, or a kink that the particular solution blows
     up: there the forcing is a straight line.
     """
+    now, segment = loop.now, loop.segment
     inverse = 1.0 / h
     r1 = now.command_rate
-    r2, r3 = upper_terms(now.command, r1, segment[R_END], segment[DR_END], inverse)
-    misfit = segment[R_MID] - 0.5 * (now.command + segment[R_END]) - 0.125 * h * (r1 - segment[DR_END])
+    r2, r3 = upper_terms(now.command, r1, segment.command_end, segment.command_rate_end, inverse)
+    misfit = (
+        segment.command_mid
+        - 0.5 * (now.command + segment.command_end)
+        - 0.125 * h * (r1 - segment.command_rate_end)
+    )
     lag = lin.damping * lin.compliance
     if h < SHORT or abs(r3 * lag * lag * lag) > STEEPEST * abs(lin.stiffness):
-        return (segment[R_END] - now.command) * inverse, 0.0, 0.0, misfit, 0.0
+        return (segment.command_end - now.command) * inverse, 0.0, 0.0, misfit, 0.0
     return r1, r2, r3, misfit, 1.0
 
 
 @kernel(exact=False, inline=True)
-def tangents(parameters: Any, plan: Any, sides: Any, now: Any) -> tuple[float, float]:
+def tangents(loop: Loop) -> tuple[float, float]:
     """Torque at the start without the command, and its slope: slipping forces, integral and added spring."""
+    parameters, now = loop.parameters, loop.now
     p0 = -now.base
     p1 = 0.0
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
         lagging = side.lag * side.force_rate
         p0 -= side.weight * (side.force + lagging)
         p1 -= side.weight * side.force_rate
@@ -259,13 +232,12 @@ def tangents(parameters: Any, plan: Any, sides: Any, now: Any) -> tuple[float, f
 
 
 @kernel(exact=False, inline=True)
-def correct(
-    lin: Linear, parameters: Any, plan: Any, sides: Any, now: Any, segment: Any, half: Matrix, h: float, tol: float
-) -> float:  # fmt: skip
+def correct(lin: Linear, loop: Loop, half: Matrix, h: float, tol: float) -> float:
     """Move the axis over h; fills `segment` and returns the error in position, rad (or NOT_CONVERGED)."""
+    now = loop.now
     full = twice(half)
-    r1, r2, r3, command_misfit, bent = commanded(lin, now, segment, h)
-    p0, p1 = tangents(parameters, plan, sides, now)
+    r1, r2, r3, command_misfit, bent = commanded(lin, loop, h)
+    p0, p1 = tangents(loop)
     # The cubic is lifted by the mean of the bump that it leaves out, so that the impulse is right.
     p0 += now.command + bent * BUMP * command_misfit
     p1 += r1
@@ -287,7 +259,7 @@ def correct(
         theta_end, v_end = moved(c, full, h, free_position, free_velocity)
         if now.nonlinear == 0:
             break
-        if rounds == 0 and hides_curve(plan, sides, now.velocity, v_mid, v_end):
+        if rounds == 0 and hides_curve(loop, now.velocity, v_mid, v_end):
             return NOT_CONVERGED
         if rounds > 0:
             change = max(abs(theta_end - theta_before), 1e-3 * abs(v_end - v_before))
@@ -304,42 +276,41 @@ def correct(
         p2 = r2
         p3 = r3
         misfit = abs(command_misfit)
-        for i in range(sides_of(plan)):
-            side = side_of(sides, i)
+        for i in range(sides_of(loop)):
+            side = side_of(loop, i)
             if side.slipping > 0.0 and side.varies != 0:
-                u2, u3 = slip_terms(parameters, plan, sides, now, side, h, theta_mid, v_mid, theta_end, v_end)
+                u2, u3 = slip_terms(loop, side, h, theta_mid, v_mid, theta_end, v_end)
                 w = bent * side.weight
                 lag = side.lag
                 p1 -= 2.0 * w * lag * u2
                 p2 -= w * (u2 + 3.0 * lag * u3)
                 p3 -= w * u3
-        if parameters[KI] != 0.0 or now.added != 0.0:
-            u2, u3, m = loop_terms(
-                lin, parameters, now, segment, impulse, h, theta_mid, v_mid, theta_end, v_end
-            )
+        if loop.parameters[KI] != 0.0 or now.added != 0.0:
+            u2, u3, m = loop_terms(lin, loop, impulse, h, theta_mid, v_mid, theta_end, v_end)
             p0 += BUMP * m
             p2 += bent * u2
             p3 += bent * u3
             misfit += abs(m)
         rounds += 1
-    remember(segment, c, h, free_position, free_velocity, theta_mid, v_mid, theta_end, v_end, rounds)
-    return error_of(lin, parameters, plan, sides, now, segment, misfit)
+    remember(
+        loop.segment, c, h, (free_position, free_velocity), (theta_mid, v_mid), (theta_end, v_end), rounds
+    )
+    return error_of(lin, loop, misfit)
 
 
 @kernel(exact=False, inline=True)
-def error_of(
-    lin: Linear, parameters: Any, plan: Any, sides: Any, now: Any, segment: Any, misfit: float
-) -> float:  # fmt: skip
+def error_of(lin: Linear, loop: Loop, misfit: float) -> float:
     """Error of the segment in position, rad; the forcing is wrong by `misfit` in the middle."""
     # A torque wrong by m in the middle moves a free axis by about m h²/20J, a spring by less than m/2K; of its
     # impulse little is left.
-    h = segment[LENGTH]
+    now = loop.now
+    h = loop.segment.length
     soft = abs(lin.compliance)
     light = h * abs(lin.square) * soft
     moves = min(h * (0.05 * light + 0.02 * lin.mobility), 0.5 * soft)
     error = misfit * moves
     if now.nonlinear != 0:
-        bump, between = slip_error(lin, parameters, plan, sides, now, segment)
+        bump, between = slip_error(lin, loop)
         error += between * min(h * (0.1 * light + 0.25 * lin.mobility), 0.5 * soft)
         # What a slipping force is wrong by at the end stays for as long as it relaxes.
         slip = bump * (moves + 0.5 * min(LASTING * LASTING / lin.inertia, soft))

@@ -2,37 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from stickslip.jit import kernel
 from stickslip.simulation.case_arrays import (
+    KI,
     PERTURBATION,
     POSITION_0,
     VELOCITY_0,
 )
 from stickslip.simulation.exact.events import add_exponents, switch
+from stickslip.simulation.exact.forces import command
 from stickslip.simulation.exact.output import row_before
 from stickslip.simulation.exact.perturbation import perturbation
-from stickslip.simulation.exact.segment import (
-    DR_END,
-    GOAL_END,
-    INTEGRAL_END,
-    LENGTH,
-    POSITION_END,
-    POSITION_EVENT,
-    R_END,
-    RATE_END,
-    VELOCITY_END,
-    VELOCITY_EVENT,
-    integral_at,
-    slip_force_at,
-)
-from stickslip.simulation.exact.state import (
-    EDGE,
-    command,
-    side_of,
-    sides_of,
-)
+from stickslip.simulation.exact.segment import integral_at, slip_force_at
+from stickslip.simulation.exact.state import EDGE, Loop, side_of, sides_of
 from stickslip.simulation.exact.stiction import applied, release, set_off
 
 SOON = 1e-9
@@ -40,103 +22,97 @@ SOON = 1e-9
 
 
 @kernel(exact=False, inline=True)
-def finish_step(plan: Any, sides: Any, now: Any, segment: Any, t: float, ki: float) -> None:
+def finish_step(loop: Loop, t: float) -> None:
     """Stand at the end of the segment; modes stay."""
-    add_exponents(plan, sides, segment[LENGTH], segment[LENGTH])
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
+    now, segment = loop.now, loop.segment
+    add_exponents(loop, segment.length, segment.length)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
         if side.slipping > 0.0 and side.varies != 0:
             side.force = side.force_end
             side.force_now = side.force_end
             side.force_rate = side.force_rate_end
             side.decay = side.decay_end
     now.time = t
-    now.position = segment[POSITION_END]
-    now.velocity = segment[VELOCITY_END]
-    now.command = segment[R_END]
-    now.command_rate = segment[DR_END]
-    now.goal = segment[GOAL_END]
-    now.goal_rate = segment[RATE_END]
-    if ki != 0.0:
-        now.integral = segment[INTEGRAL_END]
+    now.position = segment.position_end
+    now.velocity = segment.velocity_end
+    now.command = segment.command_end
+    now.command_rate = segment.command_rate_end
+    now.goal = segment.goal_end
+    now.goal_rate = segment.rate_end
+    if loop.parameters[KI] != 0.0:
+        now.integral = segment.integral_end
 
 
 @kernel(exact=False)
-def finish_event(
-    parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, segment: Any, x: float, theta: float, v: float
-) -> None:  # fmt: skip
+def finish_event(loop: Loop, x: float, theta: float, v: float) -> None:
     """Stand at the event x; modes are about to change."""
-    add_exponents(plan, sides, segment[LENGTH], x)
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
+    now, segment = loop.now, loop.segment
+    add_exponents(loop, segment.length, x)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
         side.force_now = slip_force_at(side, segment, x)
-    now.integral = integral_at(parameters, now, segment, x)
+    now.integral = integral_at(loop, x)
     now.time += x
     now.position = theta
     now.velocity = v
-    stand(parameters, plan, cells, now)
+    stand(loop)
 
 
 @kernel(exact=False, inline=True)
-def cross(
-    parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, now: Any, segment: Any, count: Any, rows: Any,
-    h: float, tol: float, held: bool, full: bool,
-) -> None:  # fmt: skip
+def cross(loop: Loop, h: float, tol: float, held: bool, full: bool) -> None:
     """Stand at the event h, with a row of it if `full`, and change modes."""
-    count.events += 1
-    now.jumped = 1
-    theta = segment[POSITION_EVENT]
-    v = segment[VELOCITY_EVENT]
+    segment = loop.segment
+    loop.count.events += 1
+    loop.now.jumped = 1
+    theta = segment.position_event
+    v = segment.velocity_event
     if full:
-        row_before(parameters, plan, cells, sides, now, segment, count, rows, h, theta, v)
-    finish_event(parameters, plan, cells, sides, now, segment, h, theta, v)
-    switch(parameters, plan, elements, sides, now)
+        row_before(loop, h, theta, v)
+    finish_event(loop, h, theta, v)
+    switch(loop)
     if held:
-        release(plan, elements, sides, parameters, now)
-    if parameters[PERTURBATION] != 0.0:
-        perturbation(parameters, plan, elements, now, h, tol, True)
+        release(loop)
+    if loop.parameters[PERTURBATION] != 0.0:
+        perturbation(loop, h, tol, True)
 
 
 @kernel(exact=False)
-def stand(parameters: Any, plan: Any, cells: Any, now: Any) -> None:
+def stand(loop: Loop) -> None:
     """Take the reference where the loop stands."""
-    r, dr, goal, rate = command(parameters, plan, cells, now, now.time)
-    now.command = r
-    now.command_rate = dr
-    now.goal = goal
-    now.goal_rate = rate
+    now = loop.now
+    now.command, now.command_rate, now.goal, now.goal_rate = command(loop, now.time)
 
 
 @kernel(exact=False)
-def start(parameters: Any, plan: Any, cells: Any, elements: Any, sides: Any, now: Any, breaks: Any) -> None:
-    """Stand at t = 0."""
+def start(loop: Loop, following: float) -> None:
+    """Stand at t = 0, before the first break."""
+    parameters, now = loop.parameters, loop.now
     now.jumped = 1
     now.edge_low = EDGE
-    now.edge_high = breaks[0] - EDGE
+    now.edge_high = following - EDGE
     now.position = parameters[POSITION_0]
     now.velocity = parameters[VELOCITY_0]
     if now.velocity != 0.0:
         now.sigma = 1.0 if now.velocity > 0.0 else -1.0
-    stand(parameters, plan, cells, now)
-    for i in range(sides_of(plan)):
-        side = side_of(sides, i)
+    stand(loop)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
         side.inside = 1 if abs(now.velocity) < side.layer else 0
-    if now.velocity == 0.0 and not set_off(plan, elements, sides, parameters, now):
-        r, _, _, _ = command(parameters, plan, cells, now, SOON)
-        push = applied(parameters, plan, elements, sides, now) + r - now.command
+    if now.velocity == 0.0 and not set_off(loop):
+        push = applied(loop) + command(loop, SOON).torque - now.command
         now.sigma = 1.0 if push >= 0.0 else -1.0
 
 
 @kernel(exact=False)
-def pass_break(
-    parameters: Any, plan: Any, cells: Any, sides: Any, now: Any, t: float, following: float
-) -> bool:  # fmt: skip
+def pass_break(loop: Loop, t: float, following: float) -> bool:
     """Stand on the other side of a break; returns whether the commanded torque jumps."""
+    now = loop.now
     before = now.command
     now.jumped = 1
     now.time = t
     now.edge_low = t + EDGE
     now.edge_high = following - EDGE
     now.unseen = 0
-    stand(parameters, plan, cells, now)
+    stand(loop)
     return abs(now.command - before) > 1e-9

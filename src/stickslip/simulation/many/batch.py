@@ -28,10 +28,11 @@ from stickslip.simulation.case_arrays import (
     Case,
 )
 from stickslip.simulation.exact import state as col
-from stickslip.simulation.exact.engine import TURNS, can_run
+from stickslip.simulation.exact.engine import NODES, TURNS, can_run
 from stickslip.simulation.exact.engine import prepare as prepare_one
-from stickslip.simulation.exact.kernel import AT_ELEMENTS, AT_SIDES, LONGEST_STEP
-from stickslip.simulation.many.batch_kernel import solve_all
+from stickslip.simulation.exact.kernel import LONGEST_STEP
+from stickslip.simulation.exact.state import AT_ELEMENTS, AT_SIDES, Laid, Output
+from stickslip.simulation.many.batch_kernel import Found, solve_all
 from stickslip.simulation.many.batch_layout import Member, member, share_curves
 from stickslip.simulation.metrics import COARSE, METRICS, columns, settle_band_of
 
@@ -110,10 +111,10 @@ class Batch:
         accs = np.tile(_meter.new_meter(duration, band, LONG_WINDOW if coarse else MAX_WINDOW), (n, 1))
         cycles, codes, ends = np.full((n, 2), np.nan), np.zeros(n, dtype=np.int64), np.empty((n, 3))
         nothing = np.zeros((0, 2))
+        scratch, turns = np.zeros(AT_SIDES + self.starts.shape[1]), np.zeros((0 if coarse else TURNS, 2))
         solve_all(
-            self.parameters, self.plans, self.cells, self.breaks, self.starts,
-            np.zeros(AT_SIDES + self.starts.shape[1]), nothing, np.zeros(1), accs,
-            np.zeros((0 if coarse else TURNS, 2)), np.zeros((8, 5)), cycles, codes, ends, bool(metrics),
+            Laid(self.parameters, self.plans, self.cells, self.breaks, np.zeros(1), scratch), self.starts,
+            Output(nothing, nothing, accs[0], turns, NODES.copy()), Found(accs, cycles, codes, ends), bool(metrics),
         )  # fmt: skip
         found = columns(accs, cycles[:, 0], cycles[:, 1])
         ran = codes == case_arrays.DONE

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from stickslip.jit import call_value, kernel, pointer, record_at
 from stickslip.simulation._meter import TURN_COUNT, close_standstill
-from stickslip.simulation.exact.kernel import AT_NOW, AT_SIDES, solve
-from stickslip.simulation.exact.state import NOW
+from stickslip.simulation.exact.kernel import solve
+from stickslip.simulation.exact.state import AT_NOW, AT_SIDES, NOW, Laid, Output
 from stickslip.simulation.metrics import limit_cycle
 
 BISECTIONS = 200
@@ -48,22 +48,31 @@ def layers(address: int, rows: Any, scales: Any, slopes: Any, viscous: Any, shar
         out[i] = high
 
 
+class Found(NamedTuple):
+    """What n loops leave: accumulators of the meter, shape (n, ...); amplitude and period of limit cycles, (n, 2); why
+    each ended, (n,); time, position and velocity there, (n, 3)."""
+
+    accs: Any
+    cycles: Any
+    codes: Any
+    ends: Any
+
+
 @kernel(exact=False)
-def solve_all(
-    parameters: Any, plans: Any, cells: Any, breaks: Any, starts: Any, scratch: Any, nothing: Any, nothing_1: Any,
-    accs: Any, turns: Any, nodes: Any, cycles: Any, codes: Any, ends: Any, metered: bool,
-) -> None:  # fmt: skip
+def solve_all(laid: Laid, starts: Any, output: Output, found: Found, metered: bool) -> None:
     """Run every case from its start; writes how and where it ended, and what the meter and its turns say.
 
-    ``starts`` (n, ...) holds sides and elements; ``ends`` (n, 3) receives time, position and velocity.
+    Parameters and plans have a row a case; ``starts`` (n, ...) holds sides and elements.
     """
+    scratch, turns = laid.work, output.turns
+    accs, cycles, codes, ends = found
     for i in range(codes.size):
         scratch[:] = 0.0
         for j in range(starts.shape[1]):
             scratch[AT_SIDES + j] = starts[i, j]
         codes[i] = solve(
-            parameters[i], plans[i], cells, breaks, nothing_1, scratch, nothing, nothing, accs[i], turns, nodes,
-            False, False, metered,
+            Laid(laid.parameters[i], laid.plan[i], laid.cells, laid.breaks, laid.grid, scratch),
+            Output(output.motion, output.rows, accs[i], turns, output.nodes), False, False, metered,
         )  # fmt: skip
         now = record_at(pointer(scratch, AT_NOW), NOW)
         ends[i, 0], ends[i, 1], ends[i, 2] = now.time, now.position, now.velocity
