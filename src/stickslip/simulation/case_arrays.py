@@ -61,6 +61,11 @@ DONE, DIVERGED, NOT_FINITE, STORM, NO_STEP, ROWS_FULL, TOO_STIFF, TOO_FAST = ran
 """PERTURBATION: see `stickslip.simulation.accuracy`."""
 NO_COMPENSATOR, FROM_REFERENCE, FROM_MEASUREMENT = 0.0, 1.0, 2.0
 
+MOTION = np.dtype([(name, np.float64) for name in ("position", "velocity", "acceleration")])
+"""What a reference's profile writes, as a record: rad, rad/s, rad/s²."""
+AROUND = np.dtype([(name, np.float64) for name in Surroundings._fields])
+"""`Surroundings` as a record."""
+
 STORM_EVENTS, STORM_TIME = 4000, 5e-3
 """More switches than this within this time (s) end a run."""
 

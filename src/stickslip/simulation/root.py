@@ -21,10 +21,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from stickslip.jit import compiled_kernels
 from stickslip.subset import Layout
 
-__all__ = ["MOST", "ROOT", "SOLVED", "begin", "begin_beyond", "compiled", "improve", "ready"]
+__all__ = ["MOST", "ROOT", "SEARCH", "SOLVED", "begin", "begin_beyond", "compiled", "improve", "ready"]
 
 ROOT = Layout(
     (
@@ -35,6 +37,8 @@ ROOT = Layout(
 """x: where the equation is to be evaluated, in the end the root. inverse: of the slope, kept from search to search.
 enough: |f| over max(|x|, least) that is none; rounding: of x, to which ends that enclose a jump approach. sharp: 1
 where powers are looked for. power, factor: of the rise beyond f at rest, kept as well."""
+SEARCH = np.dtype([(name, np.float64) for name in ROOT.scalars])
+"""The same as a record."""
 MOST = 200
 """Evaluations of a search."""
 GUESSED, LEADS_ON, NARROWS, SOLVED = 0.0, 1.0, 2.0, 3.0  # phase

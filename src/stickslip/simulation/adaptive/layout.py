@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.jit import LAW, pointer, record_at, spliced
-from stickslip.simulation.case_arrays import Case, surroundings
-from stickslip.spec import Surroundings
+from stickslip.simulation.case_arrays import AROUND, MOTION, Case, surroundings
 
 __all__ = ["EVENTS", "HEAD", "SCRATCH", "STAGES", "Laid", "Loop", "due_in", "laid_out", "loop_of", "named"]
 
@@ -19,9 +18,6 @@ STATE = np.dtype(
 """The head of the state vector: rad, rad/s, the integral of the error, rad s, the velocity behind the compensator's
 filter, rad/s, and its rate, rad/s²; the states of the plant's law follow, then the compensator's."""
 HEAD = len(STATE.names or ())
-
-MOTION = np.dtype([(name, np.float64) for name in ("position", "velocity", "acceleration")])
-"""Of the reference: rad, rad/s, rad/s²."""
 
 CASE = np.dtype(
     [
@@ -46,7 +42,7 @@ NOW = np.dtype(
             "reference_time", "seen_velocity",
         )),
         ("reference", MOTION),
-        ("around", [(name, np.float64) for name in Surroundings._fields]),
+        ("around", AROUND),
     ]
 )  # fmt: skip
 """What changes beside the state vector."""

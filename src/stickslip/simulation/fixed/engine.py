@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import ParameterError
-from stickslip.jit import kernel
+from stickslip.jit import kernel, pointer
 from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter
 from stickslip.simulation.case_arrays import (
     COLUMNS,
@@ -50,28 +50,9 @@ from stickslip.simulation.case_arrays import (
     Side,
     surroundings,
 )
-from stickslip.simulation.fixed.loop import (
-    FRICTION,
-    GATHERED,
-    HEAD,
-    POSITION,
-    SIDE,
-    VELOCITY,
-    Loop,
-    copy,
-    restart,
-    step_plant,
-)
-from stickslip.simulation.fixed.output import (
-    EVENTS,
-    OUTPUTS,
-    ROWS,
-    STEPS,
-    measure,
-    record,
-    record_jump,
-    write,
-)
+from stickslip.simulation.fixed.layout import CASE, HEAD, NOW, PROGRESS, STATE, STATES, Laid, Loop, loop_of
+from stickslip.simulation.fixed.loop import copy, restart, step_plant
+from stickslip.simulation.fixed.output import measure, record, record_jump, write
 from stickslip.simulation.fixed.step import GROWTH, LANDING, advance
 from stickslip.simulation.metrics import settle_band_of
 from stickslip.simulation.root import ROOT
@@ -87,8 +68,6 @@ ROUNDING = 1e-14
 """To which a velocity is solved (relative above 1 rad/s), and an event met (N·m, rad/s)."""
 RINGING = 0.25
 """omega dt of the steps that resolve a motion near rest which a longer, damped one would lose."""
-NOW, CAP, ASKED = range(3)
-"""Of the clock: the time reached and the longest next step, s, and whether the run is to end."""
 
 
 def can_run(case: Case) -> str:
@@ -119,65 +98,61 @@ def run(case: Case, dt: float) -> Outcome:
     if not (dt > 0.0 and math.isfinite(dt)):
         raise ParameterError(f"fixed integrator: dt = {dt:g} s must be greater than 0")
     n = case.numbers
-    loop = loop_of(case, dt)
-    start = np.zeros(HEAD + case.plant.state.size + case.compensator.state.size)
-    start[HEAD:] = np.concatenate([case.plant.state, case.compensator.state])
-    start[POSITION], start[VELOCITY] = n[POSITION_0], n[VELOCITY_0]
-    start[SIDE] = np.sign(start[VELOCITY])
-    if abs(start[VELOCITY]) < n[PLANT_BAND]:
-        start[VELOCITY], start[GATHERED] = 0.0, start[VELOCITY]
-    accumulator = new_meter(float(n[DURATION]), settle_band_of(case.reference, float(n[DURATION])))
+    laid, duration = laid_out(case, dt), float(n[DURATION])
+    reached = laid.reached
+    accumulator = new_meter(duration, settle_band_of(case.reference, duration))
     turns = np.zeros((4096, 2))
-    counts = np.zeros(4, dtype=np.int64)
     grid = np.ascontiguousarray(case.grid, dtype=np.float64)
     stops = np.ascontiguousarray(case.breaks, dtype=np.float64)
-    clock = np.array([0.0, dt, 0.0])
 
     def stop() -> None:
-        clock[ASKED] = 1.0
+        reached["asked"] = 1
 
     rows, code = watched(
-        lambda: integrate(loop, start, stops, grid, dt, clock, accumulator, turns, counts),
-        lambda: Reached(float(clock[NOW]), float(n[DURATION]), float(counts[STEPS])), stop,
+        lambda: integrate(laid, stops, grid, accumulator, turns),
+        lambda: Reached(float(reached["time"]), duration, float(reached["steps"])), stop,
     )  # fmt: skip
     return Outcome(
-        rows, int(code), float(clock[NOW]), accumulator, turns[: int(accumulator[TURN_COUNT])],
-        {"steps": int(counts[STEPS]), "rejected": 0, "events": int(counts[EVENTS])},
+        rows, int(code), float(reached["time"]), accumulator, turns[: int(accumulator[TURN_COUNT])],
+        {"steps": int(reached["steps"]), "rejected": 0, "events": int(reached["events"])},
     )  # fmt: skip
 
 
-def loop_of(case: Case, dt: float) -> Loop:
+def laid_out(case: Case, dt: float) -> Laid:
     """Lay out what a step reads, and decide how the run is damped (see the module's docstring)."""
-    size = HEAD + case.plant.state.size + case.compensator.state.size
-    n = case.numbers
+    n, plant, compensator = case.numbers, case.plant, case.compensator
     measured = n[SOURCE] == FROM_MEASUREMENT
-    help_slope = n[GAIN] * contact_slope(case.compensator, dt) if measured else 0.0
-    steep = bool(dt * help_slope > RESOLVED * n[INERTIA])
-    jumps = measured and case.compensator.pointers.holding != 0
+    slope = n[GAIN] * contact_slope(compensator, dt) if measured else 0.0
+    steep = bool(dt * slope > RESOLVED * n[INERTIA])
+    jumps = measured and compensator.pointers.holding != 0
     # A feedback that jumps with the velocity chatters at rest: that would be resolved without end.
     travel = math.inf if steep or jumps else travel_of(case)
-    return Loop(
-        n,
-        case.plant.addresses,
-        case.plant.parameters,
-        case.compensator.addresses,
-        case.compensator.parameters,
-        case.profile,
-        case.reference_parameters,
-        case.plant.state.size,
-        bool(dt * contact_slope(case.plant, dt) > RESOLVED * n[INERTIA]),
-        steep,
-        RINGING * math.sqrt(n[INERTIA] / n[STIFFNESS]) if travel < math.inf else 0.0,
-        travel,
-        velocity_scale(case),
-        surroundings(case.numbers),
-        np.zeros(3),
-        np.zeros(size),
-        np.zeros(size),
-        np.zeros(size),
-        np.zeros((8, 5)),
-        searches(n[INERTIA]),
-    )
+    start = started(case)
+    fixed, now, progress = np.zeros(1, CASE), np.zeros(1, NOW), np.zeros(1, PROGRESS)
+    fixed["plant"], fixed["compensator"] = plant.pointers, compensator.pointers
+    fixed["profile"], fixed["plant_states"], fixed["size"] = case.profile, plant.state.size, start.size
+    fixed["damped"], fixed["steep"] = dt * contact_slope(plant, dt) > RESOLVED * n[INERTIA], steep
+    fixed["resolved"] = RINGING * math.sqrt(n[INERTIA] / n[STIFFNESS]) if travel < math.inf else 0.0
+    fixed["travel"], fixed["fine"], fixed["time_step"] = travel, velocity_scale(case), dt
+    now["around"], progress["cap"] = tuple(surroundings(n)), dt
+    states = np.zeros((STATES, start.size))
+    states[0] = start
+    return Laid(
+        fixed.view(np.float64), now.view(np.float64), progress.view(np.float64), n, plant.parameters,
+        compensator.parameters, case.reference_parameters, states, searches(n[INERTIA]),
+    )  # fmt: skip
+
+
+def started(case: Case) -> Array:
+    """The state at the start, at rest in the contacts."""
+    n = case.numbers
+    out = np.concatenate([np.zeros(HEAD), case.plant.state, case.compensator.state])
+    start = out[:HEAD].view(STATE)[0]
+    start["position"], start["velocity"] = n[POSITION_0], n[VELOCITY_0]
+    start["side"] = np.sign(n[VELOCITY_0])
+    if abs(n[VELOCITY_0]) < n[PLANT_BAND]:
+        start["velocity"], start["gathered"] = 0.0, n[VELOCITY_0]
+    return out
 
 
 def searches(inertia: float) -> Array:
@@ -222,99 +197,86 @@ def velocity_scale(case: Case) -> float:
 
 
 @kernel()
-def integrate(
-    loop: Loop,
-    a: Any,
-    stops: Any,
-    grid: Any,
-    dt: float,
-    clock: Any,
-    accumulator: Any,
-    turns: Any,
-    counts: Any,
-) -> tuple[Any, int]:
+def integrate(laid: Laid, stops: Any, grid: Any, accumulator: Any, turns: Any) -> tuple[Any, int]:
     """Run from 0 to the last stop; returns rows and code."""
-    b = a.copy()
-    rows = np.zeros((grid.size + 256, len(COLUMNS)))
+    loop = loop_of(laid)
+    a, b, reached, dt = loop.here, loop.end, loop.progress, loop.case.time_step
+    rows, nodes = np.zeros((grid.size + 256, len(COLUMNS))), np.zeros((8, 5))
     storm = np.full(STORM_EVENTS, -1.0)
-    a[FRICTION] = step_plant(loop, a, a[VELOCITY], a[VELOCITY], 0.0)
+    a.friction = step_plant(loop, a, a.velocity, a.velocity, 0.0)
     code = DONE
     for segment in range(stops.shape[0]):
-        begin, stop = clock[NOW], stops[segment]
-        copy(a, b)
+        begin, stop = reached.time, stops[segment]
+        copy(loop, a, b)
         restart(loop, a, begin)
         if segment > 0:
-            rows = record_jump(loop, b, a, begin, rows, counts)
+            rows = record_jump(loop, b, a, begin, rows)
         pieces = max(1, math.ceil((stop - begin) / dt * (1.0 - 1e-12)))
         for piece in range(pieces):
             goal = stop if piece == pieces - 1 else begin + (stop - begin) * (piece + 1) / pieces
-            rows, code = reach(loop, a, b, goal, dt, clock, grid, rows, storm, accumulator, turns, counts)
+            rows, code = reach(loop, goal, grid, rows, storm, nodes, accumulator, turns)
             if code != DONE:
                 break
         if code != DONE:
             break
-    if code == DONE and counts[OUTPUTS] < grid.size:
-        rows = write(loop, a, a, clock[NOW], 1.0, 0.0, clock[NOW], 0.0, rows, counts)
+    if code == DONE and reached.outputs < grid.size:
+        rows = write(loop, a, a, 1.0, 0.0, reached.time, 0.0, rows)
     if loop.numbers[METERED] != 0.0:
-        close_standstill(accumulator, clock[NOW])
-    return rows[: counts[ROWS]].copy(), code
+        close_standstill(accumulator, reached.time)
+    return rows[: reached.rows].copy(), code
 
 
 @kernel()
 def reach(
-    loop: Loop,
-    a: Any,
-    b: Any,
-    goal: float,
-    dt: float,
-    clock: Any,
-    grid: Any,
-    rows: Any,
-    storm: Any,
-    accumulator: Any,
-    turns: Any,
-    counts: Any,
+    loop: Loop, goal: float, grid: Any, rows: Any, storm: Any, nodes: Any, accumulator: Any, turns: Any
 ) -> tuple[Any, int]:
-    """Step from the clock's time to `goal`, once or, where events cut the step, more often; rows and code.
+    """Step from the time reached to `goal`, once or, where events cut the step, more often; rows and code.
 
     ``storm`` holds the times of the last events.
     """
-    while goal - clock[NOW] > 1e-12 * dt:
-        if clock[ASKED] != 0.0:
+    a, b, case, reached = loop.here, loop.end, loop.case, loop.progress
+    while goal - reached.time > 1e-12 * case.time_step:
+        if reached.asked != 0:
             return rows, TOO_STIFF
-        t = clock[NOW]
-        if loop.steep:
-            clock[CAP] = LANDING * dt if a[VELOCITY] == 0.0 else min(GROWTH * clock[CAP], dt)
-        before = a.copy() if a[VELOCITY] == 0.0 else a
-        taken, event = advance(loop, a, b, t, goal - t, clock[CAP])
-        code = verdict(loop.numbers, b, taken)
+        t = reached.time
+        if case.steep != 0:
+            longest = case.time_step
+            reached.cap = LANDING * longest if a.velocity == 0.0 else min(GROWTH * reached.cap, longest)
+        rests = a.velocity == 0.0
+        if rests:
+            # A step from rest changes the torques there, too.
+            copy(loop, a, loop.before)
+        taken, event = advance(loop, a, b, t, goal - t, reached.cap)
+        code = verdict(loop, taken)
         if code != DONE:
             return rows, code
-        if goal - t - taken < 1e-12 * dt:
+        if goal - t - taken < 1e-12 * case.time_step:
             taken = goal - t
-        rows = record_jump(loop, before, a, t, rows, counts)
-        rows = record(loop, a, b, t, taken, event, grid, rows, counts)
+        if rests:
+            rows = record_jump(loop, loop.before, a, t, rows)
+        rows = record(loop, t, taken, event, grid, rows)
         if loop.numbers[METERED] != 0.0:
-            measure(loop, a, b, t, taken, accumulator, turns)
-        copy(b, a)
-        clock[NOW] = t + taken
-        counts[STEPS] += 1
+            measure(loop, t, taken, nodes, accumulator, turns)
+        copy(loop, b, a)
+        reached.time = t + taken
+        reached.steps += 1
         if event:
-            counts[EVENTS] += 1
-            last = counts[EVENTS] % STORM_EVENTS
-            if storm[last] >= 0.0 and clock[NOW] - storm[last] < STORM_TIME:
+            reached.events += 1
+            last = reached.events % STORM_EVENTS
+            if storm[last] >= 0.0 and reached.time - storm[last] < STORM_TIME:
                 return rows, STORM
-            storm[last] = clock[NOW]
-    clock[NOW] = goal
+            storm[last] = reached.time
+    reached.time = goal
     return rows, DONE
 
 
 @kernel()
-def verdict(n: Any, b: Any, taken: float) -> int:
+def verdict(loop: Loop, taken: float) -> int:
     """DONE if a step may be kept, else why the run ends."""
-    for i in range(b.size):
-        if not math.isfinite(b[i]):
+    n, end, all_of = loop.numbers, loop.end, pointer(loop.end, 0)
+    for i in range(loop.case.size):
+        if not math.isfinite(all_of[i]):
             return NOT_FINITE
-    if abs(b[POSITION]) > n[POSITION_LIMIT] or abs(b[VELOCITY]) > n[VELOCITY_LIMIT]:
+    if abs(end.position) > n[POSITION_LIMIT] or abs(end.velocity) > n[VELOCITY_LIMIT]:
         return DIVERGED
     return NO_STEP if taken < 0.0 else DONE

@@ -1,13 +1,13 @@
-"""What a fixed step reads and writes: the state at one time, the torques on it, what depends on time alone.
+"""The torques on an axis at one time, and what depends on time alone.
 
-A law is advanced by its ``step`` inside the state, so a trial step works on a copy. Filters are second-order
+A law is advanced by its ``step`` inside the state, so a step that is tried works on a copy. Filters are second-order
 Butterworth low-passes, advanced by the same means as the axis.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 from stickslip.jit import call_holding, call_profile, call_step, kernel, pointer
 from stickslip.simulation.case_arrays import (
@@ -23,52 +23,18 @@ from stickslip.simulation.case_arrays import (
     SOURCE,
     TORQUE_LIMIT,
 )
+from stickslip.simulation.fixed.layout import HEAD, Loop
 
-# ---- the state at one time: these entries, then the plant's state, then the compensator's -----------------
-(
-    POSITION, VELOCITY, INTEGRAL, FILTERED, FILTER_RATE, POSITION_D, VELOCITY_D, LINEAR, COMPENSATING, MOTOR,
-    FRICTION, SIDE, LEAVING, GATHERED, HEAD,
-) = range(15)  # fmt: skip
-# SIDE is the direction of motion, or at rest the one from which the axis came; LEAVING the one in which it is
-# about to go (0: none); COMPENSATING includes the gain. GATHERED is, at rest in a band of velocities (Karnopp), the
-# momentum gathered there over the inertia, rad/s.
-
-STEP, HOLDING = 0, 6  # places in `Side.addresses`
-TIME = 3  # place in the surroundings
 TINY = 1e-300
 NUDGE = 1e-11  # s, by which one-sided values of the reference lie inside the step
 
 
-class Loop(NamedTuple):
-    """What a step reads besides the state: the case, and scratch arrays."""
-
-    numbers: Any
-    plant: Any
-    plant_parameters: Any
-    compensator: Any
-    compensator_parameters: Any
-    profile: int
-    reference_parameters: Any
-    plant_states: int
-    damped: bool
-    steep: bool
-    resolved: float
-    travel: float
-    fine: float
-    surroundings: Any
-    motion: Any
-    ahead: Any
-    middle: Any
-    base: Any
-    nodes: Any
-    searches: Any
-
-
 @kernel()
-def copy(source: Any, target: Any) -> None:
-    """Copy a state."""
-    for i in range(source.size):
-        target[i] = source[i]
+def copy(loop: Loop, source: Any, target: Any) -> None:
+    """Copy a state with those of its laws."""
+    old, new = pointer(source, 0), pointer(target, 0)
+    for i in range(loop.case.size):
+        new[i] = old[i]
 
 
 @kernel()
@@ -87,44 +53,34 @@ def sign(x: float) -> float:
 @kernel()
 def step_plant(loop: Loop, z: Any, v0: float, v1: float, h: float) -> float:
     """Advance the plant's law inside the state `z`; returns its torque, N·m."""
-    loop.surroundings[0] = z[POSITION]
-    return call_step(
-        loop.plant[STEP],
-        v0,
-        v1,
-        h,
-        pointer(z, HEAD),
-        pointer(loop.plant_parameters, 0),
-        pointer(loop.surroundings, 0),
-    )
+    around = loop.now.around
+    around.position = z.position
+    return call_step(loop.case.plant.step, v0, v1, h, pointer(z, HEAD), loop.plant, pointer(around, 0))
 
 
 @kernel()
 def step_compensator(loop: Loop, z: Any, v0: float, v1: float, h: float) -> float:
     """Advance the compensator's law inside the state `z`; returns gain times torque, N·m."""
-    loop.surroundings[0] = z[POSITION]
-    state = pointer(z, HEAD + loop.plant_states)
-    p, u = pointer(loop.compensator_parameters, 0), pointer(loop.surroundings, 0)
-    return loop.numbers[GAIN] * call_step(loop.compensator[STEP], v0, v1, h, state, p, u)
+    around, case = loop.now.around, loop.case
+    around.position = z.position
+    state = pointer(z, HEAD + case.plant_states)
+    return loop.numbers[GAIN] * call_step(
+        case.compensator.step, v0, v1, h, state, loop.compensator, pointer(around, 0)
+    )
 
 
 @kernel()
 def compensator_jumps(loop: Loop) -> bool:
     """Whether the compensating torque jumps where the axis passes through rest."""
     n = loop.numbers
-    return n[SOURCE] == FROM_MEASUREMENT and n[FILTER] == 0.0 and loop.compensator[HOLDING] != 0
+    return n[SOURCE] == FROM_MEASUREMENT and n[FILTER] == 0.0 and loop.case.compensator.holding != 0
 
 
 @kernel()
 def plant_holds(loop: Loop, z: Any, side: float) -> float:
     """Friction torque of a law that jumps at zero, at rest on one side of it, N·m."""
-    return side * call_holding(
-        loop.plant[HOLDING],
-        side,
-        pointer(z, HEAD),
-        pointer(loop.plant_parameters, 0),
-        pointer(loop.surroundings, 0),
-    )
+    around = pointer(loop.now.around, 0)
+    return side * call_holding(loop.case.plant.holding, side, pointer(z, HEAD), loop.plant, around)
 
 
 @kernel()
@@ -143,8 +99,8 @@ def compensator_slides(loop: Loop, z: Any, side: float) -> float:
 @kernel()
 def linear_torque(n: Any, z: Any) -> float:
     """Torque of the linear controller, N·m; thesis eqs. 3.4, 3.5 and 3.11."""
-    error = z[POSITION_D] - z[POSITION]
-    return n[KP] * error + n[KR] * z[VELOCITY_D] - n[KD] * z[VELOCITY] + n[KI] * z[INTEGRAL]
+    error = z.reference - z.position
+    return n[KP] * error + n[KR] * z.reference_rate - n[KD] * z.velocity + n[KI] * z.integral
 
 
 @kernel()
@@ -156,55 +112,59 @@ def limited(n: Any, torque: float) -> float:
 @kernel()
 def set_motor(loop: Loop, z: Any) -> None:
     """Motor torque of the controller."""
-    z[LINEAR] = linear_torque(loop.numbers, z)
-    z[MOTOR] = limited(loop.numbers, z[LINEAR] + z[COMPENSATING])
+    z.linear = linear_torque(loop.numbers, z)
+    z.motor = limited(loop.numbers, z.linear + z.compensating)
 
 
 @kernel()
 def low_pass(n: Any, a: Any, b: Any, v0: float, v1: float, h: float, w: float) -> None:
     """Second-order Butterworth y'' = f² (v - y) - sqrt(2) f y', from a to b; w is the weight of the end."""
     f = n[FILTER]
-    slope = f * f * (v0 - a[FILTERED]) - math.sqrt(2.0) * f * a[FILTER_RATE]
-    y = a[FILTERED] + h * (1.0 - w) * a[FILTER_RATE]
-    rate = a[FILTER_RATE] + h * (1.0 - w) * slope
+    slope = f * f * (v0 - a.filtered) - math.sqrt(2.0) * f * a.filter_rate
+    y = a.filtered + h * (1.0 - w) * a.filter_rate
+    rate = a.filter_rate + h * (1.0 - w) * slope
     wh = w * h
-    b[FILTER_RATE] = (rate + wh * f * f * (v1 - y)) / (1.0 + wh * f * (math.sqrt(2.0) + wh * f))
-    b[FILTERED] = y + wh * b[FILTER_RATE]
+    b.filter_rate = (rate + wh * f * f * (v1 - y)) / (1.0 + wh * f * (math.sqrt(2.0) + wh * f))
+    b.filtered = y + wh * b.filter_rate
+
+
+@kernel()
+def refer(loop: Loop, t: float) -> None:
+    """Ask for the reference at t."""
+    call_profile(loop.case.profile, t, loop.reference, pointer(loop.now.reference, 0))
 
 
 @kernel()
 def look_ahead(loop: Loop, a: Any, t: float, h: float) -> None:
     """Write into `loop.ahead` what depends on time alone at t + h: reference and feedforward."""
-    n, ahead, motion = loop.numbers, loop.ahead, loop.motion
-    copy(a, ahead)
-    at = pointer(motion, 0)
-    parameters = pointer(loop.reference_parameters, 0)
-    call_profile(loop.profile, t + min(NUDGE, 0.5 * h), parameters, at)
-    v0 = motion[1]
-    call_profile(loop.profile, t + h - min(NUDGE, 0.5 * h), parameters, at)
-    v1 = motion[1]
-    call_profile(loop.profile, t + h, parameters, at)
-    loop.surroundings[TIME] = t + h
-    ahead[POSITION_D] = motion[0]
-    ahead[VELOCITY_D] = v1
+    n, ahead, asked = loop.numbers, loop.ahead, loop.now.reference
+    copy(loop, a, ahead)
+    refer(loop, t + min(NUDGE, 0.5 * h))
+    v0 = asked.velocity
+    refer(loop, t + h - min(NUDGE, 0.5 * h))
+    v1 = asked.velocity
+    refer(loop, t + h)
+    loop.now.around.time = t + h
+    ahead.reference = asked.position
+    ahead.reference_rate = v1
     if n[SOURCE] == FROM_REFERENCE:
         if n[FILTER] > 0.0:
             low_pass(n, a, ahead, v0, v1, h, 0.5)
-            v0, v1 = a[FILTERED], ahead[FILTERED]
-        ahead[COMPENSATING] = step_compensator(loop, ahead, v0, v1, h)
+            v0, v1 = a.filtered, ahead.filtered
+        ahead.compensating = step_compensator(loop, ahead, v0, v1, h)
 
 
 @kernel()
 def restart(loop: Loop, z: Any, t: float) -> None:
     """Torques at t, seen from just after it: at the begin, and where the reference has a kink."""
-    n, motion = loop.numbers, loop.motion
-    loop.surroundings[TIME] = t
-    call_profile(loop.profile, t + NUDGE, pointer(loop.reference_parameters, 0), pointer(motion, 0))
-    z[POSITION_D], z[VELOCITY_D] = motion[0] - NUDGE * motion[1], motion[1]
+    n, asked = loop.numbers, loop.now.reference
+    loop.now.around.time = t
+    refer(loop, t + NUDGE)
+    z.reference, z.reference_rate = asked.position - NUDGE * asked.velocity, asked.velocity
     if n[SOURCE] != 0.0:
-        v = z[VELOCITY_D] if n[SOURCE] == FROM_REFERENCE else z[VELOCITY]
+        v = z.reference_rate if n[SOURCE] == FROM_REFERENCE else z.velocity
         if n[FILTER] > 0.0:
-            v = z[FILTERED]
-        if n[SOURCE] == FROM_REFERENCE or z[VELOCITY] != 0.0:
-            z[COMPENSATING] = step_compensator(loop, z, v, v, 0.0)
+            v = z.filtered
+        if n[SOURCE] == FROM_REFERENCE or z.velocity != 0.0:
+            z.compensating = step_compensator(loop, z, v, v, 0.0)
     set_motor(loop, z)

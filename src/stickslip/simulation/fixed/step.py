@@ -28,24 +28,8 @@ from stickslip.simulation.case_arrays import (
     PLANT_BAND,
     SOURCE,
 )
+from stickslip.simulation.fixed.layout import HEAD, Loop
 from stickslip.simulation.fixed.loop import (
-    COMPENSATING,
-    FILTER_RATE,
-    FILTERED,
-    FRICTION,
-    GATHERED,
-    HEAD,
-    HOLDING,
-    INTEGRAL,
-    LEAVING,
-    LINEAR,
-    MOTOR,
-    POSITION,
-    POSITION_D,
-    SIDE,
-    VELOCITY,
-    VELOCITY_D,
-    Loop,
     compensator_jumps,
     compensator_slides,
     copy,
@@ -59,12 +43,10 @@ from stickslip.simulation.fixed.loop import (
     step_compensator,
     step_plant,
 )
-from stickslip.simulation.root import MOST, ROOT, SOLVED
+from stickslip.simulation.root import MOST, SOLVED
 from stickslip.simulation.root import compiled as root
 
 GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
-SEARCH = len(ROOT.scalars)
-X, PHASE = ROOT.scalars.index("x"), ROOT.scalars.index("phase")
 begin, begin_beyond, improve = root.begin, root.begin_beyond, root.improve
 FINE = 0.1  # of the sliding curve's velocity scale, by which the velocity near rest may change in a step
 APPROACH = 0.9  # of the time to the zero of a steep compensator's velocity, in which it is approached
@@ -83,36 +65,37 @@ def close(loop: Loop, a: Any, b: Any, h: float, v1: float, side: float, w: float
     A law that jumps at zero keeps its value on `side` beyond it (side 0: its own declared value).
     """
     n, ahead = loop.numbers, loop.ahead
-    copy(a, b)
-    v0 = a[VELOCITY] if w < 1.0 else v1
-    b[VELOCITY], b[LEAVING] = v1, 0.0
-    b[POSITION] = a[POSITION] + h * ((1.0 - w) * a[VELOCITY] + w * v1)
-    b[POSITION_D], b[VELOCITY_D] = ahead[POSITION_D], ahead[VELOCITY_D]
-    error0, error1 = a[POSITION_D] - a[POSITION], b[POSITION_D] - b[POSITION]
-    b[INTEGRAL] = a[INTEGRAL] + h * ((1.0 - w) * error0 + w * error1)
+    copy(loop, a, b)
+    v0 = a.velocity if w < 1.0 else v1
+    b.velocity, b.leaving = v1, 0.0
+    b.position = a.position + h * ((1.0 - w) * a.velocity + w * v1)
+    b.reference, b.reference_rate = ahead.reference, ahead.reference_rate
+    error0, error1 = a.reference - a.position, b.reference - b.position
+    b.integral = a.integral + h * ((1.0 - w) * error0 + w * error1)
     over = v1 * side <= n[PLANT_BAND] and side != 0.0
-    b[FRICTION] = step_plant(loop, b, v0, v1, h)
-    if over and loop.plant[HOLDING] != 0:
-        b[FRICTION] = plant_slides(loop, b, side)
+    b.friction = step_plant(loop, b, v0, v1, h)
+    if over and loop.case.plant.holding != 0:
+        b.friction = plant_slides(loop, b, side)
     if n[SOURCE] == FROM_REFERENCE:
-        for i in range(HEAD + loop.plant_states, b.size):
-            b[i] = ahead[i]
-        b[COMPENSATING], b[FILTERED], b[FILTER_RATE] = (
-            ahead[COMPENSATING],
-            ahead[FILTERED],
-            ahead[FILTER_RATE],
+        old, new = pointer(ahead, 0), pointer(b, 0)
+        for i in range(HEAD + loop.case.plant_states, loop.case.size):
+            new[i] = old[i]
+        b.compensating, b.filtered, b.filter_rate = (
+            ahead.compensating,
+            ahead.filtered,
+            ahead.filter_rate,
         )
     elif n[SOURCE] == FROM_MEASUREMENT:
         y0, y1 = v0, v1
         if n[FILTER] > 0.0:
             low_pass(n, a, b, v0, v1, h, w)
-            y1 = b[FILTERED]
-            y0 = a[FILTERED] if w < 1.0 else y1
-        b[COMPENSATING] = step_compensator(loop, b, y0, y1, h)
+            y1 = b.filtered
+            y0 = a.filtered if w < 1.0 else y1
+        b.compensating = step_compensator(loop, b, y0, y1, h)
         if over and compensator_jumps(loop):
-            b[COMPENSATING] = compensator_slides(loop, b, side)
+            b.compensating = compensator_slides(loop, b, side)
     set_motor(loop, b)
-    return b[MOTOR] - b[FRICTION]
+    return b.motor - b.friction
 
 
 @kernel()
@@ -122,23 +105,22 @@ def solve(loop: Loop, a: Any, b: Any, h: float, side: float, w: float) -> bool:
     Of several solutions the first one is taken in the direction in which the net torque at the present
     velocity drives: the others lie beyond a repelling one, where the torque falls steeply with the velocity.
     """
-    inertia, v, r = loop.numbers[INERTIA], a[VELOCITY], pointer(loop.searches, 0)
-    known = inertia * v + h * (1.0 - w) * (a[MOTOR] - a[FRICTION])
+    inertia, v, search = loop.numbers[INERTIA], a.velocity, loop.search
+    r = pointer(search, 0)
+    known = inertia * v + h * (1.0 - w) * (a.motor - a.friction)
     begin(r, v)
     for _ in range(MOST):
-        f = inertia * r[X] - known - h * w * close(loop, a, b, h, r[X], side, w)
+        f = inertia * search.x - known - h * w * close(loop, a, b, h, search.x, side, w)
         if improve(r, f) == 0.0:
             return math.isfinite(f)
     return False
 
 
 @kernel()
-def crossing(loop: Loop, f_low: float, h: float, f_high: float) -> Any:
+def look_for(loop: Loop, f_low: float, h: float, f_high: float) -> None:
     """Begin to look for the time within a step at which an event happens: from f_low at its begin to f_high at h."""
-    r = pointer(loop.searches, SEARCH)
-    begin_beyond(r, 0.0, f_low, h)
-    improve(r, f_high)
-    return r
+    begin_beyond(pointer(loop.crossing, 0), 0.0, f_low, h)
+    improve(pointer(loop.crossing, 0), f_high)
 
 
 # ---- one step ---------------------------------------------------------------------------------------------
@@ -153,28 +135,31 @@ def damped_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> bool:
     if not solve(loop, a, middle, part, 0.0, 1.0):
         return False
     # The second stage starts from a, moved on for `rest` with the slopes of the first.
-    copy(a, base)
+    copy(loop, a, base)
     ratio = rest / part
-    for i in (POSITION, VELOCITY, INTEGRAL, FILTERED, FILTER_RATE):
-        base[i] = a[i] + ratio * (middle[i] - a[i])
-    step_plant(loop, base, middle[VELOCITY], middle[VELOCITY], rest)
+    base.position = a.position + ratio * (middle.position - a.position)
+    base.velocity = a.velocity + ratio * (middle.velocity - a.velocity)
+    base.integral = a.integral + ratio * (middle.integral - a.integral)
+    base.filtered = a.filtered + ratio * (middle.filtered - a.filtered)
+    base.filter_rate = a.filter_rate + ratio * (middle.filter_rate - a.filter_rate)
+    step_plant(loop, base, middle.velocity, middle.velocity, rest)
     if loop.numbers[SOURCE] == FROM_MEASUREMENT:
-        v = middle[FILTERED] if loop.numbers[FILTER] > 0.0 else middle[VELOCITY]
+        v = middle.filtered if loop.numbers[FILTER] > 0.0 else middle.velocity
         step_compensator(loop, base, v, v, rest)
     look_ahead(loop, a, t, h)
     done = solve(loop, base, b, part, 0.0, 1.0)
-    b[SIDE] = sign(b[VELOCITY])
+    b.side = sign(b.velocity)
     return done
 
 
 @kernel()
 def drive(loop: Loop, z: Any, side: float) -> float:
     """Net torque at rest, seen from one side of zero velocity, N·m."""
-    friction, motor = z[FRICTION], z[MOTOR]
-    if loop.plant[HOLDING] != 0:
+    friction, motor = z.friction, z.motor
+    if loop.case.plant.holding != 0:
         friction = plant_holds(loop, z, side)
     if compensator_jumps(loop):
-        motor = limited(loop.numbers, z[LINEAR] + compensator_slides(loop, z, side))
+        motor = limited(loop.numbers, z.linear + compensator_slides(loop, z, side))
     return motor - friction
 
 
@@ -186,8 +171,8 @@ def departure(loop: Loop, z: Any) -> float:
     """
     up, down = drive(loop, z, 1.0), -drive(loop, z, -1.0)
     if up > 0.0 and down > 0.0:
-        free = z[MOTOR] if loop.plant[HOLDING] != 0 else z[MOTOR] - z[FRICTION]
-        return -z[SIDE] if z[SIDE] != 0.0 else sign(free)
+        free = z.motor if loop.case.plant.holding != 0 else z.motor - z.friction
+        return -z.side if z.side != 0.0 else sign(free)
     if up > 0.0:
         return 1.0
     return -1.0 if down > 0.0 else 0.0
@@ -196,11 +181,11 @@ def departure(loop: Loop, z: Any) -> float:
 @kernel()
 def leave(loop: Loop, z: Any, side: float) -> None:
     """Let the axis leave rest towards `side`: the torques are those on that side of zero velocity."""
-    z[LEAVING] = side
-    if loop.plant[HOLDING] != 0:
-        z[FRICTION] = plant_slides(loop, z, side)
+    z.leaving = side
+    if loop.case.plant.holding != 0:
+        z.friction = plant_slides(loop, z, side)
     if compensator_jumps(loop):
-        z[COMPENSATING] = compensator_slides(loop, z, side)
+        z.compensating = compensator_slides(loop, z, side)
         set_motor(loop, z)
 
 
@@ -209,41 +194,42 @@ def rest_for(loop: Loop, a: Any, b: Any, t: float, h: float) -> None:
     """Stay at rest from a to b: a plant that holds gives the torque that balances the motor's."""
     look_ahead(loop, a, t, h)
     close(loop, a, b, h, 0.0, 0.0, 0.5)
-    b[SIDE] = 0.0
-    if loop.plant[HOLDING] != 0:
-        b[FRICTION] = b[MOTOR]
+    b.side = 0.0
+    if loop.case.plant.holding != 0:
+        b.friction = b.motor
 
 
 @kernel()
 def rest_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> float:
     """Rest over h, or until the torque breaks the contact away; returns the time taken (b holds the end)."""
-    if loop.plant[HOLDING] != 0:
-        a[FRICTION] = a[MOTOR]
+    if loop.case.plant.holding != 0:
+        a.friction = a.motor
     rest_for(loop, a, b, t, h)
     side = departure(loop, b)
     if side == 0.0:
         return h
     before, after = side * drive(loop, a, side), side * drive(loop, b, side)
     if before >= 0.0:  # both sides repel from the begin: only the direction was open
-        copy(a, b)
+        copy(loop, a, b)
         leave(loop, b, side)
         return 0.0
-    r = crossing(loop, before, h, after)
+    r = loop.crossing
+    look_for(loop, before, h, after)
     for _ in range(MOST):
-        if r[PHASE] == SOLVED:
+        if r.phase == SOLVED:
             break
-        rest_for(loop, a, b, t, r[X])
-        improve(r, side * drive(loop, b, side))
+        rest_for(loop, a, b, t, r.x)
+        improve(pointer(r, 0), side * drive(loop, b, side))
     leave(loop, b, side)
-    return r[X]
+    return r.x
 
 
 @kernel()
 def unbalanced(loop: Loop, z: Any) -> float:
     """What the motor's torque exceeds the holding torque by, N·m; sets the friction torque of a contact at rest."""
-    direction = sign(z[MOTOR])
-    z[FRICTION] = direction * min(abs(z[MOTOR]), direction * plant_holds(loop, z, direction))
-    return z[MOTOR] - z[FRICTION]
+    direction = sign(z.motor)
+    z.friction = direction * min(abs(z.motor), direction * plant_holds(loop, z, direction))
+    return z.motor - z.friction
 
 
 @kernel()
@@ -251,8 +237,8 @@ def gather(loop: Loop, a: Any, b: Any, t: float, h: float, before: float) -> flo
     """Rest in the band from a to b while the momentum gathers; how far its velocity lies above the band, rad/s."""
     rest_for(loop, a, b, t, h)
     push = 0.5 * h * (before + unbalanced(loop, b))
-    b[GATHERED] = a[GATHERED] + push / loop.numbers[INERTIA]
-    return abs(b[GATHERED]) - loop.numbers[PLANT_BAND]
+    b.gathered = a.gathered + push / loop.numbers[INERTIA]
+    return abs(b.gathered) - loop.numbers[PLANT_BAND]
 
 
 @kernel()
@@ -262,22 +248,23 @@ def band_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, bo
     after = gather(loop, a, b, t, h, before)
     if after <= 0.0:
         return h, False
-    r = crossing(loop, min(abs(a[GATHERED]) - loop.numbers[PLANT_BAND], 0.0), h, after)
+    r = loop.crossing
+    look_for(loop, min(abs(a.gathered) - loop.numbers[PLANT_BAND], 0.0), h, after)
     for _ in range(MOST):
-        if r[PHASE] == SOLVED:
+        if r.phase == SOLVED:
             break
-        improve(r, gather(loop, a, b, t, r[X], before))
-    side = sign(b[GATHERED])
-    b[VELOCITY], b[GATHERED] = side * loop.numbers[PLANT_BAND], 0.0
+        improve(pointer(r, 0), gather(loop, a, b, t, r.x, before))
+    side = sign(b.gathered)
+    b.velocity, b.gathered = side * loop.numbers[PLANT_BAND], 0.0
     set_motor(loop, b)
     leave(loop, b, side)
-    return r[X], True
+    return r.x, True
 
 
 @kernel()
 def enter_band(loop: Loop, b: Any, side: float) -> None:
     """Come to rest in the band, at its edge; the velocity goes on as gathered momentum."""
-    b[VELOCITY], b[GATHERED], b[LEAVING] = 0.0, side * loop.numbers[PLANT_BAND], 0.0
+    b.velocity, b.gathered, b.leaving = 0.0, side * loop.numbers[PLANT_BAND], 0.0
     set_motor(loop, b)
     unbalanced(loop, b)
 
@@ -288,7 +275,7 @@ def near_rest(loop: Loop, v0: float, v1: float) -> float:
 
     A sticking element breaks away where s(v) falls to its load, and s falls within that scale.
     """
-    scale, change = loop.fine, abs(v1 - v0)
+    scale, change = loop.case.fine, abs(v1 - v0)
     if change <= FINE * scale or min(abs(v0), abs(v1)) > 3.0 * scale:
         return 1.0
     return 0.9 * FINE * scale / change
@@ -297,13 +284,13 @@ def near_rest(loop: Loop, v0: float, v1: float) -> float:
 @kernel()
 def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, bool]:
     """A step of the trapezoid, cut at a reversal; returns the time taken (< 0: no solution) and whether."""
-    side = sign(a[VELOCITY]) if a[VELOCITY] != 0.0 else a[LEAVING]
-    jumping = side if loop.plant[HOLDING] != 0 or compensator_jumps(loop) else 0.0
+    side = sign(a.velocity) if a.velocity != 0.0 else a.leaving
+    jumping = side if loop.case.plant.holding != 0 or compensator_jumps(loop) else 0.0
     look_ahead(loop, a, t, h)
     if not solve(loop, a, b, h, jumping, 0.5):
         return -1.0, False
     for _ in range(10):
-        shorter = h * near_rest(loop, a[VELOCITY], b[VELOCITY])
+        shorter = h * near_rest(loop, a.velocity, b.velocity)
         if shorter == h:
             break
         h = shorter
@@ -311,32 +298,33 @@ def moving_step(loop: Loop, a: Any, b: Any, t: float, h: float) -> tuple[float, 
         if not solve(loop, a, b, h, jumping, 0.5):
             return -1.0, False
     band = loop.numbers[PLANT_BAND]
-    if side == 0.0 or b[VELOCITY] * side > band:
-        b[SIDE] = sign(b[VELOCITY])
+    if side == 0.0 or b.velocity * side > band:
+        b.side = sign(b.velocity)
         return h, False
-    if a[VELOCITY] * side <= band:  # it grazed: the drive to `side` fell again within the step
+    if a.velocity * side <= band:  # it grazed: the drive to `side` fell again within the step
         rest_for(loop, a, b, t, h if band == 0.0 else 0.0)
         if band > 0.0:
             enter_band(loop, b, side)
         return (h, False) if band == 0.0 else (0.0, True)
-    r = crossing(loop, side * a[VELOCITY] - band, h, side * b[VELOCITY] - band)
+    r = loop.crossing
+    look_for(loop, side * a.velocity - band, h, side * b.velocity - band)
     for _ in range(MOST):
-        if r[PHASE] == SOLVED:
+        if r.phase == SOLVED:
             break
-        look_ahead(loop, a, t, r[X])
-        if not solve(loop, a, b, r[X], jumping, 0.5):
+        look_ahead(loop, a, t, r.x)
+        if not solve(loop, a, b, r.x, jumping, 0.5):
             return -1.0, False
-        improve(r, side * b[VELOCITY] - band)
-    x = r[X]
-    if loop.steep and x > LANDING * h:
+        improve(pointer(r, 0), side * b.velocity - band)
+    x = r.x
+    if loop.case.steep != 0 and x > LANDING * h:
         x *= APPROACH
         look_ahead(loop, a, t, x)
         solved = solve(loop, a, b, x, jumping, 0.5)
-        b[SIDE] = side
-        return (x, False) if solved and side * b[VELOCITY] > 0.0 else (-1.0, False)
+        b.side = side
+        return (x, False) if solved and side * b.velocity > 0.0 else (-1.0, False)
     look_ahead(loop, a, t, x)
     close(loop, a, b, x, side * band, jumping, 0.5)
-    b[SIDE] = side
+    b.side = side
     if band > 0.0:
         enter_band(loop, b, side)
     return x, True
@@ -349,9 +337,9 @@ def loses_motion(loop: Loop, a: Any, b: Any, h: float) -> bool:
     The stages' velocities differ by what the step does not resolve; a contact that slides farther than its
     travel up to break-away remembers nothing of it.
     """
-    v0, v1 = a[VELOCITY], b[VELOCITY]
-    slides = v0 * v1 > 0.0 and min(abs(v0), abs(v1)) * h > loop.travel
-    return not slides and GAMMA * h * abs(v1 - loop.middle[VELOCITY]) > UNSEEN * loop.travel
+    v0, v1 = a.velocity, b.velocity
+    slides = v0 * v1 > 0.0 and min(abs(v0), abs(v1)) * h > loop.case.travel
+    return not slides and GAMMA * h * abs(v1 - loop.middle.velocity) > UNSEEN * loop.case.travel
 
 
 @kernel()
@@ -360,18 +348,18 @@ def advance(loop: Loop, a: Any, b: Any, t: float, h: float, cap: float) -> tuple
 
     Returns the time taken (< 0: no solution) and whether an event ended the step.
     """
-    if loop.damped:
+    if loop.case.damped != 0:
         done = damped_step(loop, a, b, t, h)
-        if done and h > loop.resolved and loses_motion(loop, a, b, h):
-            h = loop.resolved
+        if done and h > loop.case.resolved and loses_motion(loop, a, b, h):
+            h = loop.case.resolved
             done = damped_step(loop, a, b, t, h)
         return (h, False) if done else (-1.0, False)
-    if loop.numbers[PLANT_BAND] > 0.0 and a[VELOCITY] == 0.0:
+    if loop.numbers[PLANT_BAND] > 0.0 and a.velocity == 0.0:
         return band_step(loop, a, b, t, h)
-    if a[VELOCITY] == 0.0 and a[LEAVING] == 0.0 and (loop.plant[HOLDING] != 0 or compensator_jumps(loop)):
+    if a.velocity == 0.0 and a.leaving == 0.0 and (loop.case.plant.holding != 0 or compensator_jumps(loop)):
         side = departure(loop, a)
         if side == 0.0:
             taken = rest_step(loop, a, b, t, h)
-            return taken, b[LEAVING] != 0.0
+            return taken, b.leaving != 0.0
         leave(loop, a, side)
     return moving_step(loop, a, b, t, min(h, cap))
