@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -33,16 +31,6 @@ from stickslip.spec import Par
 
 AXIS = ServoAxis(drive_side="load")
 NAMES = ("inertia", "fc", "sigma2", "offset")
-
-
-@pytest.fixture(scope="module")
-def logs() -> Any:
-    sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-    try:
-        import ordinary_logs
-    finally:
-        sys.path.pop(0)
-    return ordinary_logs
 
 
 def experiment(log: Any) -> Experiment:

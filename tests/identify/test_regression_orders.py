@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,16 +13,6 @@ from stickslip.identify.regression.regression import Regression, regress_axis
 from stickslip.machines.servo import ServoAxis
 
 AXIS = ServoAxis(drive_side="load")
-
-
-@pytest.fixture(scope="module")
-def logs() -> Any:
-    sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-    try:
-        import ordinary_logs
-    finally:
-        sys.path.pop(0)
-    return ordinary_logs
 
 
 def told(log: Any) -> Regression:

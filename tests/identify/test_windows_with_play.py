@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,14 +18,9 @@ from stickslip.machines.servo import ServoAxis
 AXIS = ServoAxis(drive_side="load")
 
 
-def drawn(cell: tuple[int, str, int, str, str, str]) -> tuple[dict[str, float], Regression]:
+def drawn(logs: Any, cell: tuple[int, str, int, str, str, str]) -> tuple[dict[str, float], Regression]:
     """The truth of an ordinary log, and what certain sliding says of it."""
-    sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-    try:
-        import ordinary_logs
-    finally:
-        sys.path.pop(0)
-    log: Any = ordinary_logs.draw(*cell)
+    log = logs.draw(*cell)
     return log.truth, regress_axis([Experiment("log", log.time, log.position, log.torque)], AXIS)
 
 
@@ -41,9 +34,9 @@ def drawn(cell: tuple[int, str, int, str, str, str]) -> tuple[dict[str, float], 
         (680382, "actual", 1000, "pid", "production", "backlash"),
     ],
 )
-def test_wider_windows_tell_what_the_narrowest_make_unsure(cell: Any) -> None:
+def test_wider_windows_tell_what_the_narrowest_make_unsure(logs: Any, cell: Any) -> None:
     """Inertia came out 3 to 8 % too low, and two in three were not believed at all."""
-    truth, found = drawn(cell)
+    truth, found = drawn(logs, cell)
     assert found.widened > 1.0
     assert found.doubt == ""
     for name, most in (("inertia", 0.025), ("fc", 0.025)):
@@ -52,16 +45,16 @@ def test_wider_windows_tell_what_the_narrowest_make_unsure(cell: Any) -> None:
         assert abs(found.numbers[name].value / truth[name] - 1.0) < most
 
 
-def test_a_level_that_windows_which_stay_rough_hardly_tell_is_not_identified() -> None:
+def test_a_level_that_windows_which_stay_rough_hardly_tell_is_not_identified(logs: Any) -> None:
     """Every window says 10 to 20 % too little."""
-    truth, found = drawn((690282, "commanded", 500, "feedforward", "production", "backlash"))
+    truth, found = drawn(logs, (690282, "commanded", 500, "feedforward", "production", "backlash"))
     assert found.widened > 1.0
     assert abs(found.numbers["fc"].value / truth["fc"] - 1.0) > 0.05
     assert found.level_doubt.startswith(STILL_ROUGH)
     assert UNSURE_THERE[:15] in found.level_doubt
 
 
-def test_rough_windows_of_which_one_width_alone_tells_the_level_are_not_taken() -> None:
+def test_rough_windows_of_which_one_width_alone_tells_the_level_are_not_taken(logs: Any) -> None:
     """Its level was 5 % too low, known to 4, and a motor's with cogging was lost on a quarter of its record."""
-    _, found = drawn((415462, "actual", 500, "feedforward", "production", "backlash"))
+    _, found = drawn(logs, (415462, "actual", 500, "feedforward", "production", "backlash"))
     assert found.widened == 1.0

@@ -314,7 +314,8 @@ def balanced_units(x: Array) -> Array:
     """Units of the states, powers of two, in which rows and columns of ``x`` weigh alike.
 
     In radians and rad/s a stiff contact's matrix has a norm a thousand times its frequencies: ten halvings more, each
-    of which doubles what rounding leaves (Parlett and Reinsch 1969, doi:10.1007/BF02165404).
+    of which doubles what rounding leaves (Parlett and Reinsch 1969, doi:10.1007/BF02165404). SciPy's `matrix_balance`
+    finds the like, and would be the first call of a run to load SciPy.
     """
     size = np.abs(x) * (1.0 - np.eye(len(x)))
     units = np.ones(len(x))

@@ -62,6 +62,10 @@ KEPT = (
     "Inertia and friction stay those of certain sliding: within its intervals nothing comes near the force error of "
     "plain least squares, whose numbers it refutes (what play and reversals do is in them)."
 )
+BEST_WITHIN = (
+    "Of the values {where} their intervals those are given that explain the whole record best, reversals included: "
+    "relative force error {less:.3g} %, at the middle of the intervals {before:.3g} %."
+)
 CONTROLLER = (
     "Plain least squares leaves less of the torque, {plain:.3g} % against {own:.3g} %, with {names} below 0, which "
     "no friction is: such a torque is made from the velocity by a controller. Record moves under position control."
@@ -247,23 +251,32 @@ def settled(
         if refuted_by is None:
             moved, less, where = own.moved(chosen, free, held, level)
         else:
-            narrow = {n: shared_part(b, refuted_by.get(n, b)) for n, b in held.items()}
-            wide = {n: shared_part(at_most.get(n, b), b) for n, b in held.items()} if at_most else narrow
-            followed = own.followed(chosen, free, narrow, level) or own.followed(chosen, free, wide, level)
+            followed = followed_within(own, (chosen, free, level), held, refuted_by, at_most)
             (moved, less), where = followed or (chosen, error), "within"
             notes = [] if followed else [KEPT]
         if less < error:
-            chosen, error, before, asked = moved, less, error, set(held)
-            notes = [
-                f"Of the values {where} their intervals those are given that explain the whole record best, reversals "
-                f"included: relative force error {100.0 * less:.3g} %, at the middle of the intervals "
-                f"{100.0 * before:.3g} %."
-            ]
+            notes = [BEST_WITHIN.format(where=where, less=100.0 * less, before=100.0 * error)]
+            chosen, error, asked = moved, less, set(held)
     notes += made_by_a_controller(inverse, error)
     out = (placed(e, chosen, inverse, e.name in asked) for e in estimates)
     if refuted_by is None:
         return tuple(out), notes
     return tuple(told_alone(e, values["fc"]) if e.name == "fc" else e for e in out), notes
+
+
+def followed_within(
+    own: Settling, start: tuple[Mapping[str, float], Mapping[str, tuple[float, float]], bool],
+    held: Mapping[str, tuple[float, float]], refuted_by: Mapping[str, tuple[float, float]],
+    at_most: Mapping[str, tuple[float, float]] | None,
+) -> tuple[dict[str, float], float] | None:  # fmt: skip
+    """Values near plain least squares' force error, inside certain sliding's intervals, else inside those of both
+    methods where it is refuted by little; none where neither holds any."""
+    chosen, free, level = start
+    narrow = {n: shared_part(b, refuted_by.get(n, b)) for n, b in held.items()}
+    found = own.followed(chosen, free, narrow, level)
+    if found or not at_most:
+        return found
+    return own.followed(chosen, free, {n: shared_part(at_most.get(n, b), b) for n, b in held.items()}, level)
 
 
 def made_by_a_controller(inverse: InverseDynamics, error: float) -> list[str]:

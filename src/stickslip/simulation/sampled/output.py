@@ -12,7 +12,7 @@ from stickslip.simulation._meter import MAX_WINDOW, meter
 from stickslip.simulation.exact.flow import flow, free_motion, linear
 from stickslip.simulation.sampled.modes import friction
 from stickslip.simulation.sampled.rates import CREEPS, STUCK
-from stickslip.simulation.sampled.slip import hermite, quintic
+from stickslip.simulation.sampled.slip import hermite, within
 
 __all__ = ["measure", "write"]
 
@@ -59,7 +59,7 @@ def moved_after(axis: Any, was: Any, z: Any, h: float, t: float) -> tuple[float,
     x = t / h
     # The slope of the cubic of velocities.
     a = 6.0 * x * (1.0 - x) * (v1 - v0) / h + (1.0 - x) * (1.0 - 3.0 * x) * a0 + x * (3.0 * x - 2.0) * a1
-    return start + quintic(d, v0, a0, v1, a1, h, t), v, a
+    return start + within(d, v0, a0, v1, a1, h, t)[0], v, a
 
 
 @kernel(exact=False)

@@ -14,7 +14,7 @@ from stickslip.simulation.sampled.modes import break_away, heaviest, sign, stays
 from stickslip.simulation.sampled.order_eight import attempt
 from stickslip.simulation.sampled.rates import BENDS, FOLLOWS, Slip, curve_at, rates, slip_of
 
-__all__ = ["quintic", "slip"]
+__all__ = ["slip", "within"]
 
 SHORTEST = 1e-13
 """Of the sample time: a step that must be shorter does not exist."""
@@ -215,22 +215,10 @@ def arrival(
 
 
 @kernel(exact=False, inline=True)
-def quintic(d: float, v0: float, a0: float, v1: float, a1: float, h: float, t: float) -> float:
-    """Displacement after t of a step of h, from what both ends say, rad."""
-    x = t / h
-    p, q = d - h * (v0 + 0.5 * h * a0), h * (v1 - v0 - h * a0)
-    r = h * h * (a1 - a0)
-    c3 = 10.0 * p - 4.0 * q + 0.5 * r
-    c4 = -15.0 * p + 7.0 * q - r
-    c5 = 6.0 * p - 3.0 * q + 0.5 * r
-    return t * (v0 + 0.5 * t * a0) + x * x * x * (c3 + x * (c4 + x * c5))
-
-
-@kernel(exact=False, inline=True)
 def within(
     d: float, v0: float, a0: float, v1: float, a1: float, h: float, t: float
 ) -> tuple[float, float, float]:
-    """Displacement, velocity and acceleration after t of a step of h, by the `quintic`."""
+    """Displacement, velocity and acceleration after t of a step of h: the quintic of what both ends say."""
     x = t / h
     p, q = d - h * (v0 + 0.5 * h * a0), h * (v1 - v0 - h * a0)
     r = h * h * (a1 - a0)
