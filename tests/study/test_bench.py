@@ -13,7 +13,7 @@ from stickslip.errors import ConfigError, ParameterError, UnknownName
 from stickslip.machines.files import machine
 from stickslip.model import Model
 from stickslip.record import Record
-from stickslip.report.bench_report import write_bench_report
+from stickslip.report.bench_report import table_of, write_bench_report
 from stickslip.study.bench import BenchRun, planned, read_bench, run_bench
 from stickslip.study.bench_decision import choices, knowledge_of, standings
 from stickslip.study.bench_metrics import judged
@@ -97,6 +97,8 @@ def test_a_bench_runs_and_goes_on_where_it_was(small, tmp_path):
         ('machine = "ideal"\nmodels = "two"', 'machine = "ideal"', "machine 'one' has no model lugre"),
         ('models = "two"', 'models = "three"', "'three' names no machine of this file"),
         ('["none", "dob"]', '["none", "dop"]', "dop"),
+        ('["none", "dob"]', '["dob"]', "must hold 'none'"),
+        ('["PD"]', '["PID"]', "must hold 'PD'"),
         ("friction = 0.7", "friction = -0.7", "friction = -0.7 must be greater than 0"),
         ("friction = 0.7", 'numbers = {"encoder.count" = 1.0}', "encoder.count"),
     ],
@@ -193,6 +195,11 @@ def test_one_jump_at_rest_is_no_limit_cycle():
     assert judged(record(jump, 0.0 * k))["hunting_rad"] == 0.0
 
 
+def test_a_part_of_a_bench_brings_the_pd_alone_with_it(small):
+    keys = [p.run.key for p in planned(read_bench(small), ["one", "weaker", "dob"])]
+    assert keys == ["one/weaker/stop/PD/none", "one/weaker/stop/PD/dob"]
+
+
 def test_recovery_is_when_a_tenth_of_the_deviation_is_left():
     k = np.arange(1000)
     error = 1e-3 + np.where(k > 100, -4e-3 * np.exp(-(k - 100) / 40.0), 0.0)
@@ -230,6 +237,15 @@ def test_what_hunts_or_chatters_or_is_not_worth_it_is_not_chosen_and_the_reason_
     assert by["its inertia", "friction as believed"].label == "PD + dob-reset"
     assert by["a friction law", "friction as believed"].label == "PD + scale-dob"
     assert by["a friction law", "friction as believed"].mean == pytest.approx(0.1)
+
+
+def test_nothing_is_decided_for_a_condition_that_was_not_run():
+    believed = runs_of(none=(1e-2, 0.0, 0.0), dob_reset=(2e-3, 0.0, 1e-5))
+    weaker = [replace(r, change="weaker") for r in believed]
+    assert {c.condition for c in choices(believed)} == {"friction as believed"}
+    assert {c.condition for c in choices(weaker)} == {"friction off, and changing"}
+    labels = {cell["label"] for row in table_of(choices(believed)) for cell in row["cells"][1:]}
+    assert labels == {"not run"}
 
 
 @pytest.mark.parametrize(

@@ -71,18 +71,21 @@ def learned_on(machine: str, runs: Sequence[BenchRun]) -> list[dict[str, str]]:
 
 def table_of(found: Sequence[Choice]) -> list[dict[str, Any]]:
     """The decision table: a row for what is known of each machine, a cell for every condition."""
-    cells = {(c.machine, c.knowledge, c.condition): c.chosen for c in found}
+    choice = {(c.machine, c.knowledge, c.condition): c for c in found}
     return [
         {
             "machine": machine, "known": known,
-            "cells": [cell(cells.get((machine, known, condition))) for condition in CONDITIONS],
+            "cells": [cell(choice.get((machine, known, condition))) for condition in CONDITIONS],
         }
         for machine, known in dict.fromkeys((c.machine, c.knowledge) for c in found)
     ]  # fmt: skip
 
 
-def cell(chosen: Standing | None) -> dict[str, str]:
-    """What is chosen, its mean and its worst error over the PD's."""
+def cell(choice: Choice | None) -> dict[str, str]:
+    """What is chosen, its mean and its worst error over the PD's; a condition without runs has no choice."""
+    if choice is None:
+        return {"label": "not run", "numbers": ""}
+    chosen = choice.chosen
     if chosen is None:
         return {"label": "none: the PD itself is not calm", "numbers": ""}
     return {"label": chosen.label, "numbers": f"{shown(chosen.mean)}, at worst {shown(chosen.worst)}"}

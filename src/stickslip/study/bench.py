@@ -97,6 +97,11 @@ class BenchRun:
         """machine/change/reference/loop/compensator"""
         return "/".join(getattr(self, family) for family in FAMILIES)
 
+    @property
+    def bare(self) -> str:
+        """The key of the run that it is compared with: the PD alone on the same machine, change and reference."""
+        return "/".join((self.machine, self.change, self.reference, "PD", "none"))
+
 
 @dataclass(frozen=True)
 class BenchResult:
@@ -181,6 +186,9 @@ def read_bench(study: str | Path = BENCH) -> Bench:
         title, bandwidth = table.text("title", BENCH), table.positive("bandwidth_hz", "Hz", 10.0)
         loops = table.texts("loops", LOOPS) if table.has("loops") else LOOPS
         names = table.texts("compensators", CATALOGUE) if table.has("compensators") else tuple(CATALOGUE)
+        for key, found, bare in (("loops", loops, "PD"), ("compensators", names, "none")):
+            if bare not in found:
+                raise table.error(key, f"must hold {bare!r}: every compensator is compared with the PD alone")
         machines = _machines(table.tables("machines"))
         laws = build.models(table.tables("laws"), build.law_files(table))
         motions = {name: _motion(t) for name, t in table.tables("references").items()}
@@ -223,7 +231,7 @@ def _change(table: Table, motions: Mapping[str, Any]) -> Change:
 
 
 def planned(bench: Bench, only: Sequence[str] = ()) -> list[Planned]:
-    """Its runs, in order; of those whose names hold the parts of `only`.
+    """Its runs, in order; of those whose names hold the parts of `only`, with the bare PD that each is compared with.
 
     Raises
     ------
@@ -241,7 +249,9 @@ def planned(bench: Bench, only: Sequence[str] = ()) -> list[Planned]:
             raise UnknownName("part of a run's name", part, [n for names in known.values() for n in names])
         wanted.setdefault(family, set()).add(part)
     runs = list(_planned(bench))
-    return [p for p in runs if all(getattr(p.run, f) in names for f, names in wanted.items())]
+    kept = [p.run for p in runs if all(getattr(p.run, f) in names for f, names in wanted.items())]
+    keys = {run.key for run in kept} | {run.bare for run in kept}
+    return [p for p in runs if p.run.key in keys]
 
 
 def _planned(bench: Bench) -> Iterator[Planned]:

@@ -107,18 +107,16 @@ def standings(runs: Sequence[BenchRun], changes: Iterable[str] = ()) -> list[Sta
     """How every compensator did on every machine, over the runs with `changes` (all, where none are given)."""
     wanted = set(changes)
     kept = [r for r in runs if not wanted or r.change in wanted]
-    bare = {(r.machine, r.change, r.reference): r for r in kept if (r.loop, r.compensator) == ("PD", "none")}
+    bare = {r.key: r for r in kept if r.key == r.bare}
     groups: dict[tuple[str, str, str], list[BenchRun]] = {}
     for run in kept:
         groups.setdefault((run.machine, run.loop, run.compensator), []).append(run)
     return [_standing(key, group, bare) for key, group in groups.items()]
 
 
-def _standing(
-    key: tuple[str, str, str], group: Sequence[BenchRun], bare: Mapping[tuple[str, str, str], BenchRun]
-) -> Standing:
+def _standing(key: tuple[str, str, str], group: Sequence[BenchRun], bare: Mapping[str, BenchRun]) -> Standing:
     failed = next((r for r in group if r.failure), None)
-    pairs = [(r, bare[r.machine, r.change, r.reference]) for r in group if not r.failure]
+    pairs = [(r, bare[r.bare]) for r in group if not r.failure]
     errors = [ratio(r, b, "rms_rad") for r, b in pairs]
     chatter = largest(number(r, "chatter_Nm") / max(number(r, "effort_Nm"), 1e-9) for r, _ in pairs)
     hunting = largest(number(r, "hunting_rad") for r, _ in pairs)
@@ -186,11 +184,16 @@ class Choice:
 
 
 def choices(runs: Sequence[BenchRun]) -> list[Choice]:
-    """The decision table: for every machine, for all that may be known of it, under every condition."""
+    """The decision table: for every machine, for all that may be known of it, under every condition that it ran in.
+
+    Runs with friction as believed alone do not say what is best where friction is off.
+    """
     out: list[Choice] = []
+    believed = set(CONDITIONS["friction as believed"])
     for condition, changes in CONDITIONS.items():
         found = standings(runs, changes)
-        for machine in dict.fromkeys(s.machine for s in found):
+        beyond = set(changes) - believed or believed
+        for machine in dict.fromkeys(r.machine for r in runs if r.change in beyond):
             for k, known in enumerate(KNOWLEDGE):
                 fit = [
                     s
