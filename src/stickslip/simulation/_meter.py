@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.jit import kernel
+from stickslip.jit import kernel, pointer, record_at, spliced
 
 # Thresholds, all stated by the study (issue and reference README).
 HIGH_PASS = 2.0 * math.pi * 50.0  # rad/s
@@ -23,14 +23,36 @@ STANDSTILL = 10e-3  # s, shortest standstill that counts
 MAX_WINDOW = 2e-3  # s
 LONG_WINDOW = 16e-3  # s, where only the metrics of COARSE are wanted
 
-# ---- layout of the accumulator --------------------------------------------------------------------------------
-(
-    DURATION, SETTLE_BAND, E2, E_MAX, EV2, TM2, TM_MAX, DF2, HP2, V_MAX, REVERSALS, SS_E, E_END,
-    W2_E2, W2_E_MAX, W2_E_LOW, W2_E_HIGH, W2_EV2, W2_TM2, W2_HP2, W2_REVERSALS,
-    LOW_PASS, SIDE, STILL_SINCE, STILL_COUNT, STILL_LONGEST, OUTSIDE_LAST, WORK, LOSS, COMPENSATION_WORK,
-    REFERENCE_SIDE, REFERENCE_REVERSALS, TURN_TIME, TURN_POSITION, TURN_COUNT,
-    LAST_VELOCITY, WINDOW, SIZE,
-) = range(38)  # fmt: skip
+METER = np.dtype(
+    [
+        *((name, np.float64) for name in (
+            # Of the run, s; rad in which the error counts as settled, 0: none; the longest stretch it is handed, s.
+            "duration", "settle_band", "window",
+            # Integrals of e², (de/dt)², T_m², (T_f - T_c)² and of the square of the velocity above 50 Hz; of e over the
+            # last fifth; rad²s, rad²/s, N²m²s, rad s.
+            "e2", "ev2", "tm2", "df2", "hp2", "ss_e",
+            # Greatest error, velocity and motor torque, and the last error: rad, rad/s, N·m.
+            "e_max", "v_max", "tm_max", "e_end",
+            # The same of the second half of the run, and the least and greatest error there.
+            "w2_e2", "w2_ev2", "w2_tm2", "w2_hp2", "w2_e_max", "w2_e_low", "w2_e_high",
+            # The velocity below 50 Hz, rad/s; the side on which it, and the reference's, was beyond the trigger last.
+            "low_pass", "side", "reference_side",
+            # Since when the axis stands still, s, -1: it moves; the longest standstill, s; last time outside the band.
+            "still_since", "still_longest", "outside_last",
+            # Of the motor, of friction, and of the compensator, J.
+            "work", "loss", "compensation_work",
+            # The last zero of the velocity, s and rad; the velocity at the end of the last stretch, rad/s.
+            "turn_time", "turn_position", "last_velocity",
+        )),
+        *((name, np.int64) for name in (
+            "reversals", "w2_reversals", "reference_reversals",
+            # Standstills; reversals whose time and position are kept.
+            "still_count", "turn_count",
+        )),
+    ]
+)  # fmt: skip
+"""What the meter has gathered so far."""
+SIZE = METER.itemsize // 8
 
 
 def new_meter(duration: float, settle_band: float, window: float = MAX_WINDOW) -> Any:
@@ -40,13 +62,30 @@ def new_meter(duration: float, settle_band: float, window: float = MAX_WINDOW) -
     short ones, and the metrics are those of `COARSE`.
     """
     acc = np.zeros(SIZE)
-    acc[WINDOW] = window
-    acc[DURATION] = duration
-    acc[SETTLE_BAND] = settle_band
-    acc[STILL_SINCE] = -1.0
-    acc[W2_E_LOW] = math.inf
-    acc[W2_E_HIGH] = -math.inf
+    begun = gathered(acc)
+    begun["window"] = window
+    begun["duration"] = duration
+    begun["settle_band"] = settle_band
+    begun["still_since"] = -1.0
+    begun["w2_e_low"] = math.inf
+    begun["w2_e_high"] = -math.inf
     return acc
+
+
+def gathered(acc: Any) -> Any:
+    """What accumulators hold, by name; shape (..., SIZE) gives (...), a view."""
+    return acc.view(METER)[..., 0]
+
+
+def turning_points(acc: Any, turns: Any) -> Any:
+    """Time (s) and position (rad) of the reversals that were kept, shape (n, 2)."""
+    return turns[: int(gathered(acc)["turn_count"])]
+
+
+@spliced
+def meter_of(acc: Any) -> Any:
+    """What an accumulator holds, for kernels."""
+    return record_at(pointer(acc, 0), METER)
 
 
 class Sums(NamedTuple):
@@ -74,18 +113,19 @@ def meter(acc: Any, turns: Any, t: float, h: float, nodes: Any) -> None:
     ``nodes`` has a row for each signal (see the names above) and five columns in time; ``turns`` (n, 2) receives
     time and position of every reversal, as long as it has room.
     """
+    so_far = meter_of(acc)
     low, high = extremes(nodes, 0.25 * h)
     motor = 0.0
     for i in range(5):
         motor = max(motor, abs(nodes[MOTOR, i]))
-    second = add(acc, t, h, sums(nodes), nodes[ERROR, 4])
-    reached(acc, second, low, high, peak(nodes, acc[V_MAX]), motor)
-    if acc[WINDOW] > MAX_WINDOW:
+    second = add(so_far, t, h, sums(nodes), nodes[ERROR, 4])
+    reached(so_far, second, low, high, peak(nodes, so_far.v_max), motor)
+    if so_far.window > MAX_WINDOW:
         return
-    high_pass(acc, h, nodes, second)
-    reversals(acc, turns, t, h, nodes, second)
-    standstill(acc, t, h, nodes)
-    settling(acc, t, h, nodes)
+    high_pass(so_far, h, nodes, second)
+    reversals(so_far, turns, t, h, nodes, second)
+    standstill(so_far, t, h, nodes)
+    settling(so_far, t, h, nodes)
 
 
 @kernel(exact=False, inline=True)
@@ -119,39 +159,39 @@ def add(acc: Any, t: float, h: float, total: Sums, end: float) -> bool:
     """Add a stretch's integrals and its last error; returns whether it lies in the second half of the run."""
     second = in_second_half(acc, t)
     scale = h / 90.0
-    acc[E2] += scale * total.e2
-    acc[EV2] += scale * total.ev2
-    acc[TM2] += scale * total.tm2
-    acc[DF2] += scale * total.df2
-    acc[WORK] += scale * total.work
-    acc[LOSS] += scale * total.loss
-    acc[COMPENSATION_WORK] += scale * total.compensation
-    if t >= 0.8 * acc[DURATION] * (1.0 - 1e-12):
-        acc[SS_E] += scale * total.e
-    acc[E_END] = end
+    acc.e2 += scale * total.e2
+    acc.ev2 += scale * total.ev2
+    acc.tm2 += scale * total.tm2
+    acc.df2 += scale * total.df2
+    acc.work += scale * total.work
+    acc.loss += scale * total.loss
+    acc.compensation_work += scale * total.compensation
+    if t >= 0.8 * acc.duration * (1.0 - 1e-12):
+        acc.ss_e += scale * total.e
+    acc.e_end = end
     if second:
-        acc[W2_E2] += scale * total.e2
-        acc[W2_EV2] += scale * total.ev2
-        acc[W2_TM2] += scale * total.tm2
+        acc.w2_e2 += scale * total.e2
+        acc.w2_ev2 += scale * total.ev2
+        acc.w2_tm2 += scale * total.tm2
     return second
 
 
 @kernel(exact=False, inline=True)
 def reached(acc: Any, second: bool, low: float, high: float, speed: float, motor: float) -> None:
     """Note the least and greatest error of a stretch, and the peaks of |v| and of the motor's torque."""
-    acc[E_MAX] = max(acc[E_MAX], -low, high)
-    acc[V_MAX] = max(acc[V_MAX], speed)
-    acc[TM_MAX] = max(acc[TM_MAX], motor)
+    acc.e_max = max(acc.e_max, -low, high)
+    acc.v_max = max(acc.v_max, speed)
+    acc.tm_max = max(acc.tm_max, motor)
     if second:
-        acc[W2_E_MAX] = max(acc[W2_E_MAX], -low, high)
-        acc[W2_E_LOW] = min(acc[W2_E_LOW], low)
-        acc[W2_E_HIGH] = max(acc[W2_E_HIGH], high)
+        acc.w2_e_max = max(acc.w2_e_max, -low, high)
+        acc.w2_e_low = min(acc.w2_e_low, low)
+        acc.w2_e_high = max(acc.w2_e_high, high)
 
 
 @kernel(exact=False, inline=True)
 def in_second_half(acc: Any, t: float) -> bool:
     """Whether a stretch that begins at t lies in the second half of the run."""
-    return t >= 0.5 * acc[DURATION] * (1.0 - 1e-12)
+    return t >= 0.5 * acc.duration * (1.0 - 1e-12)
 
 
 @kernel(exact=False)
@@ -253,7 +293,7 @@ def high_pass(acc: Any, h: float, nodes: Any, second: bool) -> None:
     """Advance the 50 Hz low-pass y' = w (v - y) and add the integral of (v - y)²."""
     half = math.exp(-0.125 * HIGH_PASS * h)
     weight = HIGH_PASS * h / 24.0
-    y = acc[LOW_PASS]
+    y = acc.low_pass
     total = 7.0 * (nodes[SPEED, 0] - y) * (nodes[SPEED, 0] - y)
     for i in range(4):
         # Simpson's rule on the convolution over a quarter; its middle value from the cubic through four nodes.
@@ -274,52 +314,52 @@ def high_pass(acc: Any, h: float, nodes: Any, second: bool) -> None:
         )
         w = 7.0 if i == 3 else (12.0 if i == 1 else 32.0)
         total += w * (nodes[SPEED, i + 1] - y) * (nodes[SPEED, i + 1] - y)
-    acc[LOW_PASS] = y
+    acc.low_pass = y
     add_high_pass(acc, h / 90.0 * total, second)
 
 
 @kernel(exact=False, inline=True)
 def add_high_pass(acc: Any, total: float, second: bool) -> None:
     """Add an integral of the squared high-passed velocity."""
-    acc[HP2] += total
+    acc.hp2 += total
     if second:
-        acc[W2_HP2] += total
+        acc.w2_hp2 += total
 
 
 @kernel(exact=False)
 def reversals(acc: Any, turns: Any, t: float, h: float, nodes: Any, second: bool) -> None:
     """Count sign reversals of v and of the reference with a Schmitt trigger; keep the turning points."""
     # Rounding may put a zero between the end of the last stretch and the start of this one.
-    if acc[LAST_VELOCITY] * nodes[SPEED, 0] < 0.0:
-        acc[TURN_TIME] = t
-        acc[TURN_POSITION] = nodes[AT, 0]
-    acc[LAST_VELOCITY] = nodes[SPEED, 4]
+    if acc.last_velocity * nodes[SPEED, 0] < 0.0:
+        acc.turn_time = t
+        acc.turn_position = nodes[AT, 0]
+    acc.last_velocity = nodes[SPEED, 4]
     for i in range(1, 5):
         # The last zero of v is the turning point, if the trigger then confirms a reversal.
         if nodes[SPEED, i - 1] * nodes[SPEED, i] <= 0.0 and nodes[SPEED, i - 1] != nodes[SPEED, i]:
             f = nodes[SPEED, i - 1] / (nodes[SPEED, i - 1] - nodes[SPEED, i])
-            acc[TURN_TIME] = t + 0.25 * h * (i - 1 + f)
-            acc[TURN_POSITION] = nodes[AT, i - 1] + f * (nodes[AT, i] - nodes[AT, i - 1])
+            acc.turn_time = t + 0.25 * h * (i - 1 + f)
+            acc.turn_position = nodes[AT, i - 1] + f * (nodes[AT, i] - nodes[AT, i - 1])
         confirm(acc, turns, crest(nodes, i), second)
         follow_reference(acc, nodes[REFERENCE_SPEED, i])
 
 
 @kernel(exact=False, inline=True)
 def confirm(acc: Any, turns: Any, v: float, second: bool) -> None:
-    """Let a velocity beyond the trigger confirm the reversal that TURN_TIME remembers, if the side is another."""
+    """Let a velocity beyond the trigger confirm a reversal at its last zero, if the side is another."""
     if abs(v) <= TRIGGER:
         return
     side = 1.0 if v > 0.0 else -1.0
-    if side * acc[SIDE] < 0.0:
-        acc[REVERSALS] += 1.0
+    if side * acc.side < 0.0:
+        acc.reversals += 1
         if second:
-            acc[W2_REVERSALS] += 1.0
-        n = int(acc[TURN_COUNT])
+            acc.w2_reversals += 1
+        n = acc.turn_count
         if n < turns.shape[0]:
-            turns[n, 0] = acc[TURN_TIME]
-            turns[n, 1] = acc[TURN_POSITION]
-            acc[TURN_COUNT] += 1.0
-    acc[SIDE] = side
+            turns[n, 0] = acc.turn_time
+            turns[n, 1] = acc.turn_position
+            acc.turn_count += 1
+    acc.side = side
 
 
 @kernel(exact=False, inline=True)
@@ -327,9 +367,9 @@ def follow_reference(acc: Any, rate: float) -> None:
     """Count the reversals of the reference, whose velocity this is."""
     if abs(rate) > TRIGGER:
         side = 1.0 if rate > 0.0 else -1.0
-        if side * acc[REFERENCE_SIDE] < 0.0:
-            acc[REFERENCE_REVERSALS] += 1.0
-        acc[REFERENCE_SIDE] = side
+        if side * acc.reference_side < 0.0:
+            acc.reference_reversals += 1
+        acc.reference_side = side
 
 
 @kernel(exact=False)
@@ -344,31 +384,37 @@ def standstill(acc: Any, t: float, h: float, nodes: Any) -> None:
 def rest_seen(acc: Any, now: float, v: float, rate: float) -> None:
     """Begin or end a standstill at a velocity and the reference's."""
     still = abs(v) < TRIGGER and abs(rate) > MOVING
-    if still and acc[STILL_SINCE] < 0.0:
-        acc[STILL_SINCE] = now
-    elif not still and acc[STILL_SINCE] >= 0.0:
-        close_standstill(acc, now)
+    if still and acc.still_since < 0.0:
+        acc.still_since = now
+    elif not still and acc.still_since >= 0.0:
+        end_standstill(acc, now)
 
 
 @kernel(exact=False)
 def settling(acc: Any, t: float, h: float, nodes: Any) -> None:
     """Note when the error was last outside the band in which it counts as settled."""
-    band = acc[SETTLE_BAND]
+    band = acc.settle_band
     if band > 0.0:
         for i in range(5):
             now = abs(nodes[ERROR, i])
             if now > band:
-                acc[OUTSIDE_LAST] = t + 0.25 * h * i
+                acc.outside_last = t + 0.25 * h * i
                 if i < 4 and abs(nodes[ERROR, i + 1]) <= band:
-                    acc[OUTSIDE_LAST] += 0.25 * h * (now - band) / (now - abs(nodes[ERROR, i + 1]))
+                    acc.outside_last += 0.25 * h * (now - band) / (now - abs(nodes[ERROR, i + 1]))
+
+
+@kernel(exact=False, inline=True)
+def end_standstill(acc: Any, now: float) -> None:
+    """End a standstill, counting it if it was long enough."""
+    if acc.still_since >= 0.0:
+        length = now - acc.still_since
+        if length >= STANDSTILL:
+            acc.still_count += 1
+            acc.still_longest = max(acc.still_longest, length)
+        acc.still_since = -1.0
 
 
 @kernel(exact=False)
 def close_standstill(acc: Any, now: float) -> None:
-    """End a standstill, counting it if it was long enough; integrators call it at the end of a run too."""
-    if acc[STILL_SINCE] >= 0.0:
-        length = now - acc[STILL_SINCE]
-        if length >= STANDSTILL:
-            acc[STILL_COUNT] += 1.0
-            acc[STILL_LONGEST] = max(acc[STILL_LONGEST], length)
-        acc[STILL_SINCE] = -1.0
+    """End a standstill with the run; integrators call it."""
+    end_standstill(meter_of(acc), now)

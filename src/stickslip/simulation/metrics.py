@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel
-from stickslip.simulation import _meter as at
+from stickslip.simulation._meter import SIZE, gathered
 
 
 def settle_band_of(reference: Any, duration: float) -> float:
@@ -62,46 +62,46 @@ def metrics(acc: Any, turns: Any) -> dict[str, float]:
     The definitions are in docs/metrics.md.
     """
     late = np.ascontiguousarray(turns[turns[:, 0] > 0.0])
-    amplitude, period = limit_cycle(late, acc[at.DURATION])
+    amplitude, period = limit_cycle(late, float(gathered(acc)["duration"]))
     return {name: float(value) for name, value in columns(acc, amplitude, period).items()}
 
 
 def columns(acc: Any, amplitude: Any, period: Any) -> dict[str, Any]:
     """The metrics of many finished accumulators, shape (..., SIZE), and of their limit cycles, shape (...)."""
-    duration = acc[..., at.DURATION]
+    found = gathered(acc)
+    duration = found["duration"]
     half = 0.5 * duration
     # For good: a limit cycle that happens to end inside the band has not settled.
-    settled = (acc[..., at.SETTLE_BAND] > 0.0) & (acc[..., at.OUTSIDE_LAST] <= (1.0 - SETTLED_FOR) * duration)
+    settled = (found["settle_band"] > 0.0) & (found["outside_last"] <= (1.0 - SETTLED_FOR) * duration)
     return {
-        "position_rms_rad": np.sqrt(acc[..., at.E2] / duration),
-        "position_peak_rad": acc[..., at.E_MAX],
-        "steady_state_error_rad": acc[..., at.SS_E] / (0.2 * duration),
-        "end_error_rad": acc[..., at.E_END],
-        "settling_s": np.where(settled, acc[..., at.OUTSIDE_LAST], math.nan),
-        "velocity_rms_rad_s": np.sqrt(acc[..., at.EV2] / duration),
-        "velocity_peak_rad_s": acc[..., at.V_MAX],
-        "torque_rms_Nm": np.sqrt(acc[..., at.TM2] / duration),
-        "torque_peak_Nm": acc[..., at.TM_MAX],
-        "friction_residual_rms_Nm": np.sqrt(acc[..., at.DF2] / duration),
-        "standstills": acc[..., at.STILL_COUNT],
-        "longest_standstill_s": acc[..., at.STILL_LONGEST],
-        "reversals_per_s": acc[..., at.REVERSALS] / duration,
-        "reversals_beyond_reference_per_s": (acc[..., at.REVERSALS] - acc[..., at.REFERENCE_REVERSALS])
-        / duration,
-        "velocity_above_50Hz_rms_rad_s": np.sqrt(acc[..., at.HP2] / duration),
+        "position_rms_rad": np.sqrt(found["e2"] / duration),
+        "position_peak_rad": found["e_max"],
+        "steady_state_error_rad": found["ss_e"] / (0.2 * duration),
+        "end_error_rad": found["e_end"],
+        "settling_s": np.where(settled, found["outside_last"], math.nan),
+        "velocity_rms_rad_s": np.sqrt(found["ev2"] / duration),
+        "velocity_peak_rad_s": found["v_max"],
+        "torque_rms_Nm": np.sqrt(found["tm2"] / duration),
+        "torque_peak_Nm": found["tm_max"],
+        "friction_residual_rms_Nm": np.sqrt(found["df2"] / duration),
+        "standstills": found["still_count"],
+        "longest_standstill_s": found["still_longest"],
+        "reversals_per_s": found["reversals"] / duration,
+        "reversals_beyond_reference_per_s": (found["reversals"] - found["reference_reversals"]) / duration,
+        "velocity_above_50Hz_rms_rad_s": np.sqrt(found["hp2"] / duration),
         "limit_cycle_amplitude_rad": amplitude,
         "limit_cycle_period_s": period,
-        "second_half_position_rms_rad": np.sqrt(acc[..., at.W2_E2] / half),
-        "second_half_position_peak_rad": acc[..., at.W2_E_MAX],
-        "second_half_position_span_rad": acc[..., at.W2_E_HIGH] - acc[..., at.W2_E_LOW],
-        "second_half_velocity_rms_rad_s": np.sqrt(acc[..., at.W2_EV2] / half),
-        "second_half_torque_rms_Nm": np.sqrt(acc[..., at.W2_TM2] / half),
-        "second_half_velocity_above_50Hz_rms_rad_s": np.sqrt(acc[..., at.W2_HP2] / half),
-        "second_half_reversals_per_s": acc[..., at.W2_REVERSALS] / half,
-        "motor_work_J": acc[..., at.WORK],
-        "friction_loss_J": acc[..., at.LOSS],
+        "second_half_position_rms_rad": np.sqrt(found["w2_e2"] / half),
+        "second_half_position_peak_rad": found["w2_e_max"],
+        "second_half_position_span_rad": found["w2_e_high"] - found["w2_e_low"],
+        "second_half_velocity_rms_rad_s": np.sqrt(found["w2_ev2"] / half),
+        "second_half_torque_rms_Nm": np.sqrt(found["w2_tm2"] / half),
+        "second_half_velocity_above_50Hz_rms_rad_s": np.sqrt(found["w2_hp2"] / half),
+        "second_half_reversals_per_s": found["w2_reversals"] / half,
+        "motor_work_J": found["work"],
+        "friction_loss_J": found["loss"],
     }
 
 
-METRICS = tuple(columns(np.ones(at.SIZE), 0.0, 0.0))
+METRICS = tuple(columns(np.ones(SIZE), 0.0, 0.0))
 """Names of the metrics."""

@@ -16,10 +16,10 @@ from stickslip.jit import kernel, pointer
 from stickslip.simulation._meter import (
     MAX_WINDOW,
     SIGNALS,
-    TURN_COUNT,
     close_standstill,
     meter,
     new_meter,
+    turning_points,
 )
 from stickslip.simulation.adaptive.hybrid import rates
 from stickslip.simulation.adaptive.layout import Laid, Loop, laid_out, loop_of, named
@@ -99,7 +99,7 @@ def run(case: Case) -> Outcome:
         lambda: Reached(float(reached["time"]), duration, float(reached["steps"] + reached["rejected"])), stop,
     )  # fmt: skip
     return Outcome(
-        rows[: reached["rows"]], int(code), float(reached["time"]), acc, turns[: int(acc[TURN_COUNT])],
+        rows[: reached["rows"]], int(code), float(reached["time"]), acc, turning_points(acc, turns),
         {name: int(reached[name]) for name in ("steps", "rejected", "events")},
     )  # fmt: skip
 

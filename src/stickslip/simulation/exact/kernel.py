@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from stickslip.jit import kernel, pointer
+from stickslip.simulation._meter import meter_of
 from stickslip.simulation.case_arrays import (
     DIVERGED,
     DONE,
@@ -145,7 +146,7 @@ def solve(laid: Laid, output: Output, light: bool, full: bool, metered: bool) ->
     """
     loop = loop_of(laid, output)
     parameters, plan, now, segment = loop.parameters, loop.plan, loop.now, loop.segment
-    breaks, acc, turns, nodes = pointer(laid.breaks, 0), output.acc, output.turns, output.nodes
+    breaks, acc, turns, nodes = pointer(laid.breaks, 0), meter_of(output.acc), output.turns, output.nodes
     tol = max(SAFETY * parameters[TOLERANCE], FINEST)
     longest = min(LONGEST_STEP, parameters[MAX_STEP])
     after_event = max(0, math.ceil(math.log2(longest / FIRST_STEP)))

@@ -40,9 +40,10 @@ from stickslip.simulation.exact.ringing import (
     has_closed_form,
     ringing,
 )
+from stickslip.simulation.exact.scan import Span
 from stickslip.simulation.exact.segment import cubic_of
 from stickslip.simulation.exact.state import Loop, side_of
-from stickslip.simulation.exact.window import Shares, ringing_window, window
+from stickslip.simulation.exact.window import Rings, Shares, ringing_window, window
 
 LONGEST = 64e-3
 """Longest window where the reference changes slowly, s."""
@@ -192,7 +193,7 @@ def measure(lin: Linear, loop: Loop, h: float, acc: Any, turns: Any, nodes: Any)
             v0 = v
             p, v = free_motion(twice(twice(m)), p0, v0)
             ring = ringing(lin, width, p0, v0, p, v)
-            ringing_window(acc, turns, now.time + begin, width, nodes, lin, m, ring, share)
+            ringing_window(acc, turns, nodes, Span(now.time + begin, width), Rings(lin, m, ring, share))
             shift(nodes, 4, share, p, v)
         else:
             for k in range(1, 5):
@@ -200,7 +201,7 @@ def measure(lin: Linear, loop: Loop, h: float, acc: Any, turns: Any, nodes: Any)
                 p, v = free_motion(m, p, v)
                 theta, speed = moved(c, UNMOVED, x, p, v)
                 fill(loop, way, x, theta, speed, nodes, k)
-            window(acc, turns, now.time + begin, width, nodes)
+            window(acc, turns, nodes, Span(now.time + begin, width))
     return True
 
 

@@ -8,23 +8,13 @@ from typing import Any, NamedTuple
 from stickslip.jit import kernel
 from stickslip.simulation._meter import (
     AT,
-    E_MAX,
     ERROR,
     ERROR_RATE,
-    LAST_VELOCITY,
     MOTOR,
     MOVING,
-    OUTSIDE_LAST,
     REFERENCE_SPEED,
-    SETTLE_BAND,
     SPEED,
-    TM_MAX,
     TRIGGER,
-    TURN_POSITION,
-    TURN_TIME,
-    V_MAX,
-    W2_E_HIGH,
-    W2_E_LOW,
     confirm,
     follow_reference,
     in_second_half,
@@ -46,6 +36,24 @@ class Free(NamedTuple):
 
 
 NO_FREE = Free(0.0, 0.0, 0.0, 0.0)
+
+
+class Span(NamedTuple):
+    """A window: its begin and its width, s."""
+
+    begin: float
+    width: float
+
+
+class Look(NamedTuple):
+    """A look at fine steps: the fraction of the window at which it begins, its part of the window, in how many steps,
+    the flow of the free motion over each of them, and the free motion."""
+
+    first: float
+    part: float
+    steps: int
+    flow: Matrix
+    free: Free
 
 
 class Farthest(NamedTuple):
@@ -111,16 +119,16 @@ def peak_of(nodes: Any, row: int, width: float, steps: int) -> float:
     rates = slopes(values, width)
     if keeps_sign(rates):
         return max(abs(nodes[row, 0]), abs(nodes[row, 4]))
-    low, high = summits(values, rates, width, 0.0, 1.0, UNMOVED, NO_FREE, 0.0, 0.0, steps)
+    low, high = summits(values, rates, width, Look(0.0, 1.0, steps, UNMOVED, NO_FREE), 0.0, 0.0)
     return max(-low, high)
 
 
 @kernel(exact=False, inline=True)
 def farther(acc: Any, second: bool, low: float, high: float) -> bool:
     """Whether an error within these bounds may be the greatest or the least so far."""
-    if high > acc[E_MAX] or -low > acc[E_MAX]:
+    if high > acc.e_max or -low > acc.e_max:
         return True
-    return second and (low < acc[W2_E_LOW] or high > acc[W2_E_HIGH])
+    return second and (low < acc.w2_e_low or high > acc.w2_e_high)
 
 
 @kernel(exact=False)
@@ -141,7 +149,7 @@ def calm(acc: Any, nodes: Any, k: int, quarters: int, swing: float, sway: float)
             return False
         if not (slowest > MOVING or fastest < -MOVING or (slowest > -MOVING and fastest < MOVING)):
             return False
-    band = acc[SETTLE_BAND]
+    band = acc.settle_band
     if band > 0.0:
         low, high = bounds(nodes, ERROR, k, quarters)
         low -= swing
@@ -155,9 +163,10 @@ def calm(acc: Any, nodes: Any, k: int, quarters: int, swing: float, sway: float)
 
 @kernel(exact=False, inline=True)
 def passes(
-    acc: Any, turns: Any, t: float, width: float, nodes: Any, k: int, quarters: int, first: float, last: float
+    acc: Any, turns: Any, nodes: Any, span: Span, k: int, quarters: int, first: float, last: float
 ) -> None:  # fmt: skip
     """Note some calm quarters of a window, from k on, over which the velocity runs from `first` to `last`."""
+    t, width = span
     begin = t + 0.25 * width * k
     touch(acc, begin, nodes[AT, k], first)
     rest_seen(acc, begin, first, nodes[REFERENCE_SPEED, k])
@@ -165,17 +174,17 @@ def passes(
     for i in range(k + 1, k + quarters + 1):
         follow_reference(acc, nodes[REFERENCE_SPEED, i])
     # The node in the middle, or at the end of a quarter.
-    if acc[SETTLE_BAND] > 0.0 and abs(nodes[ERROR, k + (quarters + 1) // 2]) > acc[SETTLE_BAND]:
-        acc[OUTSIDE_LAST] = begin + 0.25 * width * quarters
-    acc[LAST_VELOCITY] = last
+    if acc.settle_band > 0.0 and abs(nodes[ERROR, k + (quarters + 1) // 2]) > acc.settle_band:
+        acc.outside_last = begin + 0.25 * width * quarters
+    acc.last_velocity = last
 
 
 @kernel(exact=False, inline=True)
 def touch(acc: Any, t: float, position: float, v: float) -> None:
     """Rounding may put a zero of the velocity between the last window and this one."""
-    if acc[LAST_VELOCITY] * v < 0.0:
-        acc[TURN_TIME] = t
-        acc[TURN_POSITION] = position
+    if acc.last_velocity * v < 0.0:
+        acc.turn_time = t
+        acc.turn_position = position
 
 
 # ---- a look at fine steps -------------------------------------------------------------------------------------
@@ -183,39 +192,34 @@ def touch(acc: Any, t: float, position: float, v: float) -> None:
 
 @kernel(exact=False, inline=True)
 def looked_through(
-    acc: Any, turns: Any, t: float, width: float, nodes: Any, first: float, part: float, m: Matrix, free: Free,
-    motor_p: float, motor_v: float, count: int, may: Farthest, second: bool,
+    acc: Any, turns: Any, nodes: Any, span: Span, look: Look, motor: tuple[float, float], may: Farthest, second: bool
 ) -> None:  # fmt: skip
-    """Note what a `part` of a window that begins at its fraction `first` may hold, in `count` steps over each of which
-    `m` carries the free motion: only signals that may be farther than before are looked at."""
+    """Note what a look at a window finds: only signals that may be farther than before are looked at."""
+    width = span.width
     if may.error:
-        low, high = summits(
-            quartic(nodes, ERROR), quartic(nodes, ERROR_RATE), width, first, part, m, free, -1.0, 0.0, count
-        )  # fmt: skip
+        low, high = summits(quartic(nodes, ERROR), quartic(nodes, ERROR_RATE), width, look, -1.0, 0.0)
         reached(acc, second, low, high, 0.0, 0.0)
     if may.speed:
         speed = quartic(nodes, SPEED)
-        low, high = summits(speed, slopes(speed, width), width, first, part, m, free, 0.0, 1.0, count)
-        acc[V_MAX] = max(acc[V_MAX], -low, high)
+        low, high = summits(speed, slopes(speed, width), width, look, 0.0, 1.0)
+        acc.v_max = max(acc.v_max, -low, high)
     if may.motor:
         torque = quartic(nodes, MOTOR)
-        low, high = summits(
-            torque, slopes(torque, width), width, first, part, m, free, motor_p, motor_v, count
-        )  # fmt: skip
-        acc[TM_MAX] = max(acc[TM_MAX], -low, high)
-    if may.events and creeps(acc, nodes, free):
-        turns_while_creeping(acc, t, width, nodes, first, part, m, free, count)
+        low, high = summits(torque, slopes(torque, width), width, look, motor[0], motor[1])
+        acc.tm_max = max(acc.tm_max, -low, high)
+    if may.events and creeps(acc, nodes, look.free):
+        turns_while_creeping(acc, nodes, span, look)
     elif may.events:
-        count_events(acc, turns, t, width, nodes, first, part, m, free, count, second)
+        count_events(acc, turns, nodes, span, look, second)
 
 
 @kernel(exact=False)
 def summits(
-    values: Five, rates: Five, width: float, first: float, part: float, m: Matrix, free: Free, of_p: float, of_v: float,
-    count: int,
+    values: Five, rates: Five, width: float, look: Look, of_p: float, of_v: float
 ) -> tuple[float, float]:  # fmt: skip
     """Least and greatest of a signal over a part of a window: its quartic, whose rate (1/s) is another, and what the
     free motion adds by its position and by its velocity."""
+    first, part, count, m, free = look
     step = part / count
     d = width * step
     p = free.position
@@ -244,7 +248,7 @@ def summits(
 def creeps(acc: Any, nodes: Any, free: Free) -> bool:
     """Whether the velocity stays below the trigger in a window, while the reference moves: the last zero of the
     velocity is all that happens."""
-    if acc[SETTLE_BAND] > 0.0:
+    if acc.settle_band > 0.0:
         return False
     slowest, fastest = bounds(nodes, REFERENCE_SPEED, 0, 4)
     if slowest <= MOVING and fastest >= -MOVING:
@@ -254,10 +258,10 @@ def creeps(acc: Any, nodes: Any, free: Free) -> bool:
 
 
 @kernel(exact=False)
-def turns_while_creeping(
-    acc: Any, t: float, width: float, nodes: Any, first: float, part: float, m: Matrix, free: Free, count: int
-) -> None:  # fmt: skip
+def turns_while_creeping(acc: Any, nodes: Any, span: Span, look: Look) -> None:
     """Note the last zero of the velocity over a part of a window that `creeps`."""
+    t, width = span
+    first, part, count, m, free = look
     speed = quartic(nodes, SPEED)
     step = part / count
     p = free.position
@@ -284,17 +288,16 @@ def turns_while_creeping(
     if last > 0:
         s = first + step * last
         at0 += value(place, s - step)
-        acc[TURN_TIME] = t + width * (s + step * (f - 1.0))
-        acc[TURN_POSITION] = at0 + f * (value(place, s) + at1 - at0)
-    acc[LAST_VELOCITY] = v0
+        acc.turn_time = t + width * (s + step * (f - 1.0))
+        acc.turn_position = at0 + f * (value(place, s) + at1 - at0)
+    acc.last_velocity = v0
 
 
 @kernel(exact=False)
-def count_events(
-    acc: Any, turns: Any, t: float, width: float, nodes: Any, first: float, part: float, m: Matrix, free: Free,
-    count: int, second: bool,
-) -> None:  # fmt: skip
+def count_events(acc: Any, turns: Any, nodes: Any, span: Span, look: Look, second: bool) -> None:
     """Count reversals and standstills over a part of a window, and note where the error leaves its band."""
+    t, width = span
+    first, part, count, m, free = look
     speed = quartic(nodes, SPEED)
     rises = slopes(speed, width)
     reference = quartic(nodes, REFERENCE_SPEED)
@@ -323,17 +326,17 @@ def count_events(
             f = v0 / (v0 - v)
             place = quartic(nodes, AT)
             at0 = value(place, s - step) + p0
-            acc[TURN_TIME] = now + d * (f - 1.0)
-            acc[TURN_POSITION] = at0 + f * (value(place, s) + p - at0)
+            acc.turn_time = now + d * (f - 1.0)
+            acc.turn_position = at0 + f * (value(place, s) + p - at0)
         confirm(acc, turns, crest, second)
         follow_reference(acc, rate)
         rest_seen(acc, now, crest, rate)
-        if acc[SETTLE_BAND] > 0.0:
+        if acc.settle_band > 0.0:
             error = quartic(nodes, ERROR)
             leave_band(acc, now, d, value(error, s - step) - p0, value(error, s) - p)
         v0 = v
         a0 = a
-    acc[LAST_VELOCITY] = v0
+    acc.last_velocity = v0
 
 
 @kernel(exact=False, inline=True)
@@ -346,8 +349,8 @@ def slopes(c: Five, width: float) -> Five:
 @kernel(exact=False, inline=True)
 def leave_band(acc: Any, now: float, d: float, before: float, error: float) -> None:
     """Note when the error was last outside the band in which it counts as settled."""
-    band = acc[SETTLE_BAND]
+    band = acc.settle_band
     if abs(error) > band:
-        acc[OUTSIDE_LAST] = now
+        acc.outside_last = now
     elif abs(before) > band:
-        acc[OUTSIDE_LAST] = now - d + d * (abs(before) - band) / (abs(before) - abs(error))
+        acc.outside_last = now - d + d * (abs(before) - band) / (abs(before) - abs(error))

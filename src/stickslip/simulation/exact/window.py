@@ -9,17 +9,12 @@ from typing import Any, NamedTuple
 from stickslip.jit import kernel
 from stickslip.simulation._meter import (
     COMPENSATING,
-    E_MAX,
     ERROR,
     ERROR_RATE,
     FRICTION,
-    LOW_PASS,
     MAX_WINDOW,
     MOTOR,
     SPEED,
-    TM_MAX,
-    V_MAX,
-    WINDOW,
     Sums,
     add,
     add_high_pass,
@@ -34,6 +29,8 @@ from stickslip.simulation.exact.scan import (
     NO_FREE,
     Farthest,
     Free,
+    Look,
+    Span,
     bulge,
     calm,
     count_events,
@@ -73,8 +70,18 @@ class Shares(NamedTuple):
     compensating_v: float
 
 
+class Rings(NamedTuple):
+    """What rings in a window: the axis, its flow over a quarter of the window, the free motion, and what that adds."""
+
+    axis: Linear
+    quarter: Matrix
+    motion: Ringing
+    share: Shares
+
+
 class Bulges(NamedTuple):
-    """How far error, velocity and motor torque leave straight lines between the nodes of a window."""
+    """How far error, velocity and motor torque leave straight lines between the nodes of a window, or what ringing
+    adds to them at most."""
 
     error: float
     speed: float
@@ -82,69 +89,70 @@ class Bulges(NamedTuple):
 
 
 @kernel(exact=False)
-def window(acc: Any, turns: Any, t: float, width: float, nodes: Any) -> None:
+def window(acc: Any, turns: Any, nodes: Any, span: Span) -> None:
     """Add a window whose nodes show all of the motion."""
+    t, width = span
     low, high = extremes(nodes, 0.25 * width)
-    fine = acc[WINDOW] <= MAX_WINDOW
+    fine = acc.window <= MAX_WINDOW
     second = add(acc, t, width, sums(nodes), nodes[ERROR, 4])
     reached(acc, second, low, high, abs(nodes[SPEED, 4]), abs(nodes[MOTOR, 4]))
-    if reach(nodes, SPEED) > acc[V_MAX]:
-        acc[V_MAX] = max(acc[V_MAX], peak_of(nodes, SPEED, width, STEPS))
-    if reach(nodes, MOTOR) > acc[TM_MAX]:
-        acc[TM_MAX] = max(acc[TM_MAX], peak_of(nodes, MOTOR, width, STEPS))
+    if reach(nodes, SPEED) > acc.v_max:
+        acc.v_max = max(acc.v_max, peak_of(nodes, SPEED, width, STEPS))
+    if reach(nodes, MOTOR) > acc.tm_max:
+        acc.tm_max = max(acc.tm_max, peak_of(nodes, MOTOR, width, STEPS))
     if not fine:
         return
     if width <= MAX_WINDOW:
         high_pass(acc, width, nodes, second)
     else:
-        total, acc[LOW_PASS] = high_passed(quartic(nodes, SPEED), NO_RINGING, width, False, acc[LOW_PASS])
+        total, acc.low_pass = high_passed(quartic(nodes, SPEED), NO_RINGING, width, False, acc.low_pass)
         add_high_pass(acc, total, second)
     if calm(acc, nodes, 0, 4, 0.0, 0.0):
-        passes(acc, turns, t, width, nodes, 0, 4, nodes[SPEED, 0], nodes[SPEED, 4])
+        passes(acc, turns, nodes, span, 0, 4, nodes[SPEED, 0], nodes[SPEED, 4])
     elif creeps(acc, nodes, NO_FREE):
         steps = math.ceil(max(STEPS, width / FINE))
-        turns_while_creeping(acc, t, width, nodes, 0.0, 1.0, UNMOVED, NO_FREE, steps)
+        turns_while_creeping(acc, nodes, span, Look(0.0, 1.0, steps, UNMOVED, NO_FREE))
     else:
         steps = math.ceil(max(STEPS, width / FINE) / 4.0)
         for k in range(4):
             if calm(acc, nodes, k, 1, 0.0, 0.0):
-                passes(acc, turns, t, width, nodes, k, 1, nodes[SPEED, k], nodes[SPEED, k + 1])
+                passes(acc, turns, nodes, span, k, 1, nodes[SPEED, k], nodes[SPEED, k + 1])
             else:
-                count_events(
-                    acc, turns, t, width, nodes, 0.25 * k, 0.25, UNMOVED, NO_FREE, steps, second
-                )  # fmt: skip
+                count_events(acc, turns, nodes, span, Look(0.25 * k, 0.25, steps, UNMOVED, NO_FREE), second)
 
 
 @kernel(exact=False)
-def ringing_window(
-    acc: Any, turns: Any, t: float, width: float, nodes: Any, lin: Linear, m: Matrix, ring: Ringing, share: Shares
-) -> None:  # fmt: skip
-    """Add a window whose nodes show all but the ringing, which `m` carries over a quarter of it."""
-    fine = acc[WINDOW] <= MAX_WINDOW
+def ringing_window(acc: Any, turns: Any, nodes: Any, span: Span, rings: Rings) -> None:
+    """Add a window whose nodes show all but the ringing."""
+    ring, width = rings.motion, span.width
+    fine = acc.window <= MAX_WINDOW
     events = False
     if fine:
         energy = ring.square * ring.p0 * ring.p0 + ring.q0 * ring.q0
         events = not calm(acc, nodes, 0, 4, math.sqrt(energy / ring.square), math.sqrt(energy) / width)
-    second = add(acc, t, width, with_ringing(nodes, ring, share, width), nodes[ERROR, 4] - ring.p1)
-    look_through(acc, turns, t, width, nodes, lin, m, ring, share, events, second)
+    second = add(
+        acc, span.begin, width, with_ringing(nodes, ring, rings.share, width), nodes[ERROR, 4] - ring.p1
+    )
+    look_through(acc, turns, nodes, span, rings, events, second)
     if fine:
-        passed, acc[LOW_PASS] = high_passed(quartic(nodes, SPEED), ring, width, True, acc[LOW_PASS])
+        passed, acc.low_pass = high_passed(quartic(nodes, SPEED), ring, width, True, acc.low_pass)
         add_high_pass(acc, passed, second)
         if not events:
             first, last = nodes[SPEED, 0] + ring.q0 / width, nodes[SPEED, 4] + ring.q1 / width
-            passes(acc, turns, t, width, nodes, 0, 4, first, last)
+            passes(acc, turns, nodes, span, 0, 4, first, last)
 
 
 @kernel(exact=False, inline=True)
 def look_through(
-    acc: Any, turns: Any, t: float, width: float, nodes: Any, lin: Linear, m: Matrix, ring: Ringing, share: Shares,
-    events: bool, second: bool,
+    acc: Any, turns: Any, nodes: Any, span: Span, rings: Rings, events: bool, second: bool
 ) -> None:  # fmt: skip
     """Note the extremes of a window that rings: what is looked through is each quarter whose bounds lie beyond those so
     far, or a short window as a whole.
 
     The end comes first: where a signal grows, it leaves the quarters before it nothing.
     """
+    lin, m, ring, share = rings
+    width = span.width
     v1 = ring.q1 / width
     last = nodes[ERROR, 4] - ring.p1
     motor = nodes[MOTOR, 4] + share.motor_p * ring.p1 + share.motor_v * v1
@@ -155,14 +163,14 @@ def look_through(
     v = ring.q0 / width
     parts = 1 if width * stiff * A_RADIAN <= 2.0 * STEPS else 4
     if parts > 1 and not events:
-        shows, _ = shown(acc, nodes, 0, 4, more, stiff * p, v, stiff, share, False, second)
+        shows, _ = shown(acc, nodes, 0, 4, more, swings(stiff * p, v, stiff, share), False, second)
         if shows < 0.0:
             return
     for k in range(parts):
         sway = math.sqrt(lin.square * p * p + v * v)
         quiet = parts > 1 and events and calm(acc, nodes, k, 1, sway / stiff, sway)
         here = events and not quiet
-        shows, may = shown(acc, nodes, k, 4 // parts, more, stiff * p, v, stiff, share, here, second)
+        shows, may = shown(acc, nodes, k, 4 // parts, more, swings(stiff * p, v, stiff, share), here, second)
         if shows >= 0.0:
             long = width / parts
             count = max(STEPS / parts, long / FINE if here else 0.0)
@@ -171,29 +179,31 @@ def look_through(
                 count = max(count, long * stiff * A_RADIAN * math.sqrt(math.sqrt(min(shows, 1.0))))
             steps = math.ceil(count)
             free = Free(p, v, 2.0 * lin.decay, lin.square)
-            a_step = flow(lin, long / steps)
-            looked_through(
-                acc, turns, t, width, nodes, k / parts, 1.0 / parts, a_step, free, share.motor_p, share.motor_v, steps,
-                may, second,
-            )  # fmt: skip
+            look = Look(k / parts, 1.0 / parts, steps, flow(lin, long / steps), free)
+            motor_shares = (share.motor_p, share.motor_v)
+            looked_through(acc, turns, nodes, span, look, motor_shares, may, second)
         if parts > 1:
             before = nodes[SPEED, k] + v
             p, v = free_motion(m, p, v)
             if quiet:
-                passes(acc, turns, t, width, nodes, k, 1, before, nodes[SPEED, k + 1] + v)
+                passes(acc, turns, nodes, span, k, 1, before, nodes[SPEED, k + 1] + v)
+
+
+@kernel(exact=False, inline=True)
+def swings(w: float, v: float, stiff: float, share: Shares) -> Bulges:
+    """What ringing adds to error, velocity and motor torque from here on at most, as its energy falls."""
+    sway = math.sqrt(w * w + v * v)
+    swing = sway / stiff
+    return Bulges(swing, sway, abs(share.motor_p) * swing + abs(share.motor_v) * sway)
 
 
 @kernel(exact=False, inline=True)
 def shown(
-    acc: Any, nodes: Any, k: int, quarters: int, more: Bulges, w: float, v: float, stiff: float, share: Shares,
-    events: bool, second: bool,
+    acc: Any, nodes: Any, k: int, quarters: int, more: Bulges, rings: Bulges, events: bool, second: bool
 ) -> tuple[float, Farthest]:  # fmt: skip
     """The greatest part that ringing has in a peak that some quarters of a window, from k on, may hold, -1 where they
     hold none; and which peaks they may hold."""
-    # The energy of the ringing falls.
-    sway = math.sqrt(w * w + v * v)
-    swing = sway / stiff
-    pull = abs(share.motor_p) * swing + abs(share.motor_v) * sway
+    swing, sway, pull = rings
     low = nodes[ERROR, k]
     high = low
     speed = abs(nodes[SPEED, k])
@@ -206,16 +216,16 @@ def shown(
     shows = 0.0 if events else -1.0
     may = Farthest(
         farther(acc, second, low - more.error - swing, high + more.error + swing),
-        speed + more.speed + sway > acc[V_MAX],
-        motor + more.motor + pull > acc[TM_MAX],
+        speed + more.speed + sway > acc.v_max,
+        motor + more.motor + pull > acc.tm_max,
         events,
     )
     if may.error:
-        shows = max(shows, swing / (acc[E_MAX] + TINY))
+        shows = max(shows, swing / (acc.e_max + TINY))
     if may.speed or events:
-        shows = max(shows, sway / (acc[V_MAX] + TINY))
+        shows = max(shows, sway / (acc.v_max + TINY))
     if may.motor:
-        shows = max(shows, pull / (acc[TM_MAX] + TINY))
+        shows = max(shows, pull / (acc.tm_max + TINY))
     return shows, may
 
 

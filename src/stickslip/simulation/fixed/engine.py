@@ -18,7 +18,7 @@ import numpy as np
 
 from stickslip.errors import ParameterError
 from stickslip.jit import kernel, pointer
-from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter
+from stickslip.simulation._meter import close_standstill, new_meter, turning_points
 from stickslip.simulation.case_arrays import (
     COLUMNS,
     COMPENSATOR_SCALE,
@@ -113,7 +113,7 @@ def run(case: Case, dt: float) -> Outcome:
         lambda: Reached(float(reached["time"]), duration, float(reached["steps"])), stop,
     )  # fmt: skip
     return Outcome(
-        rows, int(code), float(reached["time"]), accumulator, turns[: int(accumulator[TURN_COUNT])],
+        rows, int(code), float(reached["time"]), accumulator, turning_points(accumulator, turns),
         {"steps": int(reached["steps"]), "rejected": 0, "events": int(reached["events"])},
     )  # fmt: skip
 

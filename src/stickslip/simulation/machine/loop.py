@@ -25,10 +25,10 @@ from stickslip.record import Record
 from stickslip.simulation._meter import (
     MAX_WINDOW,
     SIGNALS,
-    TURN_COUNT,
     close_standstill,
     meter,
     new_meter,
+    turning_points,
 )
 from stickslip.simulation.case_arrays import COLUMNS as OF_AXES
 from stickslip.simulation.case_arrays import UNITS as OF_AXES_UNITS
@@ -113,7 +113,7 @@ def simulate_machine(
         apart = np.abs(runs[0].rows[:, 3] - runs[1].rows[:, 3])
         meta["accuracy"] = {"error_rad": float(np.max(apart, initial=0.0))}
     if metered and runs[0].code == 0:
-        turns = runs[0].turns[: int(runs[0].meter[TURN_COUNT])]
+        turns = turning_points(runs[0].meter, runs[0].turns)
         meta["metrics"] = {k: float(v) for k, v in metrics(runs[0].meter, turns).items()}
     columns = np.ascontiguousarray(runs[0].rows.T)
     channels = {name: columns[i] for i, name in enumerate(COLUMNS) if name != "time"}

@@ -6,7 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from stickslip.jit import call_value, kernel, pointer, record_at
-from stickslip.simulation._meter import TURN_COUNT, close_standstill
+from stickslip.simulation._meter import close_standstill, meter_of
 from stickslip.simulation.exact.kernel import solve
 from stickslip.simulation.exact.state import AT_NOW, AT_SIDES, NOW, Laid, Output
 from stickslip.simulation.metrics import limit_cycle
@@ -78,4 +78,4 @@ def solve_all(laid: Laid, starts: Any, output: Output, found: Found, metered: bo
         ends[i, 0], ends[i, 1], ends[i, 2] = now.time, now.position, now.velocity
         if metered:
             close_standstill(accs[i], ends[i, 0])
-            cycles[i, 0], cycles[i, 1] = limit_cycle(turns[: int(accs[i, TURN_COUNT])], ends[i, 0])
+            cycles[i, 0], cycles[i, 1] = limit_cycle(turns[: meter_of(accs[i]).turn_count], ends[i, 0])

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.jit import call_profile, call_sample, kernel, pointer
-from stickslip.simulation._meter import TURN_COUNT, close_standstill, new_meter
+from stickslip.simulation._meter import close_standstill, new_meter, turning_points
 from stickslip.simulation.case_arrays import (
     COLUMNS,
     DIVERGED,
@@ -135,7 +135,7 @@ def run(case: Case) -> Outcome:
     )  # fmt: skip
     found = {name: int(state[0][name]) for name in ("steps", "rejected", "events")}
     return Outcome(
-        rows, int(code), float(clock[NOW]), accumulator, turns[: int(accumulator[TURN_COUNT])], found,
+        rows, int(code), float(clock[NOW]), accumulator, turning_points(accumulator, turns), found,
         control.sampled.state,
     )  # fmt: skip
 
