@@ -5,20 +5,35 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from stickslip.jit import call_holding, call_step, kernel
+import numpy as np
+
+from stickslip.jit import call_holding, call_step, kernel, record_at, spliced
 from stickslip.subset import Layout
 
-__all__ = ["GIVEN", "NUMBERS", "Plant", "load_of", "outer", "share"]
+__all__ = ["AXIS", "GIVEN", "NUMBERS", "Plant", "axis_of", "load_of", "outer", "share"]
 
 NUMBERS = Layout(("inertia", "loss", "holds"))
 """What the text of a step reads of the axis. loss is all damping: the back-EMF's and an observer's; holds is 1 where
 the contact's torque jumps at rest."""
-(
-    INERTIA, LOSS, HOLDS, OFFSET, GRAVITY, GRAVITY_ANGLE, DRIVE_GAIN, BACK_EMF, LOAD_MOTOR, LOAD_EXTERNAL, BACKLASH,
-    SCALED_BY_LOAD, PERIOD, HARMONICS, PUSH, FOURIER,
-) = range(16)  # fmt: skip
-# These are its first numbers. PUSH is a torque from outside that no gearing carries (an observer's).
-# From FOURIER on: for each harmonic the cosine's and sine's torque, then the cosine's and sine's share of friction.
+AXIS = np.dtype(
+    [
+        (name, np.float64) for name in (
+            *NUMBERS.scalars,
+            # Torque against positive motion, of a pendulum, N·m, which hangs at an angle, rad.
+            "offset", "gravity", "gravity_angle",
+            # Torque per unit of the drive's signal; N·m·s/rad lost in the drive; load per torque of drive and outside,
+            # 1/(N·m); rad; whether friction is scaled by the load.
+            "drive_gain", "back_emf", "load_motor", "load_external", "backlash", "scaled_by_load",
+            # rad after which torque and friction repeat, and how many harmonics they have.
+            "period", "harmonics",
+            # Torque from outside that no gearing carries (an observer's), N·m.
+            "push",
+        )
+    ]
+)  # fmt: skip
+"""All numbers of the axis, `Mechanics` in a record; for each harmonic follow the cosine's and sine's torque, then the
+cosine's and sine's share of friction."""
+FOURIER = len(AXIS.names or ())
 GIVEN = ("start", "tried", "go_on", "keep", "withheld", "outer")
 """What the text of a step calls; C has its own."""
 
@@ -85,12 +100,18 @@ def withheld(c: Plant, side: float) -> float:
 # ---- what its position makes ------------------------------------------------------------------------------
 
 
+@spliced
+def axis_of(n: Any) -> Any:
+    """The numbers of an axis by name."""
+    return record_at(n, AXIS)
+
+
 @kernel(inline=True)
 def harmonics(n: Any, q: float, first: int) -> float:
     """Sum of the Fourier series that starts at column `first` (0: torque, 2: share of friction)."""
-    total = 0.0
-    for i in range(int(n[HARMONICS])):
-        angle = 2.0 * math.pi * (i + 1) * q / n[PERIOD]
+    total, axis = 0.0, axis_of(n)
+    for i in range(int(axis.harmonics)):
+        angle = 2.0 * math.pi * (i + 1) * q / axis.period
         at = FOURIER + 4 * i + first
         total += n[at] * math.cos(angle) + n[at + 1] * math.sin(angle)
     return total
@@ -99,10 +120,11 @@ def harmonics(n: Any, q: float, first: int) -> float:
 @kernel(inline=True)
 def outer(n: Any, q: float) -> float:
     """Torque that position alone makes, opposing motion in the positive direction: gravity, offset, cogging."""
-    torque = n[OFFSET]
-    if n[GRAVITY] != 0.0:
-        torque += n[GRAVITY] * math.sin(q - n[GRAVITY_ANGLE])
-    if n[HARMONICS] > 0.0:
+    axis = axis_of(n)
+    torque = axis.offset
+    if axis.gravity != 0.0:
+        torque += axis.gravity * math.sin(q - axis.gravity_angle)
+    if axis.harmonics > 0.0:
         torque += harmonics(n, q, 0)
     return torque
 
@@ -110,13 +132,14 @@ def outer(n: Any, q: float) -> float:
 @kernel(inline=True)
 def share(n: Any, q: float) -> float:
     """Factor on friction from the position."""
-    return 1.0 + harmonics(n, q, 2) if n[HARMONICS] > 0.0 else 1.0
+    return 1.0 + harmonics(n, q, 2) if axis_of(n).harmonics > 0.0 else 1.0
 
 
 @kernel(inline=True)
 def load_of(n: Any, q: float, v: float, drive: float) -> float:
     """Load on the contact over the load at which its parameters hold: it grows with the torques that meet in it."""
-    if n[LOAD_MOTOR] == 0.0 and n[LOAD_EXTERNAL] == 0.0:
+    axis = axis_of(n)
+    if axis.load_motor == 0.0 and axis.load_external == 0.0:
         return 1.0
-    motor = drive - n[BACK_EMF] * v
-    return 1.0 + abs(n[LOAD_MOTOR] * motor + n[LOAD_EXTERNAL] * outer(n, q))
+    motor = drive - axis.back_emf * v
+    return 1.0 + abs(axis.load_motor * motor + axis.load_external * outer(n, q))

@@ -7,40 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.jit import kernel, pointer
-from stickslip.simulation.recorded_input.contact import (
-    BACK_EMF,
-    BACKLASH,
-    DRIVE_GAIN,
-    HOLDS,
-    INERTIA,
-    LOSS,
-    PUSH,
-    SCALED_BY_LOAD,
-    Plant,
-    load_of,
-    share,
+from stickslip.jit import kernel, pointer, record_at
+from stickslip.simulation.recorded_input.contact import load_of, share
+from stickslip.simulation.recorded_input.layout import (
+    DRIVE,
+    MEMORY,
+    MEMORY_SIZE,
+    Laid,
+    Run,
+    moved_at,
+    run_of,
+    sample_at,
 )
-from stickslip.simulation.recorded_input.step import LEAST, MOTION, ROUNDING, two_stages
-from stickslip.simulation.root import ROOT, compiled
+from stickslip.simulation.recorded_input.step import LEAST, ROUNDING, two_stages
+from stickslip.simulation.root import compiled
 
-# ---- the drive's numbers ----------------------------------------------------------------------------------
-(
-    KIND, KP, KI, KD, KR, SPAN, LIMIT, CONTROL_PERIOD, MAX_STEP, SPRING, RETURNS, SIGNAL_GAIN, START_POSITION,
-    START_VELOCITY, COUNT, SLACK, FORGETS, DRIVE,
-) = range(18)  # fmt: skip
-HELD, LINEAR, FEEDBACK = 0.0, 1.0, 2.0  # KIND
-SEARCH, MOVES = len(ROOT.scalars), len(MOTION.scalars)
-APPLIED = 4  # place in the surroundings
+HELD, LINEAR, FEEDBACK = 0.0, 1.0, 2.0
+"""Kinds of drive."""
 ready = compiled.ready
 SPEED_LIMIT = 1e9  # rad/s, beyond which a simulation has diverged
-
-# ---- columns of the signals and of the result -------------------------------------------------------------
-TIME, SIGNAL, SUPPLY, POSITION, DAMPING, GOAL, FIRM, SIGNALS = range(8)
-OUT_POSITION, OUT_VELOCITY, OUT_DRIVE, OUT_CORRECTION, OUTS = range(5)
-
-# ---- what a sampled controller remembers ------------------------------------------------------------------
-LAST, BEFORE_LAST, LAST_REFERENCE, ERROR_SUM, LAST_ERROR, STARTED, BEHIND, MEMORY = range(8)
 
 
 @kernel()
@@ -53,141 +38,148 @@ def limited(x: float, limit: float) -> float:
 def control(c: Any, m: Any, reference: float, position: float, dt: float) -> float:
     """One sample of the controller: its output in the drive's unit, within its limit.
 
-    The velocity is the difference over ``SPAN`` samples (2: of the mean of two neighbours, as in EMPS).
+    The velocity is the difference over ``span`` samples (2: of the mean of two neighbours, as in EMPS).
     """
     error = reference - position
-    if m[STARTED] == 0.0:
+    if m.started == 0.0:
         # Before the first sample axis and reference moved at the velocity of the begin.
-        m[LAST], m[BEFORE_LAST] = position - c[START_VELOCITY] * dt, position - 2.0 * c[START_VELOCITY] * dt
-        m[LAST_REFERENCE], m[LAST_ERROR], m[STARTED] = reference - c[START_VELOCITY] * dt, error, 1.0
-    if c[SPAN] == 2.0:
-        velocity = 0.5 * (position - m[BEFORE_LAST]) / dt
+        m.last, m.before_last = position - c.start_velocity * dt, position - 2.0 * c.start_velocity * dt
+        m.last_reference, m.last_error, m.started = reference - c.start_velocity * dt, error, 1.0
+    if c.span == 2.0:
+        velocity = 0.5 * (position - m.before_last) / dt
     else:
-        velocity = (position - m[LAST]) / dt
-    reference_rate = (reference - m[LAST_REFERENCE]) / dt
-    m[ERROR_SUM] += 0.5 * dt * (error + m[LAST_ERROR])
-    out = c[KP] * error + c[KI] * m[ERROR_SUM] + c[KR] * reference_rate - c[KD] * velocity
-    m[BEFORE_LAST], m[LAST] = m[LAST], position
-    m[LAST_REFERENCE], m[LAST_ERROR] = reference, error
-    return limited(c[SIGNAL_GAIN] * out, c[LIMIT])
+        velocity = (position - m.last) / dt
+    reference_rate = (reference - m.last_reference) / dt
+    m.error_sum += 0.5 * dt * (error + m.last_error)
+    out = c.kp * error + c.ki * m.error_sum + c.kr * reference_rate - c.kd * velocity
+    m.before_last, m.last = m.last, position
+    m.last_reference, m.last_error = reference, error
+    return limited(c.signal_gain * out, c.limit)
 
 
 @kernel()
-def seen(n: Any, last: float, position: float) -> float:
+def seen(axis: Any, last: float, position: float) -> float:
     """Position behind the backlash: it stays until the gap is used up."""
-    half = 0.5 * n[BACKLASH]
+    half = 0.5 * axis.backlash
     return min(max(last, position - half), position + half)
 
 
 @kernel()
 def counted(c: Any, position: float) -> float:
     """The position in whole counts of the encoder; exact where it has none."""
-    return c[COUNT] * math.floor(position / c[COUNT] + 0.5) if c[COUNT] > 0.0 else position
+    return c.count * math.floor(position / c.count + 0.5) if c.count > 0.0 else position
 
 
 @kernel()
 def beyond(c: Any, away: float) -> float:
     """How far the axis lies from where it was seen, beyond what the encoder leaves open."""
-    return away - limited(away, c[SLACK])
+    return away - limited(away, c.slack)
 
 
 @kernel()
-def command(c: Any, m: Any, signals: Any, k: int, y: float, dt: float) -> float:
+def command(c: Any, m: Any, signal: float, y: float, dt: float) -> float:
     """What the drive is told at a sample: the recorded signal, or the controller's answer to it."""
-    if c[KIND] == FEEDBACK:
-        return control(c, m, signals[k, SIGNAL], counted(c, y), dt)
-    return c[SIGNAL_GAIN] * signals[k, SIGNAL]
+    if c.kind == FEEDBACK:
+        return control(c, m, signal, counted(c, y), dt)
+    return c.signal_gain * signal
 
 
 @kernel()
-def slope(c: Any, signals: Any, k: int, dt: float) -> float:
+def slope(run: Run, k: int, dt: float) -> float:
     """Slope of a recorded signal that runs linearly from sample to sample; 0 for one that is held."""
-    if c[KIND] != LINEAR:
+    c = run.drive
+    if c.kind != LINEAR:
         return 0.0
-    return c[SIGNAL_GAIN] * (signals[k + 1, SIGNAL] - signals[k, SIGNAL]) / dt
+    return c.signal_gain * (sample_at(run.signals, k + 1).signal - sample_at(run.signals, k).signal) / dt
 
 
 @kernel(inline=True)
-def advance(c: Plant, drive: float, rate: float, h: float) -> None:
+def advance(run: Run, drive: float, rate: float, h: float) -> None:
     """Move the axis on by h under the torque of the drive at standstill, `drive` at the begin and rising at `rate`."""
-    n, q, u = c.numbers, c.motion[0], c.surroundings
-    u[0], u[1], u[APPLIED] = q, load_of(n, q, c.motion[1], drive), drive + n[PUSH]
-    factor = share(n, q) * (u[1] if n[SCALED_BY_LOAD] != 0.0 else 1.0)
-    two_stages(c, n, c.motion, c.first, c.second, u[APPLIED], rate, h, factor)
+    plant, axis, around = run.plant, run.axis, run.around
+    n, q = plant.numbers, run.moving.position
+    around.position, around.load = q, load_of(n, q, run.moving.velocity, drive)
+    around.applied = drive + axis.push
+    factor = share(n, q) * (around.load if axis.scaled_by_load != 0.0 else 1.0)
+    two_stages(plant, n, plant.motion, plant.first, plant.second, around.applied, rate, h, factor)
 
 
 @kernel()
-def follow(
-    numbers: Any, step: int, holding: int, parameters: Any, surroundings: Any, start: Any, c: Any, signals: Any,
-    disturbance: Any, out: Any,
-) -> int:  # fmt: skip
-    """Simulate over the record's times; returns how many rows of `out` were reached with finite numbers."""
-    n = numbers
-    states, trial, base = start.copy(), start.copy(), start.copy()
-    searches, state, m = np.zeros((2, SEARCH)), np.zeros(MOVES), np.zeros(MEMORY)
-    n[HOLDS] = 1.0 if holding != 0 else 0.0
-    plant = Plant(
-        step, holding, pointer(parameters, 0), pointer(surroundings, 0), pointer(states, 0), pointer(base, 0),
-        pointer(trial, 0), start.size, pointer(numbers, 0), pointer(state, 0), pointer(searches, 0),
-        pointer(searches, SEARCH),
-    )  # fmt: skip
-    ready(plant.first, n[INERTIA], ROUNDING, LEAST, 1.0 - n[HOLDS])
-    ready(plant.second, n[INERTIA], ROUNDING, LEAST, 1.0 - n[HOLDS])
-    state[0], state[1] = c[START_POSITION], c[START_VELOCITY]
-    y = state[0]
-    rows = signals.shape[0]
-    loss = n[BACK_EMF]
+def between(run: Run, k: int, y: float, dt: float, kept: float, damping: float, ends: bool) -> float:
+    """Move the axis from a sample to the next one unless the record `ends`; returns its position behind the backlash.
+
+    `kept` is the damper's torque from the sample before.
+    """
+    axis, c, here, moved = run.axis, run.drive, sample_at(run.signals, k), moved_at(run.out, k)
+    acts = 1
+    if c.kind == FEEDBACK and c.control_period > 0.0:
+        acts = max(1, int(dt / c.control_period + 0.5))
+    substeps = max(1, math.ceil(dt / acts / c.max_step - 1e-9))
+    h = dt / acts / substeps
+    for act in range(acts):
+        u = command(c, run.memory, here.signal, y, dt / acts)
+        push = 0.0 if here.firm != 0.0 else kept + c.spring * beyond(c, here.position - y)
+        if act == 0:
+            moved.drive, moved.correction = u, push
+        if ends:
+            break
+        rate = slope(run, k, dt)
+        gain = axis.drive_gain * here.supply
+        axis.push = push + damping * here.goal + run.disturbance[k]
+        for i in range(substeps):
+            advance(run, gain * (u + rate * h * i), gain * rate, h)
+            y = seen(axis, y, run.moving.position)
+    return y
+
+
+@kernel()
+def follow(laid: Laid) -> int:
+    """Simulate over the record's times; returns how many rows of ``out`` were reached with finite numbers."""
+    run = run_of(laid)
+    axis, c, m, moving = run.axis, run.drive, run.memory, run.moving
+    axis.holds = 1.0 if laid.holding != 0 else 0.0
+    ready(run.plant.first, axis.inertia, ROUNDING, LEAST, 1.0 - axis.holds)
+    ready(run.plant.second, axis.inertia, ROUNDING, LEAST, 1.0 - axis.holds)
+    moving.position, moving.velocity = c.start_position, c.start_velocity
+    y = moving.position
+    rows = laid.signals.shape[0]
+    loss = axis.back_emf
     for k in range(rows):
+        here, moved = sample_at(run.signals, k), moved_at(run.out, k)
         # Without supply the winding is open: no current flows, so nothing is lost to it.
-        goal, firm = signals[k, GOAL], signals[k, FIRM] != 0.0
+        goal, firm = here.goal, here.firm != 0.0
         # Behind a low-pass, the damper is what it remembers and a damper on the velocity that the step solves for.
-        forgets = 1.0 if firm else c[FORGETS]
-        damping, kept = forgets * signals[k, DAMPING], (1.0 - forgets) * signals[k, DAMPING] * m[BEHIND]
-        if n[BACKLASH] > 0.0:
+        forgets = 1.0 if firm else c.forgets
+        damping, kept = forgets * here.damping, (1.0 - forgets) * here.damping * m.behind
+        if axis.backlash > 0.0:
             # What is measured lies behind the play: its velocity is no goal of the step, and is damped a sample later.
-            damping, kept = 0.0, signals[k, DAMPING] * m[BEHIND]
-        n[BACK_EMF] = loss if signals[k, SUPPLY] != 0.0 else 0.0
-        n[LOSS] = n[BACK_EMF] + damping
-        out[k, OUT_POSITION], out[k, OUT_VELOCITY] = y, state[1]
+            damping, kept = 0.0, here.damping * m.behind
+        axis.back_emf = loss if here.supply != 0.0 else 0.0
+        axis.loss = axis.back_emf + damping
+        moved.position, moved.velocity = y, moving.velocity
         before = min(k, rows - 2)
-        dt = signals[before + 1, TIME] - signals[before, TIME]
-        acts = 1
-        if c[KIND] == FEEDBACK and c[CONTROL_PERIOD] > 0.0:
-            acts = max(1, int(dt / c[CONTROL_PERIOD] + 0.5))
-        substeps = max(1, math.ceil(dt / acts / c[MAX_STEP] - 1e-9))
-        h = dt / acts / substeps
-        first = y if n[BACKLASH] > 0.0 else state[0]
-        pulled = 0.0
-        for act in range(acts):
-            u = command(c, m, signals, k, y, dt / acts)
-            push = 0.0 if firm else kept + c[SPRING] * beyond(c, signals[k, POSITION] - y)
-            if act == 0:
-                out[k, OUT_DRIVE], pulled = u, push
-            if k == rows - 1:
-                break
-            rate = slope(c, signals, k, dt)
-            gain = n[DRIVE_GAIN] * signals[k, SUPPLY]
-            n[PUSH] = push + damping * goal + disturbance[k]
-            for i in range(substeps):
-                advance(plant, gain * (u + rate * h * i), gain * rate, h)
-                y = seen(n, y, state[0])
-        moved = (y if n[BACKLASH] > 0.0 else state[0]) - first if k < rows - 1 else goal * dt
-        out[k, OUT_CORRECTION] = pulled + damping * (goal - moved / dt)
-        m[BEHIND] += c[FORGETS] * (goal - moved / dt - m[BEHIND])
+        dt = sample_at(run.signals, before + 1).time - sample_at(run.signals, before).time
+        first = y if axis.backlash > 0.0 else moving.position
+        y = between(run, k, y, dt, kept, damping, k == rows - 1)
+        way = (y if axis.backlash > 0.0 else moving.position) - first if k < rows - 1 else goal * dt
+        moved.correction += damping * (goal - way / dt)
+        m.behind += c.forgets * (goal - way / dt - m.behind)
         if firm and k < rows - 1:
-            state[0] += min(dt * c[RETURNS], 1.0) * beyond(c, signals[k + 1, POSITION] - state[0])
-            y = seen(n, y, state[0])
-        if not (math.isfinite(state[0]) and abs(state[1]) < SPEED_LIMIT):
+            seen_next = sample_at(run.signals, k + 1).position
+            moving.position += min(dt * c.returns, 1.0) * beyond(c, seen_next - moving.position)
+            y = seen(axis, y, moving.position)
+        if not (math.isfinite(moving.position) and abs(moving.velocity) < SPEED_LIMIT):
             return k + 1
-    # The arrays are used here so that they outlive their addresses.
-    return rows if states.size + trial.size + base.size + searches.size + state.size >= 0 else 0
+    return rows
 
 
 @kernel()
-def respond(c: Any, signals: Any, out: Any) -> None:
+def respond(drive: Any, signals: Any, out: Any) -> None:
     """What the controller makes of a recorded position, sample by sample."""
-    m = np.zeros(MEMORY)
-    for k in range(signals.shape[0]):
-        before = min(k, signals.shape[0] - 2)
-        dt = signals[before + 1, TIME] - signals[before, TIME]
-        out[k] = command(c, m, signals, k, signals[k, POSITION], dt)
+    c, memory, record = record_at(pointer(drive, 0), DRIVE), np.zeros(MEMORY_SIZE), pointer(signals, 0)
+    m = record_at(pointer(memory, 0), MEMORY)
+    for k in range(out.size):
+        before = min(k, out.size - 2)
+        dt = sample_at(record, before + 1).time - sample_at(record, before).time
+        out[k] = command(c, m, sample_at(record, k).signal, sample_at(record, k).position, dt)
+    memory[0] = 0.0  # So long it is needed: an array is freed after its last use, whatever points into it.

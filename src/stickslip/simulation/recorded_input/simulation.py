@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 import functools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,8 +20,9 @@ import numpy as np
 from stickslip.errors import InputError, ParameterError, UnknownName
 from stickslip.jit import compiled_law, flat
 from stickslip.model import Model
-from stickslip.simulation.recorded_input import contact as plant
-from stickslip.simulation.recorded_input import loop as loop
+from stickslip.simulation.recorded_input import loop
+from stickslip.simulation.recorded_input.contact import AXIS
+from stickslip.simulation.recorded_input.layout import DRIVE, MOVED, SAMPLE, laid_out
 from stickslip.spec import Law, Surroundings
 from stickslip.subset import law_layouts, lower
 
@@ -28,8 +30,15 @@ __all__ = ["COLUMNS", "Course", "Drive", "Harmonics", "Loop", "Mechanics", "cont
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-COLUMNS = ("position", "velocity", "drive", "correction")
+COLUMNS = MOVED.names or ()
+WHILE_IT_RUNS = {"loss": 0.0, "holds": 0.0, "push": 0.0}
+"""Numbers of the axis that the kernel sets."""
 KINDS = {"held": loop.HELD, "linear": loop.LINEAR, "feedback": loop.FEEDBACK}
+
+
+def packed(kind: np.dtype[Any], values: Mapping[str, Any]) -> Array:
+    """A record of numbers as an array."""
+    return np.array([values[name] for name in kind.names or ()], dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -75,16 +84,13 @@ class Mechanics:
     harmonics: Harmonics = field(default_factory=Harmonics)
 
     def numbers(self, scaled_by_load: bool) -> Array:
-        """Laid out for the kernel."""
-        n = np.zeros(plant.FOURIER)
-        n[plant.INERTIA], n[plant.OFFSET] = self.inertia, self.offset
-        n[plant.GRAVITY], n[plant.GRAVITY_ANGLE] = self.gravity, self.gravity_angle
-        n[plant.DRIVE_GAIN], n[plant.BACK_EMF] = self.drive_gain, self.back_emf
-        n[plant.LOAD_MOTOR], n[plant.LOAD_EXTERNAL] = self.load_motor, self.load_external
-        n[plant.BACKLASH], n[plant.SCALED_BY_LOAD] = self.backlash, float(scaled_by_load)
+        """Laid out for the kernel: an `AXIS` and its harmonics."""
         series = self.harmonics
         count = max(len(series.torque), len(series.friction))
-        n[plant.PERIOD], n[plant.HARMONICS] = series.period, count
+        given = vars(self) | {"scaled_by_load": scaled_by_load, "period": series.period, "harmonics": count}
+        n = packed(AXIS, given | WHILE_IT_RUNS)
+        if count == 0:
+            return n
         coefficients = np.zeros((count, 4))
         coefficients[: len(series.torque), :2] = np.array(series.torque).reshape(-1, 2)
         coefficients[: len(series.friction), 2:] = np.array(series.friction).reshape(-1, 2)
@@ -188,29 +194,23 @@ class Drive:
             raise ParameterError(f"drive: max_step = {self.max_step:g} s must be greater than 0")
 
     def signals(self) -> Array:
-        """Columns that the kernel reads."""
-        s = np.zeros((self.time.size, loop.SIGNALS))
-        s[:, loop.TIME], s[:, loop.SIGNAL] = self.time, self.signal
-        s[:, loop.SUPPLY] = 1.0 if self.supply is None else self.supply
-        observer = {
-            loop.POSITION: self.position, loop.DAMPING: self.damping, loop.GOAL: self.goal, loop.FIRM: self.firm
-        }  # fmt: skip
-        for column, values in observer.items():
-            s[:, column] = 0.0 if values is None else values
-        return s
+        """Rows that the kernel reads (`SAMPLE`), shape (n, numbers)."""
+        s = np.zeros(self.time.size, SAMPLE)
+        s["time"], s["signal"] = self.time, self.signal
+        s["supply"] = 1.0 if self.supply is None else self.supply
+        for name in ("position", "damping", "goal", "firm"):
+            values = getattr(self, name)
+            s[name] = 0.0 if values is None else values
+        return s.view(np.float64).reshape(self.time.size, -1)
 
     def numbers(self) -> Array:
-        """Scalars that the kernel reads."""
-        c = np.zeros(loop.DRIVE)
+        """Scalars that the kernel reads, a `DRIVE`."""
         k = self.controller or Loop()
-        c[loop.KIND], c[loop.SIGNAL_GAIN], c[loop.MAX_STEP] = KINDS[self.kind], self.gain, self.max_step
-        c[[loop.KP, loop.KI, loop.KD, loop.KR]] = k.kp, k.ki, k.kd, k.kr
-        c[loop.SPAN], c[loop.LIMIT], c[loop.CONTROL_PERIOD] = k.velocity_span, k.limit, k.period
-        c[loop.COUNT] = k.count
-        c[loop.SPRING], c[loop.FORGETS] = self.spring, self.forgets
-        c[loop.RETURNS], c[loop.SLACK] = self.returns, self.slack
-        c[loop.START_POSITION], c[loop.START_VELOCITY] = self.start
-        return c
+        given = vars(k) | vars(self) | {
+            "kind": KINDS[self.kind], "signal_gain": self.gain, "span": k.velocity_span, "control_period": k.period,
+            "start_position": self.start[0], "start_velocity": self.start[1],
+        }  # fmt: skip
+        return packed(DRIVE, given)
 
 
 class Course:
@@ -220,7 +220,9 @@ class Course:
         self.law = law
         self.drive = drive
         self._numbers = drive.numbers()
-        self._disturbance = np.zeros(drive.time.size) if drive.disturbance is None else drive.disturbance
+        self._disturbance = flat(
+            np.zeros(drive.time.size) if drive.disturbance is None else drive.disturbance
+        )
         self.scaled_by_load = not reads_load(law)
         self._last: tuple[Any, Array] | None = None
 
@@ -251,19 +253,19 @@ class Course:
     def _run(
         self, mechanics: Mechanics, parameters: Any, gain: float | None, start: tuple[float, float] | None
     ) -> Array:
-        c = self._numbers.copy()
+        numbers = self._numbers.copy()
+        c = numbers.view(DRIVE)[0]
         if gain is not None:
-            c[loop.SIGNAL_GAIN] = gain
+            c["signal_gain"] = gain
         if start is not None:
-            c[loop.START_POSITION], c[loop.START_VELOCITY] = start
-        out = np.full((self.drive.time.size, loop.OUTS), np.nan)
-        pointers = compiled_law(self.law)
-        loop.follow(
-            mechanics.numbers(self.scaled_by_load), pointers.step, pointers.holding, flat(self.law.pack(parameters)),
-            np.array(Surroundings()), flat(self.law.pack_state(self.law.state(parameters))), c, self._signals,
-            self._disturbance, out,
+            c["start_position"], c["start_velocity"] = start
+        state = flat(self.law.pack_state(self.law.state(parameters)))
+        laid = laid_out(
+            mechanics.numbers(self.scaled_by_load), numbers, flat(self.law.pack(parameters)), state,
+            compiled_law(self.law), self._signals, self._disturbance,
         )  # fmt: skip
-        return out
+        loop.follow(laid)
+        return laid.out
 
 
 @functools.cache

@@ -15,13 +15,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from stickslip.jit import compiled_kernels
 from stickslip.simulation.recorded_input import contact
 from stickslip.simulation.recorded_input.contact import NUMBERS, go_on, keep, outer, start, tried, withheld
 from stickslip.simulation.root import MOST, ROOT, begin, begin_beyond, improve
 from stickslip.subset import Layout
 
-__all__ = ["GAMMA", "LAYOUTS", "LEAST", "MOTION", "ROUNDING", "step_on", "two_stages"]
+__all__ = ["GAMMA", "LAYOUTS", "LEAST", "MOTION", "MOVING", "ROUNDING", "step_on", "two_stages"]
 
 GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
 REST = 1.0 - GAMMA
@@ -30,6 +32,8 @@ ROUNDING = 1e-11
 LEAST = 1e-2
 MOTION = Layout(("position", "velocity", "middle"))
 """The axis's motion; middle is the velocity of the step's first stage."""
+MOVING = np.dtype([(name, np.float64) for name in MOTION.scalars])
+"""The same as a record."""
 LAYOUTS = {"n": NUMBERS, "a": MOTION, "r": ROOT, "first": ROOT, "second": ROOT}
 
 

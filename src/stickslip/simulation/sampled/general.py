@@ -14,8 +14,7 @@ import numpy as np
 
 from stickslip.jit import call_holding, call_step, kernel, pointer
 from stickslip.simulation.case_arrays import INERTIA, PLANT_BAND, Case, surroundings
-from stickslip.simulation.recorded_input import contact as driven
-from stickslip.simulation.recorded_input.contact import Plant, keep
+from stickslip.simulation.recorded_input.contact import AXIS, Plant, axis_of, keep
 from stickslip.simulation.recorded_input.step import GAMMA, LEAST, MOTION, ROUNDING, two_stages
 from stickslip.simulation.root import ROOT, compiled
 from stickslip.simulation.sampled.rates import HOLDS, STEPS
@@ -56,13 +55,12 @@ class Contact(NamedTuple):
 def contact_of(case: Case) -> Contact:
     """The plant's law, at rest."""
     n, side = case.numbers, case.plant
-    numbers = np.zeros(driven.FOURIER)
-    numbers[driven.INERTIA] = n[INERTIA]
-    numbers[driven.HOLDS] = float(side.pointers.holding != 0)
+    numbers = np.zeros(1, AXIS)
+    numbers["inertia"], numbers["holds"] = n[INERTIA], side.pointers.holding != 0
     states = side.state.size
     return Contact(
-        side.pointers.step, side.pointers.holding, float(n[PLANT_BAND]), numbers, side.parameters, surroundings(n),
-        side.state.copy(), np.zeros(states), np.zeros(states), np.zeros(states), np.zeros(MOVES),
+        side.pointers.step, side.pointers.holding, float(n[PLANT_BAND]), numbers.view(np.float64), side.parameters,
+        surroundings(n), side.state.copy(), np.zeros(states), np.zeros(states), np.zeros(states), np.zeros(MOVES),
         np.zeros((2, SEARCH)),
     )  # fmt: skip
 
@@ -75,9 +73,9 @@ def plant_of(c: Contact) -> Plant:
         pointer(c.trial, 0), c.state.size, pointer(c.numbers, 0), pointer(c.motion, 0), pointer(c.searches, 0),
         pointer(c.searches, SEARCH),
     )  # fmt: skip
-    sharp = 1.0 - plant.numbers[driven.HOLDS]
-    ready(plant.first, plant.numbers[driven.INERTIA], ROUNDING, LEAST, sharp)
-    ready(plant.second, plant.numbers[driven.INERTIA], ROUNDING, LEAST, sharp)
+    inertia, sharp = axis_of(plant.numbers).inertia, 1.0 - axis_of(plant.numbers).holds
+    ready(plant.first, inertia, ROUNDING, LEAST, sharp)
+    ready(plant.second, inertia, ROUNDING, LEAST, sharp)
     return plant
 
 
