@@ -8,9 +8,9 @@ Nothing is stepped over: break-aways and reversals are located on the exact flow
 position per step, rad.
 
 A law is taken as `Elements` or as a `Bristle` (LuGre, Dahl). `exact.flow` the flow, `exact.state` what is remembered,
-`exact.forces` torques, `exact.step` one step, `exact.segment` the motion inside it, `exact.bristle` bristles and
-curves, `exact.event_functions` what ends a mode, `exact.events` where, `exact.stiction` rest, `exact.output` rows,
-`exact.transition` what changes at an event, `exact.kernel` the loop, `_forcing` feedforward.
+`exact.forces` torques, `exact.step` one step, `exact.segment` the motion inside it, `exact.events` what ends a mode and
+where, `exact.transition` what changes there, and rest, `exact.output` rows, `exact.kernel` the loop; `exact.metering`,
+`exact.window`, `exact.scan` and `exact.ringing` hand the motion to the meter. `_forcing` feedforward.
 """
 
 from __future__ import annotations

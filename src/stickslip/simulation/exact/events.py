@@ -1,8 +1,10 @@
 """Events of the exact integrator: where an element breaks away, where the velocity passes through zero.
 
-An event function is a number that rises to zero where a mode ends; `trigger` is the largest of them. Events are
-located on the exact flow. Looked for at the middle and the end of a segment, on both sides of a reversal, and where
-the velocity dips through zero between them (a grazing reversal).
+An event function is a number that rises to zero where a mode ends; `trigger` is the largest of them. It jumps where
+the velocity changes its sign, for the load of a sticking element is counted along the motion. Events are located on
+the exact flow. Looked for at the middle and the end of a segment, on both sides of a reversal, where a limit that rises
+with the velocity (F_S below F_C) may be passed for a moment that no step would see, and where the velocity dips through
+zero between them (a grazing reversal).
 """
 
 from __future__ import annotations
@@ -11,34 +13,193 @@ import math
 from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
-from stickslip.simulation.exact.event_functions import (
-    BARELY,
-    NOISE,
-    STILL,
-    load_of,
-    looks,
-    pass_on,
-    passes_turn,
-    stays,
-    trigger,
-    trigger_at_node,
-    weigh,
-)
 from stickslip.simulation.exact.flow import UNMOVED, Linear, acceleration, flow, free_motion, moved
 from stickslip.simulation.exact.forces import sliding
 from stickslip.simulation.exact.segment import cubic_of, state_at
-from stickslip.simulation.exact.state import BENDS, RELAXES, Loop, element_of, side_of, sides_of
-from stickslip.simulation.exact.stiction import NONE, set_off
+from stickslip.simulation.exact.state import Loop, element_of, side_of, sides_of
 
+NONE = -1.0
+NOISE = 1e-12
+"""Velocities this small (rad/s) may be rounding errors of one that creeps to zero: no reversal yet."""
+BARELY = 1e-12
+"""Velocity that stands for a side of zero, rad/s."""
+STILL = 1e-9
+"""An axis whose velocity changes by less than this between two nodes (rad/s) rests, whatever sign rounding gives it."""
+LOOK, MOST_LOOKS, LOOKS_AT_TURN = 0.1, 16.0, 8
+"""Where an event may hide between two nodes, it is looked for at every such change of velocity, in parts of v_s,
+so often at most, and so often where the velocity turns."""
+VELOCITY_WEIGHT = 10.0
+"""N·m per rad/s: puts a reversal on the scale of a break-away."""
 NEAR = 1e-3
 """N·m: a guess of how far the event function is below zero."""
-ROUNDING = 1e-10
-"""N·m by which a load may seem to miss the limit that it was located at."""
-ON_EDGE = 1e-6
-"""Velocities this near the edge of a steep layer, in parts of it, are on it."""
 MOST_DIPS, MOST_HALVINGS = 6, 60
 SIMULTANEOUS = 1e-14
 """Times that count as one, s."""
+
+
+@kernel(exact=False)
+def load_of(literal: bool, direction: float, force: float) -> float:
+    """The load that the slip rule compares (`stickslip.laws.slip_rule`)."""
+    return abs(force) if literal else direction * force
+
+
+@kernel(exact=False, inline=True)
+def heaviest(loop: Loop, side: Any, theta: float, v: float) -> float:
+    """Largest load per share among a side's sticking elements, N·m."""
+    top = -1e300
+    direction = 1.0 if v >= 0.0 else -1.0
+    for i in range(side.first, side.first + side.sticking):
+        e = element_of(loop, i)
+        load = load_of(side.literal != 0, direction, e.load_at_0 + e.load_slope * theta)
+        if load > top:
+            top = load
+    return top
+
+
+@kernel(exact=False, inline=True)
+def mode_ends(now: Any, side: Any, i: int, v: float) -> float:
+    """How far the velocity is beyond where it ends a mode: at a reversal, or at the edge of a steep layer."""
+    g = -1e9
+    if i == 0 and now.watched != 0:
+        g = -VELOCITY_WEIGHT * (now.sigma * v - now.narrow + NOISE)
+    if side.inside != 0:
+        g = max(g, VELOCITY_WEIGHT * (abs(v) - side.layer))
+    return g
+
+
+@kernel(exact=False, inline=True)
+def beyond_limit(loop: Loop, side: Any, top: float, v: float) -> float:
+    """How far a side's largest load is beyond the limit; the curve is asked for where its least level is in reach."""
+    limit = side.lowest
+    if top > limit:
+        # At rest, rounding would ask for the curve at ever other velocities.
+        limit = sliding(loop, side, v if abs(v) > BARELY else math.copysign(BARELY, v))
+    return top - limit
+
+
+@kernel(exact=False, inline=True)
+def trigger(loop: Loop, theta: float, v: float) -> float:
+    """The largest event function at a state: not negative where a mode ends."""
+    g = -1e9
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        g = max(g, mode_ends(loop.now, side, i, v))
+        if side.sticking != 0:
+            top = heaviest(loop, side, theta, v)
+            g = max(g, beyond_limit(loop, side, top, v))
+    return g
+
+
+@kernel(exact=False, inline=True)
+def trigger_at_node(loop: Loop, v: float) -> float:
+    """`trigger` at the next node, which is weighed."""
+    g = -1e9
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        g = max(g, mode_ends(loop.now, side, i, v))
+        if side.sticking != 0:
+            g = max(g, beyond_limit(loop, side, side.top_next, v))
+    return g
+
+
+@kernel(exact=False, inline=True)
+def stays(loop: Loop, v: float) -> bool:
+    """Whether the loads at the next node are within the limit at v: up to there, while the motion slows down."""
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        if side.sticking != 0 and beyond_limit(loop, side, side.top_next, v) >= 0.0:
+            return False
+    return True
+
+
+@kernel(exact=False, inline=True)
+def weigh(loop: Loop, theta: float, v: float) -> bool:
+    """Note each side's largest load at the next node; returns whether one is near its limit there or here."""
+    near = False
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        if side.sticking != 0:
+            top = heaviest(loop, side, theta, v)
+            side.top_next = top
+            near = near or max(top, side.top) > side.lowest
+    return near
+
+
+@kernel(exact=False, inline=True)
+def pass_on(loop: Loop) -> None:
+    """Stand at the next node."""
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        side.top = side.top_next
+
+
+@kernel(exact=False, inline=True)
+def weigh_here(loop: Loop) -> None:
+    """Note each side's largest load where the loop stands."""
+    now = loop.now
+    weigh(loop, now.position, now.velocity)
+    pass_on(loop)
+
+
+@kernel(exact=False, inline=True)
+def farthest(width: float, theta0: float, v0: float, theta1: float, v1: float) -> float:
+    """A position beyond which a motion that turns within `width` does not go."""
+    beyond = 0.5 * abs(theta1 - theta0) + 0.25 * width * abs(v1 - v0)
+    return theta0 + 0.5 * (theta1 - theta0) + math.copysign(beyond, v0)
+
+
+@kernel(exact=False, inline=True)
+def passes_turn(loop: Loop, width: float, theta0: float, v0: float, theta1: float, v1: float) -> bool:
+    """Whether a sticking element may be loaded beyond its limit where the velocity passes zero; ends are given."""
+    peak = farthest(width, theta0, v0, theta1, v1)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        if side.sticking != 0:
+            before = heaviest(loop, side, peak, v0)
+            after = heaviest(loop, side, theta1, v1)
+            lowest = side.lowest
+            if before > lowest and before > sliding(loop, side, math.copysign(BARELY, v0)):
+                return True
+            if after > lowest and after > sliding(loop, side, math.copysign(BARELY, v1)):
+                return True
+    return False
+
+
+@kernel(exact=False, inline=True)
+def looks(
+    loop: Loop, width: float, theta0: float, v0: float, a0: float, theta1: float, v1: float, a1: float
+) -> int:
+    """Number of parts of a segment at whose ends events are looked for; the segment's ends are given, and weighed.
+
+    The load of a sticking element near its limit can cross it up and down between two nodes, since s(v) varies
+    over v_s. Not where the motion speeds up all along: there the event function rises with the load.
+    """
+    jump = abs(v1 - v0)
+    # A smooth velocity leaves its chord by less than this, and the range of its ends by even less.
+    mean = (v1 - v0) / width
+    bulge = 0.5 * width * (abs(a0 - mean) + abs(a1 - mean))
+    fastest = max(abs(v0), abs(v1)) + min(jump, bulge)
+    rises = v0 * v1 >= 0.0 and a0 * v1 > 0.0 and a1 * v1 > 0.0
+    parts = 1
+    peak = farthest(width, theta0, v0, theta1, v1)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        if side.sticking == 0:
+            continue
+        lowest = side.lowest
+        if jump > STILL and v0 * v1 < 0.0 and heaviest(loop, side, peak, v0) > lowest:
+            parts = LOOKS_AT_TURN
+        seen = LOOK * side.scale
+        if jump > seen > 0.0:
+            top0 = side.top
+            top1 = side.top_next
+            top = max(top0, top1)
+            if top > lowest and not (rises and top0 <= top1):
+                lowest = sliding(loop, side, fastest)
+                lowest = min(lowest, sliding(loop, side, -fastest))
+                if top > lowest:
+                    parts = max(parts, int(min(jump / seen, MOST_LOOKS)) + 1)
+    return parts
 
 
 class Node(NamedTuple):
@@ -228,96 +389,3 @@ def at_turn(
     segment.position_event = theta
     segment.velocity_event = -before
     return x
-
-
-@kernel(exact=False, inline=True)
-def add_exponents(loop: Loop, h: float, x: float) -> None:
-    """Add the decay C int 1/s dt of slipping elements over the first x of a segment of length h."""
-    f = x / h
-    for i in range(sides_of(loop)):
-        side = side_of(loop, i)
-        if side.slipping > 0.0 and side.kind == RELAXES:
-            attraction = side.attraction
-            q0 = side.decay
-            bend = 2.0 * (q0 + side.decay_end) - 4.0 * side.decay_mid
-            slope = side.decay_end - q0 - bend
-            side.exponent += attraction * x * (q0 + f * (0.5 * slope + f * bend / 3.0))
-
-
-@kernel(exact=False, inline=True)
-def settle_forces(loop: Loop) -> None:
-    """Write every element's force where the loop stands, before modes change."""
-    now = loop.now
-    for i in range(sides_of(loop)):
-        side = side_of(loop, i)
-        if side.kind == BENDS:
-            side.force = side.force_now
-            continue
-        decay = math.exp(-side.exponent)
-        moves = side.kind == RELAXES
-        s = 0.0 if moves else sliding(loop, side, now.velocity)
-        for j in range(side.first, side.last):
-            e = element_of(loop, j)
-            if e.slips == 0:
-                e.force = e.offset + e.stiffness * now.position
-            elif moves:
-                part = e.share / side.slipping
-                gained = side.force_now - decay * side.force_start
-                e.force = decay * e.force + part * gained
-            else:
-                e.force = e.share * now.sigma * s
-
-
-@kernel(exact=False, inline=True)
-def switch(loop: Loop) -> None:
-    """Change the modes that end here: stick at a reversal, slip where the limit is reached."""
-    now = loop.now
-    v = now.velocity
-    settle_forces(loop)
-    for i in range(sides_of(loop)):
-        side = side_of(loop, i)
-        enter_or_leave(loop, side, v)
-    if now.watched != 0 and now.sigma * v <= 1e-9 * abs(v):
-        for i in range(loop.plan.elements):
-            element_of(loop, i).slips = 0
-        if now.sigma * v > 0.0:
-            now.velocity = 0.0
-        if not set_off(loop):
-            now.sigma = -now.sigma
-        # Where the curve rises with the velocity, what stuck before may be loaded beyond it in the new direction.
-        if now.sigma != 0.0:
-            v = now.sigma * max(now.sigma * now.velocity, BARELY)
-            break_away(loop, v, now.sigma)
-        return
-    break_away(loop, v, 1.0 if v >= 0.0 else -1.0)
-
-
-@kernel(exact=False, inline=True)
-def break_away(loop: Loop, v: float, direction: float) -> None:
-    """Let the sticking elements slip whose load in `direction` is at its limit."""
-    for i in range(sides_of(loop)):
-        side = side_of(loop, i)
-        if side.first == side.last:
-            continue
-        s = sliding(loop, side, v)
-        for j in range(side.first, side.last):
-            e = element_of(loop, j)
-            load = load_of(side.literal != 0, direction, e.force)
-            if e.slips == 0 and load >= e.share * s - ROUNDING:
-                e.slips = 1
-                loop.now.sigma = direction
-
-
-@kernel(exact=False)
-def enter_or_leave(loop: Loop, side: Any, v: float) -> None:
-    """Pass the edge of a steep layer if the axis stands there."""
-    now = loop.now
-    edge = side.layer
-    if edge == 0.0:
-        return
-    if side.inside != 0:
-        if abs(v) >= (1.0 - ON_EDGE) * edge:
-            side.inside = 0
-            now.sigma = 1.0 if v > 0.0 else -1.0
-    elif now.sigma * v <= (1.0 + ON_EDGE) * edge:
-        side.inside = 1

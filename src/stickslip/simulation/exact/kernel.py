@@ -23,19 +23,15 @@ from stickslip.simulation.case_arrays import (
     TOO_STIFF,
     VELOCITY_LIMIT,
 )
-from stickslip.simulation.exact.bristle import bend
-from stickslip.simulation.exact.event_functions import weigh_here
-from stickslip.simulation.exact.events import find
+from stickslip.simulation.exact.events import find, weigh_here
 from stickslip.simulation.exact.flow import Linear, kept_flow
-from stickslip.simulation.exact.forces import arrange
+from stickslip.simulation.exact.forces import arrange, bend
 from stickslip.simulation.exact.metering import measure
 from stickslip.simulation.exact.output import row_after, write_grid, write_rows
-from stickslip.simulation.exact.perturbation import perturbation
 from stickslip.simulation.exact.segment import shows
 from stickslip.simulation.exact.state import CUT, DEEPEST, EDGE, Laid, Loop, Output, kept_of, loop_of
 from stickslip.simulation.exact.step import NOT_CONVERGED, correct, look_ahead
-from stickslip.simulation.exact.stiction import rest
-from stickslip.simulation.exact.transition import cross, finish_step, pass_break, start
+from stickslip.simulation.exact.transition import cross, finish_step, pass_break, perturbation, rest, start
 
 SAFETY = 0.0015
 """Share of the tolerance that one step may be wrong by."""

@@ -36,10 +36,7 @@ from stickslip.simulation.exact.flow import (
 )
 from stickslip.simulation.exact.forces import Command, command
 from stickslip.simulation.exact.output import torques_at
-from stickslip.simulation.exact.ringing import (
-    has_closed_form,
-    ringing,
-)
+from stickslip.simulation.exact.ringing import has_closed_form, ringing
 from stickslip.simulation.exact.scan import Span
 from stickslip.simulation.exact.segment import cubic_of
 from stickslip.simulation.exact.state import Loop, side_of

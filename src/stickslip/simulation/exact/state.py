@@ -132,7 +132,7 @@ SIDE = np.dtype(
 
 RELAXES, FOLLOWS, BENDS = range(3)
 """What `kind` says of the force of what slips: it relaxes towards the curve, is on the curve at once, or is that of a
-bristle (`exact.bristle` has the last two)."""
+bristle (`exact.forces.bend` has to do with the last two)."""
 
 SEGMENT = np.dtype(
     [

@@ -10,7 +10,6 @@ from typing import Any
 
 from stickslip.jit import kernel
 from stickslip.simulation.case_arrays import INERTIA, KI
-from stickslip.simulation.exact.bristle import bristle_rate, bristle_terms, curve_rest, curve_terms
 from stickslip.simulation.exact.flow import (
     Linear,
     Matrix,
@@ -21,7 +20,14 @@ from stickslip.simulation.exact.flow import (
     twice,
     upper_terms,
 )
-from stickslip.simulation.exact.forces import command, sliding
+from stickslip.simulation.exact.forces import (
+    bristle_rate,
+    bristle_terms,
+    command,
+    curve_rest,
+    curve_terms,
+    sliding,
+)
 from stickslip.simulation.exact.segment import cubic_of, remember, slip_force_at
 from stickslip.simulation.exact.state import BENDS, FOLLOWS, Loop, side_of, sides_of
 

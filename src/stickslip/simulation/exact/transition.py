@@ -1,24 +1,33 @@
-"""Where the loop of the exact integrator stands: at its start, after a step, at an event, at a break."""
+"""Where the loop of the exact integrator stands: at its start, after a step, at a break, at rest, and at an event,
+where its modes change.
+
+Rest is an axis that rigid friction holds at v = 0, until the applied torque is larger. Steps may be made wrong on
+purpose: what a run shows that it is sensitive to (`stickslip.simulation.accuracy`).
+"""
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 from stickslip.jit import kernel
-from stickslip.simulation.case_arrays import (
-    KI,
-    PERTURBATION,
-    POSITION_0,
-    VELOCITY_0,
-)
-from stickslip.simulation.exact.events import add_exponents, switch
-from stickslip.simulation.exact.forces import command
+from stickslip.simulation.case_arrays import KI, KP, PERTURBATION, POSITION_0, VELOCITY_0
+from stickslip.simulation.exact.events import BARELY, NONE, load_of
+from stickslip.simulation.exact.forces import command, sliding
 from stickslip.simulation.exact.output import row_before
-from stickslip.simulation.exact.perturbation import perturbation
-from stickslip.simulation.exact.segment import integral_at, slip_force_at
-from stickslip.simulation.exact.state import EDGE, Loop, side_of, sides_of
-from stickslip.simulation.exact.stiction import applied, release, set_off
+from stickslip.simulation.exact.segment import integral_at, remember, slip_force_at
+from stickslip.simulation.exact.state import BENDS, EDGE, RELAXES, Loop, element_of, side_of, sides_of
+from stickslip.simulation.exact.step import look_ahead
 
 SOON = 1e-9
 """Time at which the commanded torque tells where a free axis sets off, s."""
+ROUNDING = 1e-10
+"""N·m by which a load may seem to miss the limit that it was located at."""
+ON_EDGE = 1e-6
+"""Velocities this near the edge of a steep layer, in parts of it, are on it."""
+LONGEST_REST = 2e-3
+LASTING, LEAST = 1e-4, 1e-3
+"""A step that is shorter than this (s) is perturbed by as much less, but by no less than this share."""
 
 
 @kernel(exact=False, inline=True)
@@ -116,3 +125,223 @@ def pass_break(loop: Loop, t: float, following: float) -> bool:
     now.unseen = 0
     stand(loop)
     return abs(now.command - before) > 1e-9
+
+
+@kernel(exact=False, inline=True)
+def add_exponents(loop: Loop, h: float, x: float) -> None:
+    """Add the decay C int 1/s dt of slipping elements over the first x of a segment of length h."""
+    f = x / h
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        if side.slipping > 0.0 and side.kind == RELAXES:
+            attraction = side.attraction
+            q0 = side.decay
+            bend = 2.0 * (q0 + side.decay_end) - 4.0 * side.decay_mid
+            slope = side.decay_end - q0 - bend
+            side.exponent += attraction * x * (q0 + f * (0.5 * slope + f * bend / 3.0))
+
+
+@kernel(exact=False, inline=True)
+def settle_forces(loop: Loop) -> None:
+    """Write every element's force where the loop stands, before modes change."""
+    now = loop.now
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        if side.kind == BENDS:
+            side.force = side.force_now
+            continue
+        decay = math.exp(-side.exponent)
+        moves = side.kind == RELAXES
+        s = 0.0 if moves else sliding(loop, side, now.velocity)
+        for j in range(side.first, side.last):
+            e = element_of(loop, j)
+            if e.slips == 0:
+                e.force = e.offset + e.stiffness * now.position
+            elif moves:
+                part = e.share / side.slipping
+                gained = side.force_now - decay * side.force_start
+                e.force = decay * e.force + part * gained
+            else:
+                e.force = e.share * now.sigma * s
+
+
+@kernel(exact=False, inline=True)
+def switch(loop: Loop) -> None:
+    """Change the modes that end here: stick at a reversal, slip where the limit is reached."""
+    now = loop.now
+    v = now.velocity
+    settle_forces(loop)
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        enter_or_leave(loop, side, v)
+    if now.watched != 0 and now.sigma * v <= 1e-9 * abs(v):
+        for i in range(loop.plan.elements):
+            element_of(loop, i).slips = 0
+        if now.sigma * v > 0.0:
+            now.velocity = 0.0
+        if not set_off(loop):
+            now.sigma = -now.sigma
+        # Where the curve rises with the velocity, what stuck before may be loaded beyond it in the new direction.
+        if now.sigma != 0.0:
+            v = now.sigma * max(now.sigma * now.velocity, BARELY)
+            break_away(loop, v, now.sigma)
+        return
+    break_away(loop, v, 1.0 if v >= 0.0 else -1.0)
+
+
+@kernel(exact=False, inline=True)
+def break_away(loop: Loop, v: float, direction: float) -> None:
+    """Let the sticking elements slip whose load in `direction` is at its limit."""
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        if side.first == side.last:
+            continue
+        s = sliding(loop, side, v)
+        for j in range(side.first, side.last):
+            e = element_of(loop, j)
+            load = load_of(side.literal != 0, direction, e.force)
+            if e.slips == 0 and load >= e.share * s - ROUNDING:
+                e.slips = 1
+                loop.now.sigma = direction
+
+
+@kernel(exact=False)
+def enter_or_leave(loop: Loop, side: Any, v: float) -> None:
+    """Pass the edge of a steep layer if the axis stands there."""
+    now = loop.now
+    edge = side.layer
+    if edge == 0.0:
+        return
+    if side.inside != 0:
+        if abs(v) >= (1.0 - ON_EDGE) * edge:
+            side.inside = 0
+            now.sigma = 1.0 if v > 0.0 else -1.0
+    elif now.sigma * v <= (1.0 + ON_EDGE) * edge:
+        side.inside = 1
+
+
+@kernel(exact=False)
+def rest(loop: Loop, left: float) -> float:
+    """Stay at rest for at most `left` s; fills `segment`, returns when the axis breaks away or NONE."""
+    now, segment = loop.now, loop.segment
+    h = min(left, LONGEST_REST)
+    theta = now.position
+    look_ahead(loop, h, 0.0)
+    remember(segment, (theta, 0.0, 0.0, 0.0), h, (0.0, 0.0), (theta, 0.0), (theta, 0.0), 0)
+    reference_integral = h / 30.0 * (7.0 * (now.goal + segment.goal_end) + 16.0 * segment.goal_mid)
+    reference_integral += h * h / 60.0 * (now.goal_rate - segment.rate_end)
+    segment.integral_end = now.integral + reference_integral - theta * h
+    segment.position_event = theta
+    segment.velocity_event = 0.0
+    low = 0.0
+    if excess(loop, 0.0) > 0.0:
+        return 0.0
+    for node in range(1, 3):
+        high = 0.5 * node * h
+        if excess(loop, high) > 0.0:
+            for _ in range(60):
+                x = 0.5 * (low + high)
+                if excess(loop, x) > 0.0:
+                    high = x
+                else:
+                    low = x
+                if high - low < 1e-13:
+                    break
+            return high
+        low = high
+    return NONE
+
+
+@kernel(exact=False)
+def excess(loop: Loop, x: float) -> float:
+    """Applied torque beyond what is held, after another x at rest, N·m."""
+    parameters, now = loop.parameters, loop.now
+    middle = command(loop, now.time + 0.5 * x)
+    end = command(loop, now.time + x)
+    torque = applied(loop) + end.torque - now.command
+    if parameters[KI] != 0.0:
+        reference_integral = x / 30.0 * (7.0 * (now.goal + end.position) + 16.0 * middle.position)
+        reference_integral += x * x / 60.0 * (now.goal_rate - end.velocity)
+        torque += parameters[KI] * (reference_integral - now.position * x)
+    return abs(torque) - max(stiction(loop), 0.0)
+
+
+@kernel(exact=False)
+def stiction(loop: Loop) -> float:
+    """Half the net interval of torque that rigid elements hold at rest, N·m; negative where they repel."""
+    total = 0.0
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        total += side.weight * side.rigid * side.breakaway
+    return total
+
+
+@kernel(exact=False)
+def applied(loop: Loop) -> float:
+    """Torque on the resting axis without its rigid elements, N·m."""
+    parameters, now = loop.parameters, loop.now
+    torque = now.command + parameters[KI] * now.integral - parameters[KP] * now.position
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        if side.kind == BENDS:
+            force = side.spring * now.position + side.spring_offset
+            torque -= side.weight * (force + side.force)
+        for j in range(side.first, side.last):
+            torque -= side.weight * element_of(loop, j).force
+    return torque
+
+
+@kernel(exact=False)
+def set_off(loop: Loop) -> bool:
+    """At v = 0: rest, or the direction in which the axis goes on; False where no rigid elements decide that.
+
+    Rigid friction in the plant holds what lies inside its interval, less the jump of a compensator that acts on
+    sign(v). A compensator that jumps by more than the plant repels: the axis goes on through zero.
+    """
+    now = loop.now
+    rigid = side_of(loop, 0).rigid > 0.0 or (loop.plan.sides > 1 and side_of(loop, 1).rigid > 0.0)
+    if not rigid:
+        return False
+    interval = stiction(loop)
+    torque = applied(loop)
+    before = now.sigma
+    now.held = 0
+    if abs(torque) > max(interval, 0.0):
+        now.sigma = 1.0 if torque > 0.0 else -1.0
+    elif interval < 0.0 and before != 0.0:
+        now.sigma = -before
+    else:
+        now.sigma = 0.0
+        now.held = 1
+        now.velocity = 0.0
+    if now.sigma * now.velocity < 0.0:
+        now.velocity = 0.0
+    return True
+
+
+@kernel(exact=False)
+def release(loop: Loop) -> None:
+    """Leave rest in the direction of the applied torque."""
+    now = loop.now
+    now.held = 0
+    now.sigma = 1.0 if applied(loop) > 0.0 else -1.0
+
+
+@kernel(exact=False)
+def perturbation(loop: Loop, h: float, tol: float, switched: bool) -> None:
+    """Move the axis after a step of h by PERTURBATION times what the step may be wrong by; springs that stick follow.
+
+    Always along the motion, or always against it: such errors add up, and in a limit cycle shift its phase.
+    """
+    now = loop.now
+    distance = loop.parameters[PERTURBATION] * tol * min(1.0, LEAST + h / LASTING)
+    if now.velocity < 0.0:
+        distance = -distance
+    now.position += distance
+    if not switched:
+        return
+    # After a switch the springs are set up anew from the elements' forces.
+    for i in range(loop.plan.elements):
+        e = element_of(loop, i)
+        if e.slips == 0:
+            e.force += e.stiffness * distance
