@@ -102,7 +102,6 @@ def arrange(loop: Loop) -> Linear:
     cubic particular solution exists.
     """
     parameters, now = loop.parameters, loop.now
-    theta = now.position
     v = now.velocity
     total = parameters[KP]
     damping = parameters[KD]
@@ -116,21 +115,7 @@ def arrange(loop: Loop) -> Linear:
     for i in range(sides_of(loop)):
         side = side_of(loop, i)
         w = side.weight
-        side.damping = side.viscous
-        if side.kind == BENDS:
-            begin_bristle(side, theta, now.held)
-        else:
-            gather(loop, side, theta)
-            side.slipping += side.rigid * abs(now.sigma)
-        if side.steep > 0.0:
-            if side.inside != 0:
-                side.damping = side.steepness
-                # Over the moment that a crossing takes, this spring moves nothing.
-                steep = w * side.steepness
-                floor = max(floor, IN_LAYER * steep * steep / parameters[INERTIA])
-            else:
-                side.slipping += side.steep
-                now.narrow = max(now.narrow, side.layer)
+        floor = set_up(loop, side, floor)
         damping += w * side.damping
         total += w * side.spring
         now.base += w * side.spring_offset
@@ -154,6 +139,28 @@ def arrange(loop: Loop) -> Linear:
         now.added = 2.0 * floor
         now.nonlinear = 1
     return linear(parameters[INERTIA], damping, total + now.added)
+
+
+@kernel(exact=False, inline=True)
+def set_up(loop: Loop, side: Any, floor: float) -> float:
+    """Gather what sticks and what slips of a side; returns the least stiffness, more where it is in a steep layer."""
+    now = loop.now
+    side.damping = side.viscous
+    if side.kind == BENDS:
+        begin_bristle(side, now.position, now.held)
+    else:
+        gather(loop, side, now.position)
+        side.slipping += side.rigid * abs(now.sigma)
+    if side.steep > 0.0:
+        if side.inside != 0:
+            side.damping = side.steepness
+            # Over the moment that a crossing takes, this spring moves nothing.
+            steep = side.weight * side.steepness
+            floor = max(floor, IN_LAYER * steep * steep / loop.parameters[INERTIA])
+        else:
+            side.slipping += side.steep
+            now.narrow = max(now.narrow, side.layer)
+    return floor
 
 
 @kernel(exact=False, inline=True)

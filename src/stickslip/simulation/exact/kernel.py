@@ -102,19 +102,6 @@ def next_level(lin: Linear, loop: Loop, level: int, tol: float) -> int:
 
 
 @kernel(exact=False)
-def ended(loop: Loop) -> int:
-    """DONE, or why the run cannot go on."""
-    parameters, now = loop.parameters, loop.now
-    theta = abs(now.position)
-    v = abs(now.velocity)
-    if theta <= parameters[POSITION_LIMIT] and v <= parameters[VELOCITY_LIMIT]:
-        return DONE
-    if math.isfinite(theta) and math.isfinite(v):
-        return DIVERGED
-    return NOT_FINITE
-
-
-@kernel(exact=False)
 def storms(loop: Loop) -> bool:
     """Whether more than STORM_EVENTS events came within STORM_TIME; looked at after so many events."""
     now, count = loop.now, loop.count
@@ -124,6 +111,19 @@ def storms(loop: Loop) -> bool:
     now.storm_count = count.events
     now.storm_since = now.time
     return soon
+
+
+@kernel(exact=False)
+def ended(loop: Loop) -> int:
+    """DONE, or why the run cannot go on."""
+    parameters, plan, now = loop.parameters, loop.plan, loop.now
+    theta = abs(now.position)
+    v = abs(now.velocity)
+    if not (theta <= parameters[POSITION_LIMIT] and v <= parameters[VELOCITY_LIMIT]):
+        return DIVERGED if math.isfinite(theta) and math.isfinite(v) else NOT_FINITE
+    if storms(loop):
+        return STORM
+    return TOO_STIFF if loop.count.steps > plan.first_steps + plan.step_rate * now.time else DONE
 
 
 @kernel(exact=False)
@@ -141,7 +141,7 @@ def solve(laid: Laid, output: Output, light: bool, full: bool, metered: bool) ->
     `metered`.
     """
     loop = loop_of(laid, output)
-    parameters, plan, now, segment = loop.parameters, loop.plan, loop.now, loop.segment
+    parameters, now = loop.parameters, loop.now
     breaks, acc, turns, nodes = pointer(laid.breaks, 0), meter_of(output.acc), output.turns, output.nodes
     tol = max(SAFETY * parameters[TOLERANCE], FINEST)
     longest = min(LONGEST_STEP, parameters[MAX_STEP])
@@ -170,7 +170,7 @@ def solve(laid: Laid, output: Output, light: bool, full: bool, metered: bool) ->
                 return NO_STEP
             event = find(lin, loop, tol)
         happens = event >= 0.0
-        h = event if happens else segment.length
+        h = event if happens else loop.segment.length
         if light and awaits(loop, now.time + h):
             write_grid(lin, loop, h, 0.1 * tol, generation)
         if full:
@@ -202,8 +202,4 @@ def solve(laid: Laid, output: Output, light: bool, full: bool, metered: bool) ->
         code = ended(loop)
         if code != DONE:
             return code
-        if storms(loop):
-            return STORM
-        if loop.count.steps > plan.first_steps + plan.step_rate * now.time:
-            return TOO_STIFF
     return DONE
