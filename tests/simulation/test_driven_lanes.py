@@ -189,8 +189,9 @@ def test_a_stage_is_solved_in_vectors():
     packed = tuple(float(x) for x in law.pack(Model(law, **law.example).parameters))
     text = driven_lanes.source(law, Trace(packed))
     module = compiled_lanes(f"{text}\n# a text of its own, {os.getpid()}, since cached code has no listing")
-    signals, out = np.ones((3, simd_batch.SIGNALS, 8)), np.zeros((3, 8))
-    module.follow_lanes((1.0,) * simd_batch.NUMBERS, packed, np.zeros(1), np.zeros(8), signals, 1, 8, out)
+    signals, out = np.ones((3, len(simd_batch.SIGNALS), 8)), np.zeros((3, 8))
+    ones = simd_batch.Numbers(*[1.0] * len(simd_batch.Numbers._fields))
+    module.follow_lanes(ones, packed, np.zeros(1), np.zeros(8), signals, 1, 8, out)
     (code,) = module.solve.inspect_asm().values()
     wide = [line for line in code.splitlines() if "vdivpd" in line and ("ymm" in line or "zmm" in line)]
     assert wide

@@ -133,11 +133,11 @@ def test_compiled_and_branchless_texts_say_the_same(
     assert root.compiled.improve(flat, f) == goes_on
     assert flat.tolist() == [getattr(plain, name) for name in ROOT.scalars]
 
-    rows = dict(zip(("X", "LAST", "F_LAST", "OTHER", "PHASE", "RISE"), range(6)))
-    w = np.array([x, last, f_last, other, phase, inverse])
-    scope: dict[str, Any] = {**rows, "LANES": 1, "math": math, "select": selected}
+    names = ("x", "last", "f_last", "other", "phase", "rise")
+    w = SimpleNamespace(**dict(zip(names, np.array([x, last, f_last, other, phase, inverse]))))
+    scope: dict[str, Any] = {"math": math, "select": selected}
     with np.errstate(all="ignore"):
         exec("\n".join(root_finder()[1:]), scope)
-        assert scope["searched"](w, 0, np.float64(f), ENOUGH, ROUNDING) == goes_on
+        assert scope["searched"](w, np.float64(f), ENOUGH, ROUNDING) == goes_on
     ends = [getattr(plain, name) for name in ("x", "last", "f_last", "other", "phase", "inverse")]
-    assert w.tolist() == pytest.approx(ends, rel=1e-15, nan_ok=True)
+    assert [getattr(w, name) for name in names] == pytest.approx(ends, rel=1e-15, nan_ok=True)

@@ -22,6 +22,7 @@ from stickslip.simulation import root
 from stickslip.simulation.many.simd_source import body
 from stickslip.simulation.recorded_input import simd_batch
 from stickslip.simulation.recorded_input.branchless import Assumption, Name, NotStraight, Trace, traced
+from stickslip.simulation.recorded_input.simd_batch import Numbers
 from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, reads_load
 from stickslip.simulation.recorded_input.step import LEAST
 from stickslip.simulation.root import ROOT
@@ -38,12 +39,13 @@ LONGEST = 0.5
 """Part of a record beyond which its longest segment, `Segments.longest`, is too long for lanes to be worth it."""
 INLINED = frozenset(
     {
-        "start", "look", "first_stage", "second_stage", "take_other_rise", "accept", "beyond", "pull", "look_back",
+        "start", "look", "first_stage", "second_stage", "take_states", "take_other_rise", "accept", "beyond", "pull",
+        "look_back",
     }
 )  # fmt: skip
 """Functions that run for all lanes at once."""
-KEPT = {"x": "X", "last": "LAST", "f_last": "F_LAST", "other": "OTHER", "phase": "PHASE", "inverse": "RISE"}
-"""What the root finder keeps of every lane, and in which row."""
+KEPT = {"x": "x", "last": "last", "f_last": "f_last", "other": "other", "phase": "phase", "inverse": "rise"}
+"""What the root finder keeps of every lane, and under which name."""
 
 
 # ---- the program -----------------------------------------------------------------------------------------------
@@ -93,7 +95,8 @@ def source(law: Law, trace: Trace) -> str:
     text = [
         "import math",
         "import numpy as np",
-        "from stickslip.jit import compile_inlined, compile_lanes, exponential, exponential_less_one, pointer, select",
+        "from stickslip.jit import compile_inlined, compile_lanes, exponential, exponential_less_one",
+        "from stickslip.jit import pointer, record_at, select",
         f"LANES, STATES, HOLDS = {LANES}, {count}, {law.holding is not None}",
     ]
     constants, functions = body(("recorded_input/simd_batch",), INLINED)
@@ -108,15 +111,15 @@ def source(law: Law, trace: Trace) -> str:
 def root_finder() -> tuple[str, ...]:
     """The lines of `stickslip.simulation.root.improve`. What is written without branches rises like no power."""
     given = {"enough": Name("enough"), "rounding": Name("rounding"), "least": LEAST}
-    start = [Name(KEPT[f].lower()) if f in KEPT else given.get(f, 0.0) for f in ROOT.scalars]
+    start = [Name(KEPT[f]) if f in KEPT else given.get(f, 0.0) for f in ROOT.scalars]
     arrays: dict[Any, Any] = {("r", i): value for i, value in enumerate(start)}
     trace = Trace(())
     functions = lower({"_improve_": root.improve}, {"r": ROOT})
     result = traced(functions, "_improve_", {"r": "r", "f": Name("f")}, arrays, trace)
-    lines = [f"{row.lower()} = w[{row} * LANES + lane]" for row in KEPT.values()]
+    lines = [f"{name} = w.{name}" for name in KEPT.values()]
     lines += trace.lines
-    lines += [f"w[{row} * LANES + lane] = {arrays['r', ROOT.scalars.index(f)]}" for f, row in KEPT.items()]
-    head = "def searched(w, lane, f, enough, rounding):"
+    lines += [f"w.{name} = {arrays['r', ROOT.scalars.index(f)]}" for f, name in KEPT.items()]
+    head = "def searched(w, f, enough, rounding):"
     return ("@compile_inlined", head, *(f"    {line}" for line in [*lines, f"return {result}"]))
 
 
@@ -134,12 +137,12 @@ def written(
     own = Trace(trace.parameters, assumptions=trace.assumptions)
     given = {**arguments, "z": "z", "p": "p", "u": "u"}
     result = traced(functions, f"_{entry}_", given, arrays, own)
-    lines = [f"z{i} = w[(BASE + {i}) * LANES + lane]" for i in range(count)]
-    lines += ["load = w[LOAD * LANES + lane]", *own.lines]
+    lines = ["z = pointer(w, 0)", *(f"z{i} = z[(BASE + {i}) * LANES]" for i in range(count))]
+    lines += ["load = w.load", *own.lines]
     if entry == "step":
-        lines += [f"w[(TRIAL + {i}) * LANES + lane] = {arrays['z', i]}" for i in range(count)]
+        lines += [f"z[(TRIAL + {i}) * LANES] = {arrays['z', i]}" for i in range(count)]
     lines.append(f"return {result}")
-    return ["@compile_inlined", f"def {name}(w, lane, {signature}, p):", *(f"    {line}" for line in lines)]
+    return ["@compile_inlined", f"def {name}(w, {signature}, p):", *(f"    {line}" for line in lines)]
 
 
 # ---- a record ----------------------------------------------------------------------------------------------------
@@ -197,19 +200,19 @@ class Segments:
         """The signals of all lanes, shape (rows, SIGNALS, LANES)."""
         drive, at = self.drive, self.rows
         last = at == drive.time.size - 1
-        out = np.zeros((len(at), simd_batch.SIGNALS, LANES))
+        out = np.zeros((len(at), len(simd_batch.SIGNALS), LANES))
+        row = simd_batch.SIGNALS.index
         columns = {
-            simd_batch.SIGNAL: drive.gain * drive.signal, simd_batch.SEEN: drive.position,
-            simd_batch.DAMPING: drive.damping,
-            simd_batch.GOAL: drive.goal, simd_batch.FIRM: drive.firm, simd_batch.DISTURBANCE: drive.disturbance,
+            "signal": drive.gain * drive.signal, "seen": drive.position, "damping": drive.damping, "goal": drive.goal,
+            "firm": drive.firm, "disturbance": drive.disturbance,
         }  # fmt: skip
-        for place, values in columns.items():
+        for name, values in columns.items():
             if values is not None:
-                out[:, place] = values[at]
+                out[:, row(name)] = values[at]
         assert drive.position is not None
-        out[:, simd_batch.NEXT] = np.append(drive.position[1:], drive.position[-1])[at]
-        out[:, simd_batch.GOES_ON] = ~last
-        out[:, simd_batch.PERIOD] = np.diff(drive.time, append=2.0 * drive.time[-1] - drive.time[-2])[at]
+        out[:, row("next")] = np.append(drive.position[1:], drive.position[-1])[at]
+        out[:, row("goes_on")] = ~last
+        out[:, row("period")] = np.diff(drive.time, append=2.0 * drive.time[-1] - drive.time[-2])[at]
         return out
 
     def perturbed(self, torque: Array) -> Segments:
@@ -217,27 +220,17 @@ class Segments:
         other = object.__new__(Segments)
         other.__dict__ |= self.__dict__
         other.signals = self.signals.copy()
-        other.signals[:, simd_batch.DISTURBANCE] = torque[self.rows]
+        other.signals[:, simd_batch.SIGNALS.index("disturbance")] = torque[self.rows]
         return other
 
-    def numbers(self, mechanics: Mechanics) -> tuple[float, ...]:
+    def numbers(self, mechanics: Mechanics) -> Numbers:
         """What the kernel reads of axis and observer."""
-        drive = self.drive
-        n = np.zeros(simd_batch.NUMBERS)
-        n[simd_batch.INERTIA], n[simd_batch.OFFSET] = mechanics.inertia, mechanics.offset
-        n[simd_batch.DRIVE_GAIN], n[simd_batch.BACK_EMF] = mechanics.drive_gain, mechanics.back_emf
-        n[simd_batch.LOAD_MOTOR], n[simd_batch.LOAD_EXTERNAL] = mechanics.load_motor, mechanics.load_external
-        n[simd_batch.SCALED], n[simd_batch.SPRING], n[simd_batch.FORGETS] = (
-            self.scaled,
-            drive.spring,
-            drive.forgets,
-        )
-        n[simd_batch.RETURNS], n[simd_batch.SLACK], n[simd_batch.ROUNDING] = (
-            drive.returns,
-            drive.slack,
-            self.rounding,
-        )
-        return tuple(n.tolist())
+        drive, m = self.drive, mechanics
+        given = (
+            m.inertia, m.offset, m.drive_gain, m.back_emf, m.load_motor, m.load_external, self.scaled, drive.spring,
+            drive.forgets, drive.returns, drive.slack, self.rounding,
+        )  # fmt: skip
+        return Numbers(*map(float, given))
 
     def corrections(self, mechanics: Mechanics, parameters: Any) -> Array | None:
         """The observer's corrections, shape (n,), as `recorded_input.Course.run` says; None where it cannot be."""

@@ -16,16 +16,16 @@ HOLDS: bool = False
 """Whether its torque jumps at rest."""
 
 
-def law(w: Any, lane: int, v: float, h: float, p: Any) -> float:
+def law(w: Any, v: float, h: float, p: Any) -> float:
     """Torque after h at the velocity v from the states in ``BASE``, N·m; those after it go to ``TRIAL``."""
     raise NotImplementedError
 
 
-def withstood(w: Any, lane: int, direction: float, p: Any) -> float:
+def withstood(w: Any, direction: float, p: Any) -> float:
     """Torque that the contact withstands at rest, N·m."""
     raise NotImplementedError
 
 
-def searched(w: Any, lane: int, f: float, enough: float, rounding: float) -> float:
-    """`stickslip.simulation.root.improve`: take f at ``X``; 1 where it is to be evaluated again."""
+def searched(w: Any, f: float, enough: float, rounding: float) -> float:
+    """`stickslip.simulation.root.improve`: take f at ``x``; 1 where it is to be evaluated again."""
     raise NotImplementedError
