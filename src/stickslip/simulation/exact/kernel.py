@@ -45,6 +45,15 @@ MOST_GROWTH = 8.0
 """Unstable motion grows by no more than exp of this in one step."""
 
 
+@kernel(exact=False, inline=True)
+def lay_steps(loop: Loop, longest: float) -> None:
+    """Give every level its step."""
+    h = longest
+    for i in range(DEEPEST + 1):
+        kept_of(loop, i).step = h
+        h *= 0.5
+
+
 @kernel(exact=False)
 def growth_of(lin: Linear) -> float:
     """Rate at which unstable motion grows, 1/s; not positive where none does."""
@@ -101,6 +110,16 @@ def next_level(lin: Linear, loop: Loop, level: int, tol: float) -> int:
     return level
 
 
+@kernel(exact=False, inline=True)
+def go_on(lin: Linear, loop: Loop, h: float, held: bool, level: int, tol: float) -> int:
+    """Stand at the end of a segment without an event; returns the level of the next step."""
+    finish_step(loop, loop.now.time + h)
+    if loop.parameters[PERTURBATION] != 0.0:
+        perturbation(loop, h, tol, False)
+        weigh_here(loop)
+    return level if held else next_level(lin, loop, level, tol)
+
+
 @kernel(exact=False)
 def storms(loop: Loop) -> bool:
     """Whether more than STORM_EVENTS events came within STORM_TIME; looked at after so many events."""
@@ -149,10 +168,7 @@ def solve(laid: Laid, output: Output, light: bool, full: bool, metered: bool) ->
     level = after_event
     generation = 1
     next_break = 0
-    h = longest
-    for i in range(DEEPEST + 1):
-        kept_of(loop, i).step = h
-        h *= 0.5
+    lay_steps(loop, longest)
     start(loop, breaks[0])
     lin = arrange(loop)
     weigh_here(loop)
@@ -185,12 +201,7 @@ def solve(laid: Laid, output: Output, light: bool, full: bool, metered: bool) ->
             generation += 1
             level = after_event if slow_again else max(level, after_event)
         else:
-            finish_step(loop, now.time + h)
-            if parameters[PERTURBATION] != 0.0:
-                perturbation(loop, h, tol, False)
-                weigh_here(loop)
-            if not held:
-                level = next_level(lin, loop, level, tol)
+            level = go_on(lin, loop, h, held, level, tol)
         jumps = happens
         if h >= left - EDGE:
             following = min(next_break + 1, laid.breaks.size - 1)

@@ -28,7 +28,7 @@ from stickslip.simulation.exact.forces import (
     curve_terms,
     sliding,
 )
-from stickslip.simulation.exact.segment import cubic_of, remember, slip_force_at
+from stickslip.simulation.exact.segment import Pair, cubic_of, remember, slip_force_at
 from stickslip.simulation.exact.state import BENDS, FOLLOWS, Loop, side_of, sides_of
 
 NOT_CONVERGED = 1e9
@@ -238,6 +238,25 @@ def tangents(loop: Loop) -> tuple[float, float]:
 
 
 @kernel(exact=False, inline=True)
+def with_slips(
+    loop: Loop, upper: tuple[float, float, float], bent: float, h: float, middle: Pair, end: Pair
+) -> tuple[float, float, float]:  # fmt: skip
+    """The upper coefficients of the forcing with the slipping forces along a motion, given in its middle and at its
+    end."""
+    p1, p2, p3 = upper
+    for i in range(sides_of(loop)):
+        side = side_of(loop, i)
+        if side.slipping > 0.0 and side.varies != 0:
+            u2, u3 = slip_terms(loop, side, h, middle[0], middle[1], end[0], end[1])
+            w = bent * side.weight
+            lag = side.lag
+            p1 -= 2.0 * w * lag * u2
+            p2 -= w * (u2 + 3.0 * lag * u3)
+            p3 -= w * u3
+    return p1, p2, p3
+
+
+@kernel(exact=False, inline=True)
 def correct(lin: Linear, loop: Loop, half: Matrix, h: float, tol: float) -> float:
     """Move the axis over h; fills `segment` and returns the error in position, rad (or NOT_CONVERGED)."""
     now = loop.now
@@ -278,19 +297,10 @@ def correct(lin: Linear, loop: Loop, half: Matrix, h: float, tol: float) -> floa
                 return NOT_CONVERGED
         impulse = h * (p0 + h * (0.5 * p1 + h * (p2 / 3.0 + h * 0.25 * p3)))
         p0 = start
-        p1 = tangent
-        p2 = r2
-        p3 = r3
+        p1, p2, p3 = with_slips(
+            loop, (tangent, r2, r3), bent, h, (theta_mid, v_mid), (theta_end, v_end)
+        )  # fmt: skip
         misfit = abs(command_misfit)
-        for i in range(sides_of(loop)):
-            side = side_of(loop, i)
-            if side.slipping > 0.0 and side.varies != 0:
-                u2, u3 = slip_terms(loop, side, h, theta_mid, v_mid, theta_end, v_end)
-                w = bent * side.weight
-                lag = side.lag
-                p1 -= 2.0 * w * lag * u2
-                p2 -= w * (u2 + 3.0 * lag * u3)
-                p3 -= w * u3
         if loop.parameters[KI] != 0.0 or now.added != 0.0:
             u2, u3, m = loop_terms(lin, loop, impulse, h, theta_mid, v_mid, theta_end, v_end)
             p0 += BUMP * m
