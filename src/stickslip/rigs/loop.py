@@ -15,25 +15,24 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from typing import Any, TypeVar, cast
 
 import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.sampled_controller import SampledController
-from stickslip.errors import InputError, Interrupted, RigError
+from stickslip.errors import InputError, RigError
 from stickslip.record import Record
-from stickslip.rigs import safety
 from stickslip.rigs.budget import BUDGET, Budget
 from stickslip.rigs.declared import FIELDS, answer, blamed, checked
+from stickslip.rigs.guard import Guard
 from stickslip.rigs.interrupts import Signals
-from stickslip.rigs.loop_sample import COLUMNS, NAMES, REASON, STATE, UNITS, Control, control_of
+from stickslip.rigs.loop_sample import COLUMNS, UNITS, Control, control_of
 from stickslip.rigs.realtime import TIMES, Account, Pace, soft_real_time
 from stickslip.rigs.rig import BlockRig, Limits, Measurement, Rig, Setpoint, insist_on_setpoints, setpoints
-from stickslip.rigs.safety import ASKED, RUNNING, STOPPED, STOPPING, Bounds, Safety
+from stickslip.rigs.safety import STOPPED, STOPPING
 from stickslip.rigs.step import Step
-from stickslip.rigs.stop_reasons import crossed, told
 from stickslip.stream import Stream
 
 __all__ = ["Loop", "PythonController"]
@@ -43,13 +42,9 @@ Result = TypeVar("Result")
 PythonController = Callable[[Measurement, Setpoint], float]
 """A controller in Python: the torque from what is measured and the setpoint, N·m. It runs sample by sample."""
 
+TORQUE = Setpoint._fields.index("torque")
 BLOCK = 50
 """Samples of one compiled block: a signal is heard, and rows are committed, at least that often"""
-TIME, POSITION = Measurement._fields.index("time"), Measurement._fields.index("position")
-TORQUE, STARTED, ORIGIN, VALUE = (Safety._fields.index(n) for n in ("torque", "started", "origin", "value"))
-KNOWN = ("started", "turns", "position", "velocity", "slow_velocity", "error")
-"""What one controller takes over from another: position and velocities, but nothing of its laws"""
-TRAVEL = Bounds._fields.index("travel")
 
 
 class Loop:
@@ -107,14 +102,12 @@ class Loop:
         self._stream: Stream | None = None
         self._path, self._meta = path, dict(meta or {})
         self._controls: dict[int, tuple[Any, Control]] = {}
-        self._control = self.prepare(None)
-        self._fault: BaseException | None = None
-        self._late = False
+        self._guard = Guard(self.prepare(None))
         self._signals = Signals()
         self._undo = ExitStack()
         self._scratch = np.zeros(len(COLUMNS))
         self._setpoint = np.zeros(len(Setpoint._fields))
-        self._step = Step(self._control)
+        self._step = Step(self._guard.control)
 
     # ---- arming and disarming ------------------------------------------------------------------------------
 
@@ -130,31 +123,28 @@ class Loop:
             )
             undo.callback(self._end_record)
             undo.callback(self._disarm)
-            self._control.measured[:] = answer(self.rig, "open", self.rig.open)
+            self._guard.control.measured[:] = answer(self.rig, "open", self.rig.open)
             self._undo = undo.pop_all()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         with self._undo:
             self._ramp_down()
-            if self._signals.number and self._fault is None:
-                self._fault = self._signals.error  # it came between two runs
-        if self._signals.number and self._fault is None:
-            self._fault = self._signals.error  # or while the record was closed
-        if kind is None and self._fault is not None and (self._late or isinstance(self._fault, Interrupted)):
-            raise self._fault
+            self._hear()  # a signal that came between two runs
+        self._hear()  # or while the record was closed
+        if kind is None and (fault := self._guard.untold) is not None:
+            raise fault
+
+    def _hear(self) -> None:
+        if self._signals.number and self._guard.fault is None:
+            self._guard.fault = self._signals.error
 
     def _disarm(self) -> None:
         try:
             with blamed(self.rig, "close"):
                 self.rig.close()
         except (RigError, InputError) as error:
-            self._at_last(error)
-
-    def _at_last(self, fault: BaseException | None) -> None:
-        """What went wrong after the last sample; told by leaving the loop, unless something else is."""
-        if fault is not None and self._fault is None:
-            self._fault, self._late = fault, True
+            self._guard.at_last(error)
 
     def _described(self) -> dict[str, Any]:
         plain = self.limits.plain()
@@ -167,12 +157,9 @@ class Loop:
 
     def _end_record(self) -> None:
         if self._stream is not None:
-            self._stream.close({"loop": self.account().plain(), "ended": self._ending()})
-            self._at_last(self._stream.fault)  # the file may fail at its end alone
+            self._stream.close({"loop": self.account().plain(), "ended": self._guard.ending})
+            self._guard.at_last(self._stream.fault)  # the file may fail at its end alone
             self._stream.discard()  # where the rig did not open
-
-    def _ending(self) -> str:
-        return "as planned" if self._fault is None else str(self._fault)
 
     # ---- running -------------------------------------------------------------------------------------------
 
@@ -227,10 +214,10 @@ class Loop:
             self._in_blocks(stream, table)
         else:
             self._by_samples(stream, table, python)
-        if self._control.safety[STATE] == STOPPING:
+        if self._guard.state == STOPPING:
             self._ramp(stream)
-        if self._control.safety[STATE] == STOPPED:
-            raise self._error(stream)
+        if self._guard.state == STOPPED:
+            raise self._guard.error(self.rig.name, self.limits, stream)
         return stream.rows(begin, stream.count)
 
     def pause(self, seconds: float) -> Measurement:
@@ -240,11 +227,9 @@ class Loop:
         if self.rig.capabilities.real_clock:
             self._rest(seconds)
         else:
-            self._control.measured[:] = answer(self.rig, "pause", lambda: self.rig.pause(seconds))
-            # The axis may have moved: no speed across the pause.
-            self._control.safety[STARTED] = 0.0
-            self._remember(self._control, started=0.0)
-        return Measurement(*self._control.measured)
+            self._guard.control.measured[:] = answer(self.rig, "pause", lambda: self.rig.pause(seconds))
+            self._guard.forget_speed()
+        return Measurement(*self._guard.control.measured)
 
     def meanwhile(self, work: Callable[[], Result]) -> Result:
         """Do `work` (compile, identify) with zero torque; a rig whose clock is real is served all the while.
@@ -276,8 +261,8 @@ class Loop:
         self._take_over(self.prepare(None), math.inf)
         self._pace.restart()
         self._by_samples(None, setpoints(count), None)
-        if self._control.safety[STATE] == STOPPED:
-            raise self._error(self._open_stream())
+        if self._guard.state == STOPPED:
+            raise self._guard.error(self.rig.name, self.limits, self._open_stream())
 
     def _open_stream(self) -> Stream:
         if self._stream is None:
@@ -286,22 +271,8 @@ class Loop:
 
     def _take_over(self, control: Control, travel: float) -> None:
         """Go on from where the last segment left the axis, with another controller."""
-        last = self._control
-        control.bounds[TRAVEL] = min(travel, safety.UNBOUNDED)
-        control.measured[:] = last.measured
-        control.safety[:] = last.safety
-        if control is not last:
-            known = {name: last.memory[NAMES.index(name)] for name in KNOWN}
-            self._remember(control, **known, open=1.0)
-        control.safety[ORIGIN] = control.measured[POSITION]
-        if self._fault is None:
-            control.safety[STATE] = RUNNING
-        self._control, self._step = control, Step(control)
-
-    def _remember(self, control: Control, **values: float) -> None:
-        """Write into a controller's memory."""
-        for name, value in values.items():
-            control.memory[NAMES.index(name)] = value
+        self._guard.take_over(control, travel)
+        self._step = Step(control)
 
     # ---- samples -------------------------------------------------------------------------------------------
 
@@ -317,9 +288,9 @@ class Loop:
                     self._sample(stream, place + k * stride, times[k])
                 else:
                     self._ask_python(ask, setpoints[k])
-                    if self._control.safety[STATE] != STOPPED:
+                    if self._guard.state != STOPPED:
                         self._sample(stream, self._setpoint.ctypes.data, times[k])
-                if self._control.safety[STATE] >= STOPPED:
+                if self._guard.state >= STOPPED:
                     return
 
     def _within_budget(
@@ -330,11 +301,11 @@ class Loop:
             return python
 
         def take_over(reason: BaseException) -> None:
-            self._ask(reason)
+            self._guard.ask(reason)
             self._ramp(stream)
             self._signals.release()
 
-        rests = self._control.safety[TORQUE] == 0.0
+        rests = self._guard.torque == 0.0
         budget = Budget(self.rig.sample_time, self._budget, take_over, rests=rests)
         undo.enter_context(budget.watched())
         return lambda measured, setpoint: budget.call(python, measured, setpoint)
@@ -344,7 +315,7 @@ class Loop:
         begin = time.perf_counter_ns()
         row = self._row(stream)
         if self._signals.number:
-            self._ask(self._signals.error)
+            self._guard.ask(self._signals.error)
         before = time.thread_time_ns()
         torque = self._step.decide(setpoint, row)
         between = time.thread_time_ns()
@@ -359,7 +330,7 @@ class Loop:
             if stream is not None:
                 stream.spare()
             times[0] = self._pace.wait(self._step.rehearse)
-        measured = self._control.measured
+        measured = self._guard.control.measured
         try:
             found: object = cast(object, self.rig.exchange(torque))
             # One number would be taken for all.
@@ -367,86 +338,61 @@ class Loop:
                 raise RigError(f"{self.rig.name}: exchange gave {found!r}; it must give a Measurement")
             measured[:] = found
         except BaseException as error:  # whatever it is: the torque goes to zero first
-            measured[TIME] += self.rig.sample_time
-            self._ask(error)
+            self._guard.pass_time(self.rig.sample_time)
+            self._guard.ask(error)
 
     def _row(self, stream: Stream | None) -> int:
         """Address of where the sample is recorded; without room for it, nowhere, and the loop stops."""
         if stream is not None:
             if stream.fault is not None:
-                self._ask(stream.fault)
+                self._guard.ask(stream.fault)
             try:
                 return stream.place()
             except RigError as error:
-                self._ask(error)
+                self._guard.ask(error)
         return self._scratch.ctypes.data
 
     def _ask_python(self, python: PythonController, setpoint: Array) -> None:
         """The setpoint with the torque of a controller written in Python added."""
         self._setpoint[:] = setpoint
         try:
-            self._setpoint[2] += python(Measurement(*self._control.measured), Setpoint(*setpoint))
+            self._setpoint[TORQUE] += python(Measurement(*self._guard.control.measured), Setpoint(*setpoint))
         except BaseException as error:
-            self._ask(error)
+            self._guard.ask(error)
 
     def _in_blocks(self, stream: Stream, setpoints: Array) -> None:
         """In compiled blocks through `BlockRig.exchange_block`."""
         rig = cast(BlockRig, self.rig)
         done = 0
-        while done < len(setpoints) and self._control.safety[STATE] < STOPPED and not self._signals.number:
+        while done < len(setpoints) and self._guard.state < STOPPED and not self._signals.number:
             if stream.fault is not None:
                 break
             try:
                 rows = stream.room(min(BLOCK, len(setpoints) - done))
-                count = rig.exchange_block(self._control, setpoints[done : done + len(rows)], rows)
+                count = rig.exchange_block(self._guard.control, setpoints[done : done + len(rows)], rows)
             except BaseException as error:
-                self._ask(error)
+                self._guard.ask(error)
                 return
             stream.commit(count)
             done += count
         if self._signals.number:
-            self._ask(self._signals.error)
+            self._guard.ask(self._signals.error)
         if stream.fault is not None:
-            self._ask(stream.fault)
+            self._guard.ask(stream.fault)
 
     # ---- stopping ------------------------------------------------------------------------------------------
-
-    def _ask(self, reason: BaseException) -> None:
-        """Begin to stop, unless that is under way; the first reason is the one that is told."""
-        s = self._control.safety
-        if s[STATE] in (STOPPING, STOPPED):
-            return
-        self._fault = reason
-        s[STATE], s[REASON] = STOPPING, ASKED
 
     def _ramp(self, stream: Stream | None) -> None:
         """Samples until the torque is zero; the ramp is the compiled one, so its length is bounded."""
         self._setpoint[:] = 0.0
         times = np.zeros(len(TIMES), dtype=np.int64)
-        while self._control.safety[STATE] != STOPPED:
+        while self._guard.state != STOPPED:
             self._sample(stream, self._setpoint.ctypes.data, times)
 
     def _ramp_down(self) -> None:
         """Take the torque away without a fault: before a pause and at the end."""
-        s = self._control.safety
-        if s[STATE] == STOPPED:
+        if self._guard.state == STOPPED:
             return
-        if s[TORQUE] != 0.0 or s[STATE] == STOPPING:
-            s[STATE] = STOPPING
+        if self._guard.begin_ramp():
             self._ramp(self._stream)
-        s[STATE], s[REASON] = RUNNING, 0.0
-        self._remember(self._control, open=1.0)  # a controller that goes on begins without torque
-
-    def _error(self, stream: Stream) -> BaseException:
-        """What is raised once the torque is zero."""
-        s, at = self._control.safety, float(self._control.measured[TIME])
-        if self._fault is None:
-            self._fault = crossed(self.rig.name, self.limits, int(s[REASON]), float(s[VALUE]), at)
-        fault = self._fault = told(self._fault)
-        if isinstance(fault, RigError):
-            if math.isnan(fault.time):
-                fault.time = at
-            if fault.record is None:
-                with suppress(MemoryError):
-                    fault.record = stream.record()
-        return fault
+        self._guard.end_ramp()

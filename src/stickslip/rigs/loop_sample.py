@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -16,16 +16,20 @@ from stickslip.control.learned import after
 from stickslip.control.linear import Gains
 from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
-from stickslip.jit import call_guarded, compiled_guarded, flat, kernel, pointer, pointer_at
+from stickslip.jit import call_guarded, compiled_guarded, flat, kernel, pointer, pointer_at, record_at
 from stickslip.rigs.rig import Limits, Measurement, Setpoint
-from stickslip.rigs.safety import ENDED, STOPPED, Safety, bounds, guarded_by
+from stickslip.rigs.safety import STOPPED, Safety, bounds, guarded_by
 from stickslip.rigs.safety import Bounds as BoundNames
 from stickslip.spec import Surroundings, fields_of
 from stickslip.subset import Layout
 
 __all__ = [
+    "BOUNDS",
     "COLUMNS",
+    "MEASURED",
     "NAMES",
+    "REMEMBERED",
+    "SAFETY",
     "UNITS",
     "Control",
     "addresses",
@@ -51,7 +55,16 @@ NAMES = tuple(f.name for f in MEMORY)
 """The fields of a controller's memory."""
 NOTHING = Controller(Gains(0.0))
 
-STATE, REASON, VELOCITY = (Safety._fields.index(name) for name in ("state", "reason", "velocity"))
+
+def record_of(names: Iterable[str]) -> np.dtype[Any]:
+    """A record of numbers, for what arrays hold by place."""
+    return np.dtype([(name, np.float64) for name in names])
+
+
+MEASURED, REFERENCE, BOUNDS, SAFETY, REMEMBERED, ROW = map(
+    record_of, (Measurement._fields, Setpoint._fields, BoundNames._fields, Safety._fields, NAMES, COLUMNS)
+)
+"""What a sample reads and writes, by name; the last two are the controller's memory and a row of the record."""
 
 
 class Control(NamedTuple):
@@ -68,8 +81,6 @@ class Control(NamedTuple):
     state: Any
     parameters: Any
     surroundings: Any
-    compensation: int
-    """Place of the compensating torque in the memory"""
 
 
 def control_of(
@@ -103,7 +114,7 @@ def control_of(
     # The setpoints' torques alone are given as they are.
     numbers = chosen.settings if controller else chosen.settings._replace(fade=0.0)
     memory = np.zeros(len(NAMES))
-    memory[NAMES.index("open")] = 1.0
+    memory.view(REMEMBERED)["open"] = 1.0
     return Control(
         sampler(chosen),
         np.zeros(len(Measurement._fields)),
@@ -114,7 +125,6 @@ def control_of(
         flat(chosen.packed_state()),
         flat(chosen.packed()),
         np.array(Surroundings()),
-        NAMES.index("others"),
     )
 
 
@@ -161,15 +171,40 @@ GUARD = {
 """Layouts of what the guard reads and writes."""
 
 
+class Sample(NamedTuple):
+    """Addresses of what one sample takes, in the order of its function, and of the row that is recorded."""
+
+    address: int
+    measured: Any
+    setpoint: Any
+    bounds: Any
+    safety: Any
+    settings: Any
+    memory: Any
+    state: Any
+    parameters: Any
+    surroundings: Any
+    row: Any
+
+
 @kernel(inline=True)
-def step(
-    address: int, y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any, row: Any, place: int
-) -> float:
-    """One guarded sample through pointers; `row` gets what the record keeps."""
-    torque = call_guarded(address, y, w, b, s, n, m, z, p, u)
-    row[0], row[1], row[2], row[3], row[4] = y[0], y[1], s[VELOCITY], y[2], torque
-    row[5], row[6], row[7], row[8], row[9] = y[3], y[4], w[0], w[1], w[2]
-    row[10], row[11], row[12], row[13], row[14] = m[place], w[3], y[5], s[STATE], s[REASON]
+def step(at: Sample) -> float:
+    """One guarded sample; ``row`` gets what the record keeps."""
+    torque = call_guarded(
+        at.address, at.measured, at.setpoint, at.bounds, at.safety, at.settings, at.memory, at.state, at.parameters,
+        at.surroundings,
+    )  # fmt: skip
+    y, w, s = (
+        record_at(at.measured, MEASURED),
+        record_at(at.setpoint, REFERENCE),
+        record_at(at.safety, SAFETY),
+    )
+    row = record_at(at.row, ROW)
+    row.time, row.position, row.velocity, row.motor_torque = y.time, y.position, s.velocity, y.torque
+    row.torque_command, row.sensor_torque, row.temperature = torque, y.sensor, y.temperature
+    row.position_reference, row.velocity_reference, row.torque_setpoint = w.position, w.velocity, w.torque
+    row.compensation_torque, row.closed = record_at(at.memory, REMEMBERED).others, w.closed
+    row.status, row.state, row.reason = y.status, s.state, s.reason
     return torque
 
 
@@ -177,20 +212,29 @@ def step(
 def decide(control: Control, setpoint: Any, row: Any) -> float:
     """The torque for the next sample, N·m, from ``control.measured``; `row` gets what the record keeps."""
     return step(
-        control.address, pointer(control.measured, 0), pointer(setpoint, 0), pointer(control.bounds, 0),
-        pointer(control.safety, 0), pointer(control.settings, 0), pointer(control.memory, 0),
-        pointer(control.state, 0), pointer(control.parameters, 0), pointer(control.surroundings, 0),
-        pointer(row, 0), control.compensation,
+        Sample(
+            control.address, pointer(control.measured, 0), pointer(setpoint, 0), pointer(control.bounds, 0),
+            pointer(control.safety, 0), pointer(control.settings, 0), pointer(control.memory, 0),
+            pointer(control.state, 0), pointer(control.parameters, 0), pointer(control.surroundings, 0),
+            pointer(row, 0),
+        )
     )  # fmt: skip
 
 
+ADDRESSES = np.dtype([(name, np.int64) for name in Sample._fields])
+"""A `Sample` as whole numbers, which Python can write."""
+
+
 @kernel()
-def decide_at(a: Any) -> float:
-    """`decide` by addresses: the function's, those of its arrays in its order, the row's; then the place of the
-    compensation."""
+def decide_at(addresses: Any) -> float:
+    """`decide` by `ADDRESSES`."""
+    a = record_at(pointer(addresses, 0), ADDRESSES)
     return step(
-        a[0], pointer_at(a[1]), pointer_at(a[2]), pointer_at(a[3]), pointer_at(a[4]), pointer_at(a[5]),
-        pointer_at(a[6]), pointer_at(a[7]), pointer_at(a[8]), pointer_at(a[9]), pointer_at(a[10]), a[11],
+        Sample(
+            a.address, pointer_at(a.measured), pointer_at(a.setpoint), pointer_at(a.bounds), pointer_at(a.safety),
+            pointer_at(a.settings), pointer_at(a.memory), pointer_at(a.state), pointer_at(a.parameters),
+            pointer_at(a.surroundings), pointer_at(a.row),
+        )
     )  # fmt: skip
 
 
@@ -200,20 +244,16 @@ def nothing_at(_: Any) -> float:
     return 0.0
 
 
-SETPOINT, ROW = 2, 10  # places in the addresses that change from sample to sample
-
-
-def addresses(control: Control) -> Any:
-    """What `decide_at` reads but for setpoint and row; `control` must outlive it."""
-    arrays = (
-        control.measured, None, control.bounds, control.safety, control.settings, control.memory,
-        control.state, control.parameters, control.surroundings, None,
-    )  # fmt: skip
-    at = (0 if x is None else x.ctypes.data for x in arrays)
-    return np.array([control.address, *at, control.compensation], dtype=np.int64)
+def addresses(control: Control) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """`ADDRESSES` of a control, which must outlive them; those of setpoint and row are 0."""
+    out = np.zeros(1, ADDRESSES)
+    out["address"] = control.address
+    for name in control._fields[1:]:
+        out[name] = getattr(control, name).ctypes.data
+    return out.view(np.int64)
 
 
 @kernel()
 def finished(control: Control) -> bool:
     """Whether the loop ends after this sample: the torque is ramped to zero, or the segment's travel is reached."""
-    return control.safety[STATE] == STOPPED or control.safety[STATE] == ENDED
+    return record_at(pointer(control.safety, 0), SAFETY).state >= STOPPED

@@ -25,7 +25,8 @@ from stickslip.spec import Par
 
 __all__ = ["REASONS", "Bounds", "Safety", "bounds", "guarded", "guarded_by"]
 
-# States. ENDED: the segment's travel is reached, which is no fault; the next segment goes on.
+# States; from STOPPED on no sample follows. ENDED: the segment's travel is reached, which is no fault; the next segment
+# goes on.
 RUNNING, STOPPING, STOPPED, ENDED = 0.0, 1.0, 2.0, 3.0
 
 # Reasons to stop.

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from stickslip.rigs.loop_sample import COLUMNS, ROW, SETPOINT, Control, addresses, decide_at, nothing_at
-from stickslip.rigs.rig import Measurement, Setpoint
+from stickslip.rigs.loop_sample import ADDRESSES, COLUMNS, MEASURED, Control, addresses, decide_at, nothing_at
+from stickslip.rigs.rig import Setpoint
 
 __all__ = ["Step"]
 
-POSITION = Measurement._fields.index("position")
+SETPOINT, ROW = ((ADDRESSES.names or ()).index(name) for name in ("setpoint", "row"))
+"""Places of the addresses that change from sample to sample; by name they would take twice as long."""
 
 
 class Step:
@@ -23,20 +24,22 @@ class Step:
     def __init__(self, control: Control) -> None:
         self.control = control
         self._addresses = addresses(control)
+        self._sample = self._addresses.view(np.float64)  # as kernels take it
         # The rehearsal works on copies that stand still on their setpoint. They live here, since only their
         # addresses are used.
         self._copies = control._replace(
-            **{name: getattr(control, name).copy() for name in control._fields[1:-1]}
+            **{name: getattr(control, name).copy() for name in control._fields[1:]}
         )
-        self._still = np.array(Setpoint(position=float(control.measured[POSITION]), closed=1.0))
-        self._row = np.zeros(len(COLUMNS))
-        self._rehearsal = addresses(self._copies)
-        self._rehearsal[SETPOINT], self._rehearsal[ROW] = self._still.ctypes.data, self._row.ctypes.data
+        position = float(control.measured.view(MEASURED)["position"][0])
+        self._still, self._row = np.array(Setpoint(position=position, closed=1.0)), np.zeros(len(COLUMNS))
+        at = addresses(self._copies)
+        at[SETPOINT], at[ROW] = self._still.ctypes.data, self._row.ctypes.data
+        self._rehearsal = at.view(np.float64)
 
     def decide(self, setpoint: int, row: int) -> float:
         """The torque for the next sample, N·m; `setpoint` and `row` are addresses."""
         self._addresses[SETPOINT], self._addresses[ROW] = setpoint, row
-        return decide_at(self._addresses)
+        return decide_at(self._sample)
 
     def rehearse(self) -> None:
         """Run the sample on copies: its code is then in the caches of the processor."""
@@ -45,4 +48,4 @@ class Step:
 
     def idle(self) -> None:
         """A compiled function that does nothing, called as the sample is: what calling and clock take."""
-        nothing_at(self._addresses)
+        nothing_at(self._sample)

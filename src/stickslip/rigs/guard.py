@@ -1,0 +1,132 @@
+"""The safety of the loop by name: what its compiled sample remembers, and the first reason to stop."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+
+from stickslip.errors import Interrupted, RigError
+from stickslip.rigs.loop_sample import BOUNDS, MEASURED, REMEMBERED, SAFETY, Control
+from stickslip.rigs.rig import Limits
+from stickslip.rigs.safety import ASKED, RUNNING, STOPPED, STOPPING, UNBOUNDED, Safety
+from stickslip.rigs.stop_reasons import crossed, told
+from stickslip.stream import Stream
+
+__all__ = ["Guard"]
+
+STATE = Safety._fields.index("state")
+"""Every sample asks for it, and a place takes a quarter of the time that a name does."""
+KNOWN = ("started", "turns", "position", "velocity", "slow_velocity", "error")
+"""What one controller takes over from another: position and velocities, but nothing of its laws"""
+
+
+class Guard:
+    """The safety of the control at work.
+
+    Parameters
+    ----------
+    control : Control
+
+    Attributes
+    ----------
+    control : Control
+    fault : BaseException or None
+        The first reason to stop that was not seen by the sample itself; at the end what is told of it.
+    """
+
+    def __init__(self, control: Control) -> None:
+        self.fault: BaseException | None = None
+        self._late = False
+        self._name(control)
+
+    def _name(self, control: Control) -> None:
+        # Once, so that a sample that goes wrong allocates nothing.
+        self.control = control
+        self._safety = control.safety.view(SAFETY)[0]
+        self._measured = control.measured.view(MEASURED)[0]
+        self._memory = control.memory.view(REMEMBERED)[0]
+
+    @property
+    def state(self) -> float:
+        """RUNNING, STOPPING, STOPPED or ENDED (`stickslip.rigs.safety`)."""
+        return self.control.safety[STATE]
+
+    @property
+    def torque(self) -> float:
+        """The torque commanded last, N·m."""
+        return float(self._safety["torque"])
+
+    def take_over(self, control: Control, travel: float) -> None:
+        """Go on from where the last segment left the axis, with another controller."""
+        last, known = self.control, self._memory
+        control.bounds.view(BOUNDS)["travel"] = min(travel, UNBOUNDED)
+        control.measured[:] = last.measured
+        control.safety[:] = last.safety
+        self._name(control)
+        if control is not last:
+            for name in KNOWN:
+                self._memory[name] = known[name]
+            self._memory["open"] = 1.0
+        self._safety["origin"] = self._measured["position"]
+        if self.fault is None:
+            self._safety["state"] = RUNNING
+
+    def forget_speed(self) -> None:
+        """The axis may have moved meanwhile: no speed from the last sample to the next."""
+        self._safety["started"] = self._memory["started"] = 0.0
+
+    def pass_time(self, seconds: float) -> None:
+        """A sample went by without a measurement."""
+        self._measured["time"] += seconds
+
+    # ---- stopping ------------------------------------------------------------------------------------------
+
+    def ask(self, reason: BaseException) -> None:
+        """Begin to stop, unless that is under way; the first reason is the one that is told."""
+        s = self._safety
+        if s["state"] in (STOPPING, STOPPED):
+            return
+        self.fault = reason
+        s["state"], s["reason"] = STOPPING, ASKED
+
+    def begin_ramp(self) -> bool:
+        """Begin to take the torque away without a fault; whether there is any."""
+        s = self._safety
+        if s["torque"] == 0.0 and s["state"] != STOPPING:
+            return False
+        s["state"] = STOPPING
+        return True
+
+    def end_ramp(self) -> None:
+        """The torque is zero: a controller that goes on begins without torque."""
+        self._safety["state"], self._safety["reason"] = RUNNING, 0.0
+        self._memory["open"] = 1.0
+
+    def at_last(self, fault: BaseException | None) -> None:
+        """What went wrong after the last sample; told by leaving the loop, unless something else is."""
+        if fault is not None and self.fault is None:
+            self.fault, self._late = fault, True
+
+    @property
+    def untold(self) -> BaseException | None:
+        """What leaving the loop is to raise: nobody has been told of it."""
+        return self.fault if self._late or isinstance(self.fault, Interrupted) else None
+
+    @property
+    def ending(self) -> str:
+        """How the run ended, for its record."""
+        return "as planned" if self.fault is None else str(self.fault)
+
+    def error(self, rig: str, limits: Limits, stream: Stream) -> BaseException:
+        """What is raised once the torque is zero."""
+        s, at = self._safety, float(self._measured["time"])
+        if self.fault is None:
+            self.fault = crossed(rig, limits, int(s["reason"]), float(s["value"]), at)
+        fault = self.fault = told(self.fault)
+        if isinstance(fault, RigError):
+            if math.isnan(fault.time):
+                fault.time = at
+            if fault.record is None:
+                with suppress(MemoryError):
+                    fault.record = stream.record()
+        return fault
