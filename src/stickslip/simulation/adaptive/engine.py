@@ -133,12 +133,12 @@ def tolerances(case: Case) -> Any:
 
 
 @kernel()
-def emit(loop: Loop, t: float, y: Any, rows: Any, n: int, event: float) -> int:
-    """Write a row at t; returns the number of rows."""
+def emit(loop: Loop, t: float, y: Any, rows: Any, event: float) -> None:
+    """Write a row at t, if there is room for it."""
+    now, n = loop.now, loop.progress.rows
     if n >= rows.shape[0]:
-        return n
+        return
     torques(loop, t, y)
-    now = loop.now
     rows[n, 0] = t
     rows[n, 1] = now.reference.position
     rows[n, 2] = now.reference.velocity
@@ -148,7 +148,7 @@ def emit(loop: Loop, t: float, y: Any, rows: Any, n: int, event: float) -> int:
     rows[n, 6] = now.friction_torque
     rows[n, 7] = now.compensation_torque
     rows[n, 8] = event
-    return n + 1
+    loop.progress.rows = n + 1
 
 
 @kernel()
@@ -195,36 +195,54 @@ def broken(loop: Loop) -> int:
 
 
 @kernel()
-def cross(loop: Loop, t: float, stop: float, rows: Any, written: int, room: int) -> tuple[int, int]:
-    """Switch at an event, with a row before and after it; returns the number of rows and of switching rounds."""
-    if rows.shape[0] - written > room + 2:
-        written = emit(loop, t, loop.y, rows, written, 1.0)
+def cross(loop: Loop, t: float, stop: float, rows: Any, room: int) -> int:
+    """Switch at an event, with a row before and after it that leave `room`; returns the rounds that it took."""
+    if rows.shape[0] - loop.progress.rows > room + 2:
+        emit(loop, t, loop.y, rows, 1.0)
     events(loop, t, loop.y)
     switch(loop, t, loop.y)
     rounds = settle(loop, t)
     begin_side(loop, t, 0.5 * (t + stop), loop.y)
-    if rows.shape[0] - written > room + 2:
-        written = emit(loop, t, loop.y, rows, written, 1.0)
-    return written, rounds
+    if rows.shape[0] - loop.progress.rows > room + 2:
+        emit(loop, t, loop.y, rows, 1.0)
+    return rounds
+
+
+@kernel()
+def accept(loop: Loop, t: float, grid: Any, rows: Any, nodes: Any, acc: Any, turns: Any) -> None:
+    """Hand out the step that was tried, and make its end the state."""
+    n, reached, step = loop.case.states, loop.progress, loop.step.length
+    reached.steps += 1
+    while reached.outputs < grid.shape[0] and grid[reached.outputs] <= t + step:
+        time = grid[reached.outputs]
+        dense(loop, step, min(1.0, (time - t) / step), loop.middle)
+        emit(loop, time, loop.middle, rows, 0.0)
+        reached.outputs += 1
+    if loop.numbers[METERED] != 0.0:
+        measure(loop, t, step, nodes, acc, turns)
+    last = pointer(loop.rates, 6 * n)
+    # Element by element: assigning slices would compile numpy's checks of shapes, seconds of it.
+    for j in range(n):
+        loop.y[j] = loop.end[j]
+        loop.rates[j] = last[j]
 
 
 @kernel()
 def integrate(laid: Laid, breaks: Any, grid: Any, rows: Any, acc: Any, turns: Any) -> int:
     """Run the loop from rest to the last break. Returns how it ended; when is in the progress."""
     loop = loop_of(laid)
-    n, y, reached, tried = loop.case.states, loop.y, loop.progress, loop.step
-    last, nodes = pointer(loop.rates, 6 * n), np.zeros((SIGNALS, 5))
-    longest = min(loop.numbers[MAX_STEP], MAX_WINDOW)
-    t, written, out, code = 0.0, 0, 0, DONE
+    y, reached, tried = loop.y, loop.progress, loop.step
+    nodes, longest = np.zeros((SIGNALS, 5)), min(loop.numbers[MAX_STEP], MAX_WINDOW)
+    t, code = 0.0, DONE
     storm_start, storm_events = 0.0, 0
     tried.next = 1e-6
     for b in range(breaks.shape[0]):
         stop = breaks[b]
         begin_side(loop, t, 0.5 * (t + stop), y)
         settle(loop, t)
-        if out < grid.shape[0] and grid[out] <= t:
-            written = emit(loop, t, y, rows, written, 0.0)
-            out += 1
+        if reached.outputs < grid.shape[0] and grid[reached.outputs] <= t:
+            emit(loop, t, y, rows, 0.0)
+            reached.outputs += 1
         fresh = True
         tried.next = min(tried.next, 1e-4)
         while t < stop and code == DONE:
@@ -238,25 +256,14 @@ def integrate(laid: Laid, breaks: Any, grid: Any, rows: Any, acc: Any, turns: An
             if code != DONE or tried.taken == 0:
                 reached.rejected += 1
                 continue
-            step = tried.length
-            reached.steps += 1
-            while out < grid.shape[0] and grid[out] <= t + step:
-                dense(loop, step, min(1.0, (grid[out] - t) / step), loop.middle)
-                written = emit(loop, grid[out], loop.middle, rows, written, 0.0)
-                out += 1
-            if loop.numbers[METERED] != 0.0:
-                measure(loop, t, step, nodes, acc, turns)
-            t = stop if tried.final != 0 else t + step
+            accept(loop, t, grid, rows, nodes, acc, turns)
+            t = stop if tried.final != 0 else t + tried.length
             reached.time = t
-            # Element by element: assigning slices would compile numpy's checks of shapes, seconds of it.
-            for j in range(n):
-                y[j] = loop.end[j]
-                loop.rates[j] = last[j]
             code = broken(loop)
             if code == DONE and tried.event != 0:
                 reached.events += 1
                 storm_events += 1
-                written, rounds = cross(loop, t, stop, rows, written, grid.shape[0] - out)
+                rounds = cross(loop, t, stop, rows, grid.shape[0] - reached.outputs)
                 fresh = True
                 if t - storm_start > STORM_TIME:
                     storm_start, storm_events = t, 0
@@ -270,5 +277,4 @@ def integrate(laid: Laid, breaks: Any, grid: Any, rows: Any, acc: Any, turns: An
         if code != DONE:
             break
     close_standstill(acc, t)
-    reached.rows = written
     return code

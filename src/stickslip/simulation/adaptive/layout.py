@@ -68,8 +68,8 @@ STEP = np.dtype(
 
 PROGRESS = np.dtype(
     [
-        # Steps taken and rejected, events, rows written.
-        *((name, np.int64) for name in ("steps", "rejected", "events", "rows")),
+        # Steps taken and rejected, events, rows written, output times met.
+        *((name, np.int64) for name in ("steps", "rejected", "events", "rows", "outputs")),
         # The time reached, s; how many steps there may be at the start, and for each second of the motion.
         *((name, np.float64) for name in ("time", "first_steps", "step_rate")),
     ]
