@@ -54,6 +54,8 @@ SLOWER, STRICTER = 0.5, 3.0
 """Other choices that would do as well: an observer this much slower, degrees of freedom this few."""
 TOLERANCE = 1e-4
 """Relative decrease of the sum of squares at which the last descent ends."""
+EVALUATIONS = 60
+"""Simulations by which a round ends, the last step downhill apart."""
 BLOCK = 0.25
 """s of a segment that is left out: some correlation times of the disturbance."""
 REACH = 3.0
@@ -154,7 +156,8 @@ def prediction_error(
     band : float
         Hz up to which corrections count.
     rounds : int
-        Times that weights and parameters are found in turn, the last to a tenth of the others' tolerance.
+        Times that weights and parameters are found in turn; behind the last the minimum is found to a tenth of their
+        tolerance.
     seed : int
         Of the noise with which the corrections are perturbed.
 
@@ -173,14 +176,14 @@ def prediction_error(
 
     criterion = Criterion.first(observed(), law, vector, mechanics)
     u = vector.start if start is None else start
-    optimum = None
-    for left in reversed(range(rounds)):
+    for _ in range(rounds):
         criterion = criterion.adapted(u)
-        optimum = criterion.descend(
-            u, 12, TOLERANCE if left == 0 else 10.0 * TOLERANCE, jacobian_there=left == 0
-        )
-        u = optimum.u
-    assert optimum is not None
+        # Along a valley a Jacobian kept by secants gets as far as a fresh one, at a step for each sixteen.
+        search = criterion.search(u)
+        search.run(EVALUATIONS, 10.0 * TOLERANCE)
+        u = search.u
+    optimum = criterion.descend(u, 12, TOLERANCE)
+    u = optimum.u
     spread = spread_of(criterion, optimum)
     perturbed = perturbed_steps(criterion, optimum, np.random.default_rng(seed))
     others = [
