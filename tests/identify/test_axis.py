@@ -258,17 +258,28 @@ def test_torque_and_friction_over_the_position_are_recovered(seed: int) -> None:
     )
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_friction_that_grows_with_the_load_is_recovered(seed: int) -> None:
-    """A pendulum: the gearing carries the motor's and gravity's torque, each with a share of its own."""
+def test_friction_that_grows_with_the_load_is_recovered() -> None:
+    """A pendulum: the gearing carries the motor's and gravity's torque, each with a share of its own.
+
+    The four numbers of a record share one error, so that eight records are counted: identified in most, within the
+    95 % interval in most of these, within 99.9 % in all.
+    """
     known = {"gravity": 0.25, "gravity_angle": 0.1, "load_motor": 0.8, "load_external": 1.5}
-    experiment = cases.experiment("coulomb", seed, offset=0.0, noise=5e-3, **known)
+    truth = {"load_motor": 0.8, "load_external": 1.5, "gravity": 0.25, "fc": cases.FC}
     axis = ServoAxis(drive_side="load", gravity="pendulum")
-    found = identify_axis(
-        [experiment], axis, ["coulomb"], extras=Extras(load=True), frozen=["offset"], values={"offset": 0.0},
-        intervals="prediction",
-    )  # fmt: skip
-    assert_recovered(found, {"load_motor": 0.8, "load_external": 1.5, "gravity": 0.25, "fc": cases.FC})
+    away: list[float] = []
+    for seed in range(8):
+        experiment = cases.experiment("coulomb", seed, offset=0.0, noise=5e-3, **known)
+        found = identify_axis(
+            [experiment], axis, ["coulomb"], extras=Extras(load=True), frozen=["offset"], values={"offset": 0.0},
+            intervals="prediction",
+        )  # fmt: skip
+        if all(found[n].identified for n in truth):
+            halves = {n: 0.5 * (found[n].upper - found[n].lower) for n in truth}
+            away.append(max(abs(found[n].value - truth[n]) / halves[n] for n in truth))
+    assert len(away) >= 6
+    assert np.median(away) <= 1.0
+    assert max(away) <= 3.29 / 1.96
 
 
 def test_under_a_constant_torque_load_is_not_told_from_friction_unless_the_drive_brakes() -> None:
@@ -353,7 +364,12 @@ def test_without_its_loop_a_record_still_tells_the_law() -> None:
     assert stribeck < 0.8 * coulomb
     assert found.model is not None
     assert found.model.law.name == "stribeck"
-    assert_recovered(found, {"fs": 0.335, "fc": cases.FC})
+    assert_recovered(found, {"fc": cases.FC})
+    # Where friction falls to its level is not told, so that what acts at rest is: only by reversals, in time.
+    assert "extrapolated to rest" in found["fs"].verdict
+    assert found["fs"].lower < 0.335 < found["fs"].upper
+    held = identify_axis([experiment], AXIS, ["coulomb", "stribeck"], skew=-0.5 * experiment.period)
+    assert_recovered(held, {"fs": 0.335, "fc": cases.FC})
 
 
 def test_gains_that_do_not_make_the_recorded_signal_are_doubted() -> None:

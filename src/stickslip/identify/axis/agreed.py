@@ -16,6 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.axis.gravity import hanging
+from stickslip.identify.axis.settled import ALONE, APART, TWO_METHODS
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.noise import Noise
@@ -51,8 +52,21 @@ AS_GOOD = 1.5
 """Times as much as the regression leaves of the torque in certain sliding, that other values may leave and still
 stand."""
 TOLD_BY_SLIDING = ("inertia", "offset", "gravity", "gravity_angle", "fc", "sigma2")
+FALL = ("fs", "vs")
+"""What friction's fall with velocity is told by."""
+MOVED, UNLIKE = 1.3, 0.01
+"""Factor on the interval of these where the torque had to be moved to where it acted: reversals are then blurred by a
+part of a row; and half-width of what a law that is none of nature's leaves unsure in any case."""
 DOUBT = "the prediction error, the only evidence for it, contradicts certain sliding on {name}: {other} against {own}"
 
+ONE_BAND = (
+    "two methods are apart: the prediction error says {other.value:.4g}, certain sliding, of which one band of "
+    "frequencies alone tells it, {own.value:.4g} {own.unit}"
+)
+BAND_ALONE = (
+    "one band of frequencies alone tells it, where level and slope, or motor and load, are not told apart"
+)
+AT_REST = "extrapolated to rest: at which velocity friction falls to its level is not told"
 UNDECIDED = (
     "the prediction error says {name} {own}, the plain inverse dynamics {other}, and the record slides too little in "
     "one direction to decide"
@@ -176,6 +190,8 @@ def agreed(
             continue
         if fine and abs(e.value - own.value) > SAME * abs(own.value) and e.name in ("inertia", "fc"):
             doubts = DOUBT.format(name=e.name, other=f"{e.value:.4g}", own=f"{own.value:.4g} {e.unit}")
+        if fine and e.identified and not found.confirmed(e.name):
+            own = both_told(own, e, parameters[e.name])
         if stands:
             own, said = held_together(own, plain_value(e.name, inverse), parameters[e.name], size)
             notes += said
@@ -187,12 +203,13 @@ def agreed(
             for e in estimates if taken.get(e.name) is e
         }  # fmt: skip
         notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
-    if fine and found.falls >= FALLS:
-        for e in estimates:
-            if e.name in ("fs", "vs") and e.name in parameters:
-                taken[e.name], said = fall_together(e, found, parameters[e.name])
-                notes += said
+    for e in estimates if fine else ():
+        if e.name in FALL and e.name in parameters:
+            taken[e.name], said = fall_together(e, found, parameters[e.name], held=held)
+            notes += said
     out = tuple(taken.get(e.name, e) for e in estimates)
+    # Reversals show what a contact withstands, where the torque is known to act from row to row.
+    out = out if held else with_rest(out)
     if doubts:
         out = tuple(
             replace(e, identified=False, verdict=doubts) if e.identified and e.name not in sliding else e
@@ -214,12 +231,35 @@ def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale
 
 
 def with_level(estimates: Iterable[Estimate], found: Regression) -> tuple[Estimate, ...]:
-    """The estimates, the level of certain sliding not identified where it is extrapolated; values stay."""
-    low, high = found.interval("fc")
-    # Where sliding hardly tells it, it is the prediction error's.
-    doubt = found.level_doubt if high <= RATIO * low else ""
+    """The estimates, level and slope of friction not identified where certain sliding does not tell them apart; values
+    stay.
+
+    One band of frequencies alone tells them, where motor and load move apart; the level is extrapolated, or its value
+    had to be moved far towards another method's.
+    """
+    (low, high), own = found.interval("fc"), found.numbers["fc"].value
+    # What sliding hardly tells is the prediction error's.
+    clear = {"fc": high <= RATIO * low, "sigma2": found.slope_told}
+
+    def doubt_on(e: Estimate) -> str:
+        if clear.get(e.name) and not found.confirmed(e.name) and (found.rough or high > ALONE * low):
+            return BAND_ALONE
+        if e.name != "fc" or not clear["fc"]:
+            return ""
+        share = abs(e.value - own) / abs(own)
+        if not found.level_doubt and share > APART and found.fall_may_hide:
+            return TWO_METHODS.format(share=share, own=own, value=e.value, unit=e.unit)
+        return found.level_doubt
+
+    doubts = ((e, doubt_on(e) if e.identified else "") for e in estimates)
+    return tuple(replace(e, identified=False, verdict=doubt) if doubt else e for e, doubt in doubts)
+
+
+def with_rest(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """The estimates, friction at rest not identified where the velocity of its fall is not."""
+    untold = any(e.name == "vs" and not e.identified for e in estimates)
     return tuple(
-        replace(e, identified=False, verdict=doubt) if doubt and e.name == "fc" and e.identified else e
+        replace(e, identified=False, verdict=AT_REST) if untold and e.name == "fs" and e.identified else e
         for e in estimates
     )
 
@@ -236,19 +276,32 @@ def plain_value(name: str, inverse: InverseDynamics | None) -> tuple[float, floa
     return inverse[own], QUANTILE * float(inverse.robust_std[inverse.names.index(own)])
 
 
-def fall_together(e: Estimate, found: Regression, p: Parameter) -> tuple[Estimate, list[str]]:
-    """Fs or vs of the prediction error, its interval widened to hold what certain sliding says of the fall of
-    friction where both contradict each other."""
+def fall_together(e: Estimate, found: Regression, p: Parameter, *, held: bool) -> tuple[Estimate, list[str]]:
+    """Fs or vs of the prediction error, with what certain sliding says of the fall of friction where both contradict
+    each other, and with what a moved torque and the law's own form leave unsure."""
     own = found.vs if e.name == "vs" else found.numbers["fs"]
-    half = QUANTILE * own.std
-    apart = abs(own.value - e.value) > math.hypot(0.5 * (e.upper - e.lower), half)
-    if not (apart and e.identified) or abs(own.value - e.value) <= SAME * abs(e.value):
-        return e, []
-    wide = told(e, p, e.value, min(e.lower, own.value), max(e.upper, own.value), math.nan)
-    return wide, [
-        f"{e.name}: certain sliding says {own.value:.4g}, the prediction error {e.value:.4g} {e.unit}; the interval "
-        "holds both."
-    ]
+    notes: list[str] = []
+    if not e.identified:
+        return e, notes
+    apart = abs(own.value - e.value) > math.hypot(half_width(e), QUANTILE * own.std)
+    if found.falls >= FALLS and apart and abs(own.value - e.value) > SAME * abs(e.value):
+        e = told(e, p, e.value, min(e.lower, own.value), max(e.upper, own.value), math.nan)
+        notes.append(
+            f"{e.name}: certain sliding says {own.value:.4g}, the prediction error {e.value:.4g} {e.unit}; the "
+            "interval holds both."
+        )
+    return (as_moved(e, p, 1.0 if held else MOVED) if e.identified else e), notes
+
+
+def as_moved(e: Estimate, p: Parameter, factor: float) -> Estimate:
+    """An estimate whose interval is so many times as wide, in logarithms, and not narrower than the law is true."""
+    below, above = (math.hypot(factor * math.log(end / e.value), UNLIKE) for end in (e.lower, e.upper))
+    return told(e, p, e.value, e.value * math.exp(-below), e.value * math.exp(above), math.nan)
+
+
+def half_width(e: Estimate) -> float:
+    """Of its interval."""
+    return 0.5 * (e.upper - e.lower)
 
 
 def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tuple[Estimate, ...]:
@@ -281,6 +334,15 @@ def as_good(inverse: InverseDynamics, found: Regression, times: float = AS_GOOD)
     }
     gravity = {n: inverse[n] for n in ("gravity_sin", "gravity_cos") if inverse.has(n)}
     return found.widened == 1.0 and found.left_by(values | gravity) <= times * found.left
+
+
+def both_told(e: Estimate, other: Estimate, p: Parameter) -> Estimate:
+    """What one band of certain sliding alone tells, where the prediction error contradicts it: its interval holds both,
+    and nothing decides between them."""
+    if not e.identified or abs(other.value - e.value) <= SAME * abs(e.value):
+        return e
+    wide = told(e, p, e.value, min(e.lower, other.value), max(e.upper, other.value), math.nan)
+    return replace(wide, identified=False, verdict=ONE_BAND.format(other=other, own=e))
 
 
 def held_together(

@@ -22,7 +22,7 @@ from stickslip.identify.regression.sliding_rows import FEWEST, Signals, SlidingR
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["QUANTILE", "ROTATED", "Bands", "calmed", "follows", "in_bands", "rough", "together"]
+__all__ = ["QUANTILE", "ROTATED", "Bands", "calmed", "follows", "in_bands", "rough", "telling", "together"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

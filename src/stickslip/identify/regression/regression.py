@@ -30,6 +30,7 @@ from stickslip.identify.regression.bands import (
     follows,
     in_bands,
     rough,
+    telling,
     together,
 )
 from stickslip.identify.regression.sliding_rows import SlidingRows, narrowest_width, signals_of
@@ -48,6 +49,9 @@ GIVEN = 0.05
 """Rows to which a skew that is given is known."""
 LEVEL, EXCLUDED = 0.05, 0.05
 """Half-width, in parts of Fc, up to which it is told in any case; probability of a fall up to which none is there."""
+SLOPED, WIDELY = 0.1, 0.2
+"""Part of Fc to which viscous friction must be known at the highest speed, where no fall shows; and of that speed below
+which the slowest rows lie where one may hide."""
 FALLS, SHOWN = 0.95, 4.0
 """Probability, and standard deviations of Fs - Fc, from which on friction is taken to fall with velocity."""
 LEVEL_UNTOLD = (
@@ -132,7 +136,7 @@ class Regression:
         """RMS of the torque that its own numbers leave in those rows, N·m (N), a torque over the position among it; a
         fall of friction that shows is taken for one where little else is left."""
         own = {name: n.value for name, n in self.numbers.items()}
-        if self.shows_a_fall and not rough(self.bands[0]):
+        if self.shows_a_fall and not self.rough:
             own |= {"vs": self.vs.value}
         return self.left_by(own)
 
@@ -148,6 +152,15 @@ class Regression:
         unseen = ("inertia", *sorted(ROTATED))
         return UNMOVED if swings and not any(self.above_chance(n) for n in unseen) else ""
 
+    def confirmed(self, name: str) -> bool:
+        """Whether more than one band tells a number."""
+        return len(telling(name, self.bands)) > 1
+
+    @property
+    def rough(self) -> bool:
+        """Whether the widest band leaves so much that motor and load may not move as one there."""
+        return rough(self.bands[0])
+
     def above_chance(self, name: str) -> bool:
         """Whether a number differs from 0 by more than its interval."""
         low, high = self.interval(name)
@@ -161,13 +174,27 @@ class Regression:
         is not excluded and viscous friction not told apart from its end, level and slope are one number at the highest
         speeds: the level is extrapolated, however narrow half of its value would seem.
         """
-        level, (low, high) = self.numbers["fc"], self.interval("sigma2")
+        level = self.numbers["fc"]
         share = QUANTILE * level.std / max(abs(level.value), 1e-300)
-        if share > ROUGHLY and self.widened > 1.0 and rough(self.bands[0]):
+        if share > ROUGHLY and self.widened > 1.0 and self.rough:
             return STILL_ROUGH + UNSURE_THERE.format(share=share, most=ROUGHLY)
-        if share <= LEVEL or self.falls <= EXCLUDED or 0.0 < high <= RATIO * low:
+        if self.slope_told:
             return ""
-        return LEVEL_UNTOLD
+        sloped = QUANTILE * self.numbers["sigma2"].std * self.fastest > SLOPED * abs(level.value)
+        hidden = self.falls < FALLS and self.fall_may_hide
+        untold = (hidden and (sloped or share > LEVEL)) or (share > LEVEL and self.falls > EXCLUDED)
+        return LEVEL_UNTOLD if untold else ""
+
+    @property
+    def slope_told(self) -> bool:
+        """Whether viscous friction is told to a factor of two."""
+        low, high = self.interval("sigma2")
+        return 0.0 < high <= RATIO * low
+
+    @property
+    def fall_may_hide(self) -> bool:
+        """Whether a fall of friction may hide between slow rows and fast ones, which do not tell the slope."""
+        return not self.slope_told and self.slowest < WIDELY * self.fastest
 
     @property
     def fall_shown(self) -> float:

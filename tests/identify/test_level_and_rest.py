@@ -1,0 +1,90 @@
+"""Level, slope and static friction that a record seems to tell, and does not: what is then not called identified."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from stickslip.identify.axis.agreed import AT_REST, BAND_ALONE, as_moved, with_level, with_rest
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.experiment import Experiment
+from stickslip.identify.fit.parameter_vector import Parameter
+from stickslip.identify.regression.regression import LEVEL_UNTOLD, Regression, regress_axis
+from stickslip.machines.servo import ServoAxis
+from stickslip.spec import Par
+
+AXIS = ServoAxis(drive_side="load")
+
+
+def regressed(logs: Any, *cell: Any) -> tuple[Regression, dict[str, float]]:
+    """The regression on an ordinary log, and the truth."""
+    log = logs.draw(*cell)
+    return regress_axis([Experiment("log", log.time, log.position, log.torque)], AXIS), log.truth
+
+
+def estimate(name: str, value: float, low: float, high: float) -> Estimate:
+    """An identified one."""
+    return Estimate(name, "N·m", name, value, (high - low) / 3.92, low, high, True, "")
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        (700156, "held", 250, "pid", "steps", "cogging"),
+        (700578, "mean", 1000, "pid", "steps", "flexible"),
+        (700715, "mean", 250, "feedforward", "steps", "clean"),
+    ],
+)
+def test_a_level_between_slow_rows_and_fast_ones_that_tell_no_slope_is_extrapolated(
+    logs: Any, cell: tuple[Any, ...]
+) -> None:
+    """Slow rows alone tell a level near static friction, 23 to 31 % too high, to 1 to 5 %: fast ones that do not tell
+    viscous friction let any fall hide."""
+    found, truth = regressed(logs, *cell)
+    low, _ = found.interval("fc")
+    assert low > truth["fc"]
+    assert found.falls < 0.2
+    assert found.level_doubt == LEVEL_UNTOLD
+
+
+def test_a_level_is_believed_where_the_slope_is_told(logs: Any) -> None:
+    found, truth = regressed(logs, 700576, "mean", 1000, "p-pi", "production", "clean")
+    assert found.slope_told
+    assert not found.fall_may_hide
+    assert not found.level_doubt
+    low, high = found.interval("fc")
+    assert low < truth["fc"] < high
+
+
+def test_a_slope_that_one_band_alone_tells_beside_no_level_is_not_identified(logs: Any) -> None:
+    """Viscous friction 63 times too high, to a quarter, in the one band that tells it."""
+    found, truth = regressed(logs, 900577, "mean", 1000, "pid", "steps", "backlash")
+    low, high = found.interval("sigma2")
+    assert low > 10.0 * truth["sigma2"]
+    assert high < 2.0 * low
+    assert not found.confirmed("sigma2")
+    (judged,) = with_level([estimate("sigma2", 0.5 * (low + high), low, high)], found)
+    assert not judged.identified
+    assert judged.verdict == BAND_ALONE
+
+
+def test_static_friction_is_no_better_known_than_the_velocity_of_its_fall() -> None:
+    rest, fall = estimate("fs", 0.3, 0.29, 0.31), estimate("vs", 0.1, 0.09, 0.11)
+    assert with_rest([rest, fall]) == (rest, fall)
+    unsure = replace(fall, identified=False, verdict="wide")
+    judged, _ = with_rest([rest, unsure])
+    assert (judged.identified, judged.verdict) == (False, AT_REST)
+    # A velocity that is no parameter, or given, takes nothing away.
+    assert with_rest([rest]) == (rest,)
+
+
+def test_a_moved_torque_widens_what_reversals_tell() -> None:
+    p = Parameter("fs", Par("N·m", "F_S", "static friction", positive=True), 0.3)
+    e = estimate("fs", 0.3, 0.3 / 1.05, 0.3 * 1.05)
+    same, wider = as_moved(e, p, 1.0), as_moved(e, p, 1.3)
+    assert math.log(same.upper / 0.3) == pytest.approx(math.hypot(math.log(1.05), 0.01))
+    assert math.log(0.3 / wider.lower) == pytest.approx(math.hypot(1.3 * math.log(1.05), 0.01))
+    assert wider.identified
