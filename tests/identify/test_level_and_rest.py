@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from stickslip.identify.axis.agreed import AT_REST, BAND_ALONE, as_moved, with_level, with_rest
+from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter
@@ -88,3 +89,22 @@ def test_a_moved_torque_widens_what_reversals_tell() -> None:
     assert math.log(same.upper / 0.3) == pytest.approx(math.hypot(math.log(1.05), 0.01))
     assert math.log(0.3 / wider.lower) == pytest.approx(math.hypot(1.3 * math.log(1.05), 0.01))
     assert wider.identified
+
+
+def test_cogging_does_not_make_plain_least_squares_as_good(logs: Any) -> None:
+    """Certain sliding says Fc to 1.6 % and is right; plain least squares 27 % less, as cogging is what both leave."""
+    log = logs.draw(930086, "held", 500, "pid", "sine", "cogging")
+    found = identify_axis([Experiment("log", log.time, log.position, log.torque)], AXIS)
+    level = found["fc"]
+    assert level.identified
+    assert abs(level.value / log.truth["fc"] - 1.0) < 0.01
+    assert level.lower < log.truth["fc"] < level.upper
+    regression = found.details["regression"]
+    assert regression.unexplained_by(regression.own) < 0.3 * regression.left
+
+
+def test_nothing_is_believed_where_more_than_friction_is_left_unexplained(logs: Any) -> None:
+    """Steps that ring an elastic drivetrain: inertia came out a sixth of the truth, to 4 %."""
+    found, truth = regressed(logs, 930418, "actual", 1000, "feedforward", "steps", "flexible")
+    assert found.numbers["inertia"].value < 0.2 * truth["inertia"]
+    assert "unexplained" in found.doubt

@@ -333,7 +333,9 @@ def as_good(inverse: InverseDynamics, found: Regression, times: float = AS_GOOD)
         "offset": inverse.offset,
     }
     gravity = {n: inverse[n] for n in ("gravity_sin", "gravity_cos") if inverse.has(n)}
-    return found.widened == 1.0 and found.left_by(values | gravity) <= times * found.left
+    if found.widened > 1.0:
+        return False
+    return found.unexplained_by(values | gravity) <= times * found.unexplained_by(found.own)
 
 
 def both_told(e: Estimate, other: Estimate, p: Parameter) -> Estimate:

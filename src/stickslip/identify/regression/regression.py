@@ -23,6 +23,7 @@ from stickslip.errors import InputError
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.band_fit import BandFit, Number
+from stickslip.identify.regression.band_system import least_squares
 from stickslip.identify.regression.bands import (
     QUANTILE,
     ROTATED,
@@ -63,6 +64,12 @@ UNSURE_THERE, ROUGHLY = "it is unsure to {share:.0%} there; identified means at 
 APART = (
     "the axis does not follow its torque as one inertia does: what its acceleration needs is unsure to {share:.2g} of "
     "Fc; record gentler motion"
+)
+BEYOND = 2.0
+"""Times Fc that may be left of the torque in certain sliding for anything to be believed."""
+BEYOND_LEVEL = (
+    "the axis does not follow its torque as one inertia does: more than twice the level of friction is left "
+    "unexplained where it slides; record gentler motion"
 )
 UNMOVED = (
     "the torque shows neither the pendulum's inertia nor its weight, which move it all the same: it is what a "
@@ -117,9 +124,9 @@ class Regression:
         n = self.numbers[name]
         return n.value - QUANTILE * n.std, n.value + QUANTILE * n.std
 
-    def left_by(self, values: Mapping[str, float]) -> float:
-        """RMS of the torque that inertia, sigma2, fc, offset and gravity leave in the rows of certain sliding, N·m
-        (N); of a fall of friction also that of `fs` and `vs`, where they are among the values."""
+    def remainder(self, values: Mapping[str, float]) -> Array:
+        """Torque that inertia, sigma2, fc, offset and gravity leave in the rows of certain sliding, N·m (N), shape
+        (n,); of a fall of friction also that of `fs` and `vs`, where they are among the values."""
         fixed, position = stacked(self.rows, "fixed"), stacked(self.rows, "position")
         torque = np.concatenate([r.torque(self.numbers["skew"].value) for r in self.rows])
         known = fixed @ np.array([values[n] for n in ("inertia", "sigma2", "fc", "offset")])
@@ -129,16 +136,31 @@ class Regression:
             speed = stacked(self.rows, "speed")
             falls = np.exp(-((speed / values["vs"]) ** 2))
             known = known + (values["fs"] - values["fc"]) * falls * np.sign(speed)
-        return float(np.sqrt(np.mean((torque - known) ** 2)))
+        return np.asarray(torque - known, dtype=np.float64)
+
+    def left_by(self, values: Mapping[str, float]) -> float:
+        """RMS of `remainder`, N·m (N)."""
+        return root_mean_square(self.remainder(values))
+
+    def unexplained_by(self, values: Mapping[str, float]) -> float:
+        """The same beside what torque over the position, of the orders that were found, explains of it, N·m (N)."""
+        rest = self.remainder(values)
+        if self.orders:
+            waves = [np.concatenate([r.around(order) for r in self.rows]) for order in self.orders]
+            columns = np.concatenate(waves, axis=1)
+            rest = rest - columns @ least_squares(columns, rest)
+        return root_mean_square(rest)
+
+    @property
+    def own(self) -> dict[str, float]:
+        """Its own numbers by name; of a fall of friction that shows also vs, where little else is left."""
+        own = {name: n.value for name, n in self.numbers.items()}
+        return own | ({"vs": self.vs.value} if self.shows_a_fall and not self.rough else {})
 
     @property
     def left(self) -> float:
-        """RMS of the torque that its own numbers leave in those rows, N·m (N), a torque over the position among it; a
-        fall of friction that shows is taken for one where little else is left."""
-        own = {name: n.value for name, n in self.numbers.items()}
-        if self.shows_a_fall and not self.rough:
-            own |= {"vs": self.vs.value}
-        return self.left_by(own)
+        """RMS of the torque that its own numbers leave in those rows, N·m (N), a torque over the position among it."""
+        return self.left_by(self.own)
 
     @property
     def doubt(self) -> str:
@@ -148,6 +170,8 @@ class Regression:
         unsure = QUANTILE * inertia.std * usual
         if unsure > UNSURE * level:
             return APART.format(share=unsure / max(level, 1e-300))
+        if self.unexplained_by(self.own) > BEYOND * level:
+            return BEYOND_LEVEL
         swings = self.numbers.keys() >= ROTATED and np.ptp(stacked(self.rows, "position")) >= SWUNG
         unseen = ("inertia", *sorted(ROTATED))
         return UNMOVED if swings and not any(self.above_chance(n) for n in unseen) else ""
@@ -268,6 +292,11 @@ def regress_axis(
         numbers, bands, seen.orders, falls, vs, float(np.quantile(speed, 0.01)), float(np.max(speed)), period,
         seen.rows, seen.widened,
     )  # fmt: skip
+
+
+def root_mean_square(x: Array) -> float:
+    """Of a series."""
+    return float(np.sqrt(np.mean(x * x)))
 
 
 def fall_of(bands: Sequence[BandFit]) -> tuple[float, Number]:
