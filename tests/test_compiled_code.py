@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
-from stickslip.jit import loaded
+import stickslip
+from stickslip.jit import cache_folder, loaded
 
 HEAD = "from stickslip.jit import compile_entry, compile_inner\n"
 INNER = "@compile_inner\ndef {}(v):\n    return {}\n"
@@ -66,17 +69,50 @@ print("numba.np.arraymath" in sys.modules)
 """
 
 
+def told(program, cache):
+    """What a process prints that keeps its compiled code there."""
+    surroundings = {**os.environ, "STICKSLIP_CACHE": str(cache)}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=surroundings, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-500:]
+    return done.stdout.strip()
+
+
 def test_reading_compiled_code_loads_nothing_that_compiles(tmp_path):
     """numba's implementations of all of NumPy, for which it imports SciPy, take a third of a second a process."""
-    surroundings = {**os.environ, "STICKSLIP_CACHE": str(tmp_path)}
-    told = []
-    for _ in ("compiles", "reads"):
-        done = subprocess.run(
-            [sys.executable, "-c", TIDY], env=surroundings, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr[-500:]
-        told.append(done.stdout.strip())
-    assert told == ["True", "False"]
+    assert [told(TIDY, tmp_path) for _ in ("compiles", "reads")] == ["True", "False"]
+
+
+def test_compiled_code_is_found_where_package_and_cache_have_moved(tmp_path):
+    """A kept cache, another checkout: what names compiled code is its text and its place in the package."""
+    here = tmp_path / "here" / "cache"
+    assert told(TIDY, here) == "True"
+    shutil.copytree(Path(stickslip.__file__).parent, tmp_path / "there" / "stickslip")
+    here.rename(tmp_path / "there" / "cache")
+    moved = f"import sys; sys.path.insert(0, {str(tmp_path / 'there')!r}){TIDY}"
+    assert told(
+        f"{moved}\nimport stickslip; print(stickslip.__file__)", tmp_path / "there" / "cache"
+    ).split() == [
+        "False",
+        str(tmp_path / "there" / "stickslip" / "__init__.py"),
+    ]
+
+
+SIMULATED = """
+import sys
+import stickslip as ss
+axis = ss.RigidAxis(inertia=1e-3, friction=ss.Model("coulomb", fc=0.1))
+controller = ss.Controller(ss.place("PD", inertia=1e-3, bandwidth=20.0))
+ss.simulate(axis, controller, ss.Reference("sine", amplitude=0.01, frequency=0.4), duration=0.1)
+print("numba.np.arraymath" in sys.modules)
+"""
+
+
+def test_a_simulation_loads_nothing_that_compiles_either():
+    cache = cache_folder().parent
+    told(SIMULATED, cache)  # may compile
+    assert told(SIMULATED, cache) == "False"
 
 
 NAMES = """

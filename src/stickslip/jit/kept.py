@@ -20,7 +20,7 @@ from typing import Any
 import numba
 from numba import config
 from numba.core import event
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.runtime.nrt import rtsys
 
 from stickslip import compiling
@@ -67,8 +67,29 @@ class _Told(event.Listener):
 event.register("numba:compile", _Told())
 
 
+class _Located(UserProvidedCacheLocator):
+    """numba's folder of a file, which it names after where the file lies: here after its place in the package."""
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        """A room of the package, or what is generated, by its name: found wherever package and cache have moved."""
+        folder = Path(py_file).absolute().parent
+        if folder == cache_folder().absolute():
+            return "generated"
+        package = Path(__file__).parent.parent
+        if folder.is_relative_to(package):
+            return ".".join(folder.relative_to(package.parent).parts)
+        return super().get_suitable_cache_subpath(py_file)
+
+
+class _InOurFolder(CompileResultCacheImpl):
+    _locator_classes = (_Located,)
+
+
 class _Kept(FunctionCache):
     """numba's cache, read without what only compiling needs: its tables of all that it knows, with SciPy, 0.35 s."""
+
+    _impl_class = _InOurFolder
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         rtsys.initialize(target_context)
