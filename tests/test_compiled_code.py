@@ -23,6 +23,16 @@ print("stickslip._compiled.first" in sys.modules)
 """
 
 
+def told(program, cache):
+    """What a process prints that keeps its compiled code there."""
+    surroundings = {**os.environ, "STICKSLIP_CACHE": str(cache)}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=surroundings, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-500:]
+    return done.stdout.strip()
+
+
 def shared(number):
     """A file of two functions that every number's file holds, and an entry of its own."""
     inner = INNER.format("_half", "0.5 * v") + INNER.format("_part", "_half(v) + 1.0")
@@ -60,6 +70,28 @@ def test_functions_of_one_text_are_compiled_once():
     assert one._half is other._half
 
 
+LAW = """
+from stickslip.jit import compiled_law
+from stickslip.plugins import law
+compiled_law(law("coulomb"))
+"""
+
+
+def test_a_changed_engine_leaves_the_compiled_laws_as_they_are(tmp_path):
+    """They call nothing of it: after a change most of what a kept cache holds is good."""
+    package = tmp_path / "stickslip"
+    shutil.copytree(Path(stickslip.__file__).parent, package)
+    program = f"import sys; sys.path.insert(0, {str(tmp_path)!r}){LAW}"
+    kept = []
+    for change in ("", "# another engine"):
+        with (package / "simulation" / "metrics.py").open("a") as file:
+            file.write(change)
+        told(program, tmp_path / "cache")
+        kept.append({file: file.stat().st_mtime_ns for file in tmp_path.glob("cache/**/*.nbc")})
+    assert kept[0]
+    assert kept[0] == kept[1]
+
+
 TIDY = """
 import sys
 import numpy as np
@@ -67,16 +99,6 @@ from stickslip.simulation.biquads import zero_phase
 zero_phase(np.zeros((2, 6)), np.zeros((2, 2)), np.zeros(10))
 print("numba.np.arraymath" in sys.modules)
 """
-
-
-def told(program, cache):
-    """What a process prints that keeps its compiled code there."""
-    surroundings = {**os.environ, "STICKSLIP_CACHE": str(cache)}
-    done = subprocess.run(
-        [sys.executable, "-c", program], env=surroundings, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr[-500:]
-    return done.stdout.strip()
 
 
 def test_reading_compiled_code_loads_nothing_that_compiles(tmp_path):

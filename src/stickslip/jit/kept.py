@@ -11,6 +11,7 @@ import hashlib
 import importlib.util
 import os
 import platform
+import re
 import sys
 import tempfile
 import threading
@@ -18,9 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba import config
 from numba.core import event
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.runtime.nrt import rtsys
 
 from stickslip import compiling
@@ -28,18 +28,19 @@ from stickslip import compiling
 __all__ = ["cache_folder", "cached", "decorating", "loaded"]
 
 
-def _kernel_files() -> tuple[Path, ...]:
-    """The files that kernels are made of, and those whose constants they hold: all of the rooms that have kernels."""
-    package = Path(__file__).parent.parent
-    found = (package.glob(f"{room}/**/*.py") for room in ("jit", "simulation", "machines", "rigs"))
-    return tuple(sorted(file for files in found for file in files))
+ROOMS = ("jit", "simulation", "machines", "rigs")
+"""Rooms of the package that have kernels: what these are made of, with the constants that they hold."""
+PACKAGE = Path(__file__).parent.parent
 
 
 @functools.cache
-def cache_folder() -> Path:
-    """The folder for compiled code: STICKSLIP_CACHE, else the user's cache folder, else a temporary one."""
+def cache_folder(rooms: tuple[str, ...] = ROOMS) -> Path:
+    """The folder for compiled code of some rooms: STICKSLIP_CACHE, else the user's cache folder, else a temporary one.
+
+    It is named after the content of these rooms.
+    """
     digest = hashlib.sha256(f"{numba.__version__} {sys.version} {platform.machine()}".encode())
-    for file in _kernel_files():
+    for file in sorted(file for room in rooms for file in (PACKAGE / room).glob("**/*.py")):
         digest.update(file.read_bytes())
     home = os.environ.get("STICKSLIP_CACHE") or os.path.join(
         os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "stickslip"
@@ -67,29 +68,52 @@ class _Told(event.Listener):
 event.register("numba:compile", _Told())
 
 
-class _Located(UserProvidedCacheLocator):
-    """numba's folder of a file, which it names after where the file lies: here after its place in the package."""
+class _Place:
+    """Where numba keeps what it compiles of a function: named after the file's place in the package and its content.
+
+    numba's own are named after where the file lies, and older ones after when it was written: a kept cache would be
+    of no use to another checkout.
+    """
+
+    def __init__(self, function: Any, file: str) -> None:
+        self._py_file, self._line = file, function.__code__.co_firstlineno
+        self._generated = function.__module__.startswith(GENERATED)
 
     @classmethod
-    def get_suitable_cache_subpath(cls, py_file: str) -> str:
-        """A room of the package, or what is generated, by its name: found wherever package and cache have moved."""
-        folder = Path(py_file).absolute().parent
-        if folder == cache_folder().absolute():
-            return "generated"
-        package = Path(__file__).parent.parent
-        if folder.is_relative_to(package):
-            return ".".join(folder.relative_to(package.parent).parts)
-        return super().get_suitable_cache_subpath(py_file)
+    def from_function(cls, function: Any, file: str) -> _Place:
+        return cls(function, file)
+
+    def get_cache_path(self) -> str:
+        folder = Path(self._py_file).absolute().parent
+        if self._generated:
+            return str(folder)
+        if folder.is_relative_to(PACKAGE):
+            return str(cache_folder() / ".".join(folder.relative_to(PACKAGE.parent).parts))
+        return str(cache_folder() / f"{folder.name}_{hashlib.sha256(str(folder).encode()).hexdigest()[:16]}")
+
+    def get_source_stamp(self) -> bytes:
+        return _content(self._py_file)
+
+    def get_disambiguator(self) -> str:
+        return str(self._line)
+
+    def ensure_cache_path(self) -> None:
+        os.makedirs(self.get_cache_path(), exist_ok=True)
 
 
-class _InOurFolder(CompileResultCacheImpl):
-    _locator_classes = (_Located,)
+@functools.cache
+def _content(file: str) -> bytes:
+    return hashlib.sha256(Path(file).read_bytes()).digest()
+
+
+class _InPlace(CompileResultCacheImpl):
+    _locator_classes = (_Place,)
 
 
 class _Kept(FunctionCache):
     """numba's cache, read without what only compiling needs: its tables of all that it knows, with SciPy, 0.35 s."""
 
-    _impl_class = _InOurFolder
+    _impl_class = _InPlace
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         rtsys.initialize(target_context)
@@ -100,29 +124,31 @@ class _Kept(FunctionCache):
 
 
 decorating = threading.RLock()
+GENERATED = "stickslip._compiled."
+"""Before the names of generated modules."""
+_CALLED = re.compile(r"^from (stickslip[\w.]*) import ", re.MULTILINE)
 
 
 def cached(compiled: Any, function: Any) -> Any:
-    """Keep what numba compiles of a function in our folder; numba asks for the folder when its cache is made."""
-    with decorating:
-        before = config.CACHE_DIR
-        config.CACHE_DIR = str(cache_folder())
-        try:
-            compiled._cache = _Kept(function)
-        finally:
-            config.CACHE_DIR = before
+    """Keep what numba compiles of a function in our folder."""
+    compiled._cache = _Kept(function)
     return compiled
 
 
 def loaded(name: str, text: str) -> Any:
-    """Import a generated module, written to a file so that its compiled code can be cached."""
-    path = cache_folder() / f"{name}.py"
+    """Import a generated module, written to a file so that its compiled code can be cached.
+
+    A text that calls nothing of the package but `stickslip.jit`, as those of laws and controllers, is as good after
+    any change of the engines: it has a folder that such a change leaves as it is.
+    """
+    alone = set(_CALLED.findall(text)) <= {"stickslip.jit"}
+    path = cache_folder(ROOMS[:1] if alone else ROOMS) / f"{name}.py"
     if not path.exists():
         # Written aside and renamed, so that no other process or thread reads half a file.
         draft = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.tmp")
         draft.write_text(text)
         os.replace(draft, path)
-    spec = importlib.util.spec_from_file_location(f"stickslip._compiled.{name}", path)
+    spec = importlib.util.spec_from_file_location(f"{GENERATED}{name}", path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
