@@ -16,6 +16,8 @@ __all__ = ["Facts", "Kind", "analyse", "kind_of", "merged"]
 Kind = Literal["real", "int", "bool"]
 
 INT_CALLS = {"int"}
+Seen = dict[int, frozenset[str]]
+"""Every name in a part of a function, by the part's id: where each name is declared asks for them again and again."""
 
 
 @dataclass(frozen=True)
@@ -101,38 +103,40 @@ def kind_of(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
 
 def _facts(tree: ast.FunctionDef, known: Mapping[str, Facts]) -> Facts:
     arguments = tuple(a.arg for a in tree.args.args)
-    counts = _counts(tree, arguments)
-    whole = counts | _indices(tree, arguments, known)
-    kinds: dict[str, Kind] = {**_kinds(tree, whole), **dict.fromkeys(whole, "int")}
+    nodes = list(ast.walk(tree))
+    names = [n for n in nodes if isinstance(n, ast.Name)]
+    counts = _counts(nodes, names, arguments)
+    whole = counts | _indices(nodes, arguments, known)
+    kinds: dict[str, Kind] = {**_kinds(nodes, whole), **dict.fromkeys(whole, "int")}
     declared: dict[int, tuple[str, ...]] = {}
     opened: dict[int, tuple[str, ...]] = {}
+    seen: Seen = {}
     for name in kinds:
         if name not in arguments and name not in counts:
-            _place(name, tree.body, declared, opened)
-    used = {n.id for statement in tree.body for n in ast.walk(statement) if isinstance(n, ast.Name)}
-    returns = any(isinstance(n, ast.Return) and n.value is not None for n in ast.walk(tree))
-    structures = frozenset(arguments) - _plain(tree, known)
-    return Facts(
-        arguments, returns, kinds, counts, declared, opened, structures, _writes(tree, known), frozenset(used)
-    )
+            _place(name, tree.body, declared, opened, seen)
+    returns = any(isinstance(n, ast.Return) and n.value is not None for n in nodes)
+    structures = frozenset(arguments) - _plain(nodes, names, known)
+    uses = frozenset(n.id for n in names)
+    return Facts(arguments, returns, kinds, counts, declared, opened, structures, _writes(nodes, known), uses)
 
 
 # ---- types --------------------------------------------------------------------------------------------------
 
 
-def _counts(tree: ast.FunctionDef, arguments: Sequence[str]) -> frozenset[str]:
+def _counts(nodes: Sequence[ast.AST], names: Sequence[ast.Name], arguments: Sequence[str]) -> frozenset[str]:
     """Names that are neither arguments nor locals nor called."""
-    names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
-    called = {id(n.func) for n in ast.walk(tree) if isinstance(n, ast.Call)}
+    called = {id(n.func) for n in nodes if isinstance(n, ast.Call)}
     local = {n.id for n in names if isinstance(n.ctx, ast.Store)}
     free = {n.id for n in names if id(n) not in called} - local - {"math", *arguments}
     return frozenset(free)
 
 
-def _indices(tree: ast.FunctionDef, arguments: Sequence[str], known: Mapping[str, Facts]) -> frozenset[str]:
+def _indices(
+    nodes: Sequence[ast.AST], arguments: Sequence[str], known: Mapping[str, Facts]
+) -> frozenset[str]:
     """Arguments that are an index here, or in a function that is called with them."""
     out: set[str] = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Subscript):
             out |= {n.id for n in ast.walk(node.slice) if isinstance(n, ast.Name)}
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in known:
@@ -142,17 +146,17 @@ def _indices(tree: ast.FunctionDef, arguments: Sequence[str], known: Mapping[str
     return frozenset(out & set(arguments))
 
 
-def _kinds(tree: ast.FunctionDef, counts: Iterable[str]) -> dict[str, Kind]:
+def _kinds(nodes: Sequence[ast.AST], counts: Iterable[str]) -> dict[str, Kind]:
     """The type of every local name: whole only where every value it gets is whole."""
     kinds: dict[str, Kind] = dict.fromkeys(counts, "int")
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
             kinds[node.target.id] = "int"
+    assigned = [given for node in nodes for given in _assigned(node)]
     for _ in range(3):  # a name may take its type from another
-        for node in ast.walk(tree):
-            for name, value in _assigned(node):
-                got = kind_of(value, kinds)
-                kinds[name] = got if kinds.get(name, got) == got else "real"
+        for name, value in assigned:
+            got = kind_of(value, kinds)
+            kinds[name] = got if kinds.get(name, got) == got else "real"
     return kinds
 
 
@@ -173,22 +177,27 @@ def _place(
     block: Sequence[ast.stmt],
     declared: dict[int, tuple[str, ...]],
     opened: dict[int, tuple[str, ...]],
+    seen: Seen,
 ) -> None:
     """Declare `name` in the innermost block that holds all of its uses."""
-    users = [s for s in block if _mentions(s, name)]
+    users = [s for s in block if _mentions(s, name, seen)]
     first = users[0]
     if len(users) == 1:
-        inner = [b for b in _blocks(first) if any(_mentions(s, name) for s in b)]
+        inner = [b for b in _blocks(first) if any(_mentions(s, name, seen) for s in b)]
         if isinstance(first, ast.For) and isinstance(first.target, ast.Name) and first.target.id == name:
             return  # the loop declares its own counter
-        outside = _mentions_outside_blocks(first, name)
-        if len(inner) == 1 and not outside and (not isinstance(first, ast.For) or _sets(inner[0], name)):
-            return _place(name, inner[0], declared, opened)
-        if len(inner) > 1 and not outside and all(_sets(b, name) for b in inner):
+        outside = _mentions_outside_blocks(first, name, seen)
+        if (
+            len(inner) == 1
+            and not outside
+            and (not isinstance(first, ast.For) or _sets(inner[0], name, seen))
+        ):
+            return _place(name, inner[0], declared, opened, seen)
+        if len(inner) > 1 and not outside and all(_sets(b, name, seen) for b in inner):
             for each in inner:
-                _place(name, each, declared, opened)
+                _place(name, each, declared, opened, seen)
             return None
-    if _is_assignment(first, name):
+    if _is_assignment(first, name, seen):
         declared[id(first)] = (*declared.get(id(first), ()), name)
     elif all(_own_counter(s, name) for s in users):
         return None
@@ -206,8 +215,11 @@ def _own_counter(statement: ast.stmt, name: str) -> bool:
     )
 
 
-def _mentions(node: ast.AST, name: str) -> bool:
-    return any(isinstance(n, ast.Name) and n.id == name for n in ast.walk(node))
+def _mentions(node: ast.AST, name: str, seen: Seen) -> bool:
+    found = seen.get(id(node))
+    if found is None:
+        found = seen[id(node)] = frozenset(n.id for n in ast.walk(node) if isinstance(n, ast.Name))
+    return name in found
 
 
 def _blocks(statement: ast.stmt) -> list[list[ast.stmt]]:
@@ -216,60 +228,60 @@ def _blocks(statement: ast.stmt) -> list[list[ast.stmt]]:
     return [statement.body] if isinstance(statement, ast.For) else []
 
 
-def _mentions_outside_blocks(statement: ast.stmt, name: str) -> bool:
+def _mentions_outside_blocks(statement: ast.stmt, name: str, seen: Seen) -> bool:
     if isinstance(statement, ast.If):
-        return _mentions(statement.test, name)
+        return _mentions(statement.test, name, seen)
     if isinstance(statement, ast.For):
-        return _mentions(statement.iter, name) or _mentions(statement.target, name)
+        return _mentions(statement.iter, name, seen) or _mentions(statement.target, name, seen)
     return True
 
 
-def _is_assignment(statement: ast.stmt, name: str) -> bool:
+def _is_assignment(statement: ast.stmt, name: str, seen: Seen) -> bool:
     """Whether the statement gives `name` its value without reading it."""
     return (
         isinstance(statement, ast.Assign)
         and len(statement.targets) == 1
         and isinstance(statement.targets[0], ast.Name)
         and statement.targets[0].id == name
-        and not _mentions(statement.value, name)
+        and not _mentions(statement.value, name, seen)
     )
 
 
-def _sets(block: Sequence[ast.stmt], name: str) -> bool:
+def _sets(block: Sequence[ast.stmt], name: str, seen: Seen) -> bool:
     """Whether every passage through the block gives `name` a value before it is read."""
-    first = next((s for s in block if _mentions(s, name)), None)
+    first = next((s for s in block if _mentions(s, name, seen)), None)
     if first is None:
         return True
-    if _is_assignment(first, name):
+    if _is_assignment(first, name, seen):
         return True
-    if not isinstance(first, ast.If) or _mentions(first.test, name):
+    if not isinstance(first, ast.If) or _mentions(first.test, name, seen):
         return False
-    inner = [b for b in _blocks(first) if any(_mentions(s, name) for s in b)]
-    alone = sum(_mentions(s, name) for s in block) == 1
-    return (alone or len(inner) == 2) and all(_sets(b, name) for b in inner)
+    inner = [b for b in _blocks(first) if any(_mentions(s, name, seen) for s in b)]
+    alone = sum(_mentions(s, name, seen) for s in block) == 1
+    return (alone or len(inner) == 2) and all(_sets(b, name, seen) for b in inner)
 
 
 # ---- structured arguments ---------------------------------------------------------------------------------
 
 
-def _plain(tree: ast.FunctionDef, known: Mapping[str, Facts]) -> set[str]:
+def _plain(nodes: Sequence[ast.AST], names: Sequence[ast.Name], known: Mapping[str, Facts]) -> set[str]:
     """Names that occur as numbers: neither before a dot nor handed on as a structure."""
     owners: set[int] = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Attribute):
             owners.add(id(node.value))
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in known:
             callee = known[node.func.id]
             owners |= {id(g) for g, a in zip(node.args, callee.arguments) if a in callee.structures}
-    return {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and id(n) not in owners}
+    return {n.id for n in names if id(n) not in owners}
 
 
 # ---- what a function changes ---------------------------------------------------------------------------------
 
 
-def _writes(tree: ast.FunctionDef, known: Mapping[str, Facts]) -> frozenset[str]:
+def _writes(nodes: Sequence[ast.AST], known: Mapping[str, Facts]) -> frozenset[str]:
     out: set[str] = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         targets = node.targets if isinstance(node, ast.Assign) else []
         if isinstance(node, ast.AugAssign):
             targets = [node.target]

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from stickslip.export._analysis import Facts, analyse
+from stickslip.export._analysis import Facts
 from stickslip.export._language import ATOM, UNARY, Language
 
 __all__ = ["Dialect", "function", "functions", "head", "safe"]
@@ -231,10 +231,9 @@ def function(
 
 
 def functions(
-    trees: Mapping[str, ast.FunctionDef], dialect: Dialect, public: Sequence[str]
+    trees: Mapping[str, ast.FunctionDef], known: Mapping[str, Facts], dialect: Dialect, public: Sequence[str]
 ) -> list[tuple[str, str, list[str]]]:
-    """Name, docstring and lines of every function, callees first."""
-    known = analyse(trees)
+    """Name, docstring and lines of every function, callees first, with what `analyse` knows of each."""
     return [
         (name, ast.get_docstring(tree) or "", function(name, tree, known, dialect, public=name in public))
         for name, tree in trees.items()

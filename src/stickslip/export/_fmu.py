@@ -21,7 +21,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from stickslip.export import c99
-from stickslip.export._analysis import analyse
 from stickslip.export._c import safe
 from stickslip.export._text import ascii_only, render
 from stickslip.export.job import Job
@@ -222,7 +221,7 @@ def contents_of(job: Job) -> Contents:
         {name: str(text) for name, text in c99.write(job).files.items() if name in (f"{x}.c", f"{x}.h")},
         wholes_of(law.fields, job.model.parameters._asdict()),
         ", ".join(f.name for f in law.fields if f.par.shares),
-        "_holding" in analyse(c99.translated(job)),
+        "_holding" in c99.translated(job),
     )  # fmt: skip
 
 

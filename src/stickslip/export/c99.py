@@ -78,7 +78,7 @@ def write(job: Job) -> Export:
     trees = translated(job)
     known = analyse(trees)
     public = [n for n in ("_step", "_steady", "_holding") if n in trees]
-    written = functions(trees, dialect, public)
+    written = functions(trees, known, dialect, public)
     about = {name: ascii_only(first_line(doc)) for name, doc, _ in written}
     vectors = golden_around(job.model, PACE)
     room = jumps_of(job, vectors)

@@ -107,7 +107,7 @@ def code_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
     told = [f"_{name}" for name in deviation_functions(controller)]
     trees = trees_of(controller, [*(n for n in PUBLIC if n.endswith("_turns") or not dialect.single), *told])
     known, public = analyse(trees), [n for n in (*PUBLIC, *told) if n in trees]
-    written = functions(trees, dialect, public)
+    written = functions(trees, known, dialect, public)
     about = {n: ascii_only(first_line(doc)) for n, doc, _ in written}
     text = "\n".join(line for _, _, lines in written for line in lines)
     x = dialect.prefix

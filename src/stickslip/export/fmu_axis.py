@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.export._analysis import analyse
 from stickslip.export._c import Dialect, functions
 from stickslip.export._fmu import Variable, contents_of, law_variables, numbered, surroundings_read, units_of
 from stickslip.export._fmu_run import played
@@ -127,7 +128,8 @@ def step_code(name: str) -> dict[str, Any]:
     trees = named(entries, step.LAYOUTS, contact.GIVEN)
     declared = {f"_{each}": declaration(getattr(contact, each).py_func) for each in contact.GIVEN}
     dialect = Dialect(f"{name}_axis", False, STRUCTURES)
-    written = [f for f in functions({**declared, **trees}, dialect, ()) if f[0] in trees]
+    every = {**declared, **trees}
+    written = [f for f in functions(every, analyse(every), dialect, ()) if f[0] in trees]
     text = "\n".join(line for _, _, lines in written for line in lines)
     return {
         "rounding": step.ROUNDING,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
 import math
 import textwrap
@@ -96,7 +97,7 @@ class Names:
         return name
 
 
-@dataclass
+@dataclass(frozen=True)
 class Place:
     file: str
     first_line: int
@@ -105,7 +106,9 @@ class Place:
         return f"{self.file}, line {self.first_line + getattr(node, 'lineno', 1) - 1}"
 
 
-def parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, Place]:
+@functools.lru_cache(maxsize=4096)
+def source_of(function: Callable[..., Any]) -> tuple[str, Place]:
+    """The text of a function and where it stands; to find its end, Python reads it token by token."""
     try:
         lines, first = inspect.getsourcelines(function)
     except (OSError, TypeError) as error:
@@ -113,8 +116,14 @@ def parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, Place]:
         raise LawError(
             f"the source of {name!r} cannot be read; write the law in a file of its own"
         ) from error
-    tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
-    where = Place(inspect.getsourcefile(function) or "<unknown>", max(first, 1))
+    text = textwrap.dedent("".join(lines))
+    return text, Place(inspect.getsourcefile(function) or "<unknown>", max(first, 1))
+
+
+def parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, Place]:
+    """The tree of a function, for the caller to change, and where it stands."""
+    text, where = source_of(function)
+    tree = ast.parse(text).body[0]
     if not isinstance(tree, ast.FunctionDef):
         raise LawError(f"{where.at(tree)}: a law's function is a `def`; write it as one")
     return tree, where
