@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.contract.control_laws import CHECKS, continuous, examine, specimen, variants
+from stickslip.contract.rest import at_rest
 from stickslip.control.linear import Compensation
 from stickslip.control.registry import control_law, control_law_names
 from stickslip.control_spec import ControlLaw
@@ -46,6 +47,12 @@ class State(NamedTuple):
 def winds_up(y, z, p, u):
     z.sum += y.error
     return p.k * y.error + 1e-3 * p.k * z.sum
+
+
+def winds_up_late(y, z, p, u):
+    if y.rest > 1.8e6:  # half an hour
+        z.sum += 1e-9
+    return p.k * y.error + z.sum
 
 
 def hidden_unit(y, z, p, u):
@@ -106,6 +113,12 @@ def test_the_continuous_forms_of_friction_laws_and_estimators_are_tried():
     for name in ("backward_difference", "filtered_difference"):
         assert continuous(control_law(name)).passed
     assert continuous(control_law("dither")).passed is None
+
+
+def test_what_begins_to_grow_after_half_an_hour_at_rest_is_told():
+    """The hour is cut short only where all that remains is the minute that was, bit for bit."""
+    assert at_rest(broken(winds_up_late)).passed is False
+    assert at_rest(control_law("pd")).passed
 
 
 @pytest.mark.parametrize("name", BROKEN)

@@ -9,12 +9,28 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Callable, Iterator
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from stickslip.contract.description import bounds
+from stickslip.contract.rest import at_rest
+from stickslip.contract.specimens import (
+    COUNT,
+    LIMIT,
+    PD,
+    TIME,
+    Array,
+    Plain,
+    around,
+    block_of,
+    clean_motion,
+    motion,
+    replayed,
+    specimen,
+    torques,
+    variants,
+)
 from stickslip.contract.units import parsed
 from stickslip.contract.verdict import Verdict, failed, held, not_tried
 from stickslip.control.block import ControlBlock
@@ -23,106 +39,19 @@ from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import LawError
 from stickslip.export import c99_controller
-from stickslip.export.golden import random_motion
 from stickslip.model import Model
-from stickslip.simulation.compiled_controller import FAULT, Sampled, compiled, replay
+from stickslip.simulation.compiled_controller import compiled
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import lower
 
-__all__ = ["CHECKS", "examine", "specimen", "variants"]
+__all__ = ["CHECKS", "Plain", "block_of", "examine", "specimen", "variants"]
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
-TIME, LIMIT = 1e-3, 1.0
-"""Sample time, s, and torque limit, N·m, of the specimens."""
 INERTIA = 3.8623e-4
 """Of the axis on which a law is tried, kg·m²."""
-COUNT = 400
-HOUR, MINUTE = 60, 60_000
-"""Minutes, and samples of one."""
 BEGUN = 100
 """Samples after which a friction law has forgotten the jump to the first velocity."""
 JUMP = 1e-12
 """Of the limit: what the torque may jump by when a controller takes over."""
-FRICTION = Model("lugre", sigma0=3.5e4, sigma1=0.0, sigma2=0.018, fs=0.335, fc=0.285, vs=0.01)
-PD: dict[str, Any] = {"kp": 6.099, "kd": 0.097067}
-
-
-# ---- specimens -----------------------------------------------------------------------------------------------------
-
-
-def variants(law: ControlLaw) -> Iterator[ControlLaw]:
-    """The law, and the law under every single other option of its choices."""
-    yield law
-    for choice in law.choices:
-        yield from (law.having(**{choice.name: o}) for o in choice.options if o != choice.default)
-
-
-def block_of(law: ControlLaw) -> ControlBlock:
-    """The law with its example, and with a friction law where it needs one."""
-    return ControlBlock(law, FRICTION if law.holds_friction else None, **dict(law.example))
-
-
-def specimen(law: ControlLaw, limit: float = LIMIT, time: float = TIME) -> SampledController:
-    """A controller with the law in its place."""
-    return around(block_of(law), ControlBlock("pd", **PD), limit, time)
-
-
-def around(block: ControlBlock, loop: ControlBlock, limit: float, time: float) -> SampledController:
-    """A controller with the block in its place, and the loop where the block is none."""
-    places: dict[str, Any] = {"loop": loop, block.law.place: block}
-    return SampledController(sample_time=time, torque_limit=limit, alone=True, **places)
-
-
-def motion(time: float = TIME) -> Array:
-    """Random samples: reversals, stops, a blocked axis, inputs that are no numbers; shape (COUNT, 4)."""
-    return np.column_stack(random_motion(time, LIMIT / PD["kp"], COUNT, 1))
-
-
-def clean_motion() -> Array:
-    """The same without inputs that are no numbers: those of the sample before stand in."""
-    rows = motion()
-    for i in np.flatnonzero(~np.isfinite(rows).all(axis=1)):
-        rows[i] = rows[i - 1]
-    return rows
-
-
-class Plain:
-    """A controller in plain Python."""
-
-    def __init__(self, controller: SampledController) -> None:
-        self.n, self.m = controller.settings, controller.memory()
-        self.z, self.p = controller.state(), controller.parameters
-        self.u = SimpleNamespace(**Surroundings()._asdict())
-        self.functions, self.controller = controller.functions, controller
-
-    def __call__(self, row: Any, torque: float | None = None) -> float:
-        """One sample, or one that another controller's torque is watched for, N·m."""
-        name, more = ("sample", ()) if torque is None else ("follow", (torque,))
-        return self.functions[name](*map(float, row), *more, self.n, self.m, self.z, self.p, self.u)
-
-    def state(self) -> list[float]:
-        """What the laws remember."""
-        return self.controller.packed_state(self.z)
-
-
-def torques(controller: SampledController, inputs: Array, slow: float | None = None) -> Array:
-    """The torques of plain Python, N·m; ``slow`` is the share by which the slow velocity moves in a sample."""
-    plain = Plain(controller)
-    if slow is not None:
-        plain.n = plain.n._replace(slow=slow)
-    return np.array([plain(row) for row in inputs])
-
-
-def replayed(sampled: Sampled, inputs: Array) -> Array:
-    """The torques of the compiled controller from its present state on, N·m."""
-    out, fault = np.zeros(len(inputs)), np.zeros(len(inputs))
-    replay(sampled, np.ascontiguousarray(inputs), np.array(Surroundings()), FAULT, out, fault)
-    return out
-
-
-def remembered(sampled: Sampled) -> list[bytes]:
-    """The bits of all that a compiled controller's next torque depends on besides its inputs."""
-    return [x.tobytes() for x in (sampled.memory, sampled.state, sampled.parameters)]
 
 
 # ---- the checks ----------------------------------------------------------------------------------------------------
@@ -227,31 +156,6 @@ def taken_over(law: ControlLaw) -> Verdict:
     jump = abs(plain(still) - other)
     said = f"the torque jumps by {jump:.3g} N·m as it takes over, by {alone:.3g} without"
     return held("take-over", said) if jump <= JUMP * LIMIT else failed("take-over", said)
-
-
-def at_rest(law: ControlLaw) -> Verdict:
-    """Nothing grows in an hour at rest, with an encoder that flickers by a count, or in one at the torque limit."""
-    count = 2.0 * math.pi / 65536
-    flicker = np.zeros((MINUTE, 4))
-    flicker[:, 0] = count * np.tile((0.0, 1.0, 0.0, -1.0), MINUTE // 4)
-    blocked = np.zeros((MINUTE, 4))
-    blocked[:, 1] = 1.0
-    for name, inputs in (("with a flickering encoder", flicker), ("blocked at the limit", blocked)):
-        sampled = compiled(specimen(law))
-        replayed(sampled, motion()[: COUNT // 4])
-        replayed(sampled, inputs)
-        first = np.concatenate([np.abs(sampled.state), [np.abs(replayed(sampled, inputs)).max()]])
-        torque = np.zeros(0)
-        for _ in range(HOUR - 2):
-            before = remembered(sampled)
-            torque = replayed(sampled, inputs)
-            if remembered(sampled) == before:
-                break  # all that remain are this minute, bit for bit
-        last = np.concatenate([np.abs(sampled.state), [np.abs(torque).max()]])
-        if not np.all(last <= 1.01 * first + 1e-9) or sampled.memory[sampled.fault] != 0.0:
-            i = int(np.argmax(last - first))
-            return failed("rest", f"{name}: {first[i]:.6g} after two minutes, {last[i]:.6g} after an hour")
-    return held("rest", "an hour at rest and an hour at the limit: state and torque as after two minutes")
 
 
 def units(law: ControlLaw) -> Verdict:

@@ -8,6 +8,7 @@ with its residual on the model's sliding curve, which `Job.nearest` takes.
 from __future__ import annotations
 
 import ast
+import functools
 import importlib
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -313,15 +314,22 @@ def between(forth: Any, back: Any) -> Any:
     return 0.5 * (forth + back) if isinstance(forth, float) and isinstance(back, float) else forth
 
 
-def surroundings_of(model: Model) -> set[str]:
+def surroundings_of(model: Model) -> frozenset[str]:
     """The surroundings on which a law's torque depends, other than the applied torque: they are seen in its code."""
-    trees = named({"_step": model.law.step}, law_layouts(model.law))
-    return {
+    return _surroundings_in(model.law)
+
+
+@functools.lru_cache(maxsize=256)
+def _surroundings_in(law: Law) -> frozenset[str]:
+    """Of a law: an export asks several times, and translates the law for it."""
+    trees = named({"_step": law.step}, law_layouts(law))
+    read = {
         node.attr
         for tree in trees.values()
         for node in ast.walk(tree)
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "u"
-    } - {"applied"}
+    }
+    return frozenset(read - {"applied"})
 
 
 def read_by(model: Model) -> str:
