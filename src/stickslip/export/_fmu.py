@@ -7,6 +7,7 @@ that they compile without its headers.
 
 from __future__ import annotations
 
+import functools
 import io
 import platform
 import shutil
@@ -295,17 +296,32 @@ def wholes_of(fields: Iterable[Field], values: Mapping[str, Any]) -> list[list[s
     ]
 
 
-def _compiled(name: str, files: Mapping[str, str | bytes], sources: Sequence[str]) -> bytes | None:
+def _compiled(name: str, files: Mapping[str, str], sources: Sequence[str]) -> bytes | None:
     """The shared library for Linux on x86-64; None elsewhere, or without a compiler."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None or sys.platform != "linux" or platform.machine() != "x86_64":
         return None
+    own, *interface = sources
     with TemporaryDirectory() as folder:
         for each, text in files.items():
-            Path(folder, each).write_text(str(text))
-        command = [compiler, *FLAGS, *sources, "-lm", "-o", f"{name}.so"]
+            Path(folder, each).write_text(text)
+        # What does not depend on the version of the interface.
+        shared = {each: text for each, text in files.items() if each not in interface}
+        Path(folder, "own.o").write_bytes(_object(compiler, own, tuple(shared.items())))
+        command = [compiler, *FLAGS, "own.o", *interface, "-lm", "-o", f"{name}.so"]
         subprocess.run(command, cwd=folder, check=True, capture_output=True)
         return Path(folder, f"{name}.so").read_bytes()
+
+
+@functools.lru_cache(maxsize=4)
+def _object(compiler: str, source: str, files: Iterable[tuple[str, str]]) -> bytes:
+    """A source compiled, with the files that lie beside it: once for the units of both versions."""
+    with TemporaryDirectory() as folder:
+        for each, text in files:
+            Path(folder, each).write_text(text)
+        command = [compiler, *FLAGS, "-c", source, "-o", "own.o"]
+        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+        return Path(folder, "own.o").read_bytes()
 
 
 def _zipped(files: Mapping[str, str | bytes]) -> bytes:
