@@ -14,7 +14,7 @@ from stickslip.simulation.sampled.axis import axis_of
 from stickslip.simulation.sampled.modes import gather
 from stickslip.simulation.sampled.rates import SLIPS, STUCK
 from stickslip.simulation.sampled.slip import slip
-from stickslip.simulation.sampled.stick import first_break, stick
+from stickslip.simulation.sampled.stick import Swing, first_break, stick
 
 J, TIME = 3.8623e-4, 1e-3
 K, SHARE, C = [1e4, 7e3, 5e3, 3e3], 0.25, 24.0
@@ -27,11 +27,13 @@ def s(v):
     return FC + (FS - FC) * math.exp(-((v / VS) ** 2))
 
 
+CASE = prepare(ss.RigidAxis(J, GMS), PD, ss.Reference("step", amplitude=0.1), 0.1, metered=False)
+
+
 def laid_out():
-    """The axis, its state and its elements as records, and the law's parameters."""
-    case = prepare(ss.RigidAxis(J, GMS), PD, ss.Reference("step", amplitude=0.1), 0.1, metered=False)
-    axis, state, springs = axis_of(case)
-    return axis[0], state[0], springs, case.plant.parameters
+    """The axis, its state and its elements as records."""
+    axis, state, springs = axis_of(CASE)
+    return axis[0], state[0], springs
 
 
 # ---- break-away while all stick ------------------------------------------------------------------------------------
@@ -58,7 +60,7 @@ def first_seen(forces, lin, goal, v):
 
 def test_a_load_above_the_curve_for_a_moment_before_the_axis_turns_breaks_away():
     """The curve is low at some v_s and rises as the axis slows down: a load may lie above it for microseconds."""
-    axis, _, springs, parameters = laid_out()
+    axis, _, springs = laid_out()
     lin, rng, short = linear(J, SIGMA2, sum(K)), np.random.default_rng(19), 0
     for _ in range(300):
         forces, v, u = about_to_turn(rng)
@@ -67,7 +69,7 @@ def test_a_load_above_the_curve_for_a_moment_before_the_axis_turns_breaks_away()
         seen, most = first_seen(forces, lin, goal, v)
         if forces.max() / SHARE >= s(v) or abs(most) < 1e-6:  # where the grid does not tell
             continue
-        found, way = first_break(axis, springs, parameters, lin, goal, -goal, v, TIME)
+        found, way = first_break(axis, Swing(lin, goal, -goal, v), TIME)
         assert (way != 0.0) == math.isfinite(seen)
         assert way == 0.0 or found == pytest.approx(seen, abs=3e-8)
         short += 0.0 < most < 0.01
@@ -124,14 +126,14 @@ def in_small_steps(forces, slips, v, u, h=2e-6):
 
 
 def by_the_engine(forces, slips, v, u):
-    axis, z, springs, parameters = laid_out()
+    axis, z, springs = laid_out()
     springs["force"], springs["slips"] = forces, slips
     z["velocity"], z["torque"], z["direction"] = v, u, math.copysign(1.0, v)
     z["mode"] = SLIPS if any(slips) else STUCK
-    gather(axis, z, springs)
+    gather(axis, z)
     left = TIME
     while left > 0.0:
-        taken = (stick if z["mode"] == STUCK else slip)(axis, z, springs, parameters, left)
+        taken = (stick if z["mode"] == STUCK else slip)(axis, z, left)
         left = left - taken if left - taken > 1e-12 * TIME else 0.0
     return z["position"] + z["moved"], z["velocity"]
 

@@ -45,7 +45,7 @@ from stickslip.simulation.sampled.rates import (
 )
 from stickslip.spec import Bristle, Elements
 
-__all__ = ["axis_of", "general_axis"]
+__all__ = ["Laid", "axis_of", "general_axis"]
 
 LOCAL = 1e-3
 """Of the tolerance, which one step may be wrong by."""
@@ -59,8 +59,19 @@ LEVEL = 1e-15
 """Of the curve, by which it may still vary where it counts as level."""
 
 
-def general_axis(case: Case) -> tuple[Any, Any, Any]:
-    """The constants of an axis that takes the general step, its state at the start, and no elements."""
+class Laid(NamedTuple):
+    """The records of an axis: its constants, its state at the start, and its springs.
+
+    The constants know where the springs are, and the parameters of the case's law: all are to outlive them.
+    """
+
+    axis: Any
+    state: Any
+    springs: Any
+
+
+def general_axis(case: Case) -> Laid:
+    """An axis that takes the general step: it has no springs."""
     n = case.numbers
     axis, state = np.zeros(1, AXIS), np.zeros(1, STATE)
     a, z = axis[0], state[0]
@@ -72,11 +83,11 @@ def general_axis(case: Case) -> tuple[Any, Any, Any]:
     z["mode"] = STEPS
     if case.plant.pointers.holding and abs(z["velocity"]) <= n[PLANT_BAND]:
         z["mode"], z["velocity"], z["goal"] = HOLDS, 0.0, z["velocity"]
-    return axis, state, np.zeros(0, SPRING)
+    return Laid(axis, state, np.zeros(0, SPRING))
 
 
-def axis_of(case: Case) -> tuple[Any, Any, Any]:
-    """The constants of the axis, its state at the start, and its elements."""
+def axis_of(case: Case) -> Laid:
+    """An axis whose motion is a located flow."""
     e, n, side = case.plant.elements, case.numbers, case.plant
     assert e is not None
     known = levels_of(side, e)
@@ -84,18 +95,20 @@ def axis_of(case: Case) -> tuple[Any, Any, Any]:
     a, z = axis[0], state[0]
     a["local"], a["literal"] = LOCAL * n[TOLERANCE], int(is_literal(side))
     a["viscous"], a["breakaway"] = e.viscous, e.breakaway
+    a["parameters"] = side.parameters.ctypes.data
     a["curve"], a["scale"] = (0, 1.0) if e.constant_curve else (side.pointers.sliding, e.velocity_scale)
     a["lowest"], a["floor"] = lowest(side, e), known.floors
     springs = fill_bristle(a, e) if isinstance(e, Bristle) else fill_elements(a, side, e)
+    a["springs"], a["count"] = springs.ctypes.data, springs.size
     z["velocity"], z["goal"] = n[VELOCITY_0], 0.0
     z["mode"] = starting_mode(a, z, springs)
-    gather(a, z, springs)
+    gather(a, z)
     a["near"] = NEAR * a["local"] * z["spring"]
     a["far"], a["level"] = known.far, known.level
     a["glide"] = glide_of(a)
     if z["spring"] > 0.0:
         a["flow"] = flow(linear(a["inertia"], a["viscous"], z["spring"]), a["sample_time"])
-    return axis, state, springs
+    return Laid(axis, state, springs)
 
 
 def fill_bristle(a: Any, e: Bristle) -> Any:

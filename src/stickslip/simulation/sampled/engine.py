@@ -44,7 +44,7 @@ from stickslip.simulation.recorded_input.contact import Plant
 from stickslip.simulation.sampled.axis import axis_of, general_axis
 from stickslip.simulation.sampled.general import Contact, act_on, contact_of, hold, plant_of, step_on
 from stickslip.simulation.sampled.modes import creep, friction, rest, sign
-from stickslip.simulation.sampled.output import measure, write
+from stickslip.simulation.sampled.output import PROGRESS, Output, measure, put_out, write
 from stickslip.simulation.sampled.rates import BENDS, HOLDS, RESTS, SLIPS, STEPS, STUCK
 from stickslip.simulation.sampled.slip import slip
 from stickslip.simulation.sampled.stick import stick
@@ -56,10 +56,6 @@ __all__ = ["can_run", "run"]
 NUDGE = 1e-11
 """s after a sample, at which the reference is read, so that a kink there is seen from behind."""
 MOST_STEPS = 5e7
-NOW, ASKED = range(2)
-"""Of the clock: the time reached, s, and whether the run is to end."""
-ROWS, OUTPUTS = range(2)
-"""Of the counts."""
 
 
 class Control(NamedTuple):
@@ -111,31 +107,29 @@ def run(case: Case) -> Outcome:
         standstill and break-away. A run that ends early says so in ``code`` and keeps its rows.
     """
     n = case.numbers
-    axis, state, springs = general_axis(case) if cannot_locate(case) else axis_of(case)
-    contact = contact_of(case)
-    accumulator = new_meter(float(n[DURATION]), settle_band_of(case.reference, float(n[DURATION])))
-    turns, nodes = np.zeros((4096, 2)), np.zeros((8, 5))
-    counts, clock = np.zeros(2, dtype=np.int64), np.zeros(2)
-    grid = np.ascontiguousarray(case.grid, dtype=np.float64)
+    laid = general_axis(case) if cannot_locate(case) else axis_of(case)
+    contact, stops = contact_of(case), stops_of(case)
+    output = Output(
+        np.ascontiguousarray(case.grid, dtype=np.float64), np.zeros(1, PROGRESS),
+        new_meter(float(n[DURATION]), settle_band_of(case.reference, float(n[DURATION]))), np.zeros((4096, 2)),
+        np.zeros((8, 5)),
+    )  # fmt: skip
     control = Control(
         compiled(case.controller), case.profile, case.reference_parameters, float(n[ENCODER]),
         surroundings(n), np.zeros(3),
     )  # fmt: skip
-    stops = stops_of(case)
+    reached, z = output.reached[0], laid.state[0]
 
     def stop() -> None:
-        clock[ASKED] = 1.0
+        reached["asked"] = 1
 
     rows, code = watched(
-        lambda: integrate(
-            control, axis, state, springs, contact, case.plant.parameters, stops, grid, nodes, accumulator, turns,
-            counts, clock,
-        ),
-        lambda: Reached(float(clock[NOW]), float(n[DURATION]), float(state[0]["steps"])), stop,
+        lambda: integrate(control, laid.axis, laid.state, contact, stops, output),
+        lambda: Reached(float(reached["time"]), float(n[DURATION]), float(z["steps"])), stop,
     )  # fmt: skip
-    found = {name: int(state[0][name]) for name in ("steps", "rejected", "events")}
+    found = {name: int(z[name]) for name in ("steps", "rejected", "events")}
     return Outcome(
-        rows, int(code), float(clock[NOW]), accumulator, turning_points(accumulator, turns), found,
+        rows, int(code), float(reached["time"]), output.acc, turning_points(output.acc, output.turns), found,
         control.sampled.state,
     )  # fmt: skip
 
@@ -168,18 +162,17 @@ def stops_of(case: Case) -> Array:
 
 @kernel(exact=False)
 def integrate(
-    control: Control, axes: Any, states: Any, springs: Any, contact: Contact, parameters: Any, stops: Any, grid: Any,
-    nodes: Any, acc: Any, turns: Any, counts: Any, clock: Any,
+    control: Control, axes: Any, states: Any, contact: Contact, stops: Any, output: Output
 ) -> tuple[Any, int]:  # fmt: skip
     """Run from 0 to the last stop; returns rows and code."""
-    axis, z = axes[0], states[0]
+    axis, z, reached = axes[0], states[0], output.reached[0]
     starts = states.copy()
-    rows = np.zeros((grid.size + 256, len(COLUMNS)))
+    rows = np.zeros((output.grid.size + 256, len(COLUMNS)))
     storm = np.full(STORM_EVENTS, -1.0)
     code = DONE
     plant = plant_of(contact)
-    act(control, axis, z, parameters, contact, plant, 0.0)
-    rows = put_out(control, axis, z, parameters, 0.0, grid, rows, counts)
+    act(control, axis, z, contact, plant, 0.0)
+    rows = put_out(control, axis, z, 0.0, output, rows)
     for i in range(stops.shape[0]):
         left = stops[i, 1]
         while left > 0.0 and code == DONE:
@@ -187,55 +180,50 @@ def integrate(
             if axis.metered:
                 starts[0] = z
             time = stops[i, 0] - left
-            taken = advance(axis, z, springs, parameters, contact, plant, time, left)
+            taken = advance(axis, z, contact, plant, time, left)
             left = left - taken if left - taken > 1e-12 * axis.sample_time else 0.0
             z.steps += 1
             if axis.metered and taken > 0.0:
-                measure(control, axis, starts[0], z, time, taken, nodes, acc, turns)
+                measure(control, axis, starts[0], z, time, taken, output)
             if z.events != happened:
-                rows = write(control, axis, z, parameters, time + taken, 1.0, rows, counts[ROWS])
-                counts[ROWS] += 1
+                rows = write(control, axis, z, time + taken, 1.0, reached, rows)
                 code = stormy(z, time + taken, storm)
                 if z.mode < STEPS:
-                    refresh(axis, z, parameters)
+                    refresh(axis, z)
             if z.failed:
                 code = NO_STEP
-        clock[NOW] = stops[i, 0] - left
+        reached.time = stops[i, 0] - left
         code = verdict(axis, z) if code == DONE else code
-        if clock[ASKED] != 0.0 or z.steps + z.rejected > MOST_STEPS:
+        if reached.asked or z.steps + z.rejected > MOST_STEPS:
             code = TOO_STIFF
         if code != DONE:
             break
         if stops[i, 2] > 0.0:
-            act(control, axis, z, parameters, contact, plant, stops[i, 0])
-        rows = put_out(control, axis, z, parameters, stops[i, 0], grid, rows, counts)
+            act(control, axis, z, contact, plant, stops[i, 0])
+        rows = put_out(control, axis, z, stops[i, 0], output, rows)
     if axis.metered:
-        close_standstill(acc, clock[NOW])
-    return rows[: counts[ROWS]].copy(), code
+        close_standstill(output.acc, reached.time)
+    return rows[: reached.rows].copy(), code
 
 
 @kernel(exact=False)
-def advance(
-    axis: Any, z: Any, springs: Any, parameters: Any, contact: Contact, plant: Plant, t: float, left: float
-) -> float:
+def advance(axis: Any, z: Any, contact: Contact, plant: Plant, t: float, left: float) -> float:
     """Move on by at most `left` s under the held torque, until something changes; returns the time taken."""
     if z.mode == STEPS:
         return step_on(axis, z, contact, plant, t, left)
     if z.mode == HOLDS:
         return hold(axis, z, contact, plant, t, left)
     if z.mode == STUCK:
-        return stick(axis, z, springs, parameters, left)
+        return stick(axis, z, left)
     if z.mode == SLIPS:
-        return slip(axis, z, springs, parameters, left)
+        return slip(axis, z, left)
     if z.mode == RESTS:
-        return rest(axis, z, springs, parameters, left)
-    return creep(axis, z, springs, left)
+        return rest(axis, z, left)
+    return creep(axis, z, left)
 
 
 @kernel(exact=False)
-def act(
-    control: Control, axis: Any, z: Any, parameters: Any, contact: Contact, plant: Plant, t: float
-) -> None:
+def act(control: Control, axis: Any, z: Any, contact: Contact, plant: Plant, t: float) -> None:
     """Let the controller sample, and hold what it answers."""
     motion, sampled = control.motion, control.sampled
     call_profile(control.profile, t + NUDGE, pointer(control.reference_parameters, 0), pointer(motion, 0))
@@ -248,29 +236,17 @@ def act(
     if sampled.memory[sampled.fault] != 0.0:
         z.torque = math.nan
     if z.mode < STEPS:
-        refresh(axis, z, parameters)
+        refresh(axis, z)
     else:
         act_on(axis, z, contact, plant, t)
 
 
 @kernel(exact=False)
-def refresh(axis: Any, z: Any, parameters: Any) -> None:
+def refresh(axis: Any, z: Any) -> None:
     """The acceleration after a jump of the torque or a change of what slips; a bristle at rest takes its direction."""
-    z.acceleration = (z.torque - friction(axis, z, parameters)) / axis.inertia
+    z.acceleration = (z.torque - friction(axis, z)) / axis.inertia
     if axis.kind == BENDS and z.velocity == 0.0:
         z.direction = sign(z.acceleration)
-
-
-@kernel(exact=False)
-def put_out(
-    control: Control, axis: Any, z: Any, parameters: Any, t: float, grid: Any, rows: Any, counts: Any
-) -> Any:
-    """Write the rows of the output times up to t; returns the rows."""
-    while counts[OUTPUTS] < grid.size and grid[counts[OUTPUTS]] <= t + 1e-12 * max(1.0, t):
-        rows = write(control, axis, z, parameters, grid[counts[OUTPUTS]], 0.0, rows, counts[ROWS])
-        counts[ROWS] += 1
-        counts[OUTPUTS] += 1
-    return rows
 
 
 @kernel(exact=False)

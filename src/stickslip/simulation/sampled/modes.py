@@ -16,7 +16,9 @@ from stickslip.simulation.sampled.rates import (
     STEPS,
     STUCK,
     curve_at,
+    spring_of,
 )
+from stickslip.simulation.sampled.stretch import Stretch
 
 __all__ = [
     "break_away",
@@ -60,131 +62,133 @@ def floor_below(axis: Any, v: float) -> float:
 
 
 @kernel(exact=False, inline=True)
-def heaviest(axis: Any, springs: Any, moved: float, direction: float) -> float:
+def heaviest(axis: Any, moved: float, direction: float) -> float:
     """The largest load of a sticking element over its share, N·m (`stickslip.laws.slip_rule`)."""
     most = -math.inf
-    for i in range(springs.shape[0]):
-        if springs[i].slips == 0.0:
-            force = springs[i].force + springs[i].stiffness * moved
+    for i in range(axis.count):
+        spring = spring_of(axis, i)
+        if spring.slips == 0.0:
+            force = spring.force + spring.stiffness * moved
             load = abs(force) if axis.literal else direction * force
-            most = max(most, load / springs[i].share)
+            most = max(most, load / spring.share)
     return most
 
 
 @kernel(exact=False)
-def stays_below(
-    axis: Any, parameters: Any, most: float, v0: float, v1: float, a0: float, a1: float, d: float, way: float
-) -> bool:
-    """Whether loads of at most `most` N·m cannot meet the curve in a piece of d s between two velocities of one sign.
+def stays_below(axis: Any, most: float, piece: Stretch, way: float) -> bool:
+    """Whether loads of at most `most` N·m cannot meet the curve in a stretch between two velocities of one sign.
 
-    For a curve that rises or falls throughout the velocities of the piece; its tangents bound these where the
+    For a curve that rises or falls throughout the velocities of the stretch; its tangents bound these where the
     acceleration changes its sign.
     """
     if most < axis.lowest:
         return True
-    fastest, slowest = max(way * v0, way * v1), min(way * v0, way * v1)
-    if a0 * a1 < 0.0:
-        bulge = 0.5 * d * max(abs(a0), abs(a1))
+    fastest, slowest = max(way * piece.v0, way * piece.v1), min(way * piece.v0, way * piece.v1)
+    if piece.a0 * piece.a1 < 0.0:
+        bulge = 0.5 * piece.time * max(abs(piece.a0), abs(piece.a1))
         fastest, slowest = fastest + bulge, slowest - bulge
-    if most >= curve_at(axis.curve, axis.breakaway, parameters, way * fastest):
+    if most >= curve_at(axis, way * fastest):
         return False
-    return most < curve_at(axis.curve, axis.breakaway, parameters, way * max(slowest, 0.0))
+    return most < curve_at(axis, way * max(slowest, 0.0))
 
 
 @kernel(exact=False)
-def fold(axis: Any, z: Any, springs: Any, parameters: Any) -> None:
+def fold(axis: Any, z: Any) -> None:
     """Write every element's force down as it is now."""
     relaxed = math.exp(-z.relaxed)
     level = 0.0
     if axis.kind == FOLLOWS:
-        level = z.direction * curve_at(axis.curve, axis.breakaway, parameters, z.velocity)
+        level = z.direction * curve_at(axis, z.velocity)
     elif z.share > 0.0:
         level = (z.slipping - relaxed * z.slipped_from) / z.share
-    for i in range(springs.shape[0]):
-        if springs[i].slips == 0.0:
-            springs[i].force += springs[i].stiffness * z.moved
+    for i in range(axis.count):
+        spring = spring_of(axis, i)
+        if spring.slips == 0.0:
+            spring.force += spring.stiffness * z.moved
         elif axis.kind == FOLLOWS:
-            springs[i].force = springs[i].share * level
+            spring.force = spring.share * level
         else:
-            springs[i].force = relaxed * springs[i].force + springs[i].share * level
+            spring.force = relaxed * spring.force + spring.share * level
     z.position += z.moved
     z.moved = 0.0
 
 
 @kernel(exact=False)
-def gather(axis: Any, z: Any, springs: Any) -> None:
+def gather(axis: Any, z: Any) -> None:
     """Sum up what sticks and what slips."""
     if axis.kind == BENDS:
         return
     z.held = z.spring = z.slipping = z.relaxed = 0.0
     z.share = axis.rigid + axis.steep if z.mode == SLIPS else 0.0
-    for i in range(springs.shape[0]):
-        if springs[i].slips == 0.0:
-            z.held += springs[i].force
-            z.spring += springs[i].stiffness
+    for i in range(axis.count):
+        spring = spring_of(axis, i)
+        if spring.slips == 0.0:
+            z.held += spring.force
+            z.spring += spring.stiffness
         else:
-            z.slipping += springs[i].force
-            z.share += springs[i].share
+            z.slipping += spring.force
+            z.share += spring.share
     z.slipped_from = z.slipping
 
 
 @kernel(exact=False)
-def break_away(axis: Any, z: Any, springs: Any, parameters: Any, direction: float) -> None:
+def break_away(axis: Any, z: Any, direction: float) -> None:
     """Let the elements slip whose load has reached their share of the curve; the heaviest in any case."""
-    fold(axis, z, springs, parameters)
-    level = curve_at(axis.curve, axis.breakaway, parameters, z.velocity)
-    enough = min(level * (1.0 - AT_ONCE), heaviest(axis, springs, 0.0, direction))
-    for i in range(springs.shape[0]):
-        if springs[i].slips == 0.0:
-            load = abs(springs[i].force) if axis.literal else direction * springs[i].force
-            if load >= enough * springs[i].share:
-                springs[i].slips = 1.0
+    fold(axis, z)
+    level = curve_at(axis, z.velocity)
+    enough = min(level * (1.0 - AT_ONCE), heaviest(axis, 0.0, direction))
+    for i in range(axis.count):
+        spring = spring_of(axis, i)
+        if spring.slips == 0.0:
+            load = abs(spring.force) if axis.literal else direction * spring.force
+            if load >= enough * spring.share:
+                spring.slips = 1.0
     z.direction, z.mode = direction, SLIPS
     z.events += 1
-    gather(axis, z, springs)
+    gather(axis, z)
 
 
 @kernel(exact=False)
-def turn(axis: Any, z: Any, springs: Any, parameters: Any) -> None:
+def turn(axis: Any, z: Any) -> None:
     """The velocity has fallen to zero (or to where the steep slope begins): what slipped sticks."""
     z.velocity = z.direction * axis.layer
     z.events += 1
     if axis.kind == BENDS:
         z.direction = sign(z.torque - z.slipping)
         return
-    fold(axis, z, springs, parameters)
-    for i in range(springs.shape[0]):
-        springs[i].slips = 0.0
+    fold(axis, z)
+    for i in range(axis.count):
+        spring_of(axis, i).slips = 0.0
     z.mode = STUCK
     if axis.rigid > 0.0:
         z.mode = RESTS
     elif axis.steep > 0.0:
         z.mode = CREEPS
-    gather(axis, z, springs)
+    gather(axis, z)
 
 
 @kernel(exact=False)
-def set_off(axis: Any, z: Any, springs: Any, direction: float) -> None:
+def set_off(axis: Any, z: Any, direction: float) -> None:
     """A rigid contact begins to slide."""
     z.direction, z.mode = direction, SLIPS
     z.position += z.moved
     z.moved = 0.0
     z.events += 1
-    gather(axis, z, springs)
+    gather(axis, z)
 
 
 @kernel(exact=False)
-def rest(axis: Any, z: Any, springs: Any, parameters: Any, left: float) -> float:
+def rest(axis: Any, z: Any, left: float) -> float:
     """A rigid contact holds the axis, or lets it go; returns the time taken."""
     z.velocity = z.acceleration = 0.0
-    if abs(z.torque) <= axis.rigid * curve_at(axis.curve, axis.breakaway, parameters, 0.0):
+    if abs(z.torque) <= axis.rigid * curve_at(axis, 0.0):
         return left
-    set_off(axis, z, springs, sign(z.torque))
+    set_off(axis, z, sign(z.torque))
     return 0.0
 
 
 @kernel(exact=False)
-def creep(axis: Any, z: Any, springs: Any, left: float) -> float:
+def creep(axis: Any, z: Any, left: float) -> float:
     """Follow a steep slope, J dv/dt = u - slope v, at most to where it meets the curve; returns the time taken."""
     slope = axis.slope
     rate = slope / axis.inertia
@@ -203,12 +207,12 @@ def creep(axis: Any, z: Any, springs: Any, left: float) -> float:
     z.velocity = edge if leaves else v + (goal - v) * faded
     z.acceleration = (z.torque - slope * z.velocity) / axis.inertia
     if leaves:
-        set_off(axis, z, springs, sign(goal))
+        set_off(axis, z, sign(goal))
     return taken
 
 
 @kernel(exact=False)
-def friction(axis: Any, z: Any, parameters: Any) -> float:
+def friction(axis: Any, z: Any) -> float:
     """Torque of the contact now, N·m."""
     v = z.velocity
     if z.mode == RESTS:
@@ -220,7 +224,7 @@ def friction(axis: Any, z: Any, parameters: Any) -> float:
     force = z.held + z.spring * z.moved + axis.viscous * v
     if z.mode == STUCK:
         return force
-    level = curve_at(axis.curve, axis.breakaway, parameters, v)
+    level = curve_at(axis, v)
     if axis.kind == FOLLOWS:
         return force + z.share * z.direction * level
     if axis.kind == BENDS:

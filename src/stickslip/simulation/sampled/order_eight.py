@@ -59,7 +59,7 @@ def text() -> str:
     """The step written out: `attempt`."""
     lines = [
         "from stickslip.jit import kernel",
-        "from stickslip.simulation.sampled.rates import combined, rates",
+        "from stickslip.simulation.sampled.rates import Trial, combined, rates",
         "",
         "@kernel(exact=False)",
         "def attempt(m, v0, s0, h):",
@@ -78,12 +78,11 @@ def text() -> str:
     last = len(STAGES)
     lines += [
         "    error = h * max(ve, m.of_velocity * ae, m.of_force * ge)",
-        f"    return d{last}, v{last}, s{last}, h * ({weighted(STAGES[-1], 'q')}), error",
+        f"    return Trial(h, d{last}, v{last}, s{last}, h * ({weighted(STAGES[-1], 'q')}), error)",
     ]
     return "\n".join(lines) + "\n"
 
 
 _TEXT = text()
 attempt: Any = loaded(f"order_eight_{hashlib.sha256(_TEXT.encode()).hexdigest()[:16]}", _TEXT).attempt
-"""``attempt(m, v0, s0, h)``: displacement (rad), velocity and slipping force after h, the exponent by which slipping
-elements have relaxed, and the estimated error as a position (rad)."""
+"""``attempt(m, v0, s0, h)``: the `Trial` of a step of h from velocity v0 and slipping force s0."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,19 +12,51 @@ from stickslip.simulation._meter import MAX_WINDOW, meter
 from stickslip.simulation.exact.flow import flow, free_motion, linear
 from stickslip.simulation.sampled.modes import friction
 from stickslip.simulation.sampled.rates import CREEPS, STUCK
-from stickslip.simulation.sampled.slip import hermite, within
+from stickslip.simulation.sampled.stretch import Stretch, velocity_in, within
 
-__all__ = ["measure", "write"]
+__all__ = ["PROGRESS", "Output", "measure", "put_out", "write"]
 
 BESIDE = 1e-11
 """s, by which one-sided values of the reference lie inside a stretch."""
 
 
+PROGRESS = np.dtype(
+    [
+        # The time reached, s.
+        ("time", np.float64),
+        # Whether the run is to end; rows written, and output times met.
+        *((name, np.int64) for name in ("asked", "rows", "outputs")),
+    ]
+)
+"""How far a run has come."""
+
+
+class Output(NamedTuple):
+    """What a run writes.
+
+    Attributes
+    ----------
+    grid : array, shape (n,)
+        Output times, s.
+    reached : array, shape (1,)
+        A `PROGRESS`.
+    acc, turns : array
+        The meter's (`stickslip.simulation._meter`).
+    nodes : array, shape (signals, 5)
+        Of a window of the meter; scratch.
+    """
+
+    grid: Any
+    reached: Any
+    acc: Any
+    turns: Any
+    nodes: Any
+
+
 @kernel(exact=False)
-def write(
-    control: Any, axis: Any, z: Any, parameters: Any, t: float, event: float, rows: Any, count: int
-) -> Any:
+def write(control: Any, axis: Any, z: Any, t: float, event: float, reached: Any, rows: Any) -> Any:
     """Write the row at t; returns the rows, grown where they were full."""
+    count = reached.rows
     if count == rows.shape[0]:
         grown = np.zeros((2 * count, rows.shape[1]))
         grown[:count] = rows
@@ -33,9 +65,20 @@ def write(
     row = rows[count]
     row[0], row[1], row[2] = t, control.motion[0], control.motion[1]
     row[3], row[4] = z.position + z.moved, z.velocity
-    row[5], row[6] = z.torque, friction(axis, z, parameters)
+    row[5], row[6] = z.torque, friction(axis, z)
     row[7] = control.sampled.memory[control.sampled.compensation]
     row[8] = event
+    reached.rows += 1
+    return rows
+
+
+@kernel(exact=False)
+def put_out(control: Any, axis: Any, z: Any, t: float, output: Output, rows: Any) -> Any:
+    """Write the rows of the output times up to t; returns the rows."""
+    grid, reached = output.grid, output.reached[0]
+    while reached.outputs < grid.size and grid[reached.outputs] <= t + 1e-12 * max(1.0, t):
+        rows = write(control, axis, z, grid[reached.outputs], 0.0, reached, rows)
+        reached.outputs += 1
     return rows
 
 
@@ -54,19 +97,18 @@ def moved_after(axis: Any, was: Any, z: Any, h: float, t: float) -> tuple[float,
         faded = -math.expm1(-rate * t)
         v = v0 + (z.goal - v0) * faded
         return start + z.goal * t + (v0 - z.goal) * faded / rate, v, (z.goal - v) * rate
-    d, v1, a1 = z.position + z.moved - start, z.velocity, z.acceleration
-    v = hermite(v0, a0, v1, a1, h, t)
+    v1, a1 = z.velocity, z.acceleration
+    whole = Stretch(h, z.position + z.moved - start, v0, a0, v1, a1)
     x = t / h
     # The slope of the cubic of velocities.
     a = 6.0 * x * (1.0 - x) * (v1 - v0) / h + (1.0 - x) * (1.0 - 3.0 * x) * a0 + x * (3.0 * x - 2.0) * a1
-    return start + within(d, v0, a0, v1, a1, h, t)[0], v, a
+    return start + within(whole, t)[0], velocity_in(whole, t), a
 
 
 @kernel(exact=False)
-def measure(
-    control: Any, axis: Any, was: Any, z: Any, t: float, h: float, nodes: Any, acc: Any, turns: Any
-) -> None:
+def measure(control: Any, axis: Any, was: Any, z: Any, t: float, h: float, output: Output) -> None:
     """Hand the stretch that has led from `was` to `z` to the meter."""
+    nodes = output.nodes
     windows = math.ceil(h / MAX_WINDOW * (1.0 - 1e-9))
     beside = min(BESIDE, 0.5 * h)
     for window in range(windows):
@@ -85,4 +127,4 @@ def measure(
             nodes[5, i] = was.torque
             nodes[6, i] = was.torque - axis.inertia * a
             nodes[7, i] = control.sampled.memory[control.sampled.compensation]
-        meter(acc, turns, t + h * window / windows, h / windows, nodes)
+        meter(output.acc, output.turns, t + h * window / windows, h / windows, nodes)

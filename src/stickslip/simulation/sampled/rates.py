@@ -11,9 +11,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.jit import call_value, kernel, pointer
+from stickslip.jit import call_value, kernel, pointer, pointer_at, record_at, spliced
 
-__all__ = ["AXIS", "LEVELS", "SPRING", "STATE", "Slip", "combined", "curve_at", "rates", "slip_of"]
+__all__ = [
+    "AXIS",
+    "LEVELS",
+    "SPRING",
+    "STATE",
+    "Slip",
+    "Trial",
+    "combined",
+    "curve_at",
+    "rates",
+    "slip_of",
+    "spring_of",
+]
 
 RELAXES, FOLLOWS, BENDS = range(3)
 """What a slipping force does: relax towards the curve (GMS), lie on it (Coulomb, Maxwell-slip), bend as a bristle."""
@@ -33,7 +45,9 @@ AXIS = np.dtype(
         ("flow", np.float64, (4,)),
         ("glide", np.float64, (3, 4)),
         ("floor", np.float64, (LEVELS,)),
-        *((name, np.int64) for name in ("kind", "curve", "literal", "metered")),
+        *((name, np.int64) for name in ("kind", "literal", "metered")),
+        # Addresses: of the sliding curve (0: none) and the law's parameters, and of the springs, with their number.
+        *((name, np.int64) for name in ("curve", "parameters", "springs", "count")),
     ]
 )  # fmt: skip
 """Constants of an axis: SI units; `stickslip.simulation.sampled.axis` fills them in. ``flow`` leads a stuck axis over
@@ -52,6 +66,13 @@ STATE = np.dtype(
 ``goal`` is where a stuck axis would come to rest, or the velocity at which one on its steep slope would go on."""
 SPRING = np.dtype([(name, np.float64) for name in ("stiffness", "share", "force", "slips")])
 """One element: ``force`` in N·m where ``moved`` is 0; ``slips`` is 1 or 0."""
+SPRING_SIZE = SPRING.itemsize // 8
+
+
+@spliced
+def spring_of(axis: Any, i: int) -> Any:
+    """A spring of an axis."""
+    return record_at(pointer(pointer_at(axis.springs), i * SPRING_SIZE), SPRING)
 
 
 class Slip(NamedTuple):
@@ -69,13 +90,30 @@ class Slip(NamedTuple):
     lag: float
     breakaway: float
     curve: int
-    parameters: Any
+    parameters: int
     of_velocity: float
     of_force: float
 
 
+class Trial(NamedTuple):
+    """A step that may be taken."""
+
+    time: float
+    """its length, s"""
+    moved: float
+    """displacement over it, rad"""
+    velocity: float
+    """at its end, rad/s"""
+    slipping: float
+    """slipping force there, N·m"""
+    relaxed: float
+    """exponent by which slipping elements have relaxed"""
+    error: float
+    """estimate of what it is wrong by, as a position, rad"""
+
+
 @kernel(exact=False, inline=True)
-def slip_of(axis: Any, z: Any, parameters: Any) -> Slip:
+def slip_of(axis: Any, z: Any) -> Slip:
     """The constants of the present step."""
     time = axis.sample_time
     of_force = time * time / axis.inertia
@@ -88,22 +126,22 @@ def slip_of(axis: Any, z: Any, parameters: Any) -> Slip:
     return Slip(
         axis.kind, 1.0 / axis.inertia, z.torque - z.held - z.spring * z.moved, z.spring, axis.viscous,
         z.share * z.direction, axis.attraction, z.direction, axis.bristle, axis.lag, axis.breakaway, axis.curve,
-        parameters, of_velocity, of_force,
+        axis.parameters, of_velocity, of_force,
     )  # fmt: skip
 
 
 @kernel(exact=False, inline=True)
-def curve_at(curve: int, breakaway: float, parameters: Any, v: float) -> float:
-    """s(v), N·m."""
-    if curve == 0:
-        return breakaway
-    return call_value(curve, v, pointer(parameters, 0))
+def curve_at(axis: Any, v: float) -> float:
+    """s(v) of an axis, or of what `Slip` has of it, N·m."""
+    if axis.curve == 0:
+        return axis.breakaway
+    return call_value(axis.curve, v, pointer_at(axis.parameters))
 
 
 @kernel(exact=False, inline=True)
 def rates(m: Slip, d: float, v: float, s: float) -> tuple[float, float, float]:
     """Acceleration, rate of the slipping force and rate of its relaxation, d after the step's start."""
-    level = curve_at(m.curve, m.breakaway, m.parameters, v)
+    level = curve_at(m, v)
     ds = 0.0
     decay = 0.0
     force = s

@@ -12,9 +12,10 @@ from typing import Any
 from stickslip.jit import kernel
 from stickslip.simulation.sampled.modes import break_away, heaviest, sign, stays_below, turn
 from stickslip.simulation.sampled.order_eight import attempt
-from stickslip.simulation.sampled.rates import BENDS, FOLLOWS, Slip, curve_at, rates, slip_of
+from stickslip.simulation.sampled.rates import BENDS, FOLLOWS, Slip, Trial, curve_at, rates, slip_of
+from stickslip.simulation.sampled.stretch import Stretch, lowest, velocity_in, within
 
-__all__ = ["slip", "within"]
+__all__ = ["slip"]
 
 SHORTEST = 1e-13
 """Of the sample time: a step that must be shorter does not exist."""
@@ -27,71 +28,78 @@ FINEST = 1e-6
 ROOT_STEPS = 60
 ARRIVED = 1e-14
 """rad/s, relative above 1 rad/s: a velocity at its goal."""
-Trial = tuple[float, float, float, float, float]
 
 
 @kernel(exact=False)
-def slip(axis: Any, z: Any, springs: Any, parameters: Any, left: float) -> float:
+def slip(axis: Any, z: Any, left: float) -> float:
     """Take one step of at most `left` s; returns the time taken."""
     if left == axis.sample_time and z.direction * z.velocity > axis.far and glides(axis, z):
         return left
-    m = slip_of(axis, z, parameters)
+    m = slip_of(axis, z)
     way, edge, v0 = z.direction, axis.layer, z.velocity
     a0, _, _ = rates(m, 0.0, v0, z.slipping)
     if way * v0 <= edge and way * a0 <= 0.0:
         if way == 0.0 and a0 == 0.0:
             z.acceleration = 0.0
             return left
-        turn(axis, z, springs, parameters)
+        turn(axis, z)
         return 0.0
     h = min(left, z.next)
     if z.spring > 0.0:
         h = min(h, math.sqrt(axis.inertia / z.spring))
     h = min(h, axis.longest)
     while True:
-        h, trial = accepted(axis, z, m, h)
-        h, trial, turns, breaks = ended(axis, z, springs, parameters, m, a0, h, trial)
-        if trial[4] <= axis.local or z.failed:
+        trial, turns, breaks = ended(axis, z, m, a0, accepted(axis, z, m, h))
+        if trial.error <= axis.local or z.failed:
             break
         # Cut where the axis turns, the step meets the curve's peak there, which the whole one had jumped over unseen.
-        h = z.next = shorter(axis, z, h, trial[4])
-    z.moved, z.velocity, z.slipping = z.moved + trial[0], trial[1], trial[2]
-    z.relaxed += trial[3]
-    z.acceleration, _, _ = rates(m, trial[0], trial[1], trial[2])
+        h = z.next = shorter(axis, z, trial)
+    z.moved, z.velocity, z.slipping = z.moved + trial.moved, trial.velocity, trial.slipping
+    z.relaxed += trial.relaxed
+    z.acceleration = acceleration_after(m, trial)
     if breaks:
-        break_away(axis, z, springs, parameters, way)
+        break_away(axis, z, way)
     elif turns:
-        turn(axis, z, springs, parameters)
-    elif axis.kind == BENDS and way * trial[1] < edge:
-        z.direction = sign(trial[1])
-    return h
+        turn(axis, z)
+    elif axis.kind == BENDS and way * trial.velocity < edge:
+        z.direction = sign(trial.velocity)
+    return trial.time
+
+
+@kernel(exact=False, inline=True)
+def acceleration_after(m: Slip, trial: Trial) -> float:
+    """At the end of a step, rad/s²."""
+    a, _, _ = rates(m, trial.moved, trial.velocity, trial.slipping)
+    return a
+
+
+@kernel(exact=False, inline=True)
+def stretch_of(z: Any, m: Slip, a0: float, trial: Trial) -> Stretch:
+    """What both ends of a step say of the motion inside it."""
+    return Stretch(trial.time, trial.moved, z.velocity, a0, trial.velocity, acceleration_after(m, trial))
 
 
 @kernel(exact=False)
-def ended(
-    axis: Any, z: Any, springs: Any, parameters: Any, m: Slip, a0: float, h: float, trial: Trial
-) -> tuple[float, Trial, bool, bool]:
+def ended(axis: Any, z: Any, m: Slip, a0: float, trial: Trial) -> tuple[Trial, bool, bool]:
     """Cut an accepted step where something ends; whether the axis turns there, and whether an element breaks away."""
-    way, edge, v0 = z.direction, axis.layer, z.velocity
-    near = axis.local / axis.sample_time
-    a1, _, _ = rates(m, trial[0], trial[1], trial[2])
+    way, edge = z.direction, axis.layer
+    whole = stretch_of(z, m, a0, trial)
     turns = breaks = False
-    if way * trial[1] < edge:
-        if axis.kind != BENDS or 2.0 * abs(trial[1]) * h > UNSEEN * axis.local:
-            h, trial = arrival(m, v0, z.slipping, a0, h, trial, a1, way, edge, near)
+    if way * trial.velocity < edge:
+        if axis.kind != BENDS or 2.0 * abs(trial.velocity) * trial.time > UNSEEN * axis.local:
+            trial = arrival(axis, z, m, whole)
             turns = True
-    elif way * a0 < 0.0 < way * a1:
-        low = lowest_at(v0, a0, trial[1], a1, h, way)
-        if way * hermite(v0, a0, trial[1], a1, h, low) < edge + 0.1 * abs(v0 - trial[1]):
-            h, trial = low, attempt(m, v0, z.slipping, low)
-            if way * trial[1] < edge:
-                a1, _, _ = rates(m, trial[0], trial[1], trial[2])
-                h, trial = arrival(m, v0, z.slipping, a0, h, trial, a1, way, edge, near)
+    elif way * a0 < 0.0 < way * whole.a1:
+        low = lowest(whole, way)
+        if way * velocity_in(whole, low) < edge + 0.1 * abs(z.velocity - trial.velocity):
+            trial = attempt(m, z.velocity, z.slipping, low)
+            if way * trial.velocity < edge:
+                trial = arrival(axis, z, m, stretch_of(z, m, a0, trial))
                 turns = True
     if z.spring > 0.0:
-        h, trial, breaks = next_break(axis, z, springs, parameters, m, a0, h, trial)
-        turns = turns and not breaks and way * trial[1] < edge + 1e-9
-    return h, trial, turns, breaks
+        trial, breaks = next_break(axis, z, m, a0, trial)
+        turns = turns and not breaks and way * trial.velocity < edge + 1e-9
+    return trial, turns, breaks
 
 
 @kernel(exact=False)
@@ -117,29 +125,30 @@ def glides(axis: Any, z: Any) -> bool:
 
 
 @kernel(exact=False)
-def accepted(axis: Any, z: Any, m: Slip, h: float) -> tuple[float, Trial]:
+def accepted(axis: Any, z: Any, m: Slip, h: float) -> Trial:
     """The first step of at most h that keeps the tolerance; `z.next` is the length that the next one may have."""
     cut = h < z.next
     trial = attempt(m, z.velocity, z.slipping, h)
-    while not trial[4] <= axis.local:
+    while not trial.error <= axis.local:
         cut = False
-        h = shorter(axis, z, h, trial[4])
+        h = shorter(axis, z, trial)
         if z.failed:
             break
         trial = attempt(m, z.velocity, z.slipping, h)
     grown = 4.0
-    if trial[4] > 1e-5 * axis.local:
-        grown = 0.9 * eighth_root(axis.local / trial[4])
+    if trial.error > 1e-5 * axis.local:
+        grown = 0.9 * eighth_root(axis.local / trial.error)
     # A step that the end of the sample has cut says nothing against a longer one.
     z.next = max(z.next, h * grown) if cut else h * grown
-    return h, trial
+    return trial
 
 
 @kernel(exact=False)
-def shorter(axis: Any, z: Any, h: float, error: float) -> float:
-    """How long a step may be that was wrong by `error` with h."""
+def shorter(axis: Any, z: Any, trial: Trial) -> float:
+    """How long a step may be in place of one that is wrong by too much."""
     z.rejected += 1
-    h *= max(0.1, 0.9 * eighth_root(axis.local / error)) if error < math.inf else 0.1
+    part = max(0.1, 0.9 * eighth_root(axis.local / trial.error)) if trial.error < math.inf else 0.1
+    h = trial.time * part
     if h < SHORTEST * axis.sample_time:
         z.failed = 1
     return h
@@ -151,139 +160,89 @@ def eighth_root(x: float) -> float:
     return math.sqrt(math.sqrt(math.sqrt(x)))
 
 
-@kernel(exact=False, inline=True)
-def hermite(v0: float, a0: float, v1: float, a1: float, h: float, t: float) -> float:
-    """The cubic through velocities and accelerations of both ends, rad/s."""
-    x = t / h
-    y = 1.0 - x
-    return y * y * (1.0 + 2.0 * x) * v0 + x * x * (3.0 - 2.0 * x) * v1 + x * y * h * (y * a0 - x * a1)
-
-
 @kernel(exact=False)
-def lowest_at(v0: float, a0: float, v1: float, a1: float, h: float, way: float) -> float:
-    """Where the cubic is nearest to turning: its slope changes sign once between slopes of opposite signs."""
-    low, high = 0.0, h
-    for _ in range(30):
-        t = 0.5 * (low + high)
-        d = 1e-4 * h
-        slope = hermite(v0, a0, v1, a1, h, t + d) - hermite(v0, a0, v1, a1, h, t - d)
-        if way * slope < 0.0:
-            low = t
-        else:
-            high = t
-    return 0.5 * (low + high)
-
-
-@kernel(exact=False)
-def arrival(
-    m: Slip,
-    v0: float,
-    s0: float,
-    a0: float,
-    h: float,
-    trial: Trial,
-    a1: float,
-    way: float,
-    edge: float,
-    near: float,
-) -> tuple[float, Trial]:
-    """The step within h that ends where the velocity has fallen to `edge`: Newton's rule on real steps, bracketed."""
+def arrival(axis: Any, z: Any, m: Slip, whole: Stretch) -> Trial:
+    """The step inside one that ends where the velocity has fallen to the edge: Newton's rule on real steps."""
+    way, edge, h = z.direction, axis.layer, whole.time
     low, high = 0.0, h
     # A start from where it now arrives: the motion first goes out, so that the cubic's later root is meant.
     for _ in range(40):
         t = 0.5 * (low + high)
-        if way * hermite(v0, a0, trial[1], a1, h, t) > edge:
+        if way * velocity_in(whole, t) > edge:
             low = t
         else:
             high = t
     t, low, high = 0.5 * (low + high), 0.0, h
-    enough = max(ARRIVED * max(1.0, abs(v0)), 1e-3 * near)
+    enough = max(ARRIVED * max(1.0, abs(whole.v0)), 1e-3 * (axis.local / axis.sample_time))
+    trial = attempt(m, whole.v0, z.slipping, t)
     for i in range(ROOT_STEPS):
-        trial = attempt(m, v0, s0, t)
-        gap = way * trial[1] - edge
+        gap = way * trial.velocity - edge
         if abs(gap) <= enough or high - low <= 1e-15 * h:
             break
         if gap > 0.0:
             low = t
         else:
             high = t
-        a, _, _ = rates(m, trial[0], trial[1], trial[2])
+        a = acceleration_after(m, trial)
         t -= gap / (way * a) if a != 0.0 else 0.0
         if i > 20 or not low < t < high:
             t = 0.5 * (low + high)
-    return t, trial
-
-
-@kernel(exact=False, inline=True)
-def within(
-    d: float, v0: float, a0: float, v1: float, a1: float, h: float, t: float
-) -> tuple[float, float, float]:
-    """Displacement, velocity and acceleration after t of a step of h: the quintic of what both ends say."""
-    x = t / h
-    p, q = d - h * (v0 + 0.5 * h * a0), h * (v1 - v0 - h * a0)
-    r = h * h * (a1 - a0)
-    c3 = 10.0 * p - 4.0 * q + 0.5 * r
-    c4 = -15.0 * p + 7.0 * q - r
-    c5 = 6.0 * p - 3.0 * q + 0.5 * r
-    moved = t * (v0 + 0.5 * t * a0) + x * x * x * (c3 + x * (c4 + x * c5))
-    v = v0 + t * a0 + x * x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)) / h
-    return moved, v, a0 + x * (6.0 * c3 + x * (12.0 * c4 + x * 20.0 * c5)) / (h * h)
+        trial = attempt(m, whole.v0, z.slipping, t)
+    return trial
 
 
 @kernel(exact=False)
-def next_break(
-    axis: Any, z: Any, springs: Any, parameters: Any, m: Slip, a0: float, h: float, trial: Trial
-) -> tuple[float, Trial, bool]:
+def next_break(axis: Any, z: Any, m: Slip, a0: float, trial: Trial) -> tuple[Trial, bool]:
     """Cut the step where the next element breaks away; whether one does."""
     way, v0 = z.direction, z.velocity
-    start = heaviest(axis, springs, z.moved, way)
-    end = heaviest(axis, springs, z.moved + trial[0], way)
-    if max(start, end) < axis.lowest:
-        return h, trial, False
-    if way * v0 > 0.0 and start >= curve_at(axis.curve, axis.breakaway, parameters, v0):
-        return 0.0, (0.0, v0, z.slipping, 0.0, 0.0), True
-    a1, _, _ = rates(m, trial[0], trial[1], trial[2])
+    load0 = heaviest(axis, z.moved, way)
+    if max(load0, heaviest(axis, z.moved + trial.moved, way)) < axis.lowest:
+        return trial, False
+    if way * v0 > 0.0 and load0 >= curve_at(axis, v0):
+        return Trial(0.0, 0.0, v0, z.slipping, 0.0, 0.0), True
+    whole = stretch_of(z, m, a0, trial)
+    h = whole.time
     t, d = 0.0, h / LOOKS
-    load0, w0, b0 = start, v0, a0
+    w0, b0, before = v0, a0, 0.0
     while t < h:
         d = min(d, h - t)
-        moved, w1, b1 = within(trial[0], v0, a0, trial[1], a1, h, t + d)
-        load1 = heaviest(axis, springs, z.moved + moved, way)
-        if load1 >= axis.lowest and load1 >= curve_at(axis.curve, axis.breakaway, parameters, w1):
-            return located(axis, z, springs, parameters, m, a0, a1, h, trial, t, t + d)
-        below = stays_below(axis, parameters, max(load0, load1), w0, w1, b0, b1, d, way)
-        if below or d <= FINEST * axis.sample_time:
-            t, load0, w0, b0 = t + d, load1, w1, b1
+        moved, w1, b1 = within(whole, t + d)
+        load1 = heaviest(axis, z.moved + moved, way)
+        if load1 >= axis.lowest and load1 >= curve_at(axis, w1):
+            return located(axis, z, m, whole, t, t + d)
+        piece = Stretch(d, moved - before, w0, b0, w1, b1)
+        if stays_below(axis, max(load0, load1), piece, way) or d <= FINEST * axis.sample_time:
+            t, load0, w0, b0, before = t + d, load1, w1, b1, moved
             d *= 2.0
         else:
             d *= 0.5
-    return h, trial, False
+    return trial, False
 
 
 @kernel(exact=False)
-def looked(
-    axis: Any, z: Any, springs: Any, parameters: Any, a0: float, a1: float, h: float, trial: Trial, t: float
-) -> float:
+def looked(axis: Any, z: Any, whole: Stretch, t: float) -> float:
     """How far the heaviest load lies above the curve t into a step, by its quintic, N·m."""
-    moved, v, _ = within(trial[0], z.velocity, a0, trial[1], a1, h, t)
-    load = heaviest(axis, springs, z.moved + moved, z.direction)
-    return load - curve_at(axis.curve, axis.breakaway, parameters, v)
+    moved, v, _ = within(whole, t)
+    return heaviest(axis, z.moved + moved, z.direction) - curve_at(axis, v)
 
 
 @kernel(exact=False)
-def located(
-    axis: Any, z: Any, springs: Any, parameters: Any, m: Slip, a0: float, a1: float, h: float, whole: Trial,
-    low: float, high: float,
-) -> tuple[float, Trial, bool]:  # fmt: skip
+def over(axis: Any, z: Any, trial: Trial) -> float:
+    """How far the heaviest load lies above the curve at the end of a real step, N·m."""
+    return heaviest(axis, z.moved + trial.moved, z.direction) - curve_at(axis, trial.velocity)
+
+
+@kernel(exact=False)
+def located(axis: Any, z: Any, m: Slip, whole: Stretch, low: float, high: float) -> tuple[Trial, bool]:
     """The step between low and high at whose end the heaviest load meets the curve, and whether it does.
 
     The place is found on the quintic of the whole step (Illinois' rule), then corrected on real steps.
     """
-    v0, s0, way = z.velocity, z.slipping, z.direction
-    f_low = min(looked(axis, z, springs, parameters, a0, a1, h, whole, low), 0.0)
-    f_high = max(looked(axis, z, springs, parameters, a0, a1, h, whole, high), 0.0)
+    h = whole.time
+    f_low = min(looked(axis, z, whole, low), 0.0)
+    f_high = max(looked(axis, z, whole, high), 0.0)
     begin, end = low, high
-    t, slope = high, 0.0
+    t = high
     for i in range(ROOT_STEPS):
         if f_high <= axis.near or high - low <= 1e-12 * h:
             break
@@ -291,24 +250,21 @@ def located(
         t = high - f_high / slope
         if i > 10 or not low < t < high:
             t = 0.5 * (low + high)
-        f = looked(axis, z, springs, parameters, a0, a1, h, whole, t)
+        f = looked(axis, z, whole, t)
         if f >= 0.0:
             high, f_high, f_low = t, f, 0.5 * f_low
         else:
             low, f_low, f_high = t, f, 0.5 * f_high
     d = 1e-3 * (end - begin)
-    slope = looked(axis, z, springs, parameters, a0, a1, h, whole, t + d)
-    slope = (slope - looked(axis, z, springs, parameters, a0, a1, h, whole, t - d)) / (2.0 * d)
-    trial = attempt(m, v0, s0, t)
+    slope = (looked(axis, z, whole, t + d) - looked(axis, z, whole, t - d)) / (2.0 * d)
+    trial = attempt(m, whole.v0, z.slipping, t)
     for _ in range(ROOT_STEPS):
-        f = heaviest(axis, springs, z.moved + trial[0], way)
-        f -= curve_at(axis.curve, axis.breakaway, parameters, trial[1])
+        f = over(axis, z, trial)
         if abs(f) <= axis.near:
-            return t, trial, True
+            return trial, True
         t = min(max(t - f / slope, 0.0), h) if slope > 0.0 else end
-        trial = attempt(m, v0, s0, t)
+        trial = attempt(m, whole.v0, z.slipping, t)
         if slope <= 0.0 or t == 0.0 or t == h:
             break
     # The quintic has seen more than there is, or the crossing is another one: go on from there.
-    f = heaviest(axis, springs, z.moved + trial[0], way)
-    return t, trial, f >= curve_at(axis.curve, axis.breakaway, parameters, trial[1])
+    return trial, over(axis, z, trial) >= 0.0

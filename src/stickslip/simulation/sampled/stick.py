@@ -6,14 +6,15 @@ J dv/dt = u - F_0 - K (theta - theta_0) - D v with constant u: a damped oscillat
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
 from stickslip.simulation.exact.flow import Linear, flow, free_motion, linear
 from stickslip.simulation.sampled.modes import break_away, floor_below, heaviest, sign, stays_below
-from stickslip.simulation.sampled.rates import curve_at
+from stickslip.simulation.sampled.rates import curve_at, spring_of
+from stickslip.simulation.sampled.stretch import Stretch
 
-__all__ = ["stick"]
+__all__ = ["Swing", "first_break", "stick"]
 
 PHASE = 0.5
 """rad of the oscillation between two looks at the loads."""
@@ -22,152 +23,169 @@ FINEST = 1e-6
 """Of the sample time: what a load may be above the curve for without being seen."""
 
 
+class Swing(NamedTuple):
+    """The free motion of a stuck axis, about where the springs balance the torque."""
+
+    lin: Linear
+    goal: float
+    """where that is: displacement since the forces were written down, rad"""
+    off: float
+    """at the start, rad from there"""
+    velocity: float
+    """at the start, rad/s"""
+
+
+class Moment(NamedTuple):
+    """One time of it: s, rad from the goal, rad/s."""
+
+    time: float
+    off: float
+    velocity: float
+
+
+@kernel(exact=False, inline=True)
+def after(swing: Swing, t: float) -> Moment:
+    """The motion t after its start."""
+    off, v = free_motion(flow(swing.lin, t), swing.off, swing.velocity)
+    return Moment(t, off, v)
+
+
+@kernel(exact=False, inline=True)
+def acceleration_at(lin: Linear, m: Moment) -> float:
+    """rad/s²."""
+    return -lin.square * m.off - 2.0 * lin.decay * m.velocity
+
+
 @kernel(exact=False)
-def stick(axis: Any, z: Any, springs: Any, parameters: Any, left: float) -> float:
+def stick(axis: Any, z: Any, left: float) -> float:
     """Move with sticking springs for `left` s or until one breaks away; returns the time taken."""
     lin = linear(axis.inertia, axis.viscous, z.spring)
     goal = (z.torque - z.held) * lin.compliance
-    off, v = z.moved - goal, z.velocity
+    swing = Swing(lin, goal, z.moved - goal, z.velocity)
     z.goal = goal
-    if cannot_break(axis, springs, lin, goal, off, v):
-        if left == axis.sample_time:
-            off, v = axis.flow[0] * off + axis.flow[1] * v, axis.flow[2] * off + axis.flow[3] * v
-        else:
-            off, v = free_motion(flow(lin, left), off, v)
-        taken, direction = left, 0.0
+    taken, direction = left, 0.0
+    if not cannot_break(axis, swing):
+        taken, direction = first_break(axis, swing, left)
+        end = after(swing, taken)
+    elif left == axis.sample_time:
+        off, v = free_motion(axis.flow, swing.off, swing.velocity)
+        end = Moment(left, off, v)
     else:
-        taken, direction = first_break(axis, springs, parameters, lin, goal, off, v, left)
-        off, v = free_motion(flow(lin, taken), off, v)
-    z.moved, z.velocity = goal + off, v
-    z.acceleration = -lin.square * off - 2.0 * lin.decay * v
+        end = after(swing, left)
+    z.moved, z.velocity = goal + end.off, end.velocity
+    z.acceleration = acceleration_at(lin, end)
     if direction != 0.0:
-        break_away(axis, z, springs, parameters, direction)
+        break_away(axis, z, direction)
     return taken
 
 
 @kernel(exact=False, inline=True)
-def cannot_break(axis: Any, springs: Any, lin: Linear, goal: float, off: float, v: float) -> bool:
+def cannot_break(axis: Any, swing: Swing) -> bool:
     """Whether the amplitude of the oscillation keeps every load below its share of the curve."""
+    lin, off = swing.lin, swing.off
     if lin.discriminant <= 0.0:
         return False
-    swing = v + lin.decay * off
-    reach = math.sqrt(off * off + swing * swing / lin.discriminant)
+    speed = swing.velocity + lin.decay * off
+    reach = math.sqrt(off * off + speed * speed / lin.discriminant)
     level = floor_below(axis, reach * math.sqrt(lin.square))
-    for i in range(springs.shape[0]):
-        k = springs[i].stiffness
-        if abs(springs[i].force + k * goal) + k * reach >= springs[i].share * level:
+    for i in range(axis.count):
+        spring = spring_of(axis, i)
+        k = spring.stiffness
+        if abs(spring.force + k * swing.goal) + k * reach >= spring.share * level:
             return False
     return True
 
 
 @kernel(exact=False, inline=True)
-def excess(axis: Any, springs: Any, parameters: Any, moved: float, v: float, direction: float) -> float:
+def excess(axis: Any, moved: float, v: float, direction: float) -> float:
     """How far the heaviest load lies above the curve, N·m; at rest nothing breaks away."""
-    load = heaviest(axis, springs, moved, direction)
+    load = heaviest(axis, moved, direction)
     if direction == 0.0:
         return -1.0
     if load < axis.lowest:
         return load - axis.lowest
-    return load - curve_at(axis.curve, axis.breakaway, parameters, v)
+    return load - curve_at(axis, v)
 
 
 @kernel(exact=False)
-def excess_after(
-    axis: Any,
-    springs: Any,
-    parameters: Any,
-    lin: Linear,
-    goal: float,
-    off: float,
-    v: float,
-    t: float,
-    way: float,
-) -> float:
-    """`excess` after t of the free motion, in the direction `way`."""
-    off, v = free_motion(flow(lin, t), off, v)
-    return excess(axis, springs, parameters, goal + off, v, way)
+def excess_after(axis: Any, swing: Swing, t: float, way: float) -> float:
+    """`excess` after t, in the direction `way`."""
+    then = after(swing, t)
+    return excess(axis, swing.goal + then.off, then.velocity, way)
 
 
 @kernel(exact=False)
-def first_break(
-    axis: Any, springs: Any, parameters: Any, lin: Linear, goal: float, off: float, v: float, left: float
-) -> tuple[float, float]:
+def first_break(axis: Any, swing: Swing, left: float) -> tuple[float, float]:
     """When the first element breaks away, and in which direction; the whole time and 0 if none does."""
+    lin = swing.lin
     count = math.ceil(math.sqrt(lin.square) * left / PHASE) + 1
     pace = left / count
     m = flow(lin, pace)
-    e, w = off, v
-    way = sign(w) if w != 0.0 else sign(-e)
-    if excess(axis, springs, parameters, goal + e, w, way) >= 0.0:
+    here = Moment(0.0, swing.off, swing.velocity)
+    way = sign(here.velocity) if here.velocity != 0.0 else sign(-here.off)
+    if excess(axis, swing.goal + here.off, here.velocity, way) >= 0.0:
         return 0.0, way
     for i in range(count):
-        next_e, next_w = free_motion(m, e, w)
-        begin, end = pace * i, pace * (i + 1)
-        if next_w * way < 0.0:
+        off, v = free_motion(m, here.off, here.velocity)
+        ahead = Moment(pace * (i + 1), off, v)
+        if v * way < 0.0:
             # The loads peak where the axis turns: look there, from the side it comes from.
-            top = turning_time(lin, off, v, begin, end, way)
-            top_e, top_w = free_motion(flow(lin, top), off, v)
-            low, high = meeting(
-                axis, springs, parameters, lin, goal, off, v, begin, top, e, w, top_e, top_w, way
-            )
+            top = after(swing, turning_time(swing, here.time, ahead.time, way))
+            low, high = meeting(axis, swing, here, top, way)
             if high > 0.0:
-                return bracketed(axis, springs, parameters, lin, goal, off, v, low, high, way), way
-            way, begin, e, w = -way, top, top_e, top_w
-        low, high = meeting(
-            axis, springs, parameters, lin, goal, off, v, begin, end, e, w, next_e, next_w, way
-        )
+                return bracketed(axis, swing, low, high, way), way
+            way, here = -way, top
+        low, high = meeting(axis, swing, here, ahead, way)
         if high > 0.0:
-            return bracketed(axis, springs, parameters, lin, goal, off, v, low, high, way), way
-        e, w = next_e, next_w
+            return bracketed(axis, swing, low, high, way), way
+        here = ahead
     return left, 0.0
 
 
 @kernel(exact=False)
-def meeting(
-    axis: Any, springs: Any, parameters: Any, lin: Linear, goal: float, off: float, v: float,
-    begin: float, end: float, e0: float, w0: float, e1: float, w1: float, way: float,
-) -> tuple[float, float]:  # fmt: skip
+def meeting(axis: Any, swing: Swing, begin: Moment, end: Moment, way: float) -> tuple[float, float]:
     """A piece of the time between begin and end at whose end the heaviest load is above the curve; ends in 0 if none.
 
     Halved until nothing can happen in it: just before the axis turns, the curve may dip under the load and rise again.
     """
-    t, d = begin, end - begin
-    load0 = heaviest(axis, springs, goal + e0, way)
-    while t < end:
-        load1 = heaviest(axis, springs, goal + e1, way)
-        if load1 >= axis.lowest and load1 >= curve_at(axis.curve, axis.breakaway, parameters, w1):
-            return t, t + d
-        a0 = -lin.square * e0 - 2.0 * lin.decay * w0
-        a1 = -lin.square * e1 - 2.0 * lin.decay * w1
-        below = stays_below(axis, parameters, max(load0, load1), w0, w1, a0, a1, d, way)
-        if below or d <= FINEST * axis.sample_time:
-            t, e0, w0, load0 = t + d, e1, w1, load1
+    lin, goal = swing.lin, swing.goal
+    here, ahead, d = begin, end, end.time - begin.time
+    load0 = heaviest(axis, goal + here.off, way)
+    while here.time < end.time:
+        load1 = heaviest(axis, goal + ahead.off, way)
+        if load1 >= axis.lowest and load1 >= curve_at(axis, ahead.velocity):
+            return here.time, here.time + d
+        piece = Stretch(
+            d, ahead.off - here.off, here.velocity, acceleration_at(lin, here), ahead.velocity,
+            acceleration_at(lin, ahead),
+        )  # fmt: skip
+        if stays_below(axis, max(load0, load1), piece, way) or d <= FINEST * axis.sample_time:
+            here, load0 = Moment(here.time + d, ahead.off, ahead.velocity), load1
             d *= 2.0
         else:
             d *= 0.5
-        d = min(d, end - t)
+        d = min(d, end.time - here.time)
         if d > 0.0:
-            e1, w1 = free_motion(flow(lin, t + d), off, v)
+            ahead = after(swing, here.time + d)
     return 0.0, 0.0
 
 
 @kernel(exact=False)
-def turning_time(lin: Linear, off: float, v: float, low: float, high: float, way: float) -> float:
-    """The time between low and high at which the free motion turns, from the side on which it still moves `way`."""
+def turning_time(swing: Swing, low: float, high: float, way: float) -> float:
+    """The time between low and high at which the motion turns, from the side on which it still moves `way`."""
     for _ in range(ROOT_STEPS):
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high or high - low < 1e-9 * high:
             break
-        e, w = free_motion(flow(lin, middle), off, v)
-        slope = -lin.square * e - 2.0 * lin.decay * w
-        guess = middle - w / slope if slope != 0.0 else middle
-        if w * way > 0.0:
+        there = after(swing, middle)
+        slope = acceleration_at(swing.lin, there)
+        guess = middle - there.velocity / slope if slope != 0.0 else middle
+        if there.velocity * way > 0.0:
             low = middle
         else:
             high = middle
         if low < guess < high:
-            _, w = free_motion(flow(lin, guess), off, v)
-            if w * way > 0.0:
+            if after(swing, guess).velocity * way > 0.0:
                 low = guess
             else:
                 high = guess
@@ -175,20 +193,17 @@ def turning_time(lin: Linear, off: float, v: float, low: float, high: float, way
 
 
 @kernel(exact=False)
-def bracketed(
-    axis: Any, springs: Any, parameters: Any, lin: Linear, goal: float, off: float, v: float,
-    low: float, high: float, way: float,
-) -> float:  # fmt: skip
+def bracketed(axis: Any, swing: Swing, low: float, high: float, way: float) -> float:
     """The time between low and high at which the heaviest load meets the curve (Illinois' rule); not before it."""
-    f_low = min(excess_after(axis, springs, parameters, lin, goal, off, v, low, way), 0.0)
-    f_high = excess_after(axis, springs, parameters, lin, goal, off, v, high, way)
+    f_low = min(excess_after(axis, swing, low, way), 0.0)
+    f_high = excess_after(axis, swing, high, way)
     for i in range(ROOT_STEPS):
         if f_high <= axis.near or high - low <= 1e-14 * axis.sample_time:
             break
         t = high - f_high * (high - low) / (f_high - f_low)
         if i > 10 or not low < t < high:
             t = 0.5 * (low + high)
-        f = excess_after(axis, springs, parameters, lin, goal, off, v, t, way)
+        f = excess_after(axis, swing, t, way)
         if f >= 0.0:
             high, f_high, f_low = t, f, 0.5 * f_low
         else:
