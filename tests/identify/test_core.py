@@ -12,7 +12,7 @@ from stickslip import Model, Par, law, law_names
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.estimate import Identification
 from stickslip.identify.fit.broyden import descend_by_secants
-from stickslip.identify.fit.levenberg_marquardt import central_differences, descend
+from stickslip.identify.fit.levenberg_marquardt import Squares, central_differences, descend
 from stickslip.identify.fit.noise import noise_of_repeats
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.selection import criteria, cross_validate
@@ -20,6 +20,10 @@ from stickslip.identify.fit.uncertainty import fit
 
 ANY = Par("-", "x", "a number")
 POSITIVE = Par("-", "x", "a number", positive=True)
+VALLEY = Squares(
+    lambda u: np.array([10.0 * (u[1] - u[0] ** 2), 1.0 - u[0]]), np.full(2, -9.0), np.full(2, 9.0)
+)
+"""Curved (More, Garbow and Hillstrom 1981, problem 1), with its zero at (1, 1)."""
 
 
 def vector_of(**values: tuple[Par, float]) -> Vector:
@@ -44,7 +48,9 @@ def test_every_vector_inside_the_bounds_keeps_every_bound(name: str, seed: int) 
     u = np.clip(u, vector.lower, vector.upper)
     named = vector.named(u)
     assert [p.name for p in vector.parameters if p.par.complaint(named[p.name])] == []
-    jacobian = central_differences(vector.values, u, range(vector.size), vector.lower - 1, vector.upper + 1)
+    jacobian = central_differences(
+        Squares(vector.values, vector.lower - 1, vector.upper + 1), u, range(vector.size)
+    )
     assert vector.jacobian(u) == pytest.approx(jacobian, rel=1e-6, abs=1e-7 * np.max(np.abs(jacobian)))
 
 
@@ -71,9 +77,9 @@ def test_descend_agrees_with_scipy() -> None:
 
     start, free = np.array([1.0, 0.1, 0.0]), np.full(3, np.inf)
     theirs = optimize.least_squares(residuals, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    ours = descend(residuals, start, -free, free)
+    ours = descend(Squares(residuals, -free, free), start)
     assert ours.u == pytest.approx(theirs.x, rel=1e-7)
-    held = descend(residuals, start, np.array([-9.0, -9.0, 0.45]), free)
+    held = descend(Squares(residuals, np.array([-9.0, -9.0, 0.45]), free), start)
     bounded = optimize.least_squares(
         residuals, [1.0, 0.1, 0.5], bounds=([-9, -9, 0.45], np.inf), xtol=1e-15, ftol=1e-15
     )
@@ -82,8 +88,7 @@ def test_descend_agrees_with_scipy() -> None:
 
 def test_rosenbrock_to_the_last_digit() -> None:
     """A curved valley (More, Garbow and Hillstrom 1981, problem 1) has its zero at (1, 1)."""
-    out = descend(lambda u: np.array([10.0 * (u[1] - u[0] ** 2), 1.0 - u[0]]), np.array([-1.2, 1.0]),
-                  np.full(2, -9.0), np.full(2, 9.0))  # fmt: skip
+    out = descend(VALLEY, np.array([-1.2, 1.0]))
     assert out.u == pytest.approx([1.0, 1.0], abs=1e-12)
 
 
@@ -97,22 +102,25 @@ def test_secants_reach_the_same_minimum_with_fewer_evaluations() -> None:
         return u[0] * np.exp(-u[1] * x) + u[2] - y
 
     start, free = np.array([1.0, 0.1, 0.0]), np.full(3, np.inf)
-    ours = descend(residuals, start, -free, free, tolerance=1e-10)
+    ours = descend(Squares(residuals, -free, free), start, tolerance=1e-10)
     full, calls[0] = calls[0], 0
-    u, cost = descend_by_secants(residuals, start, -free, free, tolerance=1e-10)
+    u, cost = descend_by_secants(Squares(residuals, -free, free), start, tolerance=1e-10)
     assert calls[0] < 0.7 * full
     assert u == pytest.approx(ours.u, rel=1e-4)
     assert cost == pytest.approx(ours.cost, rel=1e-8)
-    bounded, _ = descend_by_secants(residuals, start, np.array([-9.0, -9.0, 0.45]), free, tolerance=1e-10)
-    assert bounded == pytest.approx(descend(residuals, start, np.array([-9.0, -9.0, 0.45]), free).u, rel=1e-4)
-    held, _ = descend_by_secants(residuals, start, -free, free, held=[2], tolerance=1e-10)
+    bounded, _ = descend_by_secants(
+        Squares(residuals, np.array([-9.0, -9.0, 0.45]), free), start, tolerance=1e-10
+    )
+    assert bounded == pytest.approx(
+        descend(Squares(residuals, np.array([-9.0, -9.0, 0.45]), free), start).u, rel=1e-4
+    )
+    held, _ = descend_by_secants(Squares(residuals, -free, free), start, held=[2], tolerance=1e-10)
     assert held[2] == 0.0
-    assert held == pytest.approx(descend(residuals, start, -free, free, held=[2]).u, rel=1e-4)
+    assert held == pytest.approx(descend(Squares(residuals, -free, free), start, held=[2]).u, rel=1e-4)
 
 
 def test_secants_follow_a_curved_valley() -> None:
-    u, cost = descend_by_secants(lambda u: np.array([10.0 * (u[1] - u[0] ** 2), 1.0 - u[0]]), np.array([-1.2, 1.0]),
-                                 np.full(2, -9.0), np.full(2, 9.0), tolerance=1e-12)  # fmt: skip
+    u, cost = descend_by_secants(VALLEY, np.array([-1.2, 1.0]), tolerance=1e-12)
     assert u == pytest.approx([1.0, 1.0], abs=1e-6)
     assert cost < 1e-12
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.axis.prediction import motion_of, searched, watched
-from stickslip.identify.axis.search import errors_of, fitted_axis
+from stickslip.identify.axis.search import Asked, errors_of, fitted_axis
 from stickslip.identify.estimate import silent
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import feasible
@@ -29,7 +29,7 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
 
-__all__ = ["Candidate", "chosen_of", "compared", "foreseen", "options_of", "sentence_on"]
+__all__ = ["Candidate", "asked_of", "chosen_of", "compared", "foreseen", "sentence_on"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -72,7 +72,7 @@ class Candidate:
 
 def foreseen(
     fitted: Sequence[Experiment], held: Sequence[Experiment], axis: ServoAxis, laws: Sequence[Law],
-    inverse: InverseDynamics, options: Mapping[str, Any], progress: Callable[[str], None] = silent,
+    inverse: InverseDynamics, asked: Asked, progress: Callable[[str], None] = silent,
 ) -> list[Candidate]:  # fmt: skip
     """Fit every law by the prediction error and look at the torque that it lacks on the held-out data.
 
@@ -84,8 +84,7 @@ def foreseen(
     laws : sequence of Law
     inverse : InverseDynamics
         Where the searches start.
-    options : mapping
-        ``free``, ``frozen``, ``values`` and ``extras`` of `stickslip.identify.axis.prediction.axis_prediction`.
+    asked : Asked
     progress : callable
         Is told which law begins.
 
@@ -94,16 +93,12 @@ def foreseen(
     InputError
         If a record has no drive signal, too little is held out, or no law could be fitted.
     """
-    motions, band = watched(fitted, axis, options["values"], options["free"])
+    followed = watched(fitted, axis, asked)
 
     def search(law: Law) -> tuple[Criterion, Array] | str:
         progress(f"{law.name}: law {laws.index(law) + 1} of {len(laws)}")
-        own = options_of(law, options, laws)
-        values, free = own["values"], own["free"]
         try:
-            return searched(
-                fitted, axis, law, motions, inverse, values, free, own["frozen"], own["extras"], band, seed=0, hops=0
-            )  # fmt: skip
+            return searched(fitted, axis, law, followed, inverse, asked_of(law, asked, laws), hops=0)
         except InputError as error:
             return str(error)
 
@@ -167,16 +162,16 @@ def lacking(criterion: Criterion, record: Prepared, u: Array, experiment: Experi
 
 def compared(
     fitted: Sequence[Experiment], held: Sequence[Experiment], axis: ServoAxis, laws: Sequence[Law],
-    inverse: InverseDynamics | None, options: Mapping[str, Any], progress: Callable[[str], None] = silent,
+    inverse: InverseDynamics | None, asked: Asked, progress: Callable[[str], None] = silent,
 ) -> list[Candidate]:  # fmt: skip
     """Fit every law and look at what it says about the held-out data."""
     out: list[Candidate] = []
     weights: Mapping[str, float] | None = None
     for number, law in enumerate(laws, 1):
         progress(f"{law.name}: law {number} of {len(laws)}")
-        own = options_of(law, options, laws)
+        own = asked_of(law, asked, laws)
         try:
-            result = fitted_axis(fitted, axis, law, inverse, tolerance=COMPARABLE, **own)
+            result = fitted_axis(fitted, axis, law, inverse, own, tolerance=COMPARABLE)
         except InputError as error:
             out.append(failed(law, str(error)))
             continue
@@ -199,19 +194,18 @@ def compared(
     return out
 
 
-def options_of(law: Law, options: Mapping[str, Any], laws: Sequence[Law]) -> dict[str, Any]:
-    """The options without what belongs to another of the laws only: to name that is no mistake."""
+def asked_of(law: Law, asked: Asked, laws: Sequence[Law]) -> Asked:
+    """What is asked without what belongs to another of the laws only: to name that is no mistake."""
     own = {f.name for f in law.fields}
     others = {f.name for x in laws for f in x.fields} - own
 
     def meant(name: str) -> bool:
         return name.partition("[")[0] not in others
 
-    values = {k: v for k, v in dict[str, Any](options["values"] or {}).items() if meant(k)}
-    return {
-        **options, "free": [*filter(meant, options["free"])], "frozen": [*filter(meant, options["frozen"])],
-        "values": values,
-    }  # fmt: skip
+    values = {k: v for k, v in asked.values.items() if meant(k)}
+    return replace(
+        asked, free=[*filter(meant, asked.free)], frozen=[*filter(meant, asked.frozen)], values=values
+    )
 
 
 def values_of(vector: Vector, u: Array, model: Model) -> dict[str, Any]:

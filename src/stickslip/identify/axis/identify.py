@@ -24,18 +24,11 @@ from stickslip.identify.axis.agreed import (
     on_width,
     regressed,
 )
-from stickslip.identify.axis.choice import (
-    Candidate,
-    chosen_of,
-    compared,
-    foreseen,
-    options_of,
-    sentence_on,
-)  # fmt: skip
+from stickslip.identify.axis.choice import Candidate, asked_of, chosen_of, compared, foreseen, sentence_on
 from stickslip.identify.axis.law_fit import Evidence, estimated
-from stickslip.identify.axis.output import output_error
+from stickslip.identify.axis.output import judged
 from stickslip.identify.axis.result import assembled, narrow_note, noted
-from stickslip.identify.axis.search import Extras, require_start
+from stickslip.identify.axis.search import Asked, Extras, fitted_axis, require_start
 from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
@@ -131,55 +124,49 @@ def identify_axis(
         tried = [each_way(law) for law in tried]
         if "offset" not in (*free, *(values or {})):
             frozen, values = (*frozen, "offset"), {"offset": 0.0, **(values or {})}
-    options: dict[str, Any] = {
-        "free": free, "frozen": frozen, "values": values, "extras": extras, "robust": robust
-    }  # fmt: skip
+    asked = Asked(free, frozen, values or {}, extras, robust)
     refuse_harmonics(experiments, extras.harmonics + extras.friction_harmonics, simulated=True)
     evidence, notes = looked_at(experiments, validation, axis, extras, skew, per_direction, regress)
     if evidence.inverse is None:
-        require_start(evidence.experiments, axis, tried, dict(values or {}), extras)
-    if per_direction or not plain_axis(extras, free, values):
+        require_start(evidence.experiments, axis, tried, asked)
+    if per_direction or not plain_axis(asked):
         evidence = replace(evidence, sliding=None)
     automatic = tuple(laws) == AUTOMATIC
     if automatic:
         tried = shortlist(tried, evidence.sliding)
-    chosen, own = tried[0], options_of(tried[0], options, tried)
+    chosen, own = tried[0], asked_of(tried[0], asked, tried)
     if len(tried) > 1:
-        candidates, by = judged_laws(evidence, tried, options, intervals, progress)
+        candidates, by = judged_laws(evidence, tried, asked, intervals, progress)
         place = chosen_of(candidates)
         chosen, evidence = tried[place], replace(evidence, candidates=candidates)
-        own = dict(options_of(chosen, options, tried), values=candidates[place].start)
+        own = replace(asked_of(chosen, asked, tried), values=candidates[place].start)
         notes = [*notes, sentence_on(candidates, chosen.name), *by]
     progress(f"{chosen.name}: all of the data")
     lacking = ""
     if intervals == "prediction":
         try:
             found = estimated(chosen, own, evidence, notes)
-            if automatic and not per_direction and nothing_more(found, {*free, *frozen, *(values or {})}):
-                return simplest_of(chosen, options, evidence, notes)
+            if automatic and not per_direction and nothing_more(found, {*free, *frozen, *asked.values}):
+                return simplest_of(chosen, asked, evidence, notes)
             return found
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."
     return by_output_error(chosen, own, evidence, notes, profiles=profiles, lacking=lacking)
 
 
-def simplest_of(
-    law: Law, options: dict[str, Any], evidence: Evidence, notes: Sequence[str]
-) -> Identification:
+def simplest_of(law: Law, asked: Asked, evidence: Evidence, notes: Sequence[str]) -> Identification:
     """The simplest law in place of one whose additional parameters the record does not determine."""
     simplest = plugins.law(AUTOMATIC[0])
     said = [*notes, SIMPLEST.format(law=law.name, simplest=simplest.name)]
-    return estimated(simplest, options_of(simplest, options, [simplest]), evidence, said)
+    return estimated(simplest, asked_of(simplest, asked, [simplest]), evidence, said)
 
 
 def by_output_error(
-    law: Law, own: dict[str, Any], evidence: Evidence, notes: Sequence[str], *, profiles: bool, lacking: str
+    law: Law, own: Asked, evidence: Evidence, notes: Sequence[str], *, profiles: bool, lacking: str
 ) -> Identification:
     """A law fitted by the output error; ``lacking`` says why the prediction error cannot be had, where it was asked
     for."""
-    result = output_error(
-        evidence.experiments, evidence.axis, law, evidence.inverse, profiles=profiles, **own
-    )
+    result = judged(fitted_axis(evidence.experiments, evidence.axis, law, evidence.inverse, own), profiles)
     found = assembled(
         result, result.estimates, result.fit.correlation, evidence.inverse, evidence.validation,
         evidence.candidates, list(notes),
@@ -227,7 +214,7 @@ def nothing_more(found: Identification, given: Set[str]) -> bool:
 def judged_laws(
     evidence: Evidence,
     laws: Sequence[Law],
-    options: Mapping[str, Any],
+    asked: Asked,
     intervals: str,
     progress: Callable[[str], None],
 ) -> tuple[list[Candidate], list[str]]:
@@ -237,18 +224,18 @@ def judged_laws(
     said: list[str] = []
     if intervals == "prediction" and inverse is not None:
         try:
-            return foreseen(fitted, held, axis, laws, inverse, options, progress), said
+            return foreseen(fitted, held, axis, laws, inverse, asked, progress), said
         except InputError as error:
             said.append(
                 f"Laws were compared by the output error of the simulation, not the prediction error: {error}."
             )
-    return compared(fitted, held, axis, laws, inverse, options, progress), said
+    return compared(fitted, held, axis, laws, inverse, asked, progress), said
 
 
-def plain_axis(extras: Extras, free: Sequence[str], values: Mapping[str, Any] | None) -> bool:
+def plain_axis(asked: Asked) -> bool:
     """Whether the axis is no more than inertia, friction, offset or gravity, and a torque over the position."""
     more = {"drive_gain", "back_emf", "backlash", "controller_gain", "load_motor", "load_external"}
-    return not (extras.load or extras.friction_harmonics or more & {*free, *(values or {})})
+    return not (asked.extras.load or asked.extras.friction_harmonics or more & {*asked.free, *asked.values})
 
 
 def held_out(

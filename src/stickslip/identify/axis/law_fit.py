@@ -7,7 +7,7 @@ error (`stickslip.identify.axis.prediction`), held against certain sliding (`sti
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,14 +21,11 @@ from stickslip.identify.axis.agreed import (
     sliding_values,
     with_level,
 )
-from stickslip.identify.axis.choice import (
-    Candidate,
-)  # fmt: skip
-from stickslip.identify.axis.output import laid_out, starting_models
+from stickslip.identify.axis.choice import Candidate
 from stickslip.identify.axis.prediction import axis_prediction
 from stickslip.identify.axis.problem import Problem
 from stickslip.identify.axis.result import assembled, evident, noted, untold_by_reversals
-from stickslip.identify.axis.search import Extras, FittedAxis
+from stickslip.identify.axis.search import Asked, Extras, FittedAxis, laid_out, starting_models
 from stickslip.identify.axis.settled import ALIKE, settled
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
@@ -75,9 +72,7 @@ class Evidence:
     candidates: Sequence[Candidate] = ()
 
 
-def estimated(
-    law: Law, options: Mapping[str, Any], evidence: Evidence, notes: Sequence[str]
-) -> Identification:
+def estimated(law: Law, asked: Asked, evidence: Evidence, notes: Sequence[str]) -> Identification:
     """The law's values and intervals by certain sliding alone where that suffices, else by the prediction error.
 
     Raises
@@ -87,10 +82,10 @@ def estimated(
     """
     inverse, sliding = evidence.inverse, evidence.sliding
     if sliding is not None and inverse is not None and told_whole(law):
-        found = by_sliding(law, options, evidence, inverse, sliding, notes)
+        found = by_sliding(law, asked, evidence, inverse, sliding, notes)
         if all(e.identified for e in found.estimates) or not sliding.held_for(HELD):
             return found
-    return predicted(law, options, evidence, notes)
+    return predicted(law, asked, evidence, notes)
 
 
 def told_whole(law: Law) -> bool:
@@ -100,7 +95,7 @@ def told_whole(law: Law) -> bool:
 
 def by_sliding(
     law: Law,
-    options: Mapping[str, Any],
+    asked: Asked,
     evidence: Evidence,
     inverse: InverseDynamics,
     sliding: Regression,
@@ -108,12 +103,8 @@ def by_sliding(
 ) -> Identification:
     """An axis whose law certain sliding tells whole: nothing is left for a search."""
     experiments, axis = evidence.experiments, evidence.axis
-    given = dict(options["values"] or {})
-    model = starting_models(experiments, law, inverse, given)[0]
-    extras: Extras = options["extras"]
-    vector, _ = laid_out(
-        experiments, axis, law, inverse, model, given, options["free"], options["frozen"], extras
-    )
+    model = starting_models(experiments, law, inverse, asked.values)[0]
+    vector, _ = laid_out(experiments, axis, law, inverse, model, asked)
     level = abs(sliding.numbers["fc"].value)
     scale = {p.name: 1.0 if p.par.unit == "rad" else level for p in vector.free}
     start = vector.values(vector.start)
@@ -129,7 +120,7 @@ def by_sliding(
     estimates, more = beside_plain(estimates, model, inverse, sliding)
     estimates = with_level(estimates, sliding)
     u = vector.coordinates(vector.named(u) | {e.name: e.value for e in estimates})
-    found = with_values(experiments, axis, law, vector, u, extras)
+    found = with_values(experiments, axis, law, vector, u, asked.extras)
     shown = [replace(e, unit=axis.unit(e.unit)) for e in estimates]
     names, told = [e.name for e in shown], list(sliding.numbers)[:4]
     correlation = np.eye(len(names))
@@ -177,9 +168,7 @@ def with_values(
     return FittedAxis(problem.weighted(u).resolved(u), u)
 
 
-def predicted(
-    law: Law, options: Mapping[str, Any], evidence: Evidence, notes: Sequence[str]
-) -> Identification:
+def predicted(law: Law, asked: Asked, evidence: Evidence, notes: Sequence[str]) -> Identification:
     """Each number from the estimator that shows it, misfits of the simulation with these values."""
     experiments, axis, inverse, sliding = (
         evidence.experiments,
@@ -187,8 +176,10 @@ def predicted(
         evidence.inverse,
         evidence.sliding,
     )
-    given = {k: v for k, v in options.items() if k != "robust"}
-    result = axis_prediction(experiments, axis, law, first=inverse, **given)
+    result = axis_prediction(
+        experiments, axis, law, first=inverse, values=asked.values, free=asked.free, frozen=asked.frozen,
+        extras=asked.extras,
+    )  # fmt: skip
     estimates, u, said = result.estimates, result.u, list[str]()
     if sliding is not None:
         level = abs(sliding.numbers["fc"].value)
@@ -207,7 +198,7 @@ def predicted(
         said = [*said, *more]
     estimates = with_level(estimates, sliding) if sliding is not None else estimates
     u = result.vector.coordinates(result.vector.named(u) | {e.name: e.value for e in estimates})
-    fitted = with_values(experiments, axis, law, result.vector, u, options["extras"])
+    fitted = with_values(experiments, axis, law, result.vector, u, asked.extras)
     estimates = tuple(replace(e, unit=axis.unit(e.unit)) for e in estimates)
     found = assembled(
         fitted,

@@ -10,13 +10,12 @@ import numpy as np
 
 from stickslip.identify.axis.problem import Problem
 from stickslip.identify.axis.search import (
+    Asked,
     Extras,
     FittedAxis,
     descended,
     errors_of,
     fitted_axis,
-    laid_out,
-    starting_models,
 )
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
@@ -26,7 +25,7 @@ from stickslip.identify.regression.inverse import InverseDynamics, correlation_l
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
 
-__all__ = ["Extras", "OutputError", "judged", "laid_out", "output_error", "starting_models"]
+__all__ = ["Extras", "OutputError", "judged", "output_error"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -106,10 +105,8 @@ def output_error(
     InputError
         If nothing is free, or no simulation from the starting values succeeds.
     """
-    found = fitted_axis(
-        experiments, axis, law, first, free=free, frozen=frozen, values=values, extras=extras, robust=robust
-    )
-    return judged(found, profiles)
+    asked = Asked(free, frozen, values or {}, extras, robust)
+    return judged(fitted_axis(experiments, axis, law, first, asked), profiles)
 
 
 def judged(found: FittedAxis, profiles: bool = False) -> OutputError:

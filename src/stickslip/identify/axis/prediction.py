@@ -6,13 +6,13 @@ import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.axis.output import Extras, laid_out, starting_models
 from stickslip.identify.axis.problem import mechanics_of
+from stickslip.identify.axis.search import Asked, Extras, laid_out, starting_models
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import steady_fits
 from stickslip.identify.fit.broyden import Secants
@@ -28,7 +28,7 @@ from stickslip.model import Model
 from stickslip.record import encoder_step
 from stickslip.spec import Law
 
-__all__ = ["axis_prediction", "motion_of", "searched", "watched"]
+__all__ = ["Watched", "axis_prediction", "motion_of", "searched", "watched"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -91,45 +91,49 @@ def axis_prediction(
         If a record has no drive signal, moves too little, the axis has backlash, or no simulation from the starting
         values succeeds.
     """
-    motions, band = watched(experiments, axis, values, free)
+    asked = Asked(free, frozen, values or {}, extras)
+    seen = watched(experiments, axis, asked)
     start = first or inverse_dynamics(experiments, axis)
-    criterion, u = searched(
-        experiments, axis, law, motions, start, dict(values or {}), free, frozen, extras, band, seed
-    )
+    criterion, u = searched(experiments, axis, law, seen, start, asked, seed=seed)
     return prediction_error(
-        motions, law, criterion.vector, criterion.mechanics, inertia=criterion.vector.named(u)["inertia"],
-        friction=abs(start.coulomb), start=u, signed_scale=abs(start.coulomb), band=band, seed=seed,
+        seen.motions, law, criterion.vector, criterion.mechanics, inertia=criterion.vector.named(u)["inertia"],
+        friction=abs(start.coulomb), start=u, signed_scale=abs(start.coulomb), band=seen.band, seed=seed,
     )  # fmt: skip
 
 
-def watched(
-    experiments: Sequence[Experiment], axis: ServoAxis, values: Mapping[str, Any] | None, free: Sequence[str]
-) -> tuple[list[Motion], float]:
-    """What the observer follows, and the Hz up to which its corrections count; refuses what it cannot follow."""
+class Watched(NamedTuple):
+    """What the observer follows."""
+
+    motions: list[Motion]
+    band: float
+    """Hz up to which its corrections count"""
+
+
+def watched(experiments: Sequence[Experiment], axis: ServoAxis, asked: Asked) -> Watched:
+    """The experiments as the observer sees them; refuses what it cannot follow."""
     for t in experiments:
         if t.drive is None:
             raise InputError(f"{t.name}: the drive's signal is missing; this method needs it")
-    if (values or {}).get("backlash", axis.backlash) > 0.0 or "backlash" in free:
+    if asked.values.get("backlash", axis.backlash) > 0.0 or "backlash" in asked.free:
         raise InputError(
             "its observer takes the measured velocity for the axis's own, which backlash forbids"
         )
-    return [motion_of(t) for t in experiments], min(BAND, *(0.1 / t.period for t in experiments))
+    return Watched([motion_of(t) for t in experiments], min(BAND, *(0.1 / t.period for t in experiments)))
 
 
 def searched(
-    experiments: Sequence[Experiment], axis: ServoAxis, law: Law, motions: Sequence[Motion], start: InverseDynamics,
-    given: Mapping[str, Any], free: Sequence[str], frozen: Sequence[str], extras: Extras, band: float, seed: int,
-    hops: int = HOPS,
+    experiments: Sequence[Experiment], axis: ServoAxis, law: Law, seen: Watched, start: InverseDynamics, asked: Asked,
+    *, seed: int = 0, hops: int = HOPS,
 ) -> tuple[Criterion, Array]:  # fmt: skip
     """The criterion of the best minimum met under the firm observer, and its coordinates."""
     records: list[Prepared] = []
     criteria: list[Criterion] = []
-    mechanics = functools.partial(mechanics_of, harmonic_period=extras.harmonic_period)
-    for model in starting_points(experiments, axis, law, start, given):
-        vector, inertia = laid_out(experiments, axis, law, start, model, given, free, frozen, extras)
+    mechanics = functools.partial(mechanics_of, harmonic_period=asked.extras.harmonic_period)
+    for model in starting_points(experiments, axis, law, start, asked.values):
+        vector, inertia = laid_out(experiments, axis, law, start, model, asked)
         # All start from one inertia.
         records = records or [
-            prepare(m, law, inertia, abs(start.coulomb), band, rounding=ROUGH) for m in motions
+            prepare(m, law, inertia, abs(start.coulomb), seen.band, rounding=ROUGH) for m in seen.motions
         ]
         criteria.append(Criterion.first(records, law, vector, mechanics))
     costs = mapped(lambda c: cost_of(c.residuals(c.vector.start)), criteria)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from stickslip.identify.axis.problem import Problem, measured, mechanics_paramet
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import frozen_by_default, starts
 from stickslip.identify.fit.broyden import descend_by_secants
+from stickslip.identify.fit.levenberg_marquardt import Squares
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics
 from stickslip.machines.servo import ServoAxis
@@ -28,7 +29,7 @@ from stickslip.model import Model
 from stickslip.simulation.recorded_input.simulation import Mechanics
 from stickslip.spec import Law
 
-__all__ = ["Extras", "FittedAxis", "fitted_axis", "laid_out", "require_start", "starting_models"]
+__all__ = ["Asked", "Extras", "FittedAxis", "fitted_axis", "laid_out", "require_start", "starting_models"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -67,6 +68,23 @@ class Extras:
     friction_harmonics: int = 0
     harmonic_period: float = 2.0 * math.pi
     load: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What is asked of a fit.
+
+    Attributes
+    ----------
+    free, frozen, values, extras, robust
+        As in `stickslip.identify.axis.output.output_error`.
+    """
+
+    free: Sequence[str] = ()
+    frozen: Sequence[str] = ()
+    values: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    extras: Extras = Extras()
+    robust: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,12 +162,8 @@ def fitted_axis(
     axis: ServoAxis,
     law: Law,
     first: InverseDynamics | None,
+    asked: Asked,
     *,
-    free: Sequence[str] = (),
-    frozen: Sequence[str] = (),
-    values: Mapping[str, Any] | None = None,
-    extras: Extras = Extras(),
-    robust: bool = False,
     tolerance: float = ENOUGH,
 ) -> FittedAxis:
     """Find the parameters of an axis, without a judgement on them.
@@ -157,15 +171,14 @@ def fitted_axis(
     Parameters and errors as in `stickslip.identify.axis.output.output_error`; ``tolerance`` is the relative decrease of
     the sum of squares at which the last descent ends.
     """
-    given = dict(values or {})
     if first is None:
-        require_start(experiments, axis, [law], given, extras)
+        require_start(experiments, axis, [law], asked)
     candidates = [
-        laid_out(experiments, axis, law, first, model, given, free, frozen, extras)
-        for model in starting_models(experiments, law, first, given)
+        laid_out(experiments, axis, law, first, model, asked)
+        for model in starting_models(experiments, law, first, asked.values)
     ]
     beginnings = [t.until(rows_until(t, BEGIN)) for t in experiments]
-    ranked = ranked_starts(beginnings, axis, law, candidates, extras, robust)
+    ranked = ranked_starts(beginnings, axis, law, candidates, asked)
     rough = ranked[0][1].resolved(ranked[0][2])
     tried = [descended(rough, u, ROUGH) for _, _, u in ranked[:DESCENTS]]
     found = FittedAxis(rough, min(tried, key=lambda found: found[1])[0])
@@ -192,14 +205,13 @@ def descended(
 ) -> tuple[Array, float]:
     """Coordinates and sum of squares to which the misfit falls from u."""
     vector = problem.vector
-    return descend_by_secants(
-        problem.residuals, u, vector.lower, vector.upper, tolerance=tolerance, difference=difference
-    )
+    squares = Squares(problem.residuals, vector.lower, vector.upper, difference)
+    return descend_by_secants(squares, u, tolerance=tolerance)
 
 
 def ranked_starts(
     experiments: Sequence[Experiment], axis: ServoAxis, law: Law, candidates: Sequence[tuple[Vector, float]],
-    extras: Extras, robust: bool,
+    asked: Asked,
 ) -> list[tuple[float, Problem, Array]]:  # fmt: skip
     """Sum of squares, problem and coordinates of every start that can be simulated, the best first."""
     out: list[tuple[float, Problem, Array]] = []
@@ -211,8 +223,8 @@ def ranked_starts(
             law,
             vector,
             inertia=inertia,
-            robust=robust,
-            harmonic_period=extras.harmonic_period,
+            robust=asked.robust,
+            harmonic_period=asked.extras.harmonic_period,
         )
         problem = problem.weighted(vector.start) if weights is None else replace(problem, weights=weights)
         weights = problem.weights
@@ -275,9 +287,10 @@ def starting_models(
 
 def laid_out(
     experiments: Sequence[Experiment], axis: ServoAxis, law: Law, first: InverseDynamics | None, model: Model,
-    given: Mapping[str, Any], free: Sequence[str], frozen: Sequence[str], extras: Extras,
+    asked: Asked,
 ) -> tuple[Vector, float]:  # fmt: skip
     """The vector of everything that is fitted, and the inertia it starts from."""
+    given, extras = asked.values, asked.extras
     values: dict[str, float] = {}
     if first is not None:
         values = {"inertia": first_inertia(first), "offset": first.offset}
@@ -293,7 +306,7 @@ def laid_out(
     extra = mechanics_parameters(
         axis, experiments[0].quantity, values, extras.harmonics, extras.friction_harmonics
     )
-    require_known([*free, *given], law_names | {p.name for p in extra} | LEVELS)
+    require_known([*asked.free, *given], law_names | {p.name for p in extra} | LEVELS)
     if not values["inertia"] > 0.0:
         raise InputError(f"inertia = {values['inertia']:g} {axis.unit('kg·m²')} must be greater than 0")
     held = {"drive_gain", "back_emf", "backlash", "controller_gain", *frozen_by_default(law)}
@@ -303,18 +316,14 @@ def laid_out(
             held.add("load_external")
     if not extras.load:
         held |= {"load_motor", "load_external"}
-    held = (held - set(free)) | set(frozen)
+    held = (held - set(asked.free)) | set(asked.frozen)
     size = abs(first.coulomb) if first is not None else 1.0
     extra = [scaled_parameter(p, size) for p in extra]
     return NearVector(model, frozen=sorted(held), extra=extra), values["inertia"]
 
 
 def require_start(
-    experiments: Sequence[Experiment],
-    axis: ServoAxis,
-    laws: Sequence[Law],
-    given: Mapping[str, Any],
-    extras: Extras,
+    experiments: Sequence[Experiment], axis: ServoAxis, laws: Sequence[Law], asked: Asked
 ) -> None:
     """Refuse a search that has neither inverse dynamics nor starting values of any of the laws: it says why.
 
@@ -322,6 +331,7 @@ def require_start(
     ------
     InputError
     """
+    given, extras = asked.values, asked.extras
     whole = any(all(f.name in given for f in x.fields if f.par.default is None) for x in laws)
     needed = [] if whole or given.get("fc", 0.0) > 0.0 else ["fc"]  # from which the others follow
     if "inertia" not in given:
@@ -335,8 +345,8 @@ def require_start(
         )
     except InputError as error:
         why = str(error)
-    asked = " and ".join(f"--set {name}=.." for name in needed)
-    raise InputError(f"{why}; or say where the search starts with {asked}")
+    settings = " and ".join(f"--set {name}=.." for name in needed)
+    raise InputError(f"{why}; or say where the search starts with {settings}")
 
 
 def require_known(names: Iterable[str], known: set[str]) -> None:

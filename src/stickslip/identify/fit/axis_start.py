@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError, ParameterError
-from stickslip.identify.fit.levenberg_marquardt import descend
+from stickslip.identify.fit.levenberg_marquardt import Squares, descend
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.fit.sample_rate_limit import stiffness_at_rest
 from stickslip.model import Model
@@ -246,9 +246,8 @@ def steady_values(model: Model, v: Array, curve: Array, names: Sequence[str]) ->
             [(steady.torque(np.array(law.pack(p))) - curve) / size, TIE / v.size * (u - first)]
         )
 
-    best = descend(
-        residuals, first, vector.lower, vector.upper, iterations=30, tolerance=1e-8, jacobian_there=False
-    )
+    squares = Squares(residuals, vector.lower, vector.upper)
+    best = descend(squares, first, iterations=30, tolerance=1e-8, jacobian_there=False)
     p = feasible(law, vector.law_parameters(best.u))
     return {} if p is None else {name: getattr(p, name) for name in names}
 

@@ -8,19 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.identify.fit.levenberg_marquardt import (
-    MOST_TRIES,
-    STEP,
-    Quadratic,
-    Residuals,
-    cost_of,
-    downhill,
-)
+from stickslip.identify.fit.levenberg_marquardt import MOST_TRIES, Quadratic, Squares, downhill
 from stickslip.identify.fit.parallel import mapped
 
 __all__ = ["Secants", "descend_by_secants", "forward_differences"]
@@ -37,47 +30,42 @@ LONGEST = 0.5
 """Change of a coordinate in one step: beyond a factor of 1.6 a linear model of a simulation says little."""
 
 
-def forward_differences(
-    residuals: Residuals, u: Array, r: Array, lower: Array, upper: Array, widths: Array
-) -> Array:
+def forward_differences(squares: Squares, u: Array, r: Array, widths: Array) -> Array:
     """Jacobian at u, where the residuals are r, by one-sided differences inside the bounds, shape (n, p)."""
 
     def column(i: int) -> Array:
         there = u.copy()
-        there[i] = u[i] + widths[i] if u[i] + widths[i] <= upper[i] else max(u[i] - widths[i], lower[i])
+        up = u[i] + widths[i]
+        there[i] = up if up <= squares.upper[i] else max(u[i] - widths[i], squares.lower[i])
         width = float(there[i] - u[i])
-        return (residuals(there) - r) / width if width != 0.0 else np.zeros(r.size)
+        return (squares.residuals(there) - r) / width if width != 0.0 else np.zeros(r.size)
 
     jacobian = np.stack(mapped(column, range(u.size)), axis=1) if u.size else np.zeros((r.size, 0))
     return np.where(np.isfinite(jacobian), jacobian, 0.0)
 
 
 def descend_by_secants(
-    residuals: Residuals,
+    squares: Squares,
     start: Array,
-    lower: Array,
-    upper: Array,
     *,
     held: Sequence[int] = (),
     evaluations: int = 200,
     tolerance: float = 1e-6,
-    difference: float = STEP,
 ) -> tuple[Array, float]:
     """The minimum that is reached from `start`, as far as the tolerance asks.
 
     Parameters
     ----------
-    residuals : callable
-    start, lower, upper : array, shape (p,)
-        The start is moved inside the bounds.
+    squares : Squares
+        Its differences are those of the first Jacobian; later ones are narrower where that tells enough.
+    start : array, shape (p,)
+        Moved inside the bounds.
     held : sequence of int
         Coordinates that stay.
     evaluations : int
         About how many calls of the residuals at most.
     tolerance : float
         Relative decrease of the sum of squares below which it ends, on a fresh Jacobian.
-    difference : float
-        Of coordinates, for the first Jacobian; relative above 1. Later ones are narrower where that tells enough.
 
     Returns
     -------
@@ -89,7 +77,7 @@ def descend_by_secants(
     InputError
         If the residuals at the start are not finite.
     """
-    search = Secants(residuals, start, lower, upper, held, difference)
+    search = Secants(squares, start, held)
     search.run(evaluations, tolerance)
     return search.u, search.cost
 
@@ -97,26 +85,29 @@ def descend_by_secants(
 class Secants:
     """The state of a descent: where it stands, and the Jacobian it believes in."""
 
-    def __init__(
-        self, residuals: Residuals, start: Array, lower: Array, upper: Array, held: Sequence[int] = (),
-        difference: float = STEP,
-    ) -> None:  # fmt: skip
-        self.residuals, self.difference = residuals, difference
-        self.u = np.clip(np.asarray(start, dtype=np.float64), lower, upper)
+    def __init__(self, squares: Squares, start: Array, held: Sequence[int] = ()) -> None:
+        self.here = squares.begin(start)
         # A coordinate is held by bounds that leave it no room.
         stays = np.isin(np.arange(self.u.size), list(held))
-        self.lower, self.upper = np.where(stays, self.u, lower), np.where(stays, self.u, upper)
-        self.r = residuals(self.u)
-        self.cost = cost_of(self.r)
+        self.squares = replace(
+            squares,
+            lower=np.where(stays, self.u, squares.lower),
+            upper=np.where(stays, self.u, squares.upper),
+        )
         self.spent: int = 1
-        if self.cost == math.inf:
-            raise InputError(
-                "the fit cannot start: the model gives no finite values there; give another start"
-            )
-        self.damping: float = 1e-3
         self.scale: Array = np.zeros(self.u.size)
-        self.jacobian: Array = np.zeros((self.r.size, self.u.size))
+        self.jacobian: Array = np.zeros((self.here.residuals.size, self.u.size))
         self.fresh = False
+
+    @property
+    def u(self) -> Array:
+        """The coordinates where it stands, shape (p,)."""
+        return self.here.u
+
+    @property
+    def cost(self) -> float:
+        """The sum of squares there."""
+        return self.here.cost
 
     def run(self, evaluations: int, tolerance: float) -> None:
         """Go on until so many residuals were called in all, or nothing is gained any more."""
@@ -137,35 +128,35 @@ class Secants:
 
     def refresh(self) -> None:
         """Take the Jacobian anew."""
-        widths = self.difference * np.maximum(1.0, np.abs(self.u))
+        here = self.here
+        widths = self.squares.difference * np.maximum(1.0, np.abs(here.u))
         if self.scale.any():
-            known = WIDTH * math.sqrt(self.cost / self.r.size) / np.maximum(self.scale, 1e-300)
+            known = WIDTH * math.sqrt(here.cost / here.residuals.size) / np.maximum(self.scale, 1e-300)
             widths = np.clip(known, NARROWEST * widths, widths)
-        self.jacobian = forward_differences(self.residuals, self.u, self.r, self.lower, self.upper, widths)
-        self.spent, self.fresh = self.spent + self.u.size, True
+        self.jacobian = forward_differences(self.squares, here.u, here.residuals, widths)
+        self.spent, self.fresh = self.spent + here.u.size, True
         self.scale = np.maximum(self.scale, np.linalg.norm(self.jacobian, axis=0))
 
     def gain(self, tolerance: float) -> float:
         """Step downhill where the Jacobian leads there; by how much the sum of squares fell."""
-        pull = self.jacobian.T @ self.r
-        blocked = ((pull > 0.0) & (self.u <= self.lower)) | ((pull < 0.0) & (self.u >= self.upper))
+        here, r = self.here, self.here.residuals
+        pull = self.jacobian.T @ r
+        blocked = ((pull > 0.0) & (here.u <= self.squares.lower)) | (
+            (pull < 0.0) & (here.u >= self.squares.upper)
+        )
         places = np.flatnonzero((self.scale > 0.0) & ~blocked)
         if not places.size:
             return 0.0
-        model = Quadratic.normal(self.jacobian[:, places] / self.scale[places], self.r)
-        there = downhill(
-            self.residuals, self.u, self.cost, model, places.tolist(), self.scale[places], self.damping, self.lower,
-            self.upper, tolerance, MOST_TRIES if self.fresh else TRIES, LONGEST,
-        )  # fmt: skip
+        model = Quadratic.normal(self.jacobian[:, places], r, places.tolist(), self.scale[places])
+        there = downhill(self.squares, here, model, tolerance, MOST_TRIES if self.fresh else TRIES, LONGEST)
         self.spent += there.evaluations
-        gain = self.cost - there.cost
+        gain = here.cost - there.cost
         if gain <= 0.0:
             return 0.0
         # What was seen on the way corrects the Jacobian in that direction.
-        moved = there.u - self.u
+        moved = there.u - here.u
         weighted = self.scale**2 * moved
         if (size := float(weighted @ moved)) > 0.0:
-            self.jacobian += np.outer(there.residuals - self.r - self.jacobian @ moved, weighted / size)
-        self.u, self.r, self.cost = there.u, there.residuals, there.cost
-        self.damping, self.fresh = there.damping, False
+            self.jacobian += np.outer(there.residuals - r - self.jacobian @ moved, weighted / size)
+        self.here, self.fresh = there, False
         return gain

@@ -19,6 +19,7 @@ __all__ = [
     "STEP",
     "Optimum",
     "Residuals",
+    "Squares",
     "central_differences",
     "descend",
     "distinct",
@@ -36,6 +37,55 @@ Each = Callable[[Callable[[int], Array], Sequence[int]], Iterable[Array]]
 MOST_TRIES = 60
 """Damped steps that may fail."""
 STEP = float(np.finfo(np.float64).eps) ** (1.0 / 3.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Squares:
+    """A sum of squares that is to be least between bounds.
+
+    Attributes
+    ----------
+    residuals : callable
+    lower, upper : array, shape (p,)
+    difference : float
+        Of coordinates, for Jacobians; relative above 1. Residuals that are exact to fewer digits need a larger one.
+    each : callable
+        Computes the columns of a Jacobian; `map`, or `stickslip.identify.fit.parallel.mapped`.
+    """
+
+    residuals: Residuals
+    lower: Array
+    upper: Array
+    difference: float = STEP
+    each: Each = map
+
+    def begin(self, start: Array) -> Step:
+        """Where a descent begins: the start, moved inside the bounds.
+
+        Raises
+        ------
+        InputError
+            If the residuals there are not finite.
+        """
+        u = np.clip(np.asarray(start, dtype=np.float64), self.lower, self.upper)
+        r = self.residuals(u)
+        cost = cost_of(r)
+        if cost == math.inf:
+            raise InputError(
+                "the fit cannot start: the model gives no finite values there; give another start"
+            )
+        return Step(u, r, cost, 1e-3, 1)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step: where it leads, the damping for the next one, and the evaluations that it took."""
+
+    u: Array
+    residuals: Array
+    cost: float
+    damping: float
+    evaluations: int
 
 
 @dataclass(frozen=True)
@@ -67,56 +117,43 @@ def cost_of(r: Array) -> float:
     return total if math.isfinite(total) else math.inf
 
 
-def central_differences(
-    residuals: Residuals, u: Array, free: Sequence[int], lower: Array, upper: Array, difference: float = STEP,
-    each: Each = map,
-) -> Array:  # fmt: skip
-    """Jacobian by central differences inside the bounds, shape (n, p); error about 1e-10 of its scale.
-
-    Residuals that are exact to fewer digits need a larger `difference`: relative above 1.
-    """
+def central_differences(squares: Squares, u: Array, free: Sequence[int]) -> Array:
+    """Jacobian by central differences inside the bounds, shape (n, p); error about 1e-10 of its scale."""
+    residuals = squares.residuals
 
     def column(i: int) -> Array:
-        h = difference * max(1.0, abs(float(u[i])))
+        h = squares.difference * max(1.0, abs(float(u[i])))
         ahead, behind = u.copy(), u.copy()
-        ahead[i] = min(u[i] + h, upper[i])
-        behind[i] = max(u[i] - h, lower[i])
+        ahead[i] = min(u[i] + h, squares.upper[i])
+        behind[i] = max(u[i] - h, squares.lower[i])
         width = ahead[i] - behind[i]
         return (residuals(ahead) - residuals(behind)) / width if width > 0.0 else 0.0 * residuals(u)
 
-    return np.stack(list(each(column, free)), axis=1)
+    return np.stack(list(squares.each(column, free)), axis=1)
 
 
 def descend(
-    residuals: Residuals,
+    squares: Squares,
     start: Array,
-    lower: Array,
-    upper: Array,
     *,
     held: Sequence[int] = (),
     iterations: int = 300,
     tolerance: float = 1e-15,
-    difference: float = STEP,
-    each: Each = map,
     jacobian_there: bool = True,
 ) -> Optimum:
     """The minimum that is reached from `start`.
 
     Parameters
     ----------
-    residuals : callable
-    start, lower, upper : array, shape (p,)
-        The start is moved inside the bounds.
+    squares : Squares
+    start : array, shape (p,)
+        Moved inside the bounds.
     held : sequence of int
         Coordinates that stay.
     iterations : int
         Most Jacobians.
     tolerance : float
         Relative decrease of the sum of squares below which it ends.
-    difference : float
-        Of coordinates, for the Jacobian; relative above 1.
-    each : callable
-        Computes the columns of a Jacobian; `map`, or `stickslip.identify.fit.parallel.mapped`.
     jacobian_there : bool
         Whether the Jacobian is taken once more at the minimum; else it is that of one step before.
 
@@ -129,68 +166,71 @@ def descend(
     InputError
         If the residuals at the start are not finite.
     """
-    u = np.clip(np.asarray(start, dtype=np.float64), lower, upper)
-    free = [i for i in range(u.size) if i not in held]
-    r = residuals(u)
-    cost, evaluations = cost_of(r), 1
-    if cost == math.inf:
-        raise InputError("the fit cannot start: the model gives no finite values there; give another start")
-    jacobian = np.zeros((r.size, u.size))
-    damping, scale, known = 1e-3, np.zeros(len(free)), False
+    here, lower, upper = squares.begin(start), squares.lower, squares.upper
+    free = [i for i in range(here.u.size) if i not in held]
+    evaluations = here.evaluations
+    jacobian = np.zeros((here.residuals.size, here.u.size))
+    scale, known = np.zeros(len(free)), False
     for _ in range(iterations if free else 0):
-        jacobian[:, free] = central_differences(residuals, u, free, lower, upper, difference, each)
+        jacobian[:, free] = central_differences(squares, here.u, free)
         evaluations, known = evaluations + 2 * len(free), True
         part = np.where(np.isfinite(jacobian[:, free]), jacobian[:, free], 0.0)
         scale = np.maximum(scale, np.linalg.norm(part, axis=0))
         inside = [
-            i for i, g in enumerate(part.T @ r)
-            if scale[i] > 0.0 and not (g > 0.0 and u[free[i]] <= lower[free[i]])
-            and not (g < 0.0 and u[free[i]] >= upper[free[i]])
+            i for i, g in enumerate(part.T @ here.residuals)
+            if scale[i] > 0.0 and not (g > 0.0 and here.u[free[i]] <= lower[free[i]])
+            and not (g < 0.0 and here.u[free[i]] >= upper[free[i]])
         ]  # fmt: skip
         if not inside:
             break
-        places = [free[i] for i in inside]
-        model = Quadratic.of(part[:, inside] / scale[inside], r)
-        step = downhill(residuals, u, cost, model, places, scale[inside], damping, lower, upper, tolerance)
+        model = Quadratic.of(part[:, inside], here.residuals, [free[i] for i in inside], scale[inside])
+        step = downhill(squares, here, model, tolerance)
         evaluations += step.evaluations
-        if step.cost >= cost:
+        if step.cost >= here.cost:
             break
-        gain, damping = cost - step.cost, step.damping
-        u, r, cost, known = step.u, step.residuals, step.cost, False
-        if gain <= tolerance * cost or cost == 0.0:
+        gain, here, known = here.cost - step.cost, step, False
+        if gain <= tolerance * here.cost or here.cost == 0.0:
             break
     if free and not known and jacobian_there:
-        jacobian[:, free] = central_differences(residuals, u, free, lower, upper, difference, each)
+        jacobian[:, free] = central_differences(squares, here.u, free)
         evaluations += 2 * len(free)
-    return Optimum(u, cost, r, jacobian, evaluations)
+    return Optimum(here.u, here.cost, here.residuals, jacobian, evaluations)
 
 
 @dataclass(frozen=True)
 class Quadratic:
-    """The sum of squares of the linearised residuals, by a singular value decomposition."""
+    """The sum of squares of the linearised residuals, by a singular value decomposition, in some of the coordinates."""
 
     sizes: Array
     right: Array
     pull: Array
+    places: Sequence[int]
+    """of these coordinates"""
+    scale: Array
+    """that they are divided by"""
 
     @staticmethod
-    def of(scaled_jacobian: Array, r: Array) -> Quadratic:
-        """Decompose once; every damping then costs a product."""
+    def of(columns: Array, r: Array, places: Sequence[int], scale: Array) -> Quadratic:
+        """Decompose their columns of the Jacobian once; every damping then costs a product."""
         # Rotated onto their common span first: a tall Jacobian's own decomposition takes three times as long.
-        both: Array = np.asarray(np.linalg.qr(np.column_stack([scaled_jacobian, r]), "r"))
+        both: Array = np.asarray(np.linalg.qr(np.column_stack([columns / scale, r]), "r"))
         left, sizes, right = np.linalg.svd(both[:, :-1], full_matrices=False)
-        return Quadratic(sizes, right, left.T @ both[:, -1])
+        return Quadratic(sizes, right, left.T @ both[:, -1], places, scale)
 
     @staticmethod
-    def normal(scaled_jacobian: Array, r: Array) -> Quadratic:
+    def normal(columns: Array, r: Array, places: Sequence[int], scale: Array) -> Quadratic:
         """From the normal equations: half the digits at a tenth of the time, enough for an inexact Jacobian."""
-        values, vectors = np.linalg.eigh(scaled_jacobian.T @ scaled_jacobian)
+        scaled = columns / scale
+        values, vectors = np.linalg.eigh(scaled.T @ scaled)
         sizes = np.sqrt(np.maximum(values, 1e-16 * max(float(values[-1]), 1e-300)))
-        return Quadratic(sizes, vectors.T, vectors.T @ (scaled_jacobian.T @ r) / sizes)
+        return Quadratic(sizes, vectors.T, vectors.T @ (scaled.T @ r) / sizes, places, scale)
 
-    def step(self, damping: float) -> Array:
-        """The damped step, in scaled coordinates."""
-        return -(self.right.T @ (self.sizes * self.pull / (self.sizes**2 + damping)))
+    def step(self, u: Array, damping: float, longest: float) -> Array:
+        """Where the damped step from u leads; no coordinate goes farther than `longest`."""
+        there = u.copy()
+        scaled = -(self.right.T @ (self.sizes * self.pull / (self.sizes**2 + damping)))
+        there[self.places] += np.clip(scaled / self.scale, -longest, longest)
+        return there
 
     def expected(self, damping: float) -> float:
         """The decrease that this model expects of that step."""
@@ -198,32 +238,19 @@ class Quadratic:
         return float(np.sum(s2 * self.pull**2 * (s2 + 2.0 * damping) / (s2 + damping) ** 2))
 
 
-@dataclass(frozen=True)
-class Step:
-    """A trial step: where it leads, and the damping for the next one."""
-
-    u: Array
-    residuals: Array
-    cost: float
-    damping: float
-    evaluations: int
-
-
 def downhill(
-    residuals: Residuals, u: Array, cost: float, model: Quadratic, places: Sequence[int], scale: Array,
-    damping: float, lower: Array, upper: Array, tolerance: float, tries: int = MOST_TRIES,
+    squares: Squares, here: Step, model: Quadratic, tolerance: float, tries: int = MOST_TRIES,
     longest: float = math.inf,
 ) -> Step:  # fmt: skip
     """The first step that lowers the cost, damped more with every failure; the last failure where none does.
 
     No coordinate goes farther than `longest`.
     """
+    u, cost, damping = here.u, here.cost, here.damping
     growth, tried = 2.0, 0
     while True:
-        trial = u.copy()
-        trial[places] += np.clip(model.step(damping) / scale, -longest, longest)
-        trial = np.clip(trial, lower, upper)
-        r = residuals(trial)
+        trial = np.clip(model.step(u, damping, longest), squares.lower, squares.upper)
+        r = squares.residuals(trial)
         new, expected = cost_of(r), model.expected(damping)
         tried += 1
         if new < cost:
@@ -251,15 +278,7 @@ def spread_starts(
 
 
 def search(
-    residuals: Residuals,
-    starts: Array,
-    lower: Array,
-    upper: Array,
-    *,
-    rough: int = 15,
-    polished: int = 6,
-    tolerance: float = 1e-15,
-    difference: float = STEP,
+    squares: Squares, starts: Array, *, rough: int = 15, polished: int = 6, tolerance: float = 1e-15
 ) -> list[Optimum]:
     """Distinct minima, the best first: a short descent from every start of several, a full one from the best few.
 
@@ -269,32 +288,18 @@ def search(
         If no start gives finite residuals.
     """
     if len(starts) == 1:
-        return [descend(residuals, starts[0], lower, upper, tolerance=tolerance, difference=difference)]
+        return [descend(squares, starts[0], tolerance=tolerance)]
     found: list[Optimum] = []
     for start in starts:
-        inside = np.clip(start, lower, upper)
-        if math.isfinite(cost_of(residuals(inside))):
-            found.append(
-                descend(
-                    residuals,
-                    inside,
-                    lower,
-                    upper,
-                    iterations=rough,
-                    tolerance=1e-6,
-                    difference=difference,
-                    jacobian_there=False,
-                )
-            )
+        inside = np.clip(start, squares.lower, squares.upper)
+        if math.isfinite(cost_of(squares.residuals(inside))):
+            found.append(descend(squares, inside, iterations=rough, tolerance=1e-6, jacobian_there=False))
     if not found:
         raise InputError(
             "the fit cannot start: the model gives no finite values at any start; give another start"
         )
     found.sort(key=lambda o: o.cost)
-    full = [
-        descend(residuals, o.u, lower, upper, tolerance=tolerance, difference=difference)
-        for o in distinct(found, 1e-3)[:polished]
-    ]
+    full = [descend(squares, o.u, tolerance=tolerance) for o in distinct(found, 1e-3)[:polished]]
     full.sort(key=lambda o: o.cost)
     return distinct(full, 1e-4)
 

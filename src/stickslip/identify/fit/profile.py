@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.fit.levenberg_marquardt import STEP, Optimum, Residuals, descend
+from stickslip.identify.fit.levenberg_marquardt import Optimum, Squares, descend
 from stickslip.identify.fit.noise import Noise, quantile
 
 __all__ = ["inverse_information", "long_run", "profiles_of"]
@@ -73,15 +73,7 @@ class Profiles:
     better: Array | None
 
 
-def profiles_of(
-    residuals: Residuals,
-    best: Optimum,
-    noise: Noise,
-    lower: Array,
-    upper: Array,
-    lags: int,
-    difference: float = STEP,
-) -> Profiles:
+def profiles_of(squares: Squares, best: Optimum, noise: Noise, lags: int) -> Profiles:
     """Follow the profile of every coordinate to both sides."""
     inverse, seen = inverse_information(best.jacobian)
     target = np.full(best.u.size, quantile(noise) * noise.std**2)
@@ -99,15 +91,13 @@ def profiles_of(
             valley = inverse[:, i] / inverse[i, i] if inverse[i, i] > 0.0 else np.eye(best.u.size)[i]
             first = math.sqrt(max(float(target[i] * inverse[i, i]), 0.0)) if seen[i] else 1.0
             for side in (-1.0, 1.0):
-                edge = float(upper[i] if side > 0.0 else lower[i])
+                edge = float(squares.upper[i] if side > 0.0 else squares.lower[i])
                 farthest = min(abs(edge - float(best.u[i])), FARTHEST)
                 begin = max(family, key=lambda u: side * float(u[i] - best.u[i])) if again else best.u
                 near = side * float(begin[i] - best.u[i])
                 if again and near <= 1.01 * reach[i, side]:
                     continue
-                profile = Profile(
-                    residuals, best, i, side, float(target[i]), valley, lower, upper, difference
-                )
+                profile = Profile(squares, best, i, side, float(target[i]), valley)
                 reach[i, side] = profile.end(min(max(first, 1e-9), 1.0, farthest), farthest, near, begin)
                 family += profile.family
                 if profile.better is not None:
@@ -122,12 +112,10 @@ class Profile:
     """One side of the profile of coordinate i: the least sum of squares where it is held at a distance."""
 
     def __init__(
-        self, residuals: Residuals, best: Optimum, i: int, side: float, target: float, valley: Array,
-        lower: Array, upper: Array, difference: float,
-    ) -> None:  # fmt: skip
-        self.difference = difference
-        self.residuals, self.best, self.i, self.side = residuals, best, i, side
-        self.target, self.valley, self.lower, self.upper = target, valley, lower, upper
+        self, squares: Squares, best: Optimum, i: int, side: float, target: float, valley: Array
+    ) -> None:
+        self.squares, self.best, self.i, self.side = squares, best, i, side
+        self.target, self.valley = target, valley
         self.family: list[Array] = []
         self.better: Array | None = None
 
@@ -177,10 +165,8 @@ class Profile:
         for begin in (along, straight):
             try:
                 found = descend(
-                    self.residuals, begin, self.lower, self.upper,
-                    held=(self.i,), iterations=100, tolerance=1e-9, difference=self.difference,
-                    jacobian_there=False,
-                )  # fmt: skip
+                    self.squares, begin, held=(self.i,), iterations=100, tolerance=1e-9, jacobian_there=False
+                )
             except InputError:  # not finite there
                 continue
             gain = min(gain, found.cost - self.best.cost)

@@ -18,6 +18,7 @@ from stickslip.identify.fit.levenberg_marquardt import (
     STEP,
     Optimum,
     Residuals,
+    Squares,
     descend,
     distinct,
     search,
@@ -137,19 +138,15 @@ def fit(
     if not vector.free:
         raise InputError("every parameter is frozen; free at least one")
     known = as_noise(noise)
-    low, high = vector.lower, vector.upper
-    first = (
-        starts
-        if not isinstance(starts, int)
-        else spread_starts(vector.start, low, high, starts, reach=reach, seed=seed)
-    )
-    optima = search(residuals, first, low, high, tolerance=tolerance, difference=difference)
+    squares = Squares(residuals, vector.lower, vector.upper, difference)
+    if isinstance(starts, int):
+        starts = spread_starts(vector.start, vector.lower, vector.upper, starts, reach=reach, seed=seed)
+    optima = search(squares, starts, tolerance=tolerance)
     if optima[0].residuals.size == 0:
         raise InputError("no data to fit; give at least one point")
     optima, level, followed = follow_profiles(
-        residuals, vector, optima, known, size=size, profiles=profiles, lags=lags, tolerance=tolerance,
-        difference=difference,
-    )  # fmt: skip
+        squares, optima, known, size=size, profiles=profiles, lags=lags, tolerance=tolerance
+    )
     best = optima[0]
     threshold = quantile(level) * level.std**2 if level.known else math.inf
     others = tuple(o for o in optima[1:] if o.cost - best.cost < threshold)
@@ -160,24 +157,23 @@ def fit(
 
 
 def follow_profiles(
-    residuals: Residuals, vector: Vector, optima: Sequence[Optimum], known: Noise | None, *, size: float,
-    profiles: bool, lags: int, tolerance: float, difference: float,
+    squares: Squares, optima: Sequence[Optimum], known: Noise | None, *, size: float, profiles: bool, lags: int,
+    tolerance: float,
 ) -> tuple[Sequence[Optimum], Noise, Profiles]:  # fmt: skip
     """Optima, best first, their noise and their profiles, which start again from every better minimum that one meets.
 
     The profiles are empty where none are asked for, the noise is unknown, or the last of 8 still met a better minimum.
     """
-    low, high = vector.lower, vector.upper
-    level = noise_of_fit(optima[0].cost, optima[0].residuals.size, vector.size, known, size)
+    level = noise_of_fit(optima[0].cost, optima[0].residuals.size, optima[0].u.size, known, size)
     for _ in range(8 if profiles else 0):
         if not level.known:
             break
-        followed = profiles_of(residuals, optima[0], level, low, high, lags, difference)
+        followed = profiles_of(squares, optima[0], level, lags)
         if followed.better is None:
             return optima, level, followed
-        found = descend(residuals, followed.better, low, high, tolerance=tolerance, difference=difference)
+        found = descend(squares, followed.better, tolerance=tolerance)
         optima = distinct(sorted([found, *optima], key=lambda o: o.cost), 1e-4)
-        level = noise_of_fit(optima[0].cost, optima[0].residuals.size, vector.size, known, size)
+        level = noise_of_fit(optima[0].cost, optima[0].residuals.size, optima[0].u.size, known, size)
     return optima, level, Profiles({}, optima[0].u[None, :], None)
 
 

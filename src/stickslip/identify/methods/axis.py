@@ -8,9 +8,9 @@ from dataclasses import replace
 from stickslip.errors import InputError
 from stickslip.identify.axis.agreed import regressed
 from stickslip.identify.axis.identify import AUTOMATIC, identify_axis
-from stickslip.identify.axis.output import Extras
 from stickslip.identify.axis.over_angle import over_angle
 from stickslip.identify.axis.plain import inverse_identification
+from stickslip.identify.axis.search import Extras
 from stickslip.identify.estimate import Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.methods._experiments import driven, experiments_of

@@ -14,7 +14,7 @@ import numpy as np
 
 from stickslip.identify.fit.axis_start import feasible
 from stickslip.identify.fit.broyden import Secants
-from stickslip.identify.fit.levenberg_marquardt import Optimum, descend
+from stickslip.identify.fit.levenberg_marquardt import Optimum, Squares, descend
 from stickslip.identify.fit.parallel import mapped
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.observer.observer import Prepared
@@ -151,16 +151,19 @@ class Criterion:
         n = self.freedom
         return np.copysign(np.sqrt((n + 1.0) * np.log1p((r / self.scale) ** 2 / n)), r)
 
+    def squares(self) -> Squares:
+        """The residuals between the bounds of the vector."""
+        return Squares(self.residuals, self.vector.lower, self.vector.upper, DIFFERENCE, mapped)
+
     def search(self, u: Array) -> Secants:
         """A descent that stands at u."""
-        return Secants(self.residuals, u, self.vector.lower, self.vector.upper, difference=DIFFERENCE)
+        return Secants(self.squares(), u)
 
     def descend(self, u: Array, iterations: int, tolerance: float, jacobian_there: bool = True) -> Optimum:
         """The minimum reached from u."""
         return descend(
-            self.residuals, u, self.vector.lower, self.vector.upper, iterations=iterations, tolerance=tolerance,
-            difference=DIFFERENCE, each=mapped, jacobian_there=jacobian_there,
-        )  # fmt: skip
+            self.squares(), u, iterations=iterations, tolerance=tolerance, jacobian_there=jacobian_there
+        )
 
     def adapted(self, u: Array) -> Criterion:
         """The same with filter and scale that the corrections at u suggest."""

@@ -21,7 +21,7 @@ from scipy.interpolate import Akima1DInterpolator
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.fit.broyden import descend_by_secants
-from stickslip.identify.fit.levenberg_marquardt import Residuals
+from stickslip.identify.fit.levenberg_marquardt import Residuals, Squares
 from stickslip.identify.fit.noise import Noise, as_noise
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.fit.uncertainty import Fit, fit
@@ -222,6 +222,11 @@ def graded(response: Response, velocity: Array, vs: float) -> Array:
     return longest
 
 
+def squares_of(vector: Vector, residuals: Residuals) -> Squares:
+    """The residuals between the bounds of the vector."""
+    return Squares(residuals, vector.lower, vector.upper, DIFFERENCE)
+
+
 def fit_position(
     response: Response, inertia: float, sliding: Mapping[str, float], *, sigma0: float, sigma1: float,
     noise: Noise | float | None = None, profiles: bool = True,
@@ -235,14 +240,12 @@ def fit_position(
     rough = Simulation(response, vector, inertia, ROUGH)
     # sigma0 alone first: far from the minimum sigma1 would be driven to 0, which it leaves slowly.
     near, _ = descend_by_secants(
-        misfit(response, rough), vector.start, vector.lower, vector.upper,
-        held=[vector.names.index("sigma1")], tolerance=0.1, difference=DIFFERENCE,
+        squares_of(vector, misfit(response, rough)), vector.start, held=[vector.names.index("sigma1")], tolerance=0.1
     )  # fmt: skip
     enough = ENOUGH / response.time.size
     near, _ = descend_by_secants(
-        misfit(response, rough.graded(near, sliding["vs"])), near, vector.lower, vector.upper, tolerance=enough,
-        difference=DIFFERENCE,
-    )  # fmt: skip
+        squares_of(vector, misfit(response, rough.graded(near, sliding["vs"]))), near, tolerance=enough
+    )
     residuals = misfit(response, rough.graded(near, sliding["vs"]))
     known, size = as_noise(noise), float(np.ptp(response.position))
     first = fit(
@@ -281,10 +284,7 @@ def fit_bristles(
         return lambda u: bristles(stepped.position(u)) - measured
 
     def descended(u: Array) -> tuple[Array, float]:
-        return descend_by_secants(
-            apart(simulation.graded(u, vs)), u, vector.lower, vector.upper, tolerance=enough,
-            difference=DIFFERENCE,
-        )  # fmt: skip
+        return descend_by_secants(squares_of(vector, apart(simulation.graded(u, vs))), u, tolerance=enough)
 
     # sigma1 hardly matters here, and may end at either of its bounds.
     undamped = vector.start.copy()
