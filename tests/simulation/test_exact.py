@@ -239,9 +239,9 @@ def test_the_table_of_a_feedforward_gives_its_law_all_that_a_law_may_read(monkey
     handed = []
     tabulate = forcing.tabulate
 
-    def watched(step, p, u, *more):
-        handed.append(u.copy())
-        return tabulate(step, p, u, *more)
+    def watched(law, *more):
+        handed.append(law.surroundings.copy())
+        return tabulate(law, *more)
 
     monkeypatch.setattr(forcing, "tabulate", watched)
     karnopp = Model("karnopp", dv=1e-3, fs=0.335, fc=0.285, vs=0.01, sigma2=0.018)

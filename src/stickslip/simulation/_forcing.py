@@ -10,7 +10,7 @@ velocity); they shrink around a break-away, whose kink is handed on as a time to
 from __future__ import annotations
 
 from collections import OrderedDict
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,49 +36,66 @@ INSIDE = 1e-12
 MOST_CELLS = 400_000
 
 
+class Driven(NamedTuple):
+    """A law on the reference velocity: addresses, and arrays that outlive them."""
+
+    step: int
+    parameters: Any
+    surroundings: Any
+    profile: int
+    reference: Any
+    """parameters of the reference"""
+    modes: Any
+    """which of the law's states are modes"""
+    motion: Any
+    """the reference where it was asked for last; scratch"""
+
+
 @kernel()
-def velocity_at(profile: int, reference: Any, motion: Any, t: float) -> float:
+def velocity_at(law: Driven, t: float) -> float:
     """Reference velocity, rad/s."""
-    call_profile(profile, t, pointer(reference, 0), pointer(motion, 0))
-    return motion[1]
+    call_profile(law.profile, t, pointer(law.reference, 0), pointer(law.motion, 0))
+    return law.motion[1]
 
 
 @kernel()
-def walk(
-    step: int, p: Any, u: Any, profile: int, reference: Any, motion: Any, t0: float, t1: float, v0: float, steps: int,
-    z: Any,
-) -> float:  # fmt: skip
+def stepped(law: Driven, v0: float, v1: float, dt: float, z: Any) -> float:
+    """Advance z by one step of the law; returns the torque at its end."""
+    return call_step(
+        law.step, v0, v1, dt, pointer(z, 0), pointer(law.parameters, 0), pointer(law.surroundings, 0)
+    )
+
+
+@kernel()
+def walk(law: Driven, t0: float, t1: float, v0: float, steps: int, z: Any) -> float:
     """Walk the law from t0 to t1 in equal steps; advances z, returns the torque at t1."""
     dt = (t1 - t0) / steps
     torque = 0.0
     v = v0
     for i in range(steps):
-        ahead = velocity_at(profile, reference, motion, t1 if i == steps - 1 else t0 + (i + 1) * dt)
-        torque = call_step(step, v, ahead, dt, pointer(z, 0), pointer(p, 0), pointer(u, 0))
+        ahead = velocity_at(law, t1 if i == steps - 1 else t0 + (i + 1) * dt)
+        torque = stepped(law, v, ahead, dt, z)
         v = ahead
     return torque
 
 
 @kernel()
-def part(
-    step: int, p: Any, u: Any, profile: int, reference: Any, motion: Any, t0: float, t1: float, states: Any,
-    modes: Any,
-) -> tuple[float, float]:  # fmt: skip
+def part(law: Driven, t0: float, t1: float, states: Any) -> tuple[float, float]:
     """Advance states[0] over one part by extrapolation; returns the torque at t1 and the error."""
     n = states.shape[1]
-    v0 = velocity_at(profile, reference, motion, t0)
+    v0 = velocity_at(law, t0)
     for k in range(1, 4):
         for i in range(n):
             states[k, i] = states[0, i]
     # Errors fall with the square of the step, then with its cube: 1, 2 and 4 steps cancel both.
-    one = walk(step, p, u, profile, reference, motion, t0, t1, v0, 1, states[1])
-    two = walk(step, p, u, profile, reference, motion, t0, t1, v0, 2, states[2])
-    four = walk(step, p, u, profile, reference, motion, t0, t1, v0, 4, states[3])
+    one = walk(law, t0, t1, v0, 1, states[1])
+    two = walk(law, t0, t1, v0, 2, states[2])
+    four = walk(law, t0, t1, v0, 4, states[3])
     better_two = two + (two - one) / 3.0
     better_four = four + (four - two) / 3.0
     error = abs(better_four - better_two)
     for i in range(n):
-        if modes[i]:
+        if law.modes[i]:
             states[0, i] = states[3, i]
         else:
             coarse = states[2, i] + (states[2, i] - states[1, i]) / 3.0
@@ -88,10 +105,9 @@ def part(
 
 
 @kernel()
-def quartic(
-    y0: float, y1: float, y2: float, y3: float, y4: float, t: float, width: float, cell: Any
-) -> float:
+def quartic(torque: Any, t: float, width: float, cell: Any) -> float:
     """Write the cell through five torques; returns how much its quartic term bends it, N·m."""
+    y0, y1, y2, y3, y4 = torque[0], torque[1], torque[2], torque[3], torque[4]
     d1 = y1 - y0
     d2 = y2 - 2.0 * y1 + y0
     d3 = y3 - 3.0 * y2 + 3.0 * y1 - y0
@@ -108,12 +124,9 @@ def quartic(
 
 
 @kernel()
-def tabulate(
-    step: int, p: Any, u: Any, profile: int, reference: Any, edges: Any, state: Any, modes: Any, cells: Any
-) -> int:  # fmt: skip
+def tabulate(law: Driven, state: Any, edges: Any, cells: Any) -> int:
     """Fill `cells` over [edges[0], edges[-1]]; returns their number, or -1 where they do not suffice."""
     n = state.shape[0]
-    motion = np.zeros(3)
     states = np.zeros((4, max(n, 1)))
     kept = np.zeros(max(n, 1))
     torque = np.zeros(5)
@@ -126,8 +139,8 @@ def tabulate(
         end = edges[k + 1] - INSIDE
         width = min(width, 1e-4)
         # The torque on this side of the break: a step of no length.
-        v = velocity_at(profile, reference, motion, t)
-        torque[0] = call_step(step, v, v, 0.0, pointer(states, 0), pointer(p, 0), pointer(u, 0))
+        v = velocity_at(law, t)
+        torque[0] = stepped(law, v, v, 0.0, states[0])
         while t < end:
             last = t + 1.0001 * width >= end
             w = end - t if last else width
@@ -135,15 +148,12 @@ def tabulate(
                 kept[i] = states[0, i]
             error = 0.0
             for j in range(4):
-                y, e = part(
-                    step, p, u, profile, reference, motion, t + 0.25 * j * w,
-                    end if last and j == 3 else t + 0.25 * (j + 1) * w, states, modes,
-                )  # fmt: skip
-                torque[j + 1] = y
-                error = max(error, e)
+                stop = end if last and j == 3 else t + 0.25 * (j + 1) * w
+                torque[j + 1], wrong = part(law, t + 0.25 * j * w, stop, states)
+                error = max(error, wrong)
             if count == cells.shape[0]:
                 return -1
-            bend = quartic(torque[0], torque[1], torque[2], torque[3], torque[4], t, w, cells[count])
+            bend = quartic(torque, t, w, cells[count])
             bend *= min(1.0, w / BLURRED)
             worst = max(0.1 * error, bend * 0.1)
             if worst > TOLERANCE and w > SHORTEST:
@@ -199,13 +209,14 @@ def feedforward(case: Case) -> tuple[Array, list[float]]:
     if key not in _tables:
         # Half and 80 % of the run are breaks of the metrics only.
         edges = np.array([0.0, *case.reference.breaks(duration), duration])
+        law = Driven(
+            side.pointers.step, side.parameters, surroundings(case.numbers), case.profile, case.reference_parameters,
+            side.modes, np.zeros(3),
+        )  # fmt: skip
         room = 2000
         while True:
             cells = np.empty((room, CELL_SIZE))
-            n = tabulate(
-                side.pointers.step, side.parameters, surroundings(case.numbers), case.profile,
-                case.reference_parameters, edges, side.state, side.modes, cells,
-            )  # fmt: skip
+            n = tabulate(law, side.state, edges, cells)
             if n >= 0:
                 break
             room *= 8

@@ -94,11 +94,6 @@ class Side:
         band = self.model.law.rest_band if self.model else None
         return band(self.model.parameters) if self.model and band else 0.0
 
-    @property
-    def addresses(self) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """step, rate, guards, switch, steady, sliding, holding; 0 where the law has none."""
-        return np.array(self.pointers, dtype=np.int64)
-
     @staticmethod
     def of(model: Model | None) -> Side:
         """Lay out a model; None gives an empty side."""

@@ -12,21 +12,29 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from stickslip.jit import call_guards, call_profile, call_rate, call_step, call_switch, kernel, pointer
+from stickslip.jit import (
+    LawPointers,
+    call_guards,
+    call_profile,
+    call_rate,
+    call_step,
+    call_switch,
+    kernel,
+    pointer,
+    record_at,
+)
 from stickslip.simulation.adaptive.dormand_prince import ERROR, NODES, TABLEAU
+from stickslip.simulation.case_arrays import AROUND, MOTION
 
-STEP, RATE, GUARDS, SWITCH = range(4)  # places in `Side.addresses`
-POSITION, VELOCITY, ACCELERATION = range(3)
 NUDGE = 1e-11  # s, by which one-sided values of the motion lie inside the stretch between two kinks
 FINE = 0.1  # of the law's velocity scale, by which the velocity near rest may change in a step
-POSITION_AT, TIME = 0, 3  # places in the surroundings
 SHORTEST = 1e-14  # s, relative above 1 s
 
 
 class Motion(NamedTuple):
     """What the kernels read besides time and state, and their scratch arrays."""
 
-    law: Any
+    law: LawPointers
     parameters: Any
     modes: Any
     scale: float
@@ -47,9 +55,9 @@ def move(m: Motion, t: float) -> float:
     """Set the motion at t, seen from inside the stretch between two kinks; returns the velocity."""
     inside = min(max(t, m.between[0] + NUDGE), m.between[1] - NUDGE)
     call_profile(m.profile, inside, pointer(m.reference, 0), pointer(m.motion, 0))
-    m.surroundings[POSITION_AT] = m.motion[POSITION]
-    m.surroundings[TIME] = t
-    return m.motion[VELOCITY]
+    asked, around = record_at(pointer(m.motion, 0), MOTION), record_at(pointer(m.surroundings, 0), AROUND)
+    around.position, around.time = asked.position, t
+    return asked.velocity
 
 
 @kernel()
@@ -65,7 +73,7 @@ def attempt_rate(m: Motion, t: float, h: float, y: Any, out: Any) -> float:
             m.slopes[stage, j] = 0.0
         v = move(m, t + NODES[stage] * h)
         call_rate(
-            m.law[RATE], v, pointer(out, 0), pointer(m.parameters, 0), pointer(m.surroundings, 0),
+            m.law.rate, v, pointer(out, 0), pointer(m.parameters, 0), pointer(m.surroundings, 0),
             pointer(m.slopes, stage * n),
         )  # fmt: skip
     worst = 0.0
@@ -92,7 +100,7 @@ def law_step(m: Motion, t: float, h: float, z: Any) -> float:
     v0 = move(m, t)
     v1 = move(m, t + h)
     return call_step(
-        m.law[STEP], v0, v1, h, pointer(z, 0), pointer(m.parameters, 0), pointer(m.surroundings, 0)
+        m.law.step, v0, v1, h, pointer(z, 0), pointer(m.parameters, 0), pointer(m.surroundings, 0)
     )
 
 
@@ -118,13 +126,13 @@ def attempt_step(m: Motion, t: float, h: float, y: Any, out: Any) -> float:
 @kernel()
 def due(m: Motion, t: float, y: Any) -> float:
     """The largest value of a guard at t: a mode is due to end where it is not negative."""
-    if m.law[GUARDS] == 0:
+    if m.law.guards == 0:
         return -1.0
     v = move(m, t)
     for j in range(y.size):
         m.events[j] = -1.0
     call_guards(
-        m.law[GUARDS],
+        m.law.guards,
         v,
         pointer(y, 0),
         pointer(m.parameters, 0),
@@ -146,7 +154,7 @@ def change_modes(m: Motion, t: float, y: Any) -> None:
     if due(m, t, y) >= 0.0:
         v = move(m, t)
         call_switch(
-            m.law[SWITCH], v, pointer(y, 0), pointer(m.parameters, 0), pointer(m.surroundings, 0),
+            m.law.switch, v, pointer(y, 0), pointer(m.parameters, 0), pointer(m.surroundings, 0),
             pointer(m.events, 0),
         )  # fmt: skip
 
@@ -178,7 +186,7 @@ def locate(m: Motion, t: float, h: float, y: Any, out: Any) -> float:
 def shortened(m: Motion, t: float, h: float) -> float:
     """The step, shortened near rest to a fraction of the velocity scale, and to the velocity's next zero."""
     v0 = move(m, t)
-    slope = abs(m.motion[ACCELERATION])
+    slope = abs(record_at(pointer(m.motion, 0), MOTION).acceleration)
     if m.scale > 0.0 and abs(v0) < 3.0 * m.scale and slope * h > FINE * m.scale:
         h = FINE * m.scale / slope
     if v0 * move(m, t + h) >= 0.0:
@@ -204,7 +212,7 @@ def torque_at(m: Motion, t: float, y: Any, by_step: bool) -> float:
         return law_step(m, t, 0.0, m.trial)
     v = move(m, t)
     return call_rate(
-        m.law[RATE], v, pointer(m.trial, 0), pointer(m.parameters, 0), pointer(m.surroundings, 0),
+        m.law.rate, v, pointer(m.trial, 0), pointer(m.parameters, 0), pointer(m.surroundings, 0),
         pointer(m.slopes, 0),
     )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,9 +16,19 @@ __all__ = ["Along"]
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
+class Samples(NamedTuple):
+    """A motion from sample to sample: s, rad, and the velocities at both ends of each stretch, rad/s."""
+
+    time: Any
+    position: Any
+    before: Any
+    after: Any
+
+
 @kernel()
-def follow(step: int, p: Any, u: Any, time: Any, x: Any, before: Any, after: Any, z: Any, out: Any) -> None:
-    """The law's steps from sample to sample; `before` and `after` are the velocities of each stretch."""
+def follow(step: int, p: Any, u: Any, samples: Samples, z: Any, out: Any) -> None:
+    """The law's steps from sample to sample."""
+    time, x, before, after = samples.time, samples.position, samples.before, samples.after
     u[0] = x[0]
     out[0] = call_step(step, before[0], before[0], 0.0, pointer(z, 0), pointer(p, 0), pointer(u, 0))
     for i in range(1, time.size):
@@ -52,15 +62,14 @@ class Along:
             raise InputError("times must ascend strictly; merge samples of the same time")
         mean = np.diff(position) / width
         self._law, self._step = law, compiled_law(law).step
-        self._time, self._position = flat(time), flat(position)
-        self._before = flat(mean if velocity is None else velocity[:-1])
-        self._after = flat(mean if velocity is None else velocity[1:])
+        before, after = (mean, mean) if velocity is None else (velocity[:-1], velocity[1:])
+        self._samples = Samples(flat(time), flat(position), flat(before), flat(after))
 
     @property
     def velocity(self) -> Array:
         """Velocity at every sample, rad/s, shape (n,): the mean of that before and after it."""
-        both = 0.5 * (self._after[:-1] + self._before[1:])
-        return np.concatenate([self._before[:1], both, self._after[-1:]])
+        before, after = self._samples.before, self._samples.after
+        return np.concatenate([before[:1], 0.5 * (after[:-1] + before[1:]), after[-1:]])
 
     def torque(self, packed: Array, parameters: Any) -> Array:
         """Torque at every sample, N·m, shape (n,).
@@ -73,11 +82,8 @@ class Along:
             The same for the law's plain functions; only the number of elements is read.
         """
         state = flat(self._law.pack_state(self._law.state(parameters)))
-        out = np.empty(self._time.size)
-        follow(
-            self._step, flat(packed), np.array(Surroundings()), self._time, self._position, self._before,
-            self._after, state, out,
-        )  # fmt: skip
+        out = np.empty(self._samples.time.size)
+        follow(self._step, flat(packed), np.array(Surroundings()), self._samples, state, out)
         return out
 
     def of(self, model: Model) -> Array:

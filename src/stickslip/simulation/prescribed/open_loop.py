@@ -150,7 +150,7 @@ def integrated(
     stops, place = np.unique(np.concatenate([time, kinks]), return_inverse=True)
     size = side.state.size
     m = Motion(
-        side.addresses,
+        side.pointers,
         side.parameters,
         side.modes,
         side.velocity_scale,
