@@ -30,10 +30,11 @@ REFERENCE = Path(os.environ.get("STICKSLIP_REFERENCE", ROOT.parent / "shared" / 
 # Dearest first, by the processor's time: a file goes to one process as a whole, and the others wait for a long one that
 # comes last. The rest may stand in any order.
 LONGEST = (
-    "contract/test_declarations", "export/test_targets", "contract/test_control_laws", "export/test_c99",
-    "rigs/test_faults", "control/test_special_results", "commission/test_commission", "identify/test_doctor",
-    "cli/test_results", "control/test_control_loops", "identify/test_doctor_change", "contract/test_laws",
-    "sweep/test_sweep", "study/test_study", "study/test_effort", "test_readme",
+    "export/test_targets", "contract/test_declarations", "contract/test_control_laws", "export/test_c99",
+    "control/test_special_results", "test_readme", "identify/test_doctor", "commission/test_commission",
+    "rigs/test_faults", "control/test_control_loops", "cli/test_results", "contract/test_laws", "sweep/test_sweep",
+    "study/test_effort", "identify/test_doctor_change", "cli/test_bad_logs", "analyse/test_stability",
+    "cli/test_bad_input", "study/test_study",
 )  # fmt: skip
 
 
