@@ -77,10 +77,11 @@ class _C(Language):
         **Language.operators, ast.And: "&&", ast.Or: "||", ast.Not: "!"
     }  # fmt: skip
 
+    access: ClassVar[str] = "->"
+
     def __init__(self, facts: Facts, dialect: Dialect, known: Mapping[str, Facts]) -> None:
-        super().__init__(facts)
+        super().__init__(facts, known)
         self.dialect = dialect
-        self.known = known
 
     # ---- expressions ---------------------------------------------------------------------------------
 
@@ -93,38 +94,21 @@ class _C(Language):
     def as_real(self, node: ast.expr) -> str:
         return f"({self.dialect.real}){self.expression(node, ATOM)}"
 
-    def field(self, node: ast.Attribute) -> str:
-        assert isinstance(node.value, ast.Name)
-        if node.value.id == "math":
-            return {"pi": self.number(math.pi), "inf": self.number(math.inf)}[node.attr]
-        return f"{node.value.id}->{safe(node.attr)}"
+    def word(self, name: str) -> str:
+        return safe(name)
 
-    def element(self, node: ast.Subscript) -> str:
-        assert isinstance(node.value, ast.Attribute)
-        return f"{self.field(node.value)}[{self.expression(node.slice)}]"
-
-    def call(self, node: ast.Call) -> str:
-        if isinstance(node.func, ast.Attribute):
-            return self.library(node.func.attr, node.args)
-        assert isinstance(node.func, ast.Name)
-        name = node.func.id
+    def named_call(self, name: str, arguments: Sequence[ast.expr]) -> str:
         if name == "abs":
-            return self.library("fabs", node.args)
+            return self.library("fabs", arguments)
         if name in ("min", "max"):
-            return self.extreme(name, node.args)
+            return self.extreme(name, arguments)
         if name == "float":
-            return f"({self.dialect.real}){self.expression(node.args[0], ATOM)}"
+            return f"({self.dialect.real}){self.expression(arguments[0], ATOM)}"
         if name == "int":
-            return f"(int){self.expression(node.args[0], ATOM)}"
+            return f"(int){self.expression(arguments[0], ATOM)}"
         callee = self.known[name]
-        given = [self.given(a, argument, callee) for a, argument in zip(node.args, callee.arguments)]
+        given = [self.given(a, argument, callee) for a, argument in zip(arguments, callee.arguments)]
         return f"{self.dialect.prefix}{name}({', '.join(given)})"
-
-    def given(self, node: ast.expr, argument: str, callee: Facts) -> str:
-        """What is passed for an argument: a structure, an index or a number."""
-        if argument in callee.structures and isinstance(node, ast.Name):
-            return node.id
-        return self.expression(node) if callee.kinds.get(argument) == "int" else self.real(node)
 
     def library(self, name: str, arguments: Sequence[ast.expr]) -> str:
         """A call of math.h, in the precision of this export."""

@@ -7,8 +7,9 @@ order of every arithmetic operation is kept, so that a target with IEEE arithmet
 from __future__ import annotations
 
 import ast
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from stickslip.errors import LawError
@@ -28,6 +29,8 @@ class Language(ABC):
     indent : str
     operators : mapping
         How an operator of Python is spelt.
+    access : str
+        What stands between a structure and its field.
     """
 
     indent: ClassVar[str] = "    "
@@ -37,8 +40,10 @@ class Language(ABC):
         ast.USub: "-", ast.UAdd: "+",
     }  # fmt: skip
 
-    def __init__(self, facts: Facts) -> None:
-        self.facts = facts
+    access: ClassVar[str] = "."
+
+    def __init__(self, facts: Facts, known: Mapping[str, Facts]) -> None:
+        self.facts, self.known = facts, known
 
     # ---- statements ----------------------------------------------------------------------------------
 
@@ -175,8 +180,47 @@ class Language(ABC):
         """How tightly a power binds here (an atom where it is a call)."""
         return ATOM
 
+    def field(self, node: ast.Attribute) -> str:
+        """A field of a structure, or a constant of mathematics."""
+        assert isinstance(node.value, ast.Name)
+        if node.value.id == "math":
+            return self.number({"pi": math.pi, "inf": math.inf}[node.attr])
+        return f"{self.word(node.value.id)}{self.access}{self.word(node.attr)}"
+
+    def element(self, node: ast.Subscript) -> str:
+        """An element of a field."""
+        assert isinstance(node.value, ast.Attribute)
+        return f"{self.field(node.value)}[{self.expression(node.slice)}]"
+
+    # ---- calls ---------------------------------------------------------------------------------------
+
+    def call(self, node: ast.Call) -> str:
+        """A call: of a mathematical function, or of a named one."""
+        if isinstance(node.func, ast.Attribute):
+            return self.library(node.func.attr, node.args)
+        assert isinstance(node.func, ast.Name)
+        return self.named_call(node.func.id, node.args)
+
+    def given(self, node: ast.expr, argument: str, callee: Facts) -> str:
+        """What is passed for an argument: a structure, an index or a number."""
+        if argument in callee.structures and isinstance(node, ast.Name):
+            return self.word(node.id)
+        return self.expression(node) if callee.kinds.get(argument) == "int" else self.real(node)
+
+    def callee(self, node: ast.expr) -> Facts | None:
+        """What is known of the function that is called."""
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            return self.known.get(node.func.id)
+        return None
+
+    def changed(self, node: ast.Call, callee: Facts) -> list[str]:
+        """The structures that a call hands back, in the callee's order."""
+        return [self.expression(g) for g, a in zip(node.args, callee.arguments) if a in callee.writes]
+
     # ---- what a language must say --------------------------------------------------------------------
 
+    @abstractmethod
+    def word(self, name: str) -> str: ...
     @abstractmethod
     def name(self, name: str) -> str: ...
     @abstractmethod
@@ -184,11 +228,9 @@ class Language(ABC):
     @abstractmethod
     def as_real(self, node: ast.expr) -> str: ...
     @abstractmethod
-    def field(self, node: ast.Attribute) -> str: ...
+    def library(self, name: str, arguments: Sequence[ast.expr]) -> str: ...
     @abstractmethod
-    def element(self, node: ast.Subscript) -> str: ...
-    @abstractmethod
-    def call(self, node: ast.Call) -> str: ...
+    def named_call(self, name: str, arguments: Sequence[ast.expr]) -> str: ...
     @abstractmethod
     def power(self, node: ast.BinOp) -> str: ...
     @abstractmethod

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from stickslip.export._analysis import Facts, analyse
+from stickslip.export._analysis import analyse
 from stickslip.export._hoist import hoisted
 from stickslip.export._language import ATOM, Language
 
@@ -52,10 +52,6 @@ class _Matlab(Language):
         **Language.operators, ast.And: "&&", ast.Or: "||", ast.Not: "~", ast.NotEq: "~="
     }  # fmt: skip
 
-    def __init__(self, facts: Facts, known: Mapping[str, Facts]) -> None:
-        super().__init__(facts)
-        self.known = known
-
     # ---- expressions ---------------------------------------------------------------------------------
 
     def name(self, name: str) -> str:
@@ -69,22 +65,18 @@ class _Matlab(Language):
     def as_real(self, node: ast.expr) -> str:
         return self.expression(node, ATOM)
 
+    def word(self, name: str) -> str:
+        return safe(name)
+
     def field(self, node: ast.Attribute) -> str:
-        assert isinstance(node.value, ast.Name)
-        if node.value.id == "math":
-            return {"pi": "pi", "inf": "Inf"}[node.attr]
-        return f"{node.value.id}.{safe(node.attr)}"
+        return "pi" if ast.unparse(node) == "math.pi" else super().field(node)
 
     def element(self, node: ast.Subscript) -> str:
         assert isinstance(node.value, ast.Attribute)
         return f"{self.field(node.value)}({self.expression(node.slice, ATOM)} + 1)"
 
-    def call(self, node: ast.Call) -> str:
-        if isinstance(node.func, ast.Attribute):
-            return self.library(node.func.attr, node.args)
-        assert isinstance(node.func, ast.Name)
-        name = node.func.id
-        given = [self.argument(a) for a in node.args]
+    def named_call(self, name: str, arguments: Sequence[ast.expr]) -> str:
+        given = [self.expression(a) for a in arguments]
         if name in ("abs", "min", "max"):
             return f"{name}({', '.join(given)})"
         if name == "float":
@@ -92,9 +84,6 @@ class _Matlab(Language):
         if name == "int":
             return f"fix({given[0]})"
         return f"{local(name)}({', '.join(given)})"
-
-    def argument(self, node: ast.expr) -> str:
-        return self.expression(node)
 
     def library(self, name: str, arguments: Sequence[ast.expr]) -> str:
         """A mathematical function."""
@@ -136,16 +125,6 @@ class _Matlab(Language):
             return []
         outputs = [*(["~"] if callee.returns else []), *self.changed(node, callee)]
         return [f"[{', '.join(outputs)}] = {self.call(node)};"]
-
-    def callee(self, node: ast.expr) -> Facts | None:
-        """What is known of the function that is called."""
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            return self.known.get(node.func.id)
-        return None
-
-    def changed(self, node: ast.Call, callee: Facts) -> list[str]:
-        """The structures that a call hands back, in the callee's order."""
-        return [self.expression(g) for g, a in zip(node.args, callee.arguments) if a in callee.writes]
 
     def leave(self) -> str:
         return "break;"

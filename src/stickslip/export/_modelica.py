@@ -74,8 +74,7 @@ class _Modelica(Language):
     def __init__(
         self, facts: Facts, known: Mapping[str, Facts], counts: Mapping[str, int], last: set[int]
     ) -> None:
-        super().__init__(facts)
-        self.known = known
+        super().__init__(facts, known)
         self.counts = counts
         self.last = last
         self.helpers: set[str] = set()
@@ -93,39 +92,26 @@ class _Modelica(Language):
     def as_real(self, node: ast.expr) -> str:
         return self.expression(node, ATOM)
 
-    def field(self, node: ast.Attribute) -> str:
-        assert isinstance(node.value, ast.Name)
-        if node.value.id == "math":
-            return {"pi": self.number(math.pi), "inf": self.number(math.inf)}[node.attr]
-        return f"{node.value.id}.{safe(node.attr)}"
+    def word(self, name: str) -> str:
+        return safe(name)
 
     def element(self, node: ast.Subscript) -> str:
         assert isinstance(node.value, ast.Attribute)
         return f"{self.field(node.value)}[{self.expression(node.slice, ATOM)} + 1]"
 
-    def call(self, node: ast.Call) -> str:
-        if isinstance(node.func, ast.Attribute):
-            return self.library(node.func.attr, node.args)
-        assert isinstance(node.func, ast.Name)
-        name = node.func.id
+    def named_call(self, name: str, arguments: Sequence[ast.expr]) -> str:
         if name in ("abs", "min", "max"):
-            first, *rest = [self.real(a) for a in node.args]
+            first, *rest = [self.real(a) for a in arguments]
             for other in rest:
                 first = f"{name}({first}, {other})"
             return f"{name}({first})" if not rest else first
         if name == "float":
-            return self.real(node.args[0])
+            return self.real(arguments[0])
         if name == "int":
-            return f"integer({self.real(node.args[0])})"
+            return f"integer({self.real(arguments[0])})"
         callee = self.known[name]
-        kept = [(g, a) for g, a in zip(node.args, callee.arguments) if a in callee.uses]
+        kept = [(g, a) for g, a in zip(arguments, callee.arguments) if a in callee.uses]
         return f"{own_name(name)}({', '.join(self.given(g, a, callee) for g, a in kept)})"
-
-    def given(self, node: ast.expr, argument: str, callee: Facts) -> str:
-        """What is passed for an argument."""
-        if argument in callee.structures and isinstance(node, ast.Name):
-            return node.id
-        return self.expression(node) if callee.kinds.get(argument) == "int" else self.real(node)
 
     def library(self, name: str, arguments: Sequence[ast.expr]) -> str:
         """A mathematical function."""
@@ -178,16 +164,6 @@ class _Modelica(Language):
             return []
         outputs = [*([""] if callee.returns else []), *self.changed(node, callee)]
         return [f"({', '.join(outputs)}) := {self.call(node)};"]
-
-    def callee(self, node: ast.expr) -> Facts | None:
-        """What is known of the function that is called."""
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            return self.known.get(node.func.id)
-        return None
-
-    def changed(self, node: ast.Call, callee: Facts) -> list[str]:
-        """The structures that a call hands back, in the callee's order."""
-        return [self.expression(g) for g, a in zip(node.args, callee.arguments) if a in callee.writes]
 
     def leave(self) -> str:
         return "break;"

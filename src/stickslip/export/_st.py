@@ -82,10 +82,9 @@ class _St(Language):
     def __init__(
         self, name: str, names: Names, facts: Facts, known: Mapping[str, Facts], counts: Mapping[str, int]
     ) -> None:
-        super().__init__(facts)
+        super().__init__(facts, known)
         self.own = names.functions[name]
         self.names = names
-        self.known = known
         self.counts = counts
         self.helpers: set[str] = set()
         self.ignored: set[str] = set()
@@ -101,41 +100,24 @@ class _St(Language):
     def as_real(self, node: ast.expr) -> str:
         return f"INT_TO_LREAL({self.expression(node)})"
 
-    def field(self, node: ast.Attribute) -> str:
-        assert isinstance(node.value, ast.Name)
-        if node.value.id == "math":
-            return {"pi": self.number(math.pi), "inf": self.number(math.inf)}[node.attr]
-        return f"{self.names.words[node.value.id]}.{self.names.words[node.attr]}"
+    def word(self, name: str) -> str:
+        return self.names.words[name]
 
-    def element(self, node: ast.Subscript) -> str:
-        assert isinstance(node.value, ast.Attribute)
-        return f"{self.field(node.value)}[{self.expression(node.slice)}]"
-
-    def call(self, node: ast.Call) -> str:
-        if isinstance(node.func, ast.Attribute):
-            return self.library(node.func.attr, node.args)
-        assert isinstance(node.func, ast.Name)
-        name = node.func.id
+    def named_call(self, name: str, arguments: Sequence[ast.expr]) -> str:
         if name == "abs":
-            return self.library("fabs", node.args)
+            return self.library("fabs", arguments)
         if name in ("min", "max"):
-            return f"{name.upper()}({', '.join(self.real(a) for a in node.args)})"
+            return f"{name.upper()}({', '.join(self.real(a) for a in arguments)})"
         if name == "float":
-            return self.real(node.args[0])
+            return self.real(arguments[0])
         if name == "int":
-            return f"LREAL_TO_INT({self.helper('floor', node.args)})"
+            return f"LREAL_TO_INT({self.helper('floor', arguments)})"
         callee = self.known[name]
         given = [
             f"{self.names.words[a]} := {self.given(g, a, callee)}"
-            for g, a in zip(node.args, callee.arguments)
+            for g, a in zip(arguments, callee.arguments)
         ]
         return f"{self.names.functions[name]}({', '.join(given)})"
-
-    def given(self, node: ast.expr, argument: str, callee: Facts) -> str:
-        """What is passed for an argument: a structure, an index or a number."""
-        if argument in callee.structures and isinstance(node, ast.Name):
-            return self.names.words[node.id]
-        return self.expression(node) if callee.kinds.get(argument) == "int" else self.real(node)
 
     def library(self, name: str, arguments: Sequence[ast.expr]) -> str:
         """A mathematical function."""
