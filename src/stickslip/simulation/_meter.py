@@ -101,9 +101,23 @@ class Sums(NamedTuple):
     compensation: float
 
 
-# ---- rows of the nodes: position error, velocity error, position, velocity, reference velocity, and the torques of
-# motor, friction and compensator
-ERROR, ERROR_RATE, AT, SPEED, REFERENCE_SPEED, MOTOR, FRICTION, COMPENSATING, SIGNALS = range(9)
+# ---- where the rows of the nodes begin: position error, velocity error, position, velocity, reference velocity, and
+# the torques of motor, friction and compensator
+SIGNALS = 8
+ERROR, ERROR_RATE, AT, SPEED, REFERENCE_SPEED, MOTOR, FRICTION, COMPENSATING = range(0, 5 * SIGNALS, 5)
+
+
+class Turns(NamedTuple):
+    """Where reversals are kept: the address of (n, 2) numbers, time and position, and room for how many."""
+
+    at: Any
+    room: int
+
+
+@spliced
+def turns_of(turns: Any) -> Turns:
+    """The turns of an array that outlives the call: handed on, arrays count references, at a quarter of the price."""
+    return Turns(pointer(turns, 0), turns.shape[0])
 
 
 @kernel(exact=False)
@@ -113,12 +127,17 @@ def meter(acc: Any, turns: Any, t: float, h: float, nodes: Any) -> None:
     ``nodes`` has a row for each signal (see the names above) and five columns in time; ``turns`` (n, 2) receives
     time and position of every reversal, as long as it has room.
     """
-    so_far = meter_of(acc)
+    add_stretch(meter_of(acc), turns_of(turns), t, h, pointer(nodes, 0))
+
+
+@kernel(exact=False)
+def add_stretch(so_far: Any, turns: Turns, t: float, h: float, nodes: Any) -> None:
+    """Add a stretch, of whose nodes this is the address."""
     low, high = extremes(nodes, 0.25 * h)
     motor = 0.0
     for i in range(5):
-        motor = max(motor, abs(nodes[MOTOR, i]))
-    second = add(so_far, t, h, sums(nodes), nodes[ERROR, 4])
+        motor = max(motor, abs(nodes[MOTOR + i]))
+    second = add(so_far, t, h, sums(nodes), nodes[ERROR + 4])
     reached(so_far, second, low, high, peak(nodes, so_far.v_max), motor)
     if so_far.window > MAX_WINDOW:
         return
@@ -141,16 +160,18 @@ def sums(nodes: Any) -> Sums:
     compensation = 0.0
     for i in range(5):
         w = 7.0 if i == 0 or i == 4 else (12.0 if i == 2 else 32.0)
-        e += w * nodes[ERROR, i]
-        e2 += w * nodes[ERROR, i] * nodes[ERROR, i]
-        ev2 += w * nodes[ERROR_RATE, i] * nodes[ERROR_RATE, i]
-        tm2 += w * nodes[MOTOR, i] * nodes[MOTOR, i]
+        e += w * nodes[ERROR + i]
+        e2 += w * nodes[ERROR + i] * nodes[ERROR + i]
+        ev2 += w * nodes[ERROR_RATE + i] * nodes[ERROR_RATE + i]
+        tm2 += w * nodes[MOTOR + i] * nodes[MOTOR + i]
         df2 += (
-            w * (nodes[FRICTION, i] - nodes[COMPENSATING, i]) * (nodes[FRICTION, i] - nodes[COMPENSATING, i])
+            w
+            * (nodes[FRICTION + i] - nodes[COMPENSATING + i])
+            * (nodes[FRICTION + i] - nodes[COMPENSATING + i])
         )
-        work += w * nodes[MOTOR, i] * nodes[SPEED, i]
-        loss += w * nodes[FRICTION, i] * nodes[SPEED, i]
-        compensation += w * nodes[COMPENSATING, i] * nodes[SPEED, i]
+        work += w * nodes[MOTOR + i] * nodes[SPEED + i]
+        loss += w * nodes[FRICTION + i] * nodes[SPEED + i]
+        compensation += w * nodes[COMPENSATING + i] * nodes[SPEED + i]
     return Sums(e, e2, ev2, tm2, df2, work, loss, compensation)
 
 
@@ -197,14 +218,14 @@ def in_second_half(acc: Any, t: float) -> bool:
 @kernel(exact=False)
 def extremes(nodes: Any, d: float) -> tuple[float, float]:
     """Smallest and largest error over the nodes, spaced d apart, and between them where its slope changes sign."""
-    low = nodes[ERROR, 0]
-    high = nodes[ERROR, 0]
+    low = nodes[ERROR]
+    high = nodes[ERROR]
     for i in range(1, 5):
-        low = min(low, nodes[ERROR, i])
-        high = max(high, nodes[ERROR, i])
-        if nodes[ERROR_RATE, i - 1] * nodes[ERROR_RATE, i] < 0.0:
+        low = min(low, nodes[ERROR + i])
+        high = max(high, nodes[ERROR + i])
+        if nodes[ERROR_RATE + i - 1] * nodes[ERROR_RATE + i] < 0.0:
             between = summit(
-                nodes[ERROR, i - 1], nodes[ERROR_RATE, i - 1], nodes[ERROR, i], nodes[ERROR_RATE, i], d
+                nodes[ERROR + i - 1], nodes[ERROR_RATE + i - 1], nodes[ERROR + i], nodes[ERROR_RATE + i], d
             )  # fmt: skip
             low = min(low, between)
             high = max(high, between)
@@ -222,18 +243,18 @@ def summit(y0: float, d0: float, y1: float, d1: float, d: float) -> float:
 @kernel(exact=False)
 def speed_at(nodes: Any, x: float) -> float:
     """The quartic through the velocities at the five nodes, at x = 0 to 4."""
-    d1 = nodes[SPEED, 1] - nodes[SPEED, 0]
-    d2 = nodes[SPEED, 2] - 2.0 * nodes[SPEED, 1] + nodes[SPEED, 0]
-    d3 = nodes[SPEED, 3] - 3.0 * nodes[SPEED, 2] + 3.0 * nodes[SPEED, 1] - nodes[SPEED, 0]
+    d1 = nodes[SPEED + 1] - nodes[SPEED]
+    d2 = nodes[SPEED + 2] - 2.0 * nodes[SPEED + 1] + nodes[SPEED]
+    d3 = nodes[SPEED + 3] - 3.0 * nodes[SPEED + 2] + 3.0 * nodes[SPEED + 1] - nodes[SPEED]
     d4 = (
-        nodes[SPEED, 4]
-        - 4.0 * nodes[SPEED, 3]
-        + 6.0 * nodes[SPEED, 2]
-        - 4.0 * nodes[SPEED, 1]
-        + nodes[SPEED, 0]
+        nodes[SPEED + 4]
+        - 4.0 * nodes[SPEED + 3]
+        + 6.0 * nodes[SPEED + 2]
+        - 4.0 * nodes[SPEED + 1]
+        + nodes[SPEED]
     )
     rise = d3 + 0.25 * (x - 3.0) * d4
-    return nodes[SPEED, 0] + x * (d1 + 0.5 * (x - 1.0) * (d2 + (x - 2.0) / 3.0 * rise))
+    return nodes[SPEED] + x * (d1 + 0.5 * (x - 1.0) * (d2 + (x - 2.0) / 3.0 * rise))
 
 
 @kernel(exact=False)
@@ -242,12 +263,12 @@ def crest(nodes: Any, i: int) -> float:
 
     Else the place of the nodes, which is the step's and not the motion's, would decide whether it counts.
     """
-    v = nodes[SPEED, i]
-    near = max(abs(v), abs(nodes[SPEED, i - 1]))
+    v = nodes[SPEED + i]
+    near = max(abs(v), abs(nodes[SPEED + i - 1]))
     if near > TRIGGER or near < NEARLY * TRIGGER:
         return v
     top = v
-    before = nodes[SPEED, i - 1]
+    before = nodes[SPEED + i - 1]
     now = speed_at(nodes, i - 0.875)
     for j in range(2, 9):
         after = speed_at(nodes, i - 1.0 + 0.125 * j)
@@ -267,11 +288,11 @@ def peak(nodes: Any, so_far: float) -> float:
     if (
         1.3
         * max(
-            abs(nodes[SPEED, 0]),
-            abs(nodes[SPEED, 1]),
-            abs(nodes[SPEED, 2]),
-            abs(nodes[SPEED, 3]),
-            abs(nodes[SPEED, 4]),
+            abs(nodes[SPEED]),
+            abs(nodes[SPEED + 1]),
+            abs(nodes[SPEED + 2]),
+            abs(nodes[SPEED + 3]),
+            abs(nodes[SPEED + 4]),
         )
         < so_far
     ):
@@ -294,26 +315,26 @@ def high_pass(acc: Any, h: float, nodes: Any, second: bool) -> None:
     half = math.exp(-0.125 * HIGH_PASS * h)
     weight = HIGH_PASS * h / 24.0
     y = acc.low_pass
-    total = 7.0 * (nodes[SPEED, 0] - y) * (nodes[SPEED, 0] - y)
+    total = 7.0 * (nodes[SPEED] - y) * (nodes[SPEED] - y)
     for i in range(4):
         # Simpson's rule on the convolution over a quarter; its middle value from the cubic through four nodes.
         if i == 0:
             middle = (
-                5.0 * nodes[SPEED, 0] + 15.0 * nodes[SPEED, 1] - 5.0 * nodes[SPEED, 2] + nodes[SPEED, 3]
+                5.0 * nodes[SPEED] + 15.0 * nodes[SPEED + 1] - 5.0 * nodes[SPEED + 2] + nodes[SPEED + 3]
             ) / 16.0
         elif i == 3:
             middle = (
-                5.0 * nodes[SPEED, 4] + 15.0 * nodes[SPEED, 3] - 5.0 * nodes[SPEED, 2] + nodes[SPEED, 1]
+                5.0 * nodes[SPEED + 4] + 15.0 * nodes[SPEED + 3] - 5.0 * nodes[SPEED + 2] + nodes[SPEED + 1]
             ) / 16.0
         else:
             middle = (
-                9.0 * (nodes[SPEED, i] + nodes[SPEED, i + 1]) - nodes[SPEED, i - 1] - nodes[SPEED, i + 2]
+                9.0 * (nodes[SPEED + i] + nodes[SPEED + i + 1]) - nodes[SPEED + i - 1] - nodes[SPEED + i + 2]
             ) / 16.0
         y = half * half * y + weight * (
-            half * half * nodes[SPEED, i] + 4.0 * half * middle + nodes[SPEED, i + 1]
+            half * half * nodes[SPEED + i] + 4.0 * half * middle + nodes[SPEED + i + 1]
         )
         w = 7.0 if i == 3 else (12.0 if i == 1 else 32.0)
-        total += w * (nodes[SPEED, i + 1] - y) * (nodes[SPEED, i + 1] - y)
+        total += w * (nodes[SPEED + i + 1] - y) * (nodes[SPEED + i + 1] - y)
     acc.low_pass = y
     add_high_pass(acc, h / 90.0 * total, second)
 
@@ -327,25 +348,25 @@ def add_high_pass(acc: Any, total: float, second: bool) -> None:
 
 
 @kernel(exact=False)
-def reversals(acc: Any, turns: Any, t: float, h: float, nodes: Any, second: bool) -> None:
+def reversals(acc: Any, turns: Turns, t: float, h: float, nodes: Any, second: bool) -> None:
     """Count sign reversals of v and of the reference with a Schmitt trigger; keep the turning points."""
     # Rounding may put a zero between the end of the last stretch and the start of this one.
-    if acc.last_velocity * nodes[SPEED, 0] < 0.0:
+    if acc.last_velocity * nodes[SPEED] < 0.0:
         acc.turn_time = t
-        acc.turn_position = nodes[AT, 0]
-    acc.last_velocity = nodes[SPEED, 4]
+        acc.turn_position = nodes[AT]
+    acc.last_velocity = nodes[SPEED + 4]
     for i in range(1, 5):
         # The last zero of v is the turning point, if the trigger then confirms a reversal.
-        if nodes[SPEED, i - 1] * nodes[SPEED, i] <= 0.0 and nodes[SPEED, i - 1] != nodes[SPEED, i]:
-            f = nodes[SPEED, i - 1] / (nodes[SPEED, i - 1] - nodes[SPEED, i])
+        if nodes[SPEED + i - 1] * nodes[SPEED + i] <= 0.0 and nodes[SPEED + i - 1] != nodes[SPEED + i]:
+            f = nodes[SPEED + i - 1] / (nodes[SPEED + i - 1] - nodes[SPEED + i])
             acc.turn_time = t + 0.25 * h * (i - 1 + f)
-            acc.turn_position = nodes[AT, i - 1] + f * (nodes[AT, i] - nodes[AT, i - 1])
+            acc.turn_position = nodes[AT + i - 1] + f * (nodes[AT + i] - nodes[AT + i - 1])
         confirm(acc, turns, crest(nodes, i), second)
-        follow_reference(acc, nodes[REFERENCE_SPEED, i])
+        follow_reference(acc, nodes[REFERENCE_SPEED + i])
 
 
 @kernel(exact=False, inline=True)
-def confirm(acc: Any, turns: Any, v: float, second: bool) -> None:
+def confirm(acc: Any, turns: Turns, v: float, second: bool) -> None:
     """Let a velocity beyond the trigger confirm a reversal at its last zero, if the side is another."""
     if abs(v) <= TRIGGER:
         return
@@ -355,9 +376,9 @@ def confirm(acc: Any, turns: Any, v: float, second: bool) -> None:
         if second:
             acc.w2_reversals += 1
         n = acc.turn_count
-        if n < turns.shape[0]:
-            turns[n, 0] = acc.turn_time
-            turns[n, 1] = acc.turn_position
+        if n < turns.room:
+            turns.at[2 * n] = acc.turn_time
+            turns.at[2 * n + 1] = acc.turn_position
             acc.turn_count += 1
     acc.side = side
 
@@ -376,8 +397,8 @@ def follow_reference(acc: Any, rate: float) -> None:
 def standstill(acc: Any, t: float, h: float, nodes: Any) -> None:
     """Find standstills: |v| below the trigger for at least 10 ms while the reference moves."""
     for i in range(5):
-        v = nodes[SPEED, i] if i == 0 else crest(nodes, i)
-        rest_seen(acc, t + 0.25 * h * i, v, nodes[REFERENCE_SPEED, i])
+        v = nodes[SPEED + i] if i == 0 else crest(nodes, i)
+        rest_seen(acc, t + 0.25 * h * i, v, nodes[REFERENCE_SPEED + i])
 
 
 @kernel(exact=False, inline=True)
@@ -396,11 +417,11 @@ def settling(acc: Any, t: float, h: float, nodes: Any) -> None:
     band = acc.settle_band
     if band > 0.0:
         for i in range(5):
-            now = abs(nodes[ERROR, i])
+            now = abs(nodes[ERROR + i])
             if now > band:
                 acc.outside_last = t + 0.25 * h * i
-                if i < 4 and abs(nodes[ERROR, i + 1]) <= band:
-                    acc.outside_last += 0.25 * h * (now - band) / (now - abs(nodes[ERROR, i + 1]))
+                if i < 4 and abs(nodes[ERROR + i + 1]) <= band:
+                    acc.outside_last += 0.25 * h * (now - band) / (now - abs(nodes[ERROR + i + 1]))
 
 
 @kernel(exact=False, inline=True)

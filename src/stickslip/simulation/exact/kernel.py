@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulation._meter import meter_of
+from stickslip.simulation._meter import meter_of, turns_of
 from stickslip.simulation.case_arrays import (
     DIVERGED,
     DONE,
@@ -161,7 +161,8 @@ def solve(laid: Laid, output: Output, light: bool, full: bool, metered: bool) ->
     """
     loop = loop_of(laid, output)
     parameters, now = loop.parameters, loop.now
-    breaks, acc, turns, nodes = pointer(laid.breaks, 0), meter_of(output.acc), output.turns, output.nodes
+    breaks, acc = pointer(laid.breaks, 0), meter_of(output.acc)
+    turns, nodes = turns_of(output.turns), pointer(output.nodes, 0)
     tol = max(SAFETY * parameters[TOLERANCE], FINEST)
     longest = min(LONGEST_STEP, parameters[MAX_STEP])
     after_event = max(0, math.ceil(math.log2(longest / FIRST_STEP)))
@@ -191,7 +192,7 @@ def solve(laid: Laid, output: Output, light: bool, full: bool, metered: bool) ->
             write_grid(lin, loop, h, 0.1 * tol, generation)
         if full:
             write_rows(lin, loop, h)
-        if metered and not measure(lin, loop, h, acc, turns, nodes):
+        if metered and not measure(lin, loop, h, generation, level, acc, turns, nodes):
             return TOO_FAST
         if happens:
             cross(loop, h, tol, held, full)

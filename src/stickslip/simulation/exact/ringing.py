@@ -48,7 +48,7 @@ def has_closed_form(lin: Linear, width: float) -> bool:
     return abs(both - damping * pole) > 1e-3 * both
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def ringing(lin: Linear, width: float, p0: float, v0: float, p1: float, v1: float) -> Ringing:
     """The ringing from (p0, v0) to (p1, v1), position in rad and velocity in rad/s, over a window of `width` s."""
     d = 2.0 * lin.decay * width
@@ -88,11 +88,11 @@ def at_nodes(m: Five) -> Five:
 @kernel(exact=False, inline=True)
 def quartic(nodes: Any, row: int) -> Five:
     """Coefficients of the quartic in s = 0 to 1 through a row of nodes."""
-    a = nodes[row, 0]
-    b = nodes[row, 1]
-    c = nodes[row, 2]
-    d = nodes[row, 3]
-    e = nodes[row, 4]
+    a = nodes[row]
+    b = nodes[row + 1]
+    c = nodes[row + 2]
+    d = nodes[row + 3]
+    e = nodes[row + 4]
     return (
         a,
         (-25.0 * a + 48.0 * b - 36.0 * c + 16.0 * d - 3.0 * e) / 3.0,
@@ -113,7 +113,7 @@ def overlap(nodes: Any, row: int, weights: Five) -> float:
     """Integral of a row's quartic times what the weights are of."""
     total = 0.0
     for i in range(5):
-        total += weights[i] * nodes[row, i]
+        total += weights[i] * nodes[row + i]
     return total
 
 

@@ -15,6 +15,7 @@ from stickslip.simulation._meter import (
     REFERENCE_SPEED,
     SPEED,
     TRIGGER,
+    Turns,
     confirm,
     follow_reference,
     in_second_half,
@@ -35,6 +36,8 @@ class Free(NamedTuple):
     square: float
 
 
+LOOK_UP = 4
+"""Fine steps between two looks at what is left."""
 NO_FREE = Free(0.0, 0.0, 0.0, 0.0)
 
 
@@ -65,17 +68,27 @@ class Farthest(NamedTuple):
     events: bool
 
 
+class Slack(NamedTuple):
+    """How far error, velocity, motor torque and the reference's velocity leave straight lines between the nodes of a
+    window."""
+
+    error: float
+    speed: float
+    motor: float
+    reference: float
+
+
 # ---- bounds ---------------------------------------------------------------------------------------------------
 
 
 @kernel(exact=False, inline=True)
 def bulge(nodes: Any, row: int) -> float:
     """How far the quartic through a row of nodes can leave the straight line between two of them."""
-    a = nodes[row, 0]
-    b = nodes[row, 1]
-    c = nodes[row, 2]
-    d = nodes[row, 3]
-    e = nodes[row, 4]
+    a = nodes[row]
+    b = nodes[row + 1]
+    c = nodes[row + 2]
+    d = nodes[row + 3]
+    e = nodes[row + 4]
     p = c - 2.0 * b + a
     q = d - 2.0 * c + b
     r = e - 2.0 * d + c
@@ -84,21 +97,26 @@ def bulge(nodes: Any, row: int) -> float:
 
 
 @kernel(exact=False, inline=True)
-def bounds(nodes: Any, row: int, k: int, quarters: int) -> tuple[float, float]:
-    """Least and greatest that the quartic through a row of nodes can have over quarters of the window, from k on."""
-    low = nodes[row, k]
-    high = low
-    for i in range(k + 1, k + quarters + 1):
-        low = min(low, nodes[row, i])
-        high = max(high, nodes[row, i])
-    rise = bulge(nodes, row)
-    return low - rise, high + rise
+def slack_of(nodes: Any) -> Slack:
+    """The slack of a window, which all of its bounds share."""
+    return Slack(bulge(nodes, ERROR), bulge(nodes, SPEED), bulge(nodes, MOTOR), bulge(nodes, REFERENCE_SPEED))
 
 
 @kernel(exact=False, inline=True)
-def reach(nodes: Any, row: int) -> float:
+def bounds(nodes: Any, row: int, k: int, quarters: int, slack: float) -> tuple[float, float]:
+    """Least and greatest that the quartic through a row of nodes can have over quarters of the window, from k on."""
+    low = nodes[row + k]
+    high = low
+    for i in range(k + 1, k + quarters + 1):
+        low = min(low, nodes[row + i])
+        high = max(high, nodes[row + i])
+    return low - slack, high + slack
+
+
+@kernel(exact=False, inline=True)
+def reach(nodes: Any, row: int, slack: float) -> float:
     """Greatest magnitude that the quartic through a row of nodes can have."""
-    low, high = bounds(nodes, row, 0, 4)
+    low, high = bounds(nodes, row, 0, 4, slack)
     return max(-low, high)
 
 
@@ -118,7 +136,7 @@ def peak_of(nodes: Any, row: int, width: float, steps: int) -> float:
     values = quartic(nodes, row)
     rates = slopes(values, width)
     if keeps_sign(rates):
-        return max(abs(nodes[row, 0]), abs(nodes[row, 4]))
+        return max(abs(nodes[row]), abs(nodes[row + 4]))
     low, high = summits(values, rates, width, Look(0.0, 1.0, steps, UNMOVED, NO_FREE), 0.0, 0.0)
     return max(-low, high)
 
@@ -131,27 +149,32 @@ def farther(acc: Any, second: bool, low: float, high: float) -> bool:
     return second and (low < acc.w2_e_low or high > acc.w2_e_high)
 
 
-@kernel(exact=False)
-def calm(acc: Any, nodes: Any, k: int, quarters: int, swing: float, sway: float) -> bool:
+@kernel(exact=False, inline=True)
+def counts(low: float, high: float, slowest: float, fastest: float) -> bool:
+    """Whether a velocity and the reference's within these bounds may reverse, or begin or end a standstill."""
+    if slowest < -TRIGGER and fastest > TRIGGER:
+        return True
+    if low > TRIGGER or high < -TRIGGER:
+        return False
+    if low <= -TRIGGER or high >= TRIGGER or (low <= 0.0 <= high and low < high):
+        return True
+    return not (slowest > MOVING or fastest < -MOVING or (slowest > -MOVING and fastest < MOVING))
+
+
+@kernel(exact=False, inline=True)
+def calm(acc: Any, nodes: Any, k: int, quarters: int, swing: float, sway: float, slack: Slack) -> bool:
     """Whether nothing is counted in some quarters of a window, from k on: no reversal, no standstill's begin or end,
     none at the settling band.
 
     ``swing`` and ``sway`` are the most by which ringing adds to position and velocity.
     """
-    low, high = bounds(nodes, SPEED, k, quarters)
-    low -= sway
-    high += sway
-    slowest, fastest = bounds(nodes, REFERENCE_SPEED, k, quarters)
-    if slowest < -TRIGGER and fastest > TRIGGER:
+    low, high = bounds(nodes, SPEED, k, quarters, slack.speed)
+    slowest, fastest = bounds(nodes, REFERENCE_SPEED, k, quarters, slack.reference)
+    if counts(low - sway, high + sway, slowest, fastest):
         return False
-    if low <= TRIGGER and high >= -TRIGGER:
-        if low <= -TRIGGER or high >= TRIGGER or (low <= 0.0 <= high and low < high):
-            return False
-        if not (slowest > MOVING or fastest < -MOVING or (slowest > -MOVING and fastest < MOVING)):
-            return False
     band = acc.settle_band
     if band > 0.0:
-        low, high = bounds(nodes, ERROR, k, quarters)
+        low, high = bounds(nodes, ERROR, k, quarters, slack.error)
         low -= swing
         high += swing
         return low > band or high < -band or (low >= -band and high <= band)
@@ -163,18 +186,18 @@ def calm(acc: Any, nodes: Any, k: int, quarters: int, swing: float, sway: float)
 
 @kernel(exact=False, inline=True)
 def passes(
-    acc: Any, turns: Any, nodes: Any, span: Span, k: int, quarters: int, first: float, last: float
+    acc: Any, turns: Turns, nodes: Any, span: Span, k: int, quarters: int, first: float, last: float
 ) -> None:  # fmt: skip
     """Note some calm quarters of a window, from k on, over which the velocity runs from `first` to `last`."""
     t, width = span
     begin = t + 0.25 * width * k
-    touch(acc, begin, nodes[AT, k], first)
-    rest_seen(acc, begin, first, nodes[REFERENCE_SPEED, k])
+    touch(acc, begin, nodes[AT + k], first)
+    rest_seen(acc, begin, first, nodes[REFERENCE_SPEED + k])
     confirm(acc, turns, last, in_second_half(acc, t))
     for i in range(k + 1, k + quarters + 1):
-        follow_reference(acc, nodes[REFERENCE_SPEED, i])
+        follow_reference(acc, nodes[REFERENCE_SPEED + i])
     # The node in the middle, or at the end of a quarter.
-    if acc.settle_band > 0.0 and abs(nodes[ERROR, k + (quarters + 1) // 2]) > acc.settle_band:
+    if acc.settle_band > 0.0 and abs(nodes[ERROR + k + (quarters + 1) // 2]) > acc.settle_band:
         acc.outside_last = begin + 0.25 * width * quarters
     acc.last_velocity = last
 
@@ -192,7 +215,8 @@ def touch(acc: Any, t: float, position: float, v: float) -> None:
 
 @kernel(exact=False, inline=True)
 def looked_through(
-    acc: Any, turns: Any, nodes: Any, span: Span, look: Look, motor: tuple[float, float], may: Farthest, second: bool
+    acc: Any, turns: Turns, nodes: Any, span: Span, look: Look, motor: tuple[float, float], may: Farthest,
+    slack: Slack, second: bool,
 ) -> None:  # fmt: skip
     """Note what a look at a window finds: only signals that may be farther than before are looked at."""
     width = span.width
@@ -207,10 +231,10 @@ def looked_through(
         torque = quartic(nodes, MOTOR)
         low, high = summits(torque, slopes(torque, width), width, look, motor[0], motor[1])
         acc.tm_max = max(acc.tm_max, -low, high)
-    if may.events and creeps(acc, nodes, look.free):
+    if may.events and creeps(acc, nodes, look.free, slack):
         turns_while_creeping(acc, nodes, span, look)
     elif may.events:
-        count_events(acc, turns, nodes, span, look, second)
+        count_events(acc, turns, nodes, span, look, slack, second)
 
 
 @kernel(exact=False)
@@ -245,16 +269,16 @@ def summits(
 
 
 @kernel(exact=False, inline=True)
-def creeps(acc: Any, nodes: Any, free: Free) -> bool:
+def creeps(acc: Any, nodes: Any, free: Free, slack: Slack) -> bool:
     """Whether the velocity stays below the trigger in a window, while the reference moves: the last zero of the
     velocity is all that happens."""
     if acc.settle_band > 0.0:
         return False
-    slowest, fastest = bounds(nodes, REFERENCE_SPEED, 0, 4)
+    slowest, fastest = bounds(nodes, REFERENCE_SPEED, 0, 4, slack.reference)
     if slowest <= MOVING and fastest >= -MOVING:
         return False
     sway = math.sqrt(free.square * free.position * free.position + free.velocity * free.velocity)
-    return reach(nodes, SPEED) + sway < TRIGGER
+    return reach(nodes, SPEED, slack.speed) + sway < TRIGGER
 
 
 @kernel(exact=False)
@@ -269,8 +293,8 @@ def turns_while_creeping(acc: Any, nodes: Any, span: Span, look: Look) -> None:
     v0 = value(speed, first) + q
     place = quartic(nodes, AT)
     touch(acc, t + width * first, value(place, first) + p, v0)
-    rest_seen(acc, t + width * first, v0, nodes[REFERENCE_SPEED, 0])
-    follow_reference(acc, nodes[REFERENCE_SPEED, 4])
+    rest_seen(acc, t + width * first, v0, nodes[REFERENCE_SPEED])
+    follow_reference(acc, nodes[REFERENCE_SPEED + 4])
     last = 0
     f = 0.0
     at0 = 0.0
@@ -294,7 +318,9 @@ def turns_while_creeping(acc: Any, nodes: Any, span: Span, look: Look) -> None:
 
 
 @kernel(exact=False)
-def count_events(acc: Any, turns: Any, nodes: Any, span: Span, look: Look, second: bool) -> None:
+def count_events(
+    acc: Any, turns: Turns, nodes: Any, span: Span, look: Look, slack: Slack, second: bool
+) -> None:  # fmt: skip
     """Count reversals and standstills over a part of a window, and note where the error leaves its band."""
     t, width = span
     first, part, count, m, free = look
@@ -307,6 +333,8 @@ def count_events(acc: Any, turns: Any, nodes: Any, span: Span, look: Look, secon
     q = free.velocity
     v0 = value(speed, first) + q
     a0 = value(rises, first) - free.damping * q - free.square * p
+    end = first + part
+    ends = value(speed, end), value(reference, end)
     touch(acc, t + width * first, value(quartic(nodes, AT), first) + p, v0)
     rest_seen(acc, t + width * first, v0, value(reference, first))
     for i in range(1, count + 1):
@@ -336,6 +364,14 @@ def count_events(acc: Any, turns: Any, nodes: Any, span: Span, look: Look, secon
             leave_band(acc, now, d, value(error, s - step) - p0, value(error, s) - p)
         v0 = v
         a0 = a
+        if i % LOOK_UP == 0 and acc.settle_band == 0.0:
+            # Ringing dies out: of what is left, the bounds may tell that it is calm.
+            sway = math.sqrt(free.square * p * p + q * q) + slack.speed
+            low, high = min(v - q, ends[0]) - sway, max(v - q, ends[0]) + sway
+            slowest, fastest = min(rate, ends[1]) - slack.reference, max(rate, ends[1]) + slack.reference
+            if not counts(low, high, slowest, fastest):
+                follow_reference(acc, ends[1])
+                break
     acc.last_velocity = v0
 
 

@@ -146,8 +146,9 @@ SEGMENT = np.dtype(
             # rad·s of the error at the end; what the end may be wrong by, rad.
             "integral_end", "error",
         )),
-        # Of the corrector.
+        # Rounds of the corrector; whether the reference was asked for in the middle.
         ("rounds", np.int64),
+        ("asked", np.int64),
     ]
 )  # fmt: skip
 """The motion over one accepted step."""

@@ -65,8 +65,10 @@ def look_ahead(loop: Loop, h: float, tol: float) -> None:
     middle = 0.5 * (now.command + end.torque) + 0.125 * h * (now.command_rate - end.torque_rate)
     if now.unseen != 0 and h <= now.seen_length:
         now.unseen -= 1
+        segment.asked = 0
         segment.command_mid = middle
         return
+    segment.asked = 1
     asked = command(loop, now.time + 0.5 * h)
     segment.command_mid, segment.goal_mid, segment.rate_mid = asked.torque, asked.position, asked.velocity
     # A torque m bends a free axis by less than m h²/8J.

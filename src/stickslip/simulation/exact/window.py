@@ -16,6 +16,7 @@ from stickslip.simulation._meter import (
     MOTOR,
     SPEED,
     Sums,
+    Turns,
     add,
     add_high_pass,
     extremes,
@@ -30,8 +31,8 @@ from stickslip.simulation.exact.scan import (
     Farthest,
     Free,
     Look,
+    Slack,
     Span,
-    bulge,
     calm,
     count_events,
     creeps,
@@ -40,6 +41,7 @@ from stickslip.simulation.exact.scan import (
     passes,
     peak_of,
     reach,
+    slack_of,
     turns_while_creeping,
 )
 
@@ -79,26 +81,26 @@ class Rings(NamedTuple):
     share: Shares
 
 
-class Bulges(NamedTuple):
-    """How far error, velocity and motor torque leave straight lines between the nodes of a window, or what ringing
-    adds to them at most."""
+class Swings(NamedTuple):
+    """What ringing adds to error, velocity and motor torque at most."""
 
     error: float
     speed: float
     motor: float
 
 
-@kernel(exact=False)
-def window(acc: Any, turns: Any, nodes: Any, span: Span) -> None:
+@kernel(exact=False, inline=True)
+def window(acc: Any, turns: Turns, nodes: Any, span: Span) -> None:
     """Add a window whose nodes show all of the motion."""
     t, width = span
     low, high = extremes(nodes, 0.25 * width)
     fine = acc.window <= MAX_WINDOW
-    second = add(acc, t, width, sums(nodes), nodes[ERROR, 4])
-    reached(acc, second, low, high, abs(nodes[SPEED, 4]), abs(nodes[MOTOR, 4]))
-    if reach(nodes, SPEED) > acc.v_max:
+    slack = slack_of(nodes)
+    second = add(acc, t, width, sums(nodes), nodes[ERROR + 4])
+    reached(acc, second, low, high, abs(nodes[SPEED + 4]), abs(nodes[MOTOR + 4]))
+    if reach(nodes, SPEED, slack.speed) > acc.v_max:
         acc.v_max = max(acc.v_max, peak_of(nodes, SPEED, width, STEPS))
-    if reach(nodes, MOTOR) > acc.tm_max:
+    if reach(nodes, MOTOR, slack.motor) > acc.tm_max:
         acc.tm_max = max(acc.tm_max, peak_of(nodes, MOTOR, width, STEPS))
     if not fine:
         return
@@ -107,44 +109,46 @@ def window(acc: Any, turns: Any, nodes: Any, span: Span) -> None:
     else:
         total, acc.low_pass = high_passed(quartic(nodes, SPEED), NO_RINGING, width, False, acc.low_pass)
         add_high_pass(acc, total, second)
-    if calm(acc, nodes, 0, 4, 0.0, 0.0):
-        passes(acc, turns, nodes, span, 0, 4, nodes[SPEED, 0], nodes[SPEED, 4])
-    elif creeps(acc, nodes, NO_FREE):
+    if calm(acc, nodes, 0, 4, 0.0, 0.0, slack):
+        passes(acc, turns, nodes, span, 0, 4, nodes[SPEED], nodes[SPEED + 4])
+    elif creeps(acc, nodes, NO_FREE, slack):
         steps = math.ceil(max(STEPS, width / FINE))
         turns_while_creeping(acc, nodes, span, Look(0.0, 1.0, steps, UNMOVED, NO_FREE))
     else:
         steps = math.ceil(max(STEPS, width / FINE) / 4.0)
         for k in range(4):
-            if calm(acc, nodes, k, 1, 0.0, 0.0):
-                passes(acc, turns, nodes, span, k, 1, nodes[SPEED, k], nodes[SPEED, k + 1])
+            if calm(acc, nodes, k, 1, 0.0, 0.0, slack):
+                passes(acc, turns, nodes, span, k, 1, nodes[SPEED + k], nodes[SPEED + k + 1])
             else:
-                count_events(acc, turns, nodes, span, Look(0.25 * k, 0.25, steps, UNMOVED, NO_FREE), second)
+                look = Look(0.25 * k, 0.25, steps, UNMOVED, NO_FREE)
+                count_events(acc, turns, nodes, span, look, slack, second)
 
 
-@kernel(exact=False)
-def ringing_window(acc: Any, turns: Any, nodes: Any, span: Span, rings: Rings) -> None:
+@kernel(exact=False, inline=True)
+def ringing_window(acc: Any, turns: Turns, nodes: Any, span: Span, rings: Rings) -> None:
     """Add a window whose nodes show all but the ringing."""
     ring, width = rings.motion, span.width
     fine = acc.window <= MAX_WINDOW
     events = False
+    slack = slack_of(nodes)
     if fine:
         energy = ring.square * ring.p0 * ring.p0 + ring.q0 * ring.q0
-        events = not calm(acc, nodes, 0, 4, math.sqrt(energy / ring.square), math.sqrt(energy) / width)
+        events = not calm(acc, nodes, 0, 4, math.sqrt(energy / ring.square), math.sqrt(energy) / width, slack)
     second = add(
-        acc, span.begin, width, with_ringing(nodes, ring, rings.share, width), nodes[ERROR, 4] - ring.p1
+        acc, span.begin, width, with_ringing(nodes, ring, rings.share, width), nodes[ERROR + 4] - ring.p1
     )
-    look_through(acc, turns, nodes, span, rings, events, second)
+    look_through(acc, turns, nodes, span, rings, slack, events, second)
     if fine:
         passed, acc.low_pass = high_passed(quartic(nodes, SPEED), ring, width, True, acc.low_pass)
         add_high_pass(acc, passed, second)
         if not events:
-            first, last = nodes[SPEED, 0] + ring.q0 / width, nodes[SPEED, 4] + ring.q1 / width
+            first, last = nodes[SPEED] + ring.q0 / width, nodes[SPEED + 4] + ring.q1 / width
             passes(acc, turns, nodes, span, 0, 4, first, last)
 
 
 @kernel(exact=False, inline=True)
 def look_through(
-    acc: Any, turns: Any, nodes: Any, span: Span, rings: Rings, events: bool, second: bool
+    acc: Any, turns: Turns, nodes: Any, span: Span, rings: Rings, slack: Slack, events: bool, second: bool
 ) -> None:  # fmt: skip
     """Note the extremes of a window that rings: what is looked through is each quarter whose bounds lie beyond those so
     far, or a short window as a whole.
@@ -154,23 +158,22 @@ def look_through(
     lin, m, ring, share = rings
     width = span.width
     v1 = ring.q1 / width
-    last = nodes[ERROR, 4] - ring.p1
-    motor = nodes[MOTOR, 4] + share.motor_p * ring.p1 + share.motor_v * v1
-    reached(acc, second, last, last, abs(nodes[SPEED, 4] + v1), abs(motor))
-    more = Bulges(bulge(nodes, ERROR), bulge(nodes, SPEED), bulge(nodes, MOTOR))
+    last = nodes[ERROR + 4] - ring.p1
+    motor = nodes[MOTOR + 4] + share.motor_p * ring.p1 + share.motor_v * v1
+    reached(acc, second, last, last, abs(nodes[SPEED + 4] + v1), abs(motor))
     stiff = math.sqrt(lin.square)
     p = ring.p0
     v = ring.q0 / width
     parts = 1 if width * stiff * A_RADIAN <= 2.0 * STEPS else 4
     if parts > 1 and not events:
-        shows, _ = shown(acc, nodes, 0, 4, more, swings(stiff * p, v, stiff, share), False, second)
+        shows, _ = shown(acc, nodes, 0, 4, slack, swings(stiff * p, v, stiff, share), False, second)
         if shows < 0.0:
             return
     for k in range(parts):
         sway = math.sqrt(lin.square * p * p + v * v)
-        quiet = parts > 1 and events and calm(acc, nodes, k, 1, sway / stiff, sway)
+        quiet = parts > 1 and events and calm(acc, nodes, k, 1, sway / stiff, sway, slack)
         here = events and not quiet
-        shows, may = shown(acc, nodes, k, 4 // parts, more, swings(stiff * p, v, stiff, share), here, second)
+        shows, may = shown(acc, nodes, k, 4 // parts, slack, swings(stiff * p, v, stiff, share), here, second)
         if shows >= 0.0:
             long = width / parts
             count = max(STEPS / parts, long / FINE if here else 0.0)
@@ -181,43 +184,43 @@ def look_through(
             free = Free(p, v, 2.0 * lin.decay, lin.square)
             look = Look(k / parts, 1.0 / parts, steps, flow(lin, long / steps), free)
             motor_shares = (share.motor_p, share.motor_v)
-            looked_through(acc, turns, nodes, span, look, motor_shares, may, second)
+            looked_through(acc, turns, nodes, span, look, motor_shares, may, slack, second)
         if parts > 1:
-            before = nodes[SPEED, k] + v
+            before = nodes[SPEED + k] + v
             p, v = free_motion(m, p, v)
             if quiet:
-                passes(acc, turns, nodes, span, k, 1, before, nodes[SPEED, k + 1] + v)
+                passes(acc, turns, nodes, span, k, 1, before, nodes[SPEED + k + 1] + v)
 
 
 @kernel(exact=False, inline=True)
-def swings(w: float, v: float, stiff: float, share: Shares) -> Bulges:
+def swings(w: float, v: float, stiff: float, share: Shares) -> Swings:
     """What ringing adds to error, velocity and motor torque from here on at most, as its energy falls."""
     sway = math.sqrt(w * w + v * v)
     swing = sway / stiff
-    return Bulges(swing, sway, abs(share.motor_p) * swing + abs(share.motor_v) * sway)
+    return Swings(swing, sway, abs(share.motor_p) * swing + abs(share.motor_v) * sway)
 
 
 @kernel(exact=False, inline=True)
 def shown(
-    acc: Any, nodes: Any, k: int, quarters: int, more: Bulges, rings: Bulges, events: bool, second: bool
+    acc: Any, nodes: Any, k: int, quarters: int, slack: Slack, rings: Swings, events: bool, second: bool
 ) -> tuple[float, Farthest]:  # fmt: skip
     """The greatest part that ringing has in a peak that some quarters of a window, from k on, may hold, -1 where they
     hold none; and which peaks they may hold."""
     swing, sway, pull = rings
-    low = nodes[ERROR, k]
+    low = nodes[ERROR + k]
     high = low
-    speed = abs(nodes[SPEED, k])
-    motor = abs(nodes[MOTOR, k])
+    speed = abs(nodes[SPEED + k])
+    motor = abs(nodes[MOTOR + k])
     for i in range(k + 1, k + quarters + 1):
-        low = min(low, nodes[ERROR, i])
-        high = max(high, nodes[ERROR, i])
-        speed = max(speed, abs(nodes[SPEED, i]))
-        motor = max(motor, abs(nodes[MOTOR, i]))
+        low = min(low, nodes[ERROR + i])
+        high = max(high, nodes[ERROR + i])
+        speed = max(speed, abs(nodes[SPEED + i]))
+        motor = max(motor, abs(nodes[MOTOR + i]))
     shows = 0.0 if events else -1.0
     may = Farthest(
-        farther(acc, second, low - more.error - swing, high + more.error + swing),
-        speed + more.speed + sway > acc.v_max,
-        motor + more.motor + pull > acc.tm_max,
+        farther(acc, second, low - slack.error - swing, high + slack.error + swing),
+        speed + slack.speed + sway > acc.v_max,
+        motor + slack.motor + pull > acc.tm_max,
         events,
     )
     if may.error:
