@@ -222,8 +222,8 @@ def motion(plant: Machine, result: Identification) -> str:
         (angle.on(friction), [position_feedforward(found, angle="reference", lead=lead)]),
     ):
         blocks = [ss.ControlBlock("friction_feedforward", model), *more]
-        drive = ss.SampledController(
-            loop, plant.sample_time, feedforward=blocks, torque_limit=plant.limits["torque"]
+        drive = ss.Controller(
+            loop=loop, sample_time=plant.sample_time, feedforward=blocks, torque_limit=plant.limits["torque"]
         )
         record = ss.simulate(plant, drive, ss.Reference("ramp", velocity=speed), duration=9.0)
         late = record.time > 2.0

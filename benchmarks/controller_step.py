@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from stickslip.control.catalogue import Belief, compensated
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.export.c99_controller import write
 from stickslip.model import Model
 
@@ -62,7 +62,7 @@ int main(void)
 """
 
 
-def controller(name: str) -> SampledController:
+def controller(name: str) -> Controller:
     """A compensator of the catalogue on the thesis's axis, beside a PD (the scale alone: a PID) of 20 Hz."""
     loop = "PID" if name == "scale" else "PD"
     return compensated(name, loop, Belief(3.8623e-4, LAW, torque_limit=1.0, bandwidth=20.0, counts=65536.0))

@@ -21,6 +21,9 @@ FURTHER = {
 }
 """Modules besides the package's own names, and what of them is shown; () shows the whole module."""
 
+WHOLE = ("Controller",)
+"""Classes whose inherited members are shown too."""
+
 
 def make() -> None:
     """Write the pages."""
@@ -42,6 +45,7 @@ def page(module: str, name: str) -> str:
     found = getattr(__import__(module, fromlist=[name]), name)
     directive = "autoclass" if inspect.isclass(found) else "autofunction"
     members = "\n   :members:" if inspect.isclass(found) else ""
+    members += "\n   :inherited-members:" if name in WHOLE else ""
     return (
         f"# {module}.{name}\n\n```{{eval-rst}}\n.. {directive}:: {module}.{name}{members}\n```\n\n"
         "Symbols and units: [nomenclature](../nomenclature.md).\n"

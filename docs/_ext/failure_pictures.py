@@ -12,7 +12,7 @@ import numpy as np
 from pages import GENERATED, ROOT
 
 from stickslip.control.block import ControlBlock
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.machines.contact import Contact
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Harmonics
@@ -227,7 +227,9 @@ def repeated(fed_with: str) -> np.ndarray:
         "disturbance_observer", None, {"fed_with": fed_with}, inertia=INERTIA, corner=200.0
     )
     loop = ControlBlock("pd", kp=6.1, kd=0.097)
-    control = SampledController(loop, 1e-3, feedforward=learner, observer=observer, torque_limit=1.0)
+    control = Controller(
+        loop=loop, sample_time=1e-3, feedforward=learner, observer=observer, torque_limit=1.0
+    )
     reference = Reference("sine", amplitude=0.1, frequency=0.4)
     record = simulate(machine, control, reference, 1e-3 * SAMPLES * REPETITIONS, metered=False)
     error = (record["position_reference"] - record["position"])[: SAMPLES * REPETITIONS]

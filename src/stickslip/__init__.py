@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from stickslip.control.controller import Controller
     from stickslip.control.linear import Cascade, Gains, pd, pid, place, pr
     from stickslip.control.registry import control_law, control_law_names
-    from stickslip.control.sampled_controller import SampledController
     from stickslip.control_spec import ControlLaw
     from stickslip.errors import InputError, SimulationError, StickslipError
     from stickslip.machines.files import load_machine
@@ -63,7 +62,6 @@ _HOME = {
     "Record": "record",
     "Reference": "model",
     "RigidAxis": "machines.rigid",
-    "SampledController": "control.sampled_controller",
     "SimulationError": "errors",
     "StickslipError": "errors",
     "SweepResult": "verbs.sweep",
@@ -108,7 +106,6 @@ __all__ = [
     "Record",
     "Reference",
     "RigidAxis",
-    "SampledController",
     "SimulationError",
     "StickslipError",
     "SweepResult",

@@ -16,9 +16,9 @@ from stickslip.analyse.presliding_loop import Drive, Loop, describing
 from stickslip.cli import main
 from stickslip.contract.control_laws import Plain, block_of, specimen
 from stickslip.control.block import ControlBlock
+from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.control.registry import control_law, control_law_names
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.machines.files import machine
 from stickslip.study.controller_confirmed import confirmed_controller, scaled
@@ -35,7 +35,7 @@ LINEAR = [n for n in control_law_names() if control_law(n).is_linear]
 def placed(kind, bandwidth, **more):
     gains = place(kind, 3.8623e-4, bandwidth, 1.0)
     values = {"kp": gains.kp, "kd": gains.kd, **({"ki": gains.ki} if gains.ki else {})}
-    return SampledController(ControlBlock(kind.lower(), **values), T, **more), gains
+    return Controller(loop=ControlBlock(kind.lower(), **values), sample_time=T, **more), gains
 
 
 @pytest.mark.parametrize("name", LINEAR)
@@ -109,7 +109,9 @@ def test_margins_are_where_the_loop_goes_unstable():
     assert sliding.poles.stable
     _, high = sliding.torque
     for factor, good in ((0.98 * high, True), (1.02 * high, False)):
-        scaled = SampledController(ControlBlock("pd", kp=factor * gains.kp, kd=factor * gains.kd), T)
+        scaled = Controller(
+            loop=ControlBlock("pd", kp=factor * gains.kp, kd=factor * gains.kd), sample_time=T
+        )
         assert controller_stability(RIGID, scaled).loops[1].poles.stable == good
     assert found.softer == 1.0  # a PD holds the axis alone
     late = controller_stability(RIGID, controller, sliding.delay + 0.15).loops[1]
@@ -127,7 +129,10 @@ def test_the_virtual_rig_does_what_the_poles_say():
     assert not restless.loops[0].poles.stable
     limit = 1.0
     moves = [
-        moved(DRY, SampledController(c.loop, T, None, c.observer, torque_limit=limit))
+        moved(
+            DRY,
+            Controller(loop=c.loop, sample_time=T, feedforward=None, observer=c.observer, torque_limit=limit),
+        )
         for c in (calm, perturbed)
     ]
     assert moves[1] > 5.0 * moves[0]
@@ -138,11 +143,11 @@ def test_the_virtual_rig_does_what_the_poles_say():
 def test_what_is_not_smooth_about_rest_is_refused():
     smooth = block_of(control_law(str(OWN)))
     assert (
-        linearised(SampledController(smooth, T), 1e-6, 100.0).state_space()[3] < 0.0
+        linearised(Controller(loop=smooth, sample_time=T), 1e-6, 100.0).state_space()[3] < 0.0
     )  # inside its boundary layer
     sharp = ControlBlock(smooth.law, **{**smooth.parameters._asdict(), "layer": 1e-9})
     with pytest.raises(InputError, match="sliding_mode is not smooth about rest"):
-        linearised(SampledController(sharp, T), 1e-6, 100.0)
+        linearised(Controller(loop=sharp, sample_time=T), 1e-6, 100.0)
 
 
 FILE = """
@@ -166,9 +171,9 @@ def test_the_rig_does_what_the_poles_say_of_softer_and_stiffer_loops():
 
 def test_a_loop_that_is_not_gains_alone_is_tried_as_it_is():
     sliding = ControlBlock(str(OWN), inertia=DRY.inertia, slope=62.8, torque=0.45, layer=0.5)
-    found = confirmed_controller(DRY, SampledController(sliding, T))
+    found = confirmed_controller(DRY, Controller(loop=sliding, sample_time=T))
     assert [p.factor for p in found.points] == [1.0]
-    assert scaled(SampledController(sliding, T), 2.0) is None
+    assert scaled(Controller(loop=sliding, sample_time=T), 2.0) is None
 
 
 def test_the_command(tmp_path, monkeypatch, capsys):

@@ -9,7 +9,7 @@ import pytest
 
 from stickslip.analyse.observer_corner import DAMPING, HIGHEST, damped, default_corner, largest_corner, poles
 from stickslip.control.block import ControlBlock
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
 from stickslip.spec import Surroundings
 
@@ -20,7 +20,7 @@ PD = ControlBlock("pd", kp=INERTIA * W**2, kd=2.0 * INERTIA * W)
 
 def with_observer(corner, **choices):
     helper = ControlBlock("disturbance_observer", None, choices, inertia=INERTIA, corner=corner)
-    return SampledController(PD, 1e-3, observer=helper)
+    return Controller(loop=PD, sample_time=1e-3, observer=helper)
 
 
 LIMITS = [  # inertia over the nominal one, delay in samples, choices, largest stable corner, with damping 0.3
@@ -44,7 +44,7 @@ def test_limits_are_those_of_the_reference(ratio, delay, how, stable, calm):
         helper = ControlBlock(
             "disturbance_observer", None, choices, inertia=INERTIA, corner=corner, delay=how.get("delay", 0.0)
         )
-        return SampledController(PD, 1e-3, observer=helper)
+        return Controller(loop=PD, sample_time=1e-3, observer=helper)
 
     assert largest_corner(made, ratio * INERTIA, delay) == pytest.approx(stable, abs=5.0)
     assert largest_corner(made, ratio * INERTIA, delay, DAMPING) == pytest.approx(calm, abs=5.0)
@@ -78,4 +78,4 @@ def test_the_default_corner_keeps_its_damping_with_the_inertia_off_and_no_larger
 
 def test_only_a_disturbance_observer_has_a_default_corner():
     with pytest.raises(ParameterError, match="the controller has no disturbance_observer; give it one"):
-        default_corner(SampledController(PD, 1e-3))
+        default_corner(Controller(loop=PD, sample_time=1e-3))

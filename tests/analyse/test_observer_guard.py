@@ -8,7 +8,7 @@ import pytest
 
 from stickslip.analyse.observer_guard import largest_stiffness, objection, positive_real_ratios, stuck_radius
 from stickslip.control.block import ControlBlock
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
 
 INERTIA, STIFFNESS = 3.8623e-4, 25_000.0  # the thesis's axis and its contact
@@ -20,7 +20,7 @@ def observed(sigma0, correction=1.0):
     helper = ControlBlock(
         "lugre_observer", sigma0=sigma0, sigma2=0.018, correction=correction, fs=0.335, fc=0.285, vs=0.01
     )
-    return SampledController(PD, 1e-3, observer=helper)
+    return Controller(loop=PD, sample_time=1e-3, observer=helper)
 
 
 @pytest.mark.parametrize(("delay", "limit"), [(0, 25_000.0), (1, 15_800.0)])
@@ -42,7 +42,7 @@ def test_what_the_guard_says():
     assert coarse.startswith("one count of the encoder, 9.59e-05 rad, bends its bristle by 0.959 N·m")
     assert objection(observed(500.0), INERTIA, STIFFNESS, 65_536.0, 0.018, 1) == ""
     with pytest.raises(ParameterError, match="the controller has no lugre_observer; give it one"):
-        largest_stiffness(SampledController(PD, 1e-3), INERTIA, STIFFNESS)
+        largest_stiffness(Controller(loop=PD, sample_time=1e-3), INERTIA, STIFFNESS)
 
 
 def test_ratios_of_positive_realness():

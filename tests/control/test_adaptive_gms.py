@@ -95,8 +95,11 @@ def test_coefficients_stay_within_their_bounds_and_the_curve_is_never_negative()
 @pytest.mark.parametrize("velocity", ["reference", "measured"])
 def test_nothing_is_learned_while_the_reference_stands(velocity):
     law = LAW.having(velocity=velocity)
-    drive = ss.SampledController(
-        ss.ControlBlock("pid", **PID), TIME, observer=ss.ControlBlock(law, **law.example), torque_limit=1.0
+    drive = ss.Controller(
+        loop=ss.ControlBlock("pid", **PID),
+        sample_time=TIME,
+        observer=ss.ControlBlock(law, **law.example),
+        torque_limit=1.0,
     )
     n, m, z, p = drive.settings, drive.memory(), drive.state(), drive.parameters
     u, out = SimpleNamespace(**Surroundings()._asdict()), []
@@ -128,7 +131,7 @@ def rms(adaptive, loop, scale, motion):
     """mrad on an axis whose GMS law has levels of that scale, over the second period."""
     curve = {**CURVE, "fs": scale * CURVE["fs"], "fc": scale * CURVE["fc"]}
     axis = ss.RigidAxis(INERTIA, Model("gms", k=K.tolist(), alpha=[1 / 3] * 3, c=23.8782, **curve))
-    drive = ss.SampledController(loop, TIME, observer=adaptive, torque_limit=1.0, alone=True)
+    drive = ss.Controller(loop=loop, sample_time=TIME, observer=adaptive, torque_limit=1.0, alone=True)
     amplitude, frequency = MOTIONS[motion]
     reference = ss.Reference("sine", amplitude=amplitude, frequency=frequency)
     record = ss.simulate(axis, drive, reference, 2.0 / frequency, integrator="sampled", metered=False)

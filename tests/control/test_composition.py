@@ -11,11 +11,9 @@ import pytest
 
 from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Feedback, Feedforward
-from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.control.registry import control_law, control_law_names
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import LawError, ParameterError, UnknownName
 from stickslip.model import Model
 from stickslip.spec import Surroundings
@@ -71,32 +69,42 @@ def ff(model, **more):
 
 PAIRS = {
     "PD": (
-        SampledController(pd(), TIME, torque_limit=1.0),
+        Controller(loop=pd(), sample_time=TIME, torque_limit=1.0),
         Controller(place("PD", INERTIA, 20.0, 1.0), None, 1.0, TIME),
     ),
     "PID": (
-        SampledController(pid(), TIME),
+        Controller(loop=pid(), sample_time=TIME),
         Controller(place("PID", INERTIA, 20.0, 1.0), None, sample_time=TIME),
     ),
     "PR": (
-        SampledController(ControlBlock("pr", kp=pd().parameters.kp, kd=pd().parameters.kd), TIME),
+        Controller(loop=ControlBlock("pr", kp=pd().parameters.kp, kd=pd().parameters.kd), sample_time=TIME),
         Controller(place("PR", INERTIA, 20.0, 1.0), None, sample_time=TIME),
     ),
     "cascade at its limit": (
-        SampledController(
-            ControlBlock("cascade", kv=60.0, kvp=0.1, kvi=6.0, feed=0.7), TIME, ff(LUGRE), torque_limit=0.3
+        Controller(
+            loop=ControlBlock("cascade", kv=60.0, kvp=0.1, kvi=6.0, feed=0.7),
+            sample_time=TIME,
+            feedforward=ff(LUGRE),
+            torque_limit=0.3,
         ),
         Controller(Cascade(60.0, 0.1, 6.0, 0.7), Feedforward(LUGRE), 0.3, TIME),
     ),
     "feedforward": (
-        SampledController(pd(), TIME, ff(GMS, gain=0.9, lead=1e-3, deadband=0.02), torque_limit=0.6),
+        Controller(
+            loop=pd(),
+            sample_time=TIME,
+            feedforward=ff(GMS, gain=0.9, lead=1e-3, deadband=0.02),
+            torque_limit=0.6,
+        ),
         Controller(
             place("PD", INERTIA, 20.0, 1.0), Feedforward(GMS, 0.9, lead=1e-3, deadband=0.02), 0.6, TIME
         ),
     ),
     "feedforward of friction and inertia": (
-        SampledController(
-            pid(), TIME, [ff(LUGRE), ControlBlock("inertia_feedforward", inertia=INERTIA, offset=0.03)]
+        Controller(
+            loop=pid(),
+            sample_time=TIME,
+            feedforward=[ff(LUGRE), ControlBlock("inertia_feedforward", inertia=INERTIA, offset=0.03)],
         ),
         Controller(
             place("PID", INERTIA, 20.0, 1.0),
@@ -105,12 +113,14 @@ PAIRS = {
         ),
     ),
     "feedback": (
-        SampledController(pd(), TIME, observer=ControlBlock("friction_feedback", LUGRE, gain=0.7)),
+        Controller(loop=pd(), sample_time=TIME, observer=ControlBlock("friction_feedback", LUGRE, gain=0.7)),
         Controller(place("PD", INERTIA, 20.0, 1.0), Feedback(LUGRE, 0.7), sample_time=TIME),
     ),
     "filtered velocity": (
-        SampledController(
-            pd(), TIME, estimator=ControlBlock("filtered_difference", corner=2.0 * math.pi * 80.0)
+        Controller(
+            loop=pd(),
+            sample_time=TIME,
+            estimator=ControlBlock("filtered_difference", corner=2.0 * math.pi * 80.0),
         ),
         Controller(place("PD", INERTIA, 20.0, 1.0), sample_time=TIME, velocity_filter=80.0),
     ),
@@ -160,7 +170,7 @@ REPLACED = {
 def test_gains_and_a_compensator_are_control_laws_bit_for_bit(name):
     old = REPLACED[name]
     inputs = motion()[: 200 if "filter" in name or "low-pass" in name else None]
-    mine, theirs = torques_of(composed_of(old), inputs), old_torques_of(old, inputs)
+    mine, theirs = torques_of(old, inputs), old_torques_of(old, inputs)
     assert np.abs(theirs).max() > 0.01
     assert np.array_equal(mine, theirs)
 
@@ -176,21 +186,28 @@ def test_two_laws_of_one_file_keep_their_own_choices():
     curve = {"curve": "double_exponential"}
     example = LUGRE.law.having(**curve).example
     other = Model("lugre", curve, **{**example, "sigma0": 3.5e4, "sigma1": 0.0})
-    controller = SampledController(pd(), TIME, ff(LUGRE), ControlBlock("friction_feedback", other, gain=0.5))
-    alone = SampledController(pd(), TIME, observer=ControlBlock("friction_feedback", other, gain=0.5))
-    base, inputs = SampledController(pd(), TIME, ff(LUGRE)), motion()
-    none = SampledController(pd(), TIME)
+    controller = Controller(
+        loop=pd(),
+        sample_time=TIME,
+        feedforward=ff(LUGRE),
+        observer=ControlBlock("friction_feedback", other, gain=0.5),
+    )
+    alone = Controller(
+        loop=pd(), sample_time=TIME, observer=ControlBlock("friction_feedback", other, gain=0.5)
+    )
+    base, inputs = Controller(loop=pd(), sample_time=TIME, feedforward=ff(LUGRE)), motion()
+    none = Controller(loop=pd(), sample_time=TIME)
     whole, parts = torques_of(controller, inputs), torques_of(alone, inputs) + torques_of(base, inputs)
     assert whole == pytest.approx(parts - torques_of(none, inputs), abs=1e-13)
 
 
 def test_a_law_belongs_in_its_place():
     with pytest.raises(ParameterError, match="observer = 'pd' cannot be used as observer; give it as loop"):
-        SampledController(pd(), TIME, observer=pd())
+        Controller(loop=pd(), sample_time=TIME, observer=pd())
     with pytest.raises(ParameterError, match=r"sample_time = -0\.001 s must be at least 0"):
-        SampledController(pd(), -TIME)
+        Controller(loop=pd(), sample_time=-TIME)
     with pytest.raises(ParameterError, match="no control law"):
-        SampledController(None, TIME)
+        Controller(loop=None, sample_time=TIME)
 
 
 def test_a_block_says_what_is_wrong_with_it():
@@ -217,14 +234,14 @@ def test_what_adapts_stands_over_an_integral_or_an_observer(name):
     block = ControlBlock(law, LUGRE if law.holds_friction else None, **law.example)
     places = {"loop": pd(), law.place: block}
     with pytest.raises(ParameterError, match=f"{name} cannot adapt while the axis sticks") as refused:
-        SampledController(sample_time=TIME, **places)
+        Controller(sample_time=TIME, **places)
     assert "\n" not in str(refused.value)
-    SampledController(sample_time=TIME, alone=True, **places)
+    Controller(sample_time=TIME, alone=True, **places)
     helper = ControlBlock("disturbance_observer", inertia=INERTIA, corner=200.0)
     observers = [block, helper] if law.place == "observer" else helper
-    SampledController(sample_time=TIME, **{**places, "observer": observers})
+    Controller(sample_time=TIME, **{**places, "observer": observers})
     if law.place != "loop":
-        SampledController(sample_time=TIME, **{**places, "loop": pid()})
+        Controller(sample_time=TIME, **{**places, "loop": pid()})
 
 
 def test_eight_laws_adapt():
@@ -243,10 +260,10 @@ def test_a_scale_needs_a_friction_law_with_a_torque_at_constant_velocity():
 
 
 def test_a_learnt_scale_stays_inside_its_bounds_and_where_it_is_at_rest():
-    controller = SampledController(
-        pid(),
-        TIME,
-        ControlBlock("scaled_feedforward", LUGRE, **control_law("scaled_feedforward").example),
+    controller = Controller(
+        loop=pid(),
+        sample_time=TIME,
+        feedforward=ControlBlock("scaled_feedforward", LUGRE, **control_law("scaled_feedforward").example),
     )
     n, m, z, p = controller.settings, controller.memory(), controller.state(), controller.parameters
     u, sample = SimpleNamespace(**Surroundings()._asdict()), controller.functions["sample"]
@@ -278,7 +295,7 @@ def test_a_control_law_in_a_file_of_ones_own(tmp_path):
         "CONTROL_LAW = ControlLaw('spring', Params, sample, 'loop', title='Spring', equation='k e',\n"
         "                         source=('own',), example={'k': 1.0}, linear=True)\n"
     )
-    controller = SampledController(ControlBlock(str(own), k=3.0), TIME)
+    controller = Controller(loop=ControlBlock(str(own), k=3.0), sample_time=TIME)
     assert torques_of(controller, motion()[:100]) == pytest.approx(6e-3 * np.sin(np.arange(100) * 0.05))
     empty = tmp_path / "empty.py"
     empty.write_text("")
@@ -289,7 +306,11 @@ def test_a_control_law_in_a_file_of_ones_own(tmp_path):
 def test_a_friction_observers_correction_is_a_velocity_besides():
     law = Model("viscous", sigma2=0.5)
     late, corrected = (
-        SampledController(pd(), TIME, observer=ControlBlock("friction_observer", law, gain=0.8, correction=k))
+        Controller(
+            loop=pd(),
+            sample_time=TIME,
+            observer=ControlBlock("friction_observer", law, gain=0.8, correction=k),
+        )
         for k in (0.0, 3.0)
     )
     inputs = motion()[:200]
@@ -305,10 +326,10 @@ def test_what_accelerates_the_inertia_is_no_compensation_to_an_observer():
     errors = {}
     for observed in (False, True):
         for fed in (0.0, inertia):
-            made = SampledController(
-                ControlBlock("pd", kp=6.0, kd=0.1), time,
-                ControlBlock("inertia_feedforward", inertia=fed, offset=0.05),
-                ControlBlock("disturbance_observer", inertia=inertia, corner=200.0) if observed else None,
+            made = Controller(
+                loop=ControlBlock("pd", kp=6.0, kd=0.1), sample_time=time,
+                feedforward=ControlBlock("inertia_feedforward", inertia=fed, offset=0.05),
+                observer=ControlBlock("disturbance_observer", inertia=inertia, corner=200.0) if observed else None,
             )  # fmt: skip
             n, m, z, p = made.settings, made.memory(), made.state(), made.parameters
             u, sample = SimpleNamespace(**Surroundings()._asdict()), made.functions["sample"]

@@ -90,8 +90,8 @@ def rms(controller, scale):
 @pytest.mark.parametrize(("scale", "share"), [(0.7, 0.9), (1.0, 0.2), (1.3, 0.22)])
 def test_it_is_better_than_the_pid_whatever_the_friction(scale, share):
     pid = ss.ControlBlock("pid", **PID)
-    alone = ss.SampledController(pid, 1e-3, torque_limit=1.0)
-    adaptive = ss.SampledController(pid, 1e-3, observer=observer(), torque_limit=1.0)
+    alone = ss.Controller(loop=pid, sample_time=1e-3, torque_limit=1.0)
+    adaptive = ss.Controller(loop=pid, sample_time=1e-3, observer=observer(), torque_limit=1.0)
     assert rms(adaptive, scale) < share * rms(alone, scale)
 
 
@@ -108,7 +108,7 @@ def moved(controller, samples, position, reference, velocity):
 def test_factors_stay_within_their_bounds_and_where_they_are_at_rest():
     pid = ss.ControlBlock("pid", **PID)
     block = observer(rate1=1.0, rate2=1.0, most1=0.3, most2=0.1)
-    drive = ss.SampledController(pid, 1e-3, observer=block, torque_limit=1.0)
+    drive = ss.Controller(loop=pid, sample_time=1e-3, observer=block, torque_limit=1.0)
     late = moved(drive, 5000, lambda t: 0.0, lambda t: 0.3 * t, lambda t: 0.3)[-1]
     assert late["observer_scale"] == 2.0
     assert 0.0 <= late["observer_damping"] <= 0.3

@@ -9,9 +9,9 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 from stickslip.control.block import ControlBlock
+from stickslip.control.controller import Controller
 from stickslip.control.estimators import ESTIMATORS
 from stickslip.control.registry import control_law
-from stickslip.control.sampled_controller import SampledController
 from stickslip.spec import Surroundings
 
 TIME = 1e-3
@@ -19,7 +19,7 @@ TIME = 1e-3
 
 def velocities(block, position):
     """The estimate along measured positions, rad/s."""
-    controller = SampledController(ControlBlock("pd", kp=0.0, kd=1.0), TIME, estimator=block)
+    controller = Controller(loop=ControlBlock("pd", kp=0.0, kd=1.0), sample_time=TIME, estimator=block)
     n, m, z, p = controller.settings, controller.memory(), controller.state(), controller.parameters
     u, sample = SimpleNamespace(**Surroundings()._asdict()), controller.functions["sample"]
     return np.array([-sample(x, x, 0.0, 0.0, n, m, z, p, u) for x in position.tolist()])

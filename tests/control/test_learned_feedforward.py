@@ -24,7 +24,7 @@ def learner(**more):
 
 def loop_with(*feedforward):
     loop = ss.ControlBlock("pid", kp=6.0, kd=0.1, ki=100.0)
-    return ss.SampledController(loop, TIME, feedforward=feedforward, torque_limit=2.0)
+    return ss.Controller(loop=loop, sample_time=TIME, feedforward=feedforward, torque_limit=2.0)
 
 
 def samples():
@@ -106,7 +106,7 @@ def given_over_time(over, count, missing=()):
     block = ss.ControlBlock("table_feedforward", None, {"over": over}, step=2e-3, table=table)
     rows = np.zeros((count, 4))
     rows[list(missing), 0] = np.nan
-    return ran(ss.SampledController(None, TIME, feedforward=block), rows)[0][:, 1]
+    return ran(ss.Controller(loop=None, sample_time=TIME, feedforward=block), rows)[0][:, 1]
 
 
 def test_a_table_over_time_begins_at_the_first_sample_and_is_held_or_repeated():

@@ -14,7 +14,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.control.block import ControlBlock
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 
 SIGMA0, SIGMA1 = 1e5, math.sqrt(1e5)
 CURVE = {"fs": 1.5, "fc": 1.0, "vs": 1e-3, "sigma2": 0.4}
@@ -25,13 +25,13 @@ FINE = 1e-4  # s
 def loop(correction, sample_time):
     pid = ControlBlock("pid", kp=3.0, ki=4.0, kd=6.0)
     if correction is None:
-        return SampledController(pid, sample_time)
+        return Controller(loop=pid, sample_time=sample_time)
     # The paper's bristle has no bound, and sigma1 dz/dt is given too.
     observer = ControlBlock(
         "lugre_observer", sigma0=SIGMA0, sigma1=SIGMA1, correction=correction, most=1e6, **CURVE
     )
     ahead = ControlBlock("inertia_feedforward", inertia=1.0, offset=0.0)
-    return SampledController(pid, sample_time, ahead, observer)
+    return Controller(loop=pid, sample_time=sample_time, feedforward=ahead, observer=observer)
 
 
 def late_error(motion, correction, sample_time=FINE):

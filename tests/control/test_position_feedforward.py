@@ -87,7 +87,7 @@ def test_a_machines_motion_is_smoother_by_four(angle):
     loop = ss.ControlBlock("pd", kp=gains.kp, kd=gains.kd)
     found = []
     for more in ([], [position_feedforward(cogging_of(plant), angle=angle, lead=1.0e-3)]):
-        drive = ss.SampledController(loop, 1e-3, feedforward=[friction, *more], torque_limit=2.0)
+        drive = ss.Controller(loop=loop, sample_time=1e-3, feedforward=[friction, *more], torque_limit=2.0)
         record = ss.simulate(plant, drive, ss.Reference("ramp", velocity=1.0), duration=4.0)
         late = record.time > 1.0
         error = record["position_reference"] - record["position"]

@@ -7,7 +7,6 @@ import pytest
 
 from stickslip import plugins
 from stickslip.control.compensator import Feedback
-from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.export import arduino, arduino_controller, c99
@@ -17,7 +16,7 @@ from stickslip.model import Model
 
 def controller_with(model):
     helper = Feedback(model, filter_hz=10.0)
-    return composed_of(Controller(place("PID", 1e-3, 10.0, 1.0), helper, sample_time=2e-3))
+    return Controller(place("PID", 1e-3, 10.0, 1.0), helper, sample_time=2e-3)
 
 
 def exported(model, kind):

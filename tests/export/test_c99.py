@@ -12,7 +12,6 @@ import pytest
 
 from stickslip import plugins
 from stickslip.control.compensator import Feedback, Feedforward
-from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.errors import InputError
@@ -73,7 +72,7 @@ def built(job, program, folder, compiler, *more):
 
 def built_controller(controller, program, folder, compiler, single=False):
     """The same of a controller."""
-    files = c99_controller.write(composed_of(controller), "x", single).files
+    files = c99_controller.write(controller, "x", single).files
     return looped(files, single, program, folder, compiler)
 
 
@@ -260,7 +259,7 @@ def test_the_compiled_controller_gives_the_bits_of_a_text_of_its_own(kind):
 
 def test_a_controller_in_continuous_time_is_refused():
     with pytest.raises(InputError, match="sample_time"):
-        c99_controller.write(composed_of(Controller(place("PD", 1e-3, 10.0, 1.0))), "x")
+        c99_controller.write(Controller(place("PD", 1e-3, 10.0, 1.0)), "x")
 
 
 def test_a_name_that_is_no_identifier_is_refused():
@@ -300,7 +299,7 @@ MODEL = Model("stribeck", k=50.0, fs=0.33, fc=0.28, vs=0.1, sigma2=0.02)
     ids=["ff", "fb", "PD and ff"],
 )
 def test_what_the_readme_shows_compiles_and_gives_the_torque(controller, said, single, tmp_path):
-    files = c99_controller.write(composed_of(controller), "axis", single).files
+    files = c99_controller.write(controller, "axis", single).files
     readme = files["README.md"]
     assert said in readme
     assert ("add it to the torque" in readme) is (not any(controller.gains))

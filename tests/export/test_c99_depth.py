@@ -10,7 +10,6 @@ from test_c99 import COMPILERS, answers, example
 
 from stickslip import plugins
 from stickslip.control.compensator import Feedback
-from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.export import c99, c99_controller
@@ -38,7 +37,7 @@ def analysed(folder, *files):
 def test_cppcheck_finds_nothing(law, tmp_path):
     model = example(law)
     controller = Controller(place("PID", 1e-3, 10.0, 1.0), Feedback(model, filter_hz=10.0), sample_time=1e-3)
-    law, whole = c99.write(Job(model, "x")), c99_controller.write(composed_of(controller), "y")
+    law, whole = c99.write(Job(model, "x")), c99_controller.write(controller, "y")
     for name, text in {**law.files, **whole.files}.items():
         (tmp_path / name).write_text(text)
     assert analysed(tmp_path, "x.c", "x_check.c") == ""

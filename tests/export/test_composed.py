@@ -11,8 +11,8 @@ import pytest
 from stickslip import plugins
 from stickslip.contract.control_laws import Plain, specimen
 from stickslip.control.block import ControlBlock
+from stickslip.control.controller import Controller
 from stickslip.control.registry import control_law, control_law_names
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import UnknownName
 from stickslip.export import CONTROLLER_TARGETS, controller_target
 from stickslip.export._fmu_run import played
@@ -32,17 +32,18 @@ OBSERVER = ControlBlock("disturbance_observer", None, {"order": "second"}, inert
 GMS = Model("gms", **plugins.law("gms").example)
 LUGRE = Model("lugre", **plugins.law("lugre").example)
 CONTROLLERS = {
-    "PD": SampledController(PD, T),
-    "PID and observer": SampledController(
-        PID, T, ControlBlock("inertia_feedforward", inertia=3.8e-4), OBSERVER,
-        ControlBlock("butterworth_difference", corner=900.0), torque_limit=1.0,
+    "PD": Controller(loop=PD, sample_time=T),
+    "PID and observer": Controller(
+        loop=PID, sample_time=T, feedforward=ControlBlock("inertia_feedforward", inertia=3.8e-4), observer=OBSERVER,
+        estimator=ControlBlock("butterworth_difference", corner=900.0), torque_limit=1.0,
     ),
-    "two held laws": SampledController(
-        PD, T, [ControlBlock("friction_feedforward", LUGRE), ControlBlock("inertia_feedforward", inertia=3.8e-4)],
-        ControlBlock("friction_feedback", GMS), torque_limit=0.8,
+    "two held laws": Controller(
+        loop=PD, sample_time=T,
+        feedforward=[ControlBlock("friction_feedforward", LUGRE), ControlBlock("inertia_feedforward", inertia=3.8e-4)],
+        observer=ControlBlock("friction_feedback", GMS), torque_limit=0.8,
     ),
-    "own law": SampledController(
-        ControlBlock(str(OWN), inertia=3.8e-4, slope=60.0, torque=0.4, layer=0.5), T, torque_limit=1.0
+    "own law": Controller(
+        loop=ControlBlock(str(OWN), inertia=3.8e-4, slope=60.0, torque=0.4, layer=0.5), sample_time=T, torque_limit=1.0
     ),
 }  # fmt: skip
 

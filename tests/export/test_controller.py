@@ -11,7 +11,6 @@ from test_c99 import COMPILERS, answers, built_controller, example
 from stickslip import plugins
 from stickslip.cli import main
 from stickslip.control.compensator import Feedback, Feedforward
-from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import ParameterError
@@ -33,7 +32,7 @@ class Sampled:
     """The controller in plain Python."""
 
     def __init__(self, controller):
-        made = composed_of(controller)
+        made = controller
         self.p, self.n, self.z, self.m = made.parameters, made.settings, made.state(), made.memory()
         self.u = SimpleNamespace(**Surroundings()._asdict())
         self.functions = made.functions
@@ -281,7 +280,7 @@ def test_the_command_line_divides_and_states_the_error(tmp_path, monkeypatch, ca
 @pytest.mark.parametrize("name", ["c99", "arduino"])
 def test_the_check_runs_the_controller(name):
     target = controller_target(name)
-    export = target.write(composed_of(ALL["FB"]), "x", name == "arduino")
+    export = target.write(ALL["FB"], "x", name == "arduino")
     assert target.check(export, "x").passed
     for wrong in ("-7", "m->applied + m->applied / 50"):
         files = {

@@ -13,7 +13,6 @@ from stickslip import plugins
 from stickslip.cli import main
 from stickslip.control import composition
 from stickslip.control.compensator import Feedforward
-from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.export import TARGETS, arduino, c99, c99_controller, matlab, modelica, python, st, target_named
@@ -75,7 +74,7 @@ def test_the_exported_controller_keeps_the_time(single, tmp_path):
 
 
 def test_the_time_of_the_samples_loses_nothing_in_single_precision_over_days():
-    n = composed_of(Controller(Gains(0.0), sample_time=T)).settings
+    n = Controller(Gains(0.0), sample_time=T).settings
     m, u = SimpleNamespace(**{f.name: np.float32(0.0) for f in composition.MEMORY}), around()
     n = SimpleNamespace(**{k: np.float32(v) for k, v in n._replace(clock=1.0)._asdict().items()})
     m.seconds = np.float32(2e5)  # where a float has steps of 16 ms
@@ -197,7 +196,7 @@ def test_golden_steps_tell_an_export_that_lost_a_modulation(target, name):
 @pytest.mark.skipif(not COMPILERS, reason="needs a C compiler")
 def test_golden_samples_tell_a_controller_that_lost_a_modulation(name):
     controller = Controller(Gains(0.0), Feedforward(modulated()), sample_time=T)
-    export = c99_controller.write(composed_of(controller), "x")
+    export = c99_controller.write(controller, "x")
     assert c99_controller.check(export, "x").passed
     head, name_of, body = export.files["x.c"].partition("double x_feedforward_over_sample(")
     body, brace, rest = body.partition("\n}\n")

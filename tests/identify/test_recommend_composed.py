@@ -13,8 +13,8 @@ from test_recommend_axes import INERTIA, PD, identified
 from stickslip.approval import allow_code
 from stickslip.cli import main
 from stickslip.control.block import ControlBlock
+from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
-from stickslip.control.sampled_controller import SampledController
 from stickslip.control.written import tables_of
 from stickslip.errors import ParameterError
 from stickslip.identify.setting import recommend as recommending
@@ -38,7 +38,9 @@ def few(monkeypatch):
 def test_a_pd_made_of_control_laws_gets_what_a_pd_gets(few):
     given = {"sample_time": T, "torque_limit": 2.0, "amplitude": 0.2, "frequency": 0.5}
     old = recommend(identified(), Drive(gains=PD, **given), axes=1, confirm=2)
-    new = recommend(identified(), Drive(controller=SampledController(LOOP, T), **given), axes=1, confirm=2)
+    new = recommend(
+        identified(), Drive(controller=Controller(loop=LOOP, sample_time=T), **given), axes=1, confirm=2
+    )
     assert new.linear_error == pytest.approx(old.linear_error, rel=1e-6)
     assert new.gains == {"loop_kp": PD.kp, "loop_kd": PD.kd}
     assert new.chosen.setting == old.chosen.setting
@@ -47,8 +49,10 @@ def test_a_pd_made_of_control_laws_gets_what_a_pd_gets(few):
 
 def test_what_an_observer_leaves_is_what_a_compensator_is_worth(few):
     given = {"sample_time": T, "torque_limit": 2.0, "amplitude": 0.2, "frequency": 0.5}
-    alone = recommend(identified(), Drive(controller=SampledController(LOOP, T), **given), axes=1, confirm=2)
-    observed = SampledController(LOOP, T, None, OBSERVER)
+    alone = recommend(
+        identified(), Drive(controller=Controller(loop=LOOP, sample_time=T), **given), axes=1, confirm=2
+    )
+    observed = Controller(loop=LOOP, sample_time=T, feedforward=None, observer=OBSERVER)
     found = recommend(identified(), Drive(controller=observed, **given), axes=1, confirm=2)
     assert found.linear_error < 0.5 * alone.linear_error
     assert found.chosen is not None
@@ -56,7 +60,12 @@ def test_what_an_observer_leaves_is_what_a_compensator_is_worth(few):
 
 
 def test_settings_stand_beside_the_loops_own_laws():
-    loop = SampledController(LOOP, T, ControlBlock("inertia_feedforward", inertia=2e-4), OBSERVER)
+    loop = Controller(
+        loop=LOOP,
+        sample_time=T,
+        feedforward=ControlBlock("inertia_feedforward", inertia=2e-4),
+        observer=OBSERVER,
+    )
     ahead = Setting("coulomb", "feedforward", 0.9, 1e-3, 0.0, INERTIA, 0.02).on(loop, LAW)
     assert list(ahead.blocks) == [
         "estimator", "feedforward", "feedforward_2", "feedforward_3", "observer", "loop"
@@ -74,7 +83,7 @@ def test_settings_stand_beside_the_loops_own_laws():
         "pd",
     ]
     assert loop.answers_to_acceleration
-    assert not SampledController(LOOP, T).answers_to_acceleration
+    assert not Controller(loop=LOOP, sample_time=T).answers_to_acceleration
 
 
 def test_the_tables_of_a_controller_are_that_controller(tmp_path):
@@ -84,7 +93,15 @@ def test_the_tables_of_a_controller_are_that_controller(tmp_path):
     ahead = ControlBlock("friction_feedforward", LAW, {"velocity": "held"}, gain=0.9)
     inertia = ControlBlock("inertia_feedforward", inertia=INERTIA)
     estimator = ControlBlock("luenberger", corner=900.0)
-    made = SampledController([sliding, pid], T, [ahead, inertia], OBSERVER, estimator, 1.5, 65536.0)
+    made = Controller(
+        loop=[sliding, pid],
+        sample_time=T,
+        feedforward=[ahead, inertia],
+        observer=OBSERVER,
+        estimator=estimator,
+        torque_limit=1.5,
+        encoder_counts=65536.0,
+    )
     file = tmp_path / "c.toml"
     file.write_bytes(tomli_w.dumps(tables_of(made)).encode())
     with allow_code():
@@ -96,9 +113,9 @@ def test_the_tables_of_a_controller_are_that_controller(tmp_path):
 @pytest.mark.parametrize(
     ("controller", "words"),
     [
-        (SampledController(LOOP, 2e-3), "sample_time = 0.001 s, the controller's is 0.002 s"),
+        (Controller(loop=LOOP, sample_time=2e-3), "sample_time = 0.001 s, the controller's is 0.002 s"),
         (
-            SampledController(LOOP, T, ControlBlock("friction_feedforward", LAW)),
+            Controller(loop=LOOP, sample_time=T, feedforward=ControlBlock("friction_feedforward", LAW)),
             "'friction_feedforward' holds a friction law",
         ),
     ],

@@ -15,7 +15,7 @@ from test_recommend_composed import MODEL
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.control.block import ControlBlock
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
 from stickslip.identify.setting import recommend as recommending
 from stickslip.identify.setting.axes import plants_of
@@ -143,8 +143,8 @@ def test_a_loop_feeds_the_inertia_where_its_torque_answers_to_the_acceleration()
         ({"feedforward": ControlBlock("inertia_feedforward", inertia=0.0, offset=0.1)}, False),
         ({"observer": ControlBlock("disturbance_observer", inertia=INERTIA, corner=400.0)}, False),
     ):
-        assert SampledController(pd, 1e-3, **more).answers_to_acceleration is feeds
+        assert Controller(loop=pd, sample_time=1e-3, **more).answers_to_acceleration is feeds
     own = ControlBlock(
         str(OWN), inertia=INERTIA, slope=62.8, torque=0.45, layer=0.5
     )  # a loop that feeds it itself
-    assert SampledController(own, 1e-3).answers_to_acceleration is True
+    assert Controller(loop=own, sample_time=1e-3).answers_to_acceleration is True

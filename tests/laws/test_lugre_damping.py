@@ -73,7 +73,9 @@ def test_a_stuck_contact_is_damped_alike_and_a_sliding_one_not():
 
 def test_an_axis_runs_with_it():
     axis = ss.RigidAxis(3.8623e-4, contact("fading"))
-    drive = ss.SampledController(ss.ControlBlock("pd", kp=6.099, kd=0.097067), 1e-3, torque_limit=1.0)
+    drive = ss.Controller(
+        loop=ss.ControlBlock("pd", kp=6.099, kd=0.097067), sample_time=1e-3, torque_limit=1.0
+    )
     record = ss.simulate(axis, drive, ss.Reference("sine", amplitude=0.1, frequency=1.0), 1.0)
     energy = record.meta["energy"]
     assert energy["friction_loss"] > 0.0

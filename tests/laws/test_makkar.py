@@ -38,7 +38,7 @@ def test_a_stribeck_effect_that_would_drive_is_refused():
 
 def test_an_axis_follows_as_with_the_law_that_it_smooths():
     pid = ss.ControlBlock("pid", kp=18.3, kd=0.1456, ki=766.4)
-    drive = ss.SampledController(pid, 1e-3, torque_limit=1.0)
+    drive = ss.Controller(loop=pid, sample_time=1e-3, torque_limit=1.0)
     fast = ss.Reference("sine", amplitude=0.5, frequency=0.5)
     errors = []
     for friction in (MODEL, ss.Model("coulomb", fc=0.285, sigma2=0.018)):

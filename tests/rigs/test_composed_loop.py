@@ -11,7 +11,6 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.loop_sample import COLUMNS
@@ -26,15 +25,15 @@ PID = ControlBlock("pid", kp=59.28, ki=4469.9, kd=0.2621)
 OBSERVER = ControlBlock("disturbance_observer", inertia=3.8623e-4, corner=300.0)
 PAIRS = {
     "PD + FF": (
-        SampledController(PD, T, AHEAD, torque_limit=1.0),
+        Controller(loop=PD, sample_time=T, feedforward=AHEAD, torque_limit=1.0),
         Controller(pd(19.7612, 0.1747), Feedforward(FRICTION), torque_limit=1.0),
     ),
     "PID": (
-        SampledController(PID, T, torque_limit=1.0),
+        Controller(loop=PID, sample_time=T, torque_limit=1.0),
         Controller(pid(59.28, 4469.9, 0.2621), torque_limit=1.0),
     ),
 }
-OBSERVED = SampledController(PD, T, AHEAD, OBSERVER, torque_limit=1.0)
+OBSERVED = Controller(loop=PD, sample_time=T, feedforward=AHEAD, observer=OBSERVER, torque_limit=1.0)
 
 
 def sine(count, offset=0.0, hz=1.0):
@@ -92,4 +91,4 @@ def test_another_sample_time_is_refused():
         pytest.raises(InputError, match=r"sample_time = 0\.002 s, the rig's is 0\.001 s"),
         Loop(AxisRig()) as loop,
     ):
-        loop.run(sine(10), SampledController(PD, 2e-3))
+        loop.run(sine(10), Controller(loop=PD, sample_time=2e-3))

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stickslip.control.compensator import Feedback
-from stickslip.control.composed import composed_of
 from stickslip.control.composition import Settings
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
@@ -100,7 +99,7 @@ def test_compiled_and_plain_python_agree_bit_for_bit(data):
     helper = data.draw(st.sampled_from([None, Feedback(friction), Feedback(friction, filter_hz=10.0)]))
     controller = Controller(pd(5.0, 0.05), helper, torque_limit=0.9, sample_time=T)
     control = control_of(controller, LIMITS, T)
-    composed = composed_of(controller)
+    composed = controller
     sample = guarded_by(composed.functions)
 
     def fields(names, values):

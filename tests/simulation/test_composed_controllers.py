@@ -27,11 +27,13 @@ def feedforward(**choices):
 
 PAIRS = {
     "PID": (
-        ss.SampledController(PID, TIME),
+        ss.Controller(loop=PID, sample_time=TIME),
         ss.Controller(ss.place("PID", INERTIA, 20.0, 1.0), sample_time=TIME),
     ),
     "PID with feedforward and a coarse encoder": (
-        ss.SampledController(PID, TIME, feedforward(), torque_limit=0.6, encoder_counts=4096.0),
+        ss.Controller(
+            loop=PID, sample_time=TIME, feedforward=feedforward(), torque_limit=0.6, encoder_counts=4096.0
+        ),
         ss.Controller(ss.place("PID", INERTIA, 20.0, 1.0), ss.Feedforward(LUGRE, 0.9), 0.6, TIME, 4096.0),
     ),
 }
@@ -48,7 +50,7 @@ def test_the_loop_is_that_of_the_controller_it_replaces(pair):
 
 def test_a_record_says_which_laws_controlled():
     observer = ss.ControlBlock("disturbance_observer", inertia=INERTIA, corner=400.0)
-    controller = ss.SampledController(PD, TIME, feedforward(), observer)
+    controller = ss.Controller(loop=PD, sample_time=TIME, feedforward=feedforward(), observer=observer)
     record = ss.simulate(AXIS, controller, LOW, 0.05)
     said = record.meta["controller"]
     assert [said[part]["law"] for part in ("loop", "feedforward", "observer", "estimator")] == [
@@ -65,26 +67,33 @@ def test_a_record_says_which_laws_controlled():
 @pytest.mark.parametrize("integrator", ["exact", "adaptive"])
 def test_an_integrator_in_continuous_time_refuses_it_in_a_line(integrator):
     with pytest.raises(ss.InputError, match="sample") as refused:
-        ss.simulate(AXIS, ss.SampledController(PD, TIME), LOW, 0.1, integrator=integrator)
+        ss.simulate(AXIS, ss.Controller(loop=PD, sample_time=TIME), LOW, 0.1, integrator=integrator)
     assert "\n" not in str(refused.value)
 
 
 PLACED_PD, PLACED_PID = (ss.place(kind, INERTIA, 20.0, 1.0) for kind in ("PD", "PID"))
 BACK = ss.ControlBlock("friction_feedback", LUGRE, gain=0.7)
 CONTINUOUS = {
-    "PR": (ss.SampledController(ss.ControlBlock("pr", kp=6.0, kd=0.1), 0.0), ss.Controller(ss.pr(6.0, 0.1))),
+    "PR": (
+        ss.Controller(loop=ss.ControlBlock("pr", kp=6.0, kd=0.1), sample_time=0.0),
+        ss.Controller(ss.pr(6.0, 0.1)),
+    ),
     "PD": (
-        ss.SampledController(ss.ControlBlock("pd", **PD.law.placed(INERTIA, 20.0, 1.0)), 0.0),
+        ss.Controller(loop=ss.ControlBlock("pd", **PD.law.placed(INERTIA, 20.0, 1.0)), sample_time=0.0),
         ss.Controller(PLACED_PD),
     ),
     "PID, feedforward": (
-        ss.SampledController(
-            ss.ControlBlock("pid", **PID.law.placed(INERTIA, 20.0, 1.0)), 0.0, feedforward()
+        ss.Controller(
+            loop=ss.ControlBlock("pid", **PID.law.placed(INERTIA, 20.0, 1.0)),
+            sample_time=0.0,
+            feedforward=feedforward(),
         ),
         ss.Controller(PLACED_PID, ss.Feedforward(LUGRE, 0.9)),
     ),
     "PD, feedback": (
-        ss.SampledController(ss.ControlBlock("pd", **PD.law.placed(INERTIA, 20.0, 1.0)), 0.0, observer=BACK),
+        ss.Controller(
+            loop=ss.ControlBlock("pd", **PD.law.placed(INERTIA, 20.0, 1.0)), sample_time=0.0, observer=BACK
+        ),
         ss.Controller(PLACED_PD, ss.Feedback(LUGRE, 0.7)),
     ),
 }
@@ -129,21 +138,25 @@ SAMPLED_ONLY = {
 @pytest.mark.parametrize("why", SAMPLED_ONLY)
 def test_what_acts_on_samples_is_refused_in_continuous_time(why):
     with pytest.raises(ParameterError, match=why) as refused:
-        ss.SampledController(**{"loop": PD, "sample_time": 0.0, **SAMPLED_ONLY[why]})
+        ss.Controller(**{"loop": PD, "sample_time": 0.0, **SAMPLED_ONLY[why]})
     assert "give a sample_time" in str(refused.value)
     assert "\n" not in str(refused.value)
     # With one it is taken.
-    ss.SampledController(**{"loop": PD, "sample_time": TIME, **SAMPLED_ONLY[why]})
+    ss.Controller(**{"loop": PD, "sample_time": TIME, **SAMPLED_ONLY[why]})
 
 
 def test_the_slip_rule_of_a_run_is_that_of_the_laws_in_the_controller():
     gms = AXIS.friction
-    control = ss.SampledController(PD, TIME, ss.ControlBlock("friction_feedforward", gms, gain=0.9))
+    control = ss.Controller(
+        loop=PD, sample_time=TIME, feedforward=ss.ControlBlock("friction_feedforward", gms, gain=0.9)
+    )
     own, literal = (ss.simulate(AXIS, control, LOW, 0.3, slip_rule=rule) for rule in (None, "literal"))
     assert own.meta["slip_rules"] == {"friction": "signed", "feedforward": "signed"}
     assert literal.meta["slip_rules"] == {"friction": "literal", "feedforward": "literal"}
-    given = ss.SampledController(
-        PD, TIME, ss.ControlBlock("friction_feedforward", gms.having(slip_rule="literal"), gain=0.9)
+    given = ss.Controller(
+        loop=PD,
+        sample_time=TIME,
+        feedforward=ss.ControlBlock("friction_feedforward", gms.having(slip_rule="literal"), gain=0.9),
     )
     again = ss.simulate(AXIS, given, LOW, 0.3, slip_rule="literal")
     assert np.array_equal(literal["compensation_torque"], again["compensation_torque"])
@@ -162,7 +175,9 @@ REFERENCE = {
 def test_errors_are_those_of_the_reference(name):
     loop, ahead, corner, rms = REFERENCE[name]
     observer = ss.ControlBlock("disturbance_observer", inertia=INERTIA, corner=corner) if corner else None
-    controller = ss.SampledController(loop, TIME, ahead, observer, torque_limit=1.0)
+    controller = ss.Controller(
+        loop=loop, sample_time=TIME, feedforward=ahead, observer=observer, torque_limit=1.0
+    )
     record = ss.simulate(AXIS, controller, LOW, 5.0, time_step=2e-5)
     t = TIME * np.arange(5000)
     error = np.interp(t, record.time, record["position_reference"] - record["position"])

@@ -95,7 +95,7 @@ def test_the_error_of_a_run_is_told_by_finer_steps() -> None:
 
 
 def test_a_control_law_of_ones_own_runs_on_it() -> None:
-    observer = ss.SampledController(
+    observer = ss.Controller(
         loop=ss.ControlBlock("pd", kp=GAINS.kp, kd=GAINS.kd), sample_time=1e-3,
         observer=ss.ControlBlock("disturbance_observer", inertia=DRY.inertia, corner=200.0),
     )  # fmt: skip

@@ -55,7 +55,9 @@ def observer(corner):
 
 
 ROWS = {
-    name: ss.SampledController(LINEAR[loop], TIME, helper, watcher, torque_limit=1.0)
+    name: ss.Controller(
+        loop=LINEAR[loop], sample_time=TIME, feedforward=helper, observer=watcher, torque_limit=1.0
+    )
     for name, (loop, helper, watcher) in {
         "PD": ("PD", None, None),
         "PID": ("PID", None, None),

@@ -16,7 +16,6 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.control.registry import control_law
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ConfigError
 from stickslip.study.study import execute, load, load_run
 from stickslip.sweep.numbers import as_columns, known, value_of, varied
@@ -145,7 +144,7 @@ def test_in_continuous_time_a_sweep_varies_them_as_gains_and_a_compensator(study
             "friction_feedforward", base.control.blocks["feedforward"].friction, gain=0.9
         ),
     }
-    run = replace(base, control=SampledController(sample_time=0.0, **laws))
+    run = replace(base, control=Controller(sample_time=0.0, **laws))
     swept = {
         "controller.bandwidth_hz": np.array([20.0, 30.0]),
         "controller.feedforward_gain": np.array([0.5, 0.6]),

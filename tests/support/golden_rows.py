@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from stickslip.control.block import ControlBlock
+from stickslip.control.controller import Controller
 from stickslip.control.registry import control_law
-from stickslip.control.sampled_controller import SampledController
 from stickslip.model import Model
 
 INERTIA = 3.8623e-4
@@ -19,7 +19,9 @@ GMS = Model("gms", k=[12896.0, 8141.0, 4273.0], alpha=[1 / 3] * 3, c=23.8782, **
 
 
 def controller(loop, feedforward=None, observer=None, alone=False):
-    return SampledController(loop, 1e-3, feedforward, observer, torque_limit=1.0, alone=alone)
+    return Controller(
+        loop=loop, sample_time=1e-3, feedforward=feedforward, observer=observer, torque_limit=1.0, alone=alone
+    )
 
 
 def pd():

@@ -135,7 +135,7 @@ def test_the_command_writes_a_controller_that_runs(tmp_path: Path, monkeypatch, 
     said = json.loads(capsys.readouterr().out)
     assert said["controller"] == "my-learned.toml"
     controller = read_controller("my-learned.toml")
-    assert isinstance(controller, ss.SampledController)
+    assert isinstance(controller, ss.Controller)
     axis = ss.RigidAxis(INERTIA, ss.Model("coulomb", fc=0.285, sigma2=0.018))
     assert error_with(controller, BRISK, 0.5, axis) == pytest.approx(min(said["errors"]), rel=1e-6)
     assert main(["learn", "my.toml", "--corner", "400"]) == 2

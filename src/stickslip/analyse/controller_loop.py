@@ -19,8 +19,7 @@ import numpy as np
 
 from stickslip.analyse.presliding_loop import describing
 from stickslip.control.block import ControlBlock
-from stickslip.control.sampled_controller import SampledController
-from stickslip.control_spec import PLACES
+from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.machines.drivetrain import FREE
 from stickslip.model import Model
@@ -123,13 +122,13 @@ def float_of(one: Any) -> complex:
 
 
 def linearised(
-    controller: SampledController, amplitude: float, frequency: float, delay: float = 0.0
+    controller: Controller, amplitude: float, frequency: float, delay: float = 0.0
 ) -> LinearController:
     """The controller about rest.
 
     Parameters
     ----------
-    controller : SampledController
+    controller : Controller
     amplitude, frequency : float
         Of the small motion that held friction laws see, rad and Hz; an infinite amplitude for laws that slide.
     delay : float
@@ -202,12 +201,9 @@ def _krylov(a: Array, b: Array) -> Array:
     return base
 
 
-def with_springs(controller: SampledController, amplitude: float, frequency: float) -> SampledController:
+def with_springs(controller: Controller, amplitude: float, frequency: float) -> Controller:
     """The controller with a spring and damper for every friction law that it holds."""
-    places: dict[str, list[ControlBlock]] = {place: [] for place in PLACES}
-    for block in controller.blocks.values():
-        places[block.law.place].append(_stuck(block, amplitude, frequency))
-    return replace(controller, estimator=places.pop("estimator")[0], **places)
+    return controller.with_blocks(_stuck(b, amplitude, frequency) for b in controller.blocks.values())
 
 
 def _stuck(block: ControlBlock, amplitude: float, frequency: float) -> ControlBlock:
@@ -218,7 +214,7 @@ def _stuck(block: ControlBlock, amplitude: float, frequency: float) -> ControlBl
     return ControlBlock(block.law, Model(SPRING, stiffness=found.stiffness, damping=found.damping), **own)
 
 
-def _suspects(controller: SampledController) -> str:
+def _suspects(controller: Controller) -> str:
     """The laws that are not declared linear, or all of them."""
     names = [
         b.law.name for b in controller.blocks.values() if not b.law.is_linear and not b.law.holds_friction
@@ -229,7 +225,7 @@ def _suspects(controller: SampledController) -> str:
 class _Sample:
     """One sample of a controller about rest, from small changes of what it remembers and measures."""
 
-    def __init__(self, controller: SampledController) -> None:
+    def __init__(self, controller: Controller) -> None:
         self.n, self.p = controller.settings, controller.parameters
         self.m, self.z = controller.memory(), controller.state()
         self.u = SimpleNamespace(**Surroundings()._asdict())

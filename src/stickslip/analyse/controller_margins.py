@@ -13,7 +13,7 @@ from stickslip.analyse.controller_loop import LinearController, linearised
 from stickslip.analyse.presliding_loop import Axis, Loop, Poles
 from stickslip.analyse.stability import AMPLITUDES, SLOW, edge, stable
 from stickslip.analyse.stability_result import Cycle
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
 
@@ -136,15 +136,13 @@ class ControllerStability:
             )
 
 
-def controller_stability(
-    axis: Axis, controller: SampledController, delay: float = 0.0
-) -> ControllerStability:
+def controller_stability(axis: Axis, controller: Controller, delay: float = 0.0) -> ControllerStability:
     """Poles and margins of a controller on an axis.
 
     Parameters
     ----------
     axis : Axis
-    controller : SampledController
+    controller : Controller
     delay : float
         Of the torque, samples.
 
@@ -185,7 +183,7 @@ def slid(axis: Axis) -> Drivetrain:
 
 
 def about(
-    axis: Axis, controller: SampledController, delay: float, amplitude: float
+    axis: Axis, controller: Controller, delay: float, amplitude: float
 ) -> tuple[Drivetrain, LinearController]:
     """Drivetrain and controller at an amplitude of the encoder, the laws as they are at the loop's own frequency."""
 
@@ -218,7 +216,7 @@ def margins(name: str, drivetrain: Drivetrain, drive: LinearController) -> LoopM
     return LoopMargins(name, poles, (low, high), late)
 
 
-def cycle_of(axis: Axis, controller: SampledController, delay: float, first: Poles) -> Cycle | None:
+def cycle_of(axis: Axis, controller: Controller, delay: float, first: Poles) -> Cycle | None:
     """Where the growth of a loop that is unstable at the small amplitude ends as the amplitude rises."""
     if first.stable:
         return None

@@ -19,8 +19,8 @@ import numpy as np
 from stickslip.analyse.controller_loop import LinearController, float_of, linearised
 from stickslip.analyse.controller_margins import slid
 from stickslip.analyse.presliding_loop import Axis, Loop, held
+from stickslip.control.controller import Controller
 from stickslip.control.learning import bin_response, low_pass, low_pass_response
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.machines.drivetrain import Drivetrain
 
@@ -97,7 +97,7 @@ def response(drivetrain: Drivetrain, drive: LinearController, delay: float, freq
     return opened / (1.0 + opened)
 
 
-def answers(axis: Axis, controller: SampledController, delay: float) -> tuple[Array, Any]:
+def answers(axis: Axis, controller: Controller, delay: float) -> tuple[Array, Any]:
     """Frequencies, Hz, and T of the sliding axis there.
 
     Raises
@@ -122,14 +122,14 @@ def judged(
 
 
 def over_time(
-    axis: Axis, controller: SampledController, rate: float, corner: float, advance: int, delay: float = 0.0
+    axis: Axis, controller: Controller, rate: float, corner: float, advance: int, delay: float = 0.0
 ) -> Convergence:
     """The condition of learning over time.
 
     Parameters
     ----------
     axis : Axis
-    controller : SampledController
+    controller : Controller
         Without what is learned.
     rate : float
         L, the share of the loop's torque that a repetition takes over.
@@ -152,7 +152,7 @@ def over_time(
     return judged(frequency, left, passed, rate, corner, advance)
 
 
-def widest(axis: Axis, controller: SampledController, rate: float, delay: float = 0.0) -> Convergence:
+def widest(axis: Axis, controller: Controller, rate: float, delay: float = 0.0) -> Convergence:
     """The condition with the highest corner of Q, and the advance, that keep it at `KEPT` or below.
 
     Parameters and errors as of `over_time`.
@@ -179,7 +179,7 @@ def widest(axis: Axis, controller: SampledController, rate: float, delay: float 
 
 
 def over_angle(
-    axis: Axis, controller: SampledController, rate: float, width: float, speed: float, delay: float = 0.0
+    axis: Axis, controller: Controller, rate: float, width: float, speed: float, delay: float = 0.0
 ) -> Convergence:
     """The condition of learning over the angle at the fastest motion, which asks for the highest frequencies.
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from stickslip.analyse.controller_loop import linearised
 from stickslip.analyse.presliding_loop import Loop
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import Drivetrain
 
@@ -33,12 +33,12 @@ UNCERTAIN = (0.8, 1.0, 1.25)
 """Inertia over the nominal one with which the default corner keeps it."""
 
 
-def poles(controller: SampledController, inertia: float, delay: int = 0) -> Array:
+def poles(controller: Controller, inertia: float, delay: int = 0) -> Array:
     """Eigenvalues of the loop from sample to sample on a sliding axis without viscous friction.
 
     Parameters
     ----------
-    controller : SampledController
+    controller : Controller
     inertia : float
         Of the axis, kg·m².
     delay : int
@@ -59,7 +59,7 @@ def damped(values: Array, damping: float) -> bool:
 
 
 def largest_corner(
-    made: Callable[[float], SampledController], inertia: float, delay: int = 0, damping: float = 0.0
+    made: Callable[[float], Controller], inertia: float, delay: int = 0, damping: float = 0.0
 ) -> float:
     """The corner, 1/s, below which every loop is stable, to 1; `HIGHEST` where all up to there are, 0 where none is.
 
@@ -89,7 +89,7 @@ def largest_corner(
     return good
 
 
-def default_corner(controller: SampledController, delay: int = 0) -> float:
+def default_corner(controller: Controller, delay: int = 0) -> float:
     """The largest corner, 1/s, of its disturbance observer with which every pole keeps a damping ratio of `DAMPING`.
 
     With the nominal inertia off by a quarter up and a fifth down. Where the loop itself has less damping without an
@@ -105,7 +105,7 @@ def default_corner(controller: SampledController, delay: int = 0) -> float:
         raise ParameterError("default_corner: the controller has no disturbance_observer; give it one")
     nominal = controller.blocks[part].parameters.inertia
 
-    def made(corner: float) -> SampledController:
+    def made(corner: float) -> Controller:
         return controller.with_values({f"{part}_corner": corner})
 
     kept = min(largest_corner(made, nominal * x, delay, DAMPING) for x in UNCERTAIN)

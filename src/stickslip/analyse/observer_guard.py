@@ -16,7 +16,7 @@ import numpy as np
 from stickslip.analyse.controller_loop import LinearController, linearised
 from stickslip.analyse.presliding_loop import Loop
 from stickslip.control.block import ControlBlock
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
 
@@ -85,13 +85,13 @@ def positive_real_ratios(
 
 
 def stuck_radius(
-    controller: SampledController, inertia: float, stiffness: float, damping: float = 0.0, delay: int = 0
+    controller: Controller, inertia: float, stiffness: float, damping: float = 0.0, delay: int = 0
 ) -> float:
     """The largest size of an eigenvalue of the loop on an axis whose contact sticks: stable below 1.
 
     Parameters
     ----------
-    controller : SampledController
+    controller : Controller
     inertia, stiffness, damping : float
         Of the axis, kg·m²; of its contact while it sticks, N·m/rad and N·m·s/rad.
     delay : int
@@ -102,7 +102,7 @@ def stuck_radius(
     return Loop(drivetrain, drive).poles().radius
 
 
-def about_rest(controller: SampledController) -> tuple[Array, Array, Array, float]:
+def about_rest(controller: Controller) -> tuple[Array, Array, Array, float]:
     """The controller about rest, where its bristle is a spring that the velocity winds: A, B, C, D from the angle.
 
     States: those of everything else, the bristle's deflection, and the angle one sample ago.
@@ -126,7 +126,7 @@ def about_rest(controller: SampledController) -> tuple[Array, Array, Array, floa
 
 
 def largest_stiffness(
-    controller: SampledController, inertia: float, stiffness: float, damping: float = 0.0, delay: int = 0
+    controller: Controller, inertia: float, stiffness: float, damping: float = 0.0, delay: int = 0
 ) -> float:
     """The sigma0 of its LuGre observer up to which the loop on the stuck axis is stable, N·m/rad.
 
@@ -152,7 +152,7 @@ def largest_stiffness(
     return good
 
 
-def part_of(controller: SampledController) -> str:
+def part_of(controller: Controller) -> str:
     """The name of its LuGre observer's part."""
     for part, block in controller.blocks.items():
         if block.law.name == "lugre_observer":
@@ -161,14 +161,14 @@ def part_of(controller: SampledController) -> str:
 
 
 def objection(
-    controller: SampledController, inertia: float, stiffness: float, counts: float = 0.0, damping: float = 0.0,
+    controller: Controller, inertia: float, stiffness: float, counts: float = 0.0, damping: float = 0.0,
     delay: int = 0,
 ) -> str:  # fmt: skip
     """Why its LuGre observer is not to be switched on, in a sentence, or "".
 
     Parameters
     ----------
-    controller : SampledController
+    controller : Controller
     inertia, stiffness, damping, delay
         As of `stuck_radius`.
     counts : float

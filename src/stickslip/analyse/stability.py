@@ -36,8 +36,8 @@ from stickslip.analyse.stability_result import (
     Recommended,
     Stability,
 )
-from stickslip.control.controller import highest_corner
 from stickslip.control.linear import Gains
+from stickslip.control.short_form import highest_corner
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
 from stickslip.model import Model
 

@@ -158,7 +158,7 @@ def computed(args: argparse.Namespace) -> Stability:
     from stickslip.analyse.machine_axis import axis_of
     from stickslip.analyse.presliding_loop import Drive
     from stickslip.analyse.stability import stability
-    from stickslip.control.controller import highest_corner
+    from stickslip.control.short_form import highest_corner
     from stickslip.errors import InputError
 
     plant, gains, models = described(args)

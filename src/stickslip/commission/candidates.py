@@ -97,7 +97,7 @@ class Following(Track):
         assert self.using is not None
         used = self.using.compensator
         return {
-            "reference": self.reference, "gains": self.using.gains._asdict(),
+            "reference": self.reference, "gains": self.using.numbers(),
             "compensator": used
             and {"kind": used.name, "gain": used.gain, "lead": used.lead, **used.model.as_dict()},
             "angle": self.over.as_dict(),

@@ -34,8 +34,8 @@ from stickslip.contract.specimens import (
 from stickslip.contract.units import parsed
 from stickslip.contract.verdict import Verdict, failed, held, not_tried
 from stickslip.control.block import ControlBlock
+from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import LawError
 from stickslip.export import c99_controller
@@ -292,7 +292,7 @@ def delayed(law: ControlLaw) -> Verdict:
         return not_tried("delay", "it is no estimator")
     t = np.linspace(0.0, 1999 * TIME, 2000)
     position = 0.5 * t * t
-    reading = SampledController(ControlBlock("pd", kp=0.0, kd=1.0), TIME, estimator=block_of(law))
+    reading = Controller(loop=ControlBlock("pd", kp=0.0, kd=1.0), sample_time=TIME, estimator=block_of(law))
     inputs: Array = np.column_stack([position, position, np.zeros((len(t), 2))])
     lag = float(t[-1] + torques(reading, inputs)[-1])
     stated = law.delay(block_of(law).parameters, TIME)

@@ -10,7 +10,7 @@ import numpy as np
 from stickslip.contract.specimens import COUNT, motion, replayed, specimen
 from stickslip.contract.verdict import Verdict, failed, held
 from stickslip.control.composition import MEMORY
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.control_spec import ControlLaw
 from stickslip.simulation.compiled_controller import Sampled, compiled
 from stickslip.subset import named
@@ -49,7 +49,7 @@ def at_rest(law: ControlLaw) -> Verdict:
     return held("rest", "an hour at rest and an hour at the limit: state and torque as after two minutes")
 
 
-def told_of_rest(controller: SampledController) -> bool:
+def told_of_rest(controller: Controller) -> bool:
     """Whether a law of the controller reads for how long the reference has been at rest."""
     trees = named({"_sample": controller.functions["sample"]}, controller.layouts)
     return any(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.control.block import ControlBlock
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.control_spec import ControlLaw
 from stickslip.export.golden import random_motion
 from stickslip.model import Model
@@ -36,15 +36,15 @@ def block_of(law: ControlLaw) -> ControlBlock:
     return ControlBlock(law, FRICTION if law.holds_friction else None, **dict(law.example))
 
 
-def specimen(law: ControlLaw, limit: float = LIMIT, time: float = TIME) -> SampledController:
+def specimen(law: ControlLaw, limit: float = LIMIT, time: float = TIME) -> Controller:
     """A controller with the law in its place."""
     return around(block_of(law), ControlBlock("pd", **PD), limit, time)
 
 
-def around(block: ControlBlock, loop: ControlBlock, limit: float, time: float) -> SampledController:
+def around(block: ControlBlock, loop: ControlBlock, limit: float, time: float) -> Controller:
     """A controller with the block in its place, and the loop where the block is none."""
     places: dict[str, Any] = {"loop": loop, block.law.place: block}
-    return SampledController(sample_time=time, torque_limit=limit, alone=True, **places)
+    return Controller(sample_time=time, torque_limit=limit, alone=True, **places)
 
 
 def motion(time: float = TIME) -> Array:
@@ -63,7 +63,7 @@ def clean_motion() -> Array:
 class Plain:
     """A controller in plain Python."""
 
-    def __init__(self, controller: SampledController) -> None:
+    def __init__(self, controller: Controller) -> None:
         self.n, self.m = controller.settings, controller.memory()
         self.z, self.p = controller.state(), controller.parameters
         self.u = SimpleNamespace(**Surroundings()._asdict())
@@ -79,7 +79,7 @@ class Plain:
         return self.controller.packed_state(self.z)
 
 
-def torques(controller: SampledController, inputs: Array, slow: float | None = None) -> Array:
+def torques(controller: Controller, inputs: Array, slow: float | None = None) -> Array:
     """The torques of plain Python, N·m; ``slow`` is the share by which the slow velocity moves in a sample."""
     plain = Plain(controller)
     if slow is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections import namedtuple
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -106,6 +106,10 @@ class ControlBlock:
         if held is not None and friction:
             held = Model(held.law, **{**held.parameters._asdict(), **friction})
         return ControlBlock(self.law, held, **{**self.own, **values})
+
+    def holding(self, change: Callable[[Model], Model]) -> ControlBlock:
+        """The block whose friction law is what `change` makes of it."""
+        return ControlBlock(self.law, change(self.friction), **self.own) if self.friction else self
 
     # ---- for people --------------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ import numpy as np
 from stickslip.control import registry
 from stickslip.control.belief import Belief
 from stickslip.control.block import ControlBlock
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError, UnknownName
 from stickslip.model import Model
 
@@ -371,7 +371,7 @@ CATALOGUE: Mapping[str, Compensator] = {
 """By name; the order is that of tables."""
 
 
-def compensated(name: str, loop: str, belief: Belief) -> SampledController:
+def compensated(name: str, loop: str, belief: Belief) -> Controller:
     """The controller with a compensator of the catalogue, for an axis.
 
     Parameters
@@ -394,4 +394,6 @@ def compensated(name: str, loop: str, belief: Belief) -> SampledController:
         raise ParameterError(f"compensator {name!r} stands in a {' or '.join(found.loops)}, not in a {loop}")
     places = dict(found.made(belief))
     own = places.pop("loop", None) or loop_of(loop, belief)
-    return SampledController(own, belief.sample_time, torque_limit=belief.torque_limit, alone=True, **places)
+    return Controller(
+        loop=own, sample_time=belief.sample_time, torque_limit=belief.torque_limit, alone=True, **places
+    )

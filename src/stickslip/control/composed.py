@@ -1,97 +1,220 @@
-"""A controller with gains and a compensator as the control laws that it is made of."""
+"""Control laws that act together, as engines, rigs and exports read them: functions, parameters and state."""
 
 from __future__ import annotations
 
 import functools
 import math
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any, cast
 
-from stickslip.control.block import ControlBlock
-from stickslip.control.compensator import Compensator
-from stickslip.control.continuous import Continuous, continuous_form
-from stickslip.control.controller import Controller
-from stickslip.control.linear import Cascade, Gains
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.block import ControlBlock, fields_in, state_fields_in, within
+from stickslip.control.calls import calls_of, deviations_of
+from stickslip.control.composition import MEMORY, Settings, functions_with
+from stickslip.errors import ParameterError, suggestion
+from stickslip.spec import Field, Kept, Learned, Surroundings, fields_of, packed
+from stickslip.subset import Layout
 
-__all__ = ["composed_of", "continuous_of"]
+__all__ = ["FADE", "Composed"]
 
-
-def composed_of(controller: Controller | SampledController) -> SampledController:
-    """The controller made of control laws; one that is already is returned as it is.
-
-    Parameters
-    ----------
-    controller : Controller or SampledController
-    """
-    if isinstance(controller, SampledController):
-        return controller
-    feedforward, observer = _compensation(controller)
-    corner = _corner(controller)
-    # A compensator behind gains of 0 has no loop: its torque belongs to another controller's.
-    alone = controller.compensator is not None and not any(controller.gains)
-    return SampledController(
-        None if alone else _loop(controller.gains),
-        controller.sample_time,
-        feedforward,
-        observer,
-        ControlBlock("filtered_difference", corner=corner) if corner > 0.0 else None,
-        controller.torque_limit,
-        controller.encoder_counts,
-    )
+FADE = 0.1
+"""s, over which a torque that was taken over fades."""
+SLOW = 2.0 * math.pi * 20.0
+"""rad/s, corner of the low-pass of the slow velocity."""
 
 
-def continuous_of(controller: Controller | SampledController) -> Continuous:
-    """The controller in continuous time.
+class Composed:
+    """Control laws that act together; `stickslip.control.controller.Controller` says which."""
 
-    The integral of a `Controller` goes on where the torque limit holds; one made of control laws is refused there.
+    torque_limit: float
+    sample_time: float
 
-    Raises
-    ------
-    ParameterError
-        If one of its laws acts on samples only.
-    """
-    if isinstance(controller, SampledController):
-        return controller.continuous
-    feedforward, observer = _compensation(controller)
-    blocks = {"loop": _loop(controller.gains), **{b.law.name: b for b in (*feedforward, *observer)}}
-    return continuous_form(blocks)
+    @functools.cached_property
+    def blocks(self) -> dict[str, ControlBlock]:
+        """Its laws by the names of their parts, in the order in which a sample runs them."""
+        raise NotImplementedError
+
+    @functools.cached_property
+    def laws(self) -> tuple[Any, ...]:
+        """What its functions are made of: controllers for which this is equal have the same functions."""
+        return tuple((part, b.law, b.friction and b.friction.law) for part, b in self.blocks.items())
+
+    @functools.cached_property
+    def fields(self) -> tuple[Field, ...]:
+        """The parameters of all its laws, under their whole names."""
+        return _fields_of(self.laws)
+
+    @functools.cached_property
+    def state_fields(self) -> tuple[Field, ...]:
+        """As `fields`, of the states."""
+        return _state_fields_of(self.laws)
+
+    @property
+    def learned_fields(self) -> tuple[Field, ...]:
+        """Of the states, those that its laws learn, without what they keep for that alone."""
+        return tuple(
+            f for f in self.state_fields if isinstance(f.par, Learned) and not isinstance(f.par, Kept)
+        )
+
+    @functools.cached_property
+    def layouts(self) -> dict[str, Layout]:
+        """The layouts of the arguments of `functions`."""
+        parts = [f"{part}_" for part in self.blocks]
+        parts += [f"{part}_{inner}" for part, block in self.blocks.items() for inner in block.parts]
+        return {
+            "n": Layout.of(fields_of(Settings), counted=False),
+            "m": Layout.of(MEMORY, counted=False),
+            "z": Layout.of(self.state_fields, counted=False, parts=tuple(parts)),
+            "p": Layout.of(self.fields, counted=True, parts=tuple(parts)),
+            "u": Layout(Surroundings._fields),
+        }
+
+    @functools.cached_property
+    def functions(self) -> dict[str, Callable[..., float]]:
+        """The functions of `stickslip.control.composition` with its laws in their places."""
+        return functions_with(calls_of(self.blocks))
+
+    @functools.cached_property
+    def deviations(self) -> dict[str, Callable[..., float]]:
+        """Functions ``(n, z, p)`` by the whole names of what its laws learn: its standard deviation, -1: not told."""
+        return deviations_of(self.blocks)
+
+    @functools.cached_property
+    def answers_to_acceleration(self) -> bool:
+        """Whether the torque depends on the reference's acceleration alone."""
+        torques: list[float] = []
+        for acceleration in (0.0, 1.0):
+            n = self.settings._replace(torque_limit=math.inf, sample_time=self.sample_time or 1.0)
+            u = SimpleNamespace(**Surroundings()._asdict())
+            torques.append(
+                self.functions["sample"](
+                    0.0, 0.0, 0.0, acceleration, n, self.memory(), self.state(), self.parameters, u
+                )
+            )
+        return torques[0] != torques[1]
+
+    # ---- its numbers --------------------------------------------------------------------------------------
+
+    @property
+    def settings(self) -> Settings:
+        """The numbers of the composition."""
+        return Settings(
+            self.torque_limit, self.sample_time, 1.0 - math.exp(-SLOW * self.sample_time), FADE, 0.0
+        )
+
+    @property
+    def parameters(self) -> SimpleNamespace:
+        """Parameters of the laws, each law's a part: ``p.loop.kp``."""
+        return SimpleNamespace(**{part: block.parameters for part, block in self.blocks.items()})
+
+    def state(self, learned: Mapping[str, Any] | None = None) -> SimpleNamespace:
+        """The state of the laws at the start, with what they have `learned` before (as the method `learned` gives it).
+
+        Raises
+        ------
+        ParameterError
+            If a learned value is no finite number, or belongs to no law of this controller.
+        """
+        z = SimpleNamespace(**{part: block.state() for part, block in self.blocks.items()})
+        places = self._learned()
+        for name, value in (learned or {}).items():
+            if name not in places:
+                raise ParameterError(
+                    f"controller: nothing learned is called {name!r}; {suggestion(name, places)}"
+                )
+            *whole, last = places[name]
+            owner = _at(z, whole)
+            numbers = cast("list[Any]", value) if isinstance(value, list) else [value]
+            before = getattr(owner, last)
+            if not all(isinstance(x, (int, float)) and math.isfinite(x) for x in numbers) or (
+                isinstance(before, list) != isinstance(value, list)
+                or (isinstance(before, list) and len(numbers) != len(cast("list[Any]", before)))
+            ):
+                raise ParameterError(
+                    f"controller: learned {name} = {value!r} does not fit its law; save it again from one like this"
+                )
+            setattr(owner, last, [float(x) for x in numbers] if isinstance(value, list) else float(value))
+        return z
+
+    def learned(self, z: SimpleNamespace) -> dict[str, Any]:
+        """What its laws have learned in the state `z`, by whole names: to be kept with the power off; plain data."""
+        found = {name: _at(z, path) for name, path in self._learned().items()}
+        return {k: list(cast("list[Any]", v)) if isinstance(v, list) else v for k, v in found.items()}
+
+    def _learned(self) -> dict[str, tuple[str, ...]]:
+        """Where what is learned lies in the state, by whole names."""
+        fields = zip(self.state_fields, self._paths("state_fields"))
+        return {f.name: path for f, path in fields if isinstance(f.par, Learned)}
+
+    @staticmethod
+    def memory() -> SimpleNamespace:
+        """The memory of the composition at the start."""
+        return SimpleNamespace(**{f.name: 0.0 for f in MEMORY})
+
+    def values(self) -> dict[str, Any]:
+        """The parameters of all its laws by their whole names."""
+        return {f.name: _at(self.parameters, path) for f, path in zip(self.fields, self._paths("fields"))}
+
+    def packed(self) -> list[float]:
+        """The parameters as the flat list that compiled functions read."""
+        return packed(self.fields, SimpleNamespace(**self.values()))
+
+    def packed_state(self, z: SimpleNamespace | None = None) -> list[float]:
+        """The state `z` (that at the start, if none is given) as the flat list that compiled functions read."""
+        z = self.state() if z is None else z
+        values = [(f, _at(z, name)) for f, name in zip(self.state_fields, self._paths("state_fields"))]
+        flat = [value for f, value in values if not f.per_element]
+        for f, value in values:
+            if f.per_element:
+                flat.extend(value)
+        return flat
+
+    def unpacked_state(self, flat: Sequence[float]) -> SimpleNamespace:
+        """The state of the laws that `packed_state` made this flat list of."""
+        z, numbers = self.state(), iter(flat)
+        fields = [*zip(self.state_fields, self._paths("state_fields"))]
+        for f, path in sorted(fields, key=lambda pair: pair[0].per_element):
+            owner = _at(z, path[:-1])
+            before = getattr(owner, path[-1])
+            value = [float(next(numbers)) for _ in before] if f.per_element else float(next(numbers))
+            setattr(owner, path[-1], value)
+        return z
+
+    def _paths(self, kind: str) -> list[tuple[str, ...]]:
+        """Where each field lies among the parts: ``("feedforward", "friction", "sigma0")``."""
+        paths: list[tuple[str, ...]] = []
+        for part, block in self.blocks.items():
+            own = len(getattr(block.law, kind))
+            for i, f in enumerate(getattr(block, kind)):
+                held = f.name.removeprefix("friction_")
+                paths.append((part, f.name) if i < own else (part, "friction", held))
+        return paths
 
 
-def _corner(controller: Controller) -> float:
-    """Of the low-pass on the loop's velocity, rad/s; 0 for none."""
-    return 2.0 * math.pi * controller.velocity_filter
+@functools.lru_cache(maxsize=256)
+def _fields_of(laws: tuple[Any, ...]) -> tuple[Field, ...]:
+    """The parameters of these laws, under their whole names."""
+    return _distinct(f for part, law, held in laws for f in within(part, fields_in(law, held)))
 
 
-@functools.lru_cache(maxsize=1024, typed=True)
-def _loop(gains: Gains | Cascade) -> ControlBlock:
-    """The loop's law."""
-    return ControlBlock("cascade" if isinstance(gains, Cascade) else "gains", **gains._asdict())
+@functools.lru_cache(maxsize=256)
+def _state_fields_of(laws: tuple[Any, ...]) -> tuple[Field, ...]:
+    """As `_fields_of`, of the states."""
+    return _distinct(f for part, law, held in laws for f in within(part, state_fields_in(law, held)))
 
 
-@functools.lru_cache(maxsize=64)
-def _compensation(controller: Controller) -> tuple[tuple[ControlBlock, ...], tuple[ControlBlock, ...]]:
-    """Feedforwards and observers; kept, as a controller is run on many axes and references."""
-    compensator = controller.compensator
-    if compensator is None:
-        return (), ()
-    ahead: tuple[ControlBlock, ...] = ()
-    if compensator.offset or compensator.inertia_feedforward:
-        fed = {"inertia": compensator.inertia_feedforward, "offset": compensator.offset}
-        ahead = (ControlBlock("inertia_feedforward", None, None, **fed),)
-    friction = _friction(compensator, filtered=_corner(controller) > 0.0)
-    return (ahead, (friction,)) if compensator.velocity == "measured" else ((friction, *ahead), ())
+def _distinct(fields: Iterable[Field]) -> tuple[Field, ...]:
+    """The fields; two of one name would be one number."""
+    out = tuple(fields)
+    names = [f.name for f in out]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ParameterError(f"controller: two control laws have a field {twice[0]!r}; rename one of them")
+    return out
 
 
-def _friction(compensator: Compensator, *, filtered: bool) -> ControlBlock:
-    """The compensator's law; ``filtered`` where the loop's velocity passes a low-pass that its own does not."""
-    back = compensator.velocity == "measured"
-    choices: dict[str, str] = {"source": "difference"} if back and filtered else {}
-    values: dict[str, Any] = {"gain": compensator.gain, "deadband": compensator.deadband}
-    if not back:
-        values["lead"] = compensator.lead
-    if compensator.filter_hz:
-        choices["low_pass"], values["corner"] = "butterworth", 2.0 * math.pi * compensator.filter_hz
-    if compensator.substeps != 1:
-        choices["velocity"], values["substeps"] = "in_steps", float(compensator.substeps)
-    law = "friction_feedback" if back else "friction_feedforward"
-    return ControlBlock(law, compensator.model, choices, **values)
+def _at(whole: Any, path: Sequence[str]) -> Any:
+    """The value that lies there."""
+    for name in path:
+        whole = getattr(whole, name)
+    return whole

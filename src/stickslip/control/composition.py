@@ -3,7 +3,7 @@
 Written in the scalar subset (`stickslip.subset`). Arguments: settings ``n``, memory ``m`` (which begins with
 what the laws see: `stickslip.control_spec.Signals`), and the laws' states ``z`` and parameters ``p``, each law
 a part of them; surroundings ``u``. The functions `estimate`, `feedforwards`, `accelerations`, `observers`,
-`loops` and `left_over` call the laws of one controller; `stickslip.control.sampled_controller` writes them.
+`loops` and `left_over` call the laws of one controller; `stickslip.control.composed` writes them.
 
 An input that is no number leaves the memory alone: the torque that is held fades to 0, ``fault`` counts the
 samples, and the first usable one goes on from there. Positions may be split into whole turns and the rest

@@ -1,147 +1,269 @@
-"""The whole control law T_m = T_linear + T_hat (thesis eq. 3.3), with its limits and its sampling."""
+"""A controller: a composition of control laws, with its limit and its sample time."""
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
+from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Compensator
+from stickslip.control.composed import Composed
+from stickslip.control.continuous import Continuous, continuous_form, refuse_windup
 from stickslip.control.linear import Cascade, Gains
+from stickslip.control.short_form import laws_meant, refuse_short
+from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.errors import ParameterError
+from stickslip.model import Model
 
-if TYPE_CHECKING:
-    from stickslip.control_spec import ControlLaw
-    from stickslip.model import Model
+__all__ = ["Controller"]
 
-__all__ = ["Controller", "highest_corner"]
-
-FILTER_ROOM = 0.495  # of the sample rate: just below half of it, where a sampled low-pass ends
-
-
-def highest_corner(sample_time: float) -> float:
-    """Highest corner that a low-pass on samples can have, Hz; infinite in continuous time."""
-    return FILTER_ROOM / sample_time if sample_time > 0.0 else math.inf
+Blocks = ControlBlock | Sequence[ControlBlock] | None
+MANY = ("feedforward", "observer", "loop")
+"""Places in which several laws may stand; their torques are summed."""
 
 
-@dataclass(frozen=True)
-class Controller:
-    """A linear controller, a compensator, a torque limit and a sample time.
+@dataclass(frozen=True, init=False)
+class Controller(Composed):
+    """A controller that acts every sample time and holds its torque in between, or in continuous time.
 
-    Attributes
+    It is a composition of control laws: each is given at its place, ``loop``, ``feedforward``, ``observer``,
+    ``estimator``. Gains and a compensator are the short form of the usual ones (`stickslip.control.short_form`); the
+    two may be given together.
+
+    Parameters
     ----------
-    gains : Gains or Cascade
+    gains : Gains or Cascade, optional
         Of the linear part (`stickslip.control.linear`); a cascade needs a sample time.
-    compensator : Compensator or None
+    compensator : Compensator, optional
+        A friction law on the reference (`Feedforward`) or on the measurement (`Feedback`).
     torque_limit : float
-        The size of T_m never exceeds it, N·m; infinite for none.
+        The size of the torque never exceeds it, N·m; infinite for none.
     sample_time : float
-        0 acts in continuous time; otherwise the controller acts every `sample_time` s, holds its output, and
-        takes the velocity as the difference of two measured positions.
+        s; 0 acts in continuous time, where all its laws have a continuous form.
     encoder_counts : float
         Counts per revolution of the encoder that a sampled controller reads; 0 measures exactly.
     velocity_filter : float
         Corner of a first-order low-pass on the velocity that the linear part sees, Hz; 0 for none. Only with a sample
         time.
+    loop : ControlBlock or sequence of ControlBlock, optional
+        The control loop instead of gains: PD, PID, ...
+    feedforward, observer : ControlBlock or sequence of ControlBlock, optional
+        What acts on the reference alone, and on the measurement, behind what the compensator gives.
+    estimator : ControlBlock, optional
+        How the velocity is found from measured positions; the backward difference, if none is given.
+    alone : bool
+        Whether a law that adapts may stand without an integral or an observer, as in a comparison; no file says so.
+
+    Raises
+    ------
+    ParameterError
+        If a law does not belong where it is given, or a number is out of bounds.
     """
 
-    gains: Gains | Cascade
-    compensator: Compensator | None = None
-    torque_limit: float = math.inf
-    sample_time: float = 0.0
-    encoder_counts: float = 0.0
-    velocity_filter: float = 0.0
+    gains: Gains | Cascade | None
+    compensator: Compensator | None
+    torque_limit: float
+    sample_time: float
+    encoder_counts: float
+    velocity_filter: float
+    loop: tuple[ControlBlock, ...]
+    feedforward: tuple[ControlBlock, ...]
+    observer: tuple[ControlBlock, ...]
+    estimator: ControlBlock | None
+    alone: bool
 
-    @property
-    def linear(self) -> Gains:
-        """The gains as those of one sum: a cascade's PID (`Cascade.pid`)."""
-        return self.gains.pid if isinstance(self.gains, Cascade) else self.gains
+    def __init__(
+        self,
+        gains: Gains | Cascade | None = None,
+        compensator: Compensator | None = None,
+        torque_limit: float = math.inf,
+        sample_time: float = 0.0,
+        encoder_counts: float = 0.0,
+        velocity_filter: float = 0.0,
+        *,
+        loop: Blocks = None,
+        feedforward: Blocks = None,
+        observer: Blocks = None,
+        estimator: ControlBlock | None = None,
+        alone: bool = False,
+    ) -> None:
+        own = {"loop": _listed(loop), "feedforward": _listed(feedforward), "observer": _listed(observer)}
+        vars(self).update(
+            gains=gains, compensator=compensator, torque_limit=torque_limit, sample_time=sample_time,
+            encoder_counts=encoder_counts, velocity_filter=velocity_filter, estimator=estimator, alone=alone, **own,
+        )  # fmt: skip
+        self._refuse_numbers()
+        refuse_short(gains, compensator, velocity_filter, sample_time)
+        if not self.is_short:
+            self._refuse_laws()
 
-    def __post_init__(self) -> None:
-        for name, value in self.gains._asdict().items():
-            if not math.isfinite(value) or value < 0.0:
-                raise ParameterError(f"controller: {name} = {value:g} must be at least 0")
-        if math.isnan(self.torque_limit) or self.torque_limit <= 0.0:
+    def _refuse_numbers(self) -> None:
+        if not self.torque_limit > 0.0:
             raise ParameterError(
                 f"controller: torque_limit = {self.torque_limit:g} N·m must be greater than 0"
             )
-        if not math.isfinite(self.sample_time) or self.sample_time < 0.0:
+        if not (math.isfinite(self.sample_time) and self.sample_time >= 0.0):
             raise ParameterError(f"controller: sample_time = {self.sample_time:g} s must be at least 0")
-        if not math.isfinite(self.encoder_counts) or self.encoder_counts < 0.0:
+        if not (math.isfinite(self.encoder_counts) and self.encoder_counts >= 0.0):
             raise ParameterError(f"controller: encoder_counts = {self.encoder_counts:g} must be at least 0")
         if self.encoder_counts > 0.0 and self.sample_time == 0.0:
             raise ParameterError(
                 "controller: encoder_counts needs a sampled controller; give a sample_time greater than 0"
             )
-        if not math.isfinite(self.velocity_filter) or self.velocity_filter < 0.0:
-            raise ParameterError(
-                f"controller: velocity_filter = {self.velocity_filter:g} Hz must be at least 0"
-            )
-        for name, given in (
-            ("a cascade", isinstance(self.gains, Cascade)),
-            ("a velocity_filter", self.velocity_filter > 0.0),
-        ):
-            if given and self.sample_time == 0.0:
-                raise ParameterError(
-                    f"controller: {name} needs a sampled controller; give a sample_time greater than 0"
-                )
-        compensator = self.compensator
-        corner = compensator.filter_hz if compensator else None
-        if compensator and corner and corner > highest_corner(self.sample_time):
-            raise ParameterError(
-                f"{compensator.name}: filter_hz = {corner:g} Hz is too high for a sample time of {self.sample_time:g} "
-                f"s; give at most {highest_corner(self.sample_time):g} Hz, or none"
-            )
-        if compensator and self.sample_time == 0.0 and compensator.sampled:
-            name = compensator.sampled[0]
-            raise ParameterError(
-                f"controller: {name} needs a sampled controller; give a sample_time greater than 0"
-            )
 
-    # ---- as a `SampledController` says it ------------------------------------------------------------------
+    def _refuse_laws(self) -> None:
+        for place in PLACES:
+            for block in self._given(place):
+                if block.law.place != place:
+                    raise ParameterError(
+                        f"controller: {place} = {block.law.name!r} cannot be used as {place}; "
+                        f"give it as {block.law.place}"
+                    )
+        for one, other in (("gains", "loop"), ("velocity_filter", "estimator")):
+            if getattr(self, one) and getattr(self, other):
+                raise ParameterError(f"controller: {one} and {other} exclude each other; give one of them")
+        if not self.blocks.keys() - {"estimator"}:
+            raise ParameterError("controller: no control law; give a loop, a feedforward or an observer")
+        laws = [block.law for place in PLACES for block in self._given(place)]
+        adapting = next((law.name for law in laws if law.adapts), "")
+        integrates = self.linear.ki > 0.0 or any(law.integrates for law in laws)
+        if adapting and not self.alone and not integrates:
+            raise ParameterError(
+                f"controller: {adapting} cannot adapt while the axis sticks, and no other law moves the axis then; "
+                "add a loop with an integral (pid) or an observer (disturbance_observer)"
+            )
+        if self.sample_time == 0.0:
+            _ = self.continuous  # refuses laws that act on samples
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What it was given, without what was found of that."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    # ---- its laws ----------------------------------------------------------------------------------------
+
+    @property
+    def is_short(self) -> bool:
+        """Whether it is gains and a compensator alone: files, records and studies name its numbers shortly then."""
+        return self.gains is not None and not (
+            self.loop or self.feedforward or self.observer or self.estimator
+        )
+
+    @property
+    def linear(self) -> Gains:
+        """The gains as those of one sum: a cascade's PID (`Cascade.pid`); zeros where there are none."""
+        return self.gains.pid if isinstance(self.gains, Cascade) else self.gains or Gains(0.0)
+
+    def _given(self, place: str) -> tuple[ControlBlock, ...]:
+        """The laws given at a place."""
+        return _listed(getattr(self, place))
+
+    @functools.cached_property
+    def blocks(self) -> dict[str, ControlBlock]:
+        """Its laws by the names of their parts, in the order in which a sample runs them."""
+        out: dict[str, ControlBlock] = {}
+        meant = laws_meant(self.gains, self.compensator, self.velocity_filter)
+        for place in PLACES:
+            found = (*meant[place], *self._given(place))
+            if place == "estimator" and not found:
+                found = (ControlBlock("backward_difference"),)
+            for i, block in enumerate(found, 1):
+                out[place if i == 1 else f"{place}_{i}"] = block
+        return out
+
+    def with_blocks(self, blocks: Iterable[ControlBlock]) -> Controller:
+        """The controller that is made of the laws `blocks`, each at its own place."""
+        own = [*blocks]
+        places = {place: [b for b in own if b.law.place == place] for place in MANY}
+        estimator = next((b for b in own if b.law.place == "estimator"), None)
+        return replace(self, gains=None, compensator=None, velocity_filter=0.0, estimator=estimator, **places)
+
+    @functools.cached_property
+    def continuous(self) -> Continuous:
+        """Its laws in continuous time.
+
+        The integral of the short form goes on where the torque limit holds; that of a control law is refused there.
+
+        Raises
+        ------
+        ParameterError
+            If one of its laws acts on samples only.
+        """
+        found = continuous_form(self.blocks)
+        if not self.is_short:
+            refuse_windup(found, self.torque_limit)
+        return found
 
     @property
     def frictions(self) -> dict[str, Model]:
-        """The friction laws that it holds, by what a record calls them."""
-        return {"compensator": self.compensator.model} if self.compensator else {}
+        """The friction laws that it holds, by what a record calls them: their parts, or the compensator."""
+        if self.is_short:
+            return {"compensator": self.compensator.model} if self.compensator else {}
+        return {part: block.friction for part, block in self.blocks.items() if block.friction}
 
     @property
     def control_laws(self) -> tuple[ControlLaw, ...]:
-        """The control laws that its user chose: none, these are gains."""
-        return ()
+        """The control laws that its user chose: none in the short form."""
+        return () if self.is_short else tuple(block.law for block in self.blocks.values())
 
     @property
     def feeds_back(self) -> bool:
         """Whether a friction law in it acts on what is measured."""
-        return self.compensator is not None and self.compensator.velocity == "measured"
-
-    @property
-    def answers_to_acceleration(self) -> bool:
-        """Whether the torque depends on the reference's acceleration alone."""
-        return self.compensator is not None and self.compensator.inertia_feedforward != 0.0
+        return any(b.law.place == "observer" and b.friction for b in self.blocks.values())
 
     def holding(self, change: Callable[[Model], Model]) -> Controller:
-        """The controller whose friction law is what `change` makes of it."""
-        if self.compensator is None:
-            return self
-        return replace(self, compensator=replace(self.compensator, model=change(self.compensator.model)))
+        """The controller whose friction laws are what `change` makes of them."""
+        own = {place: [b.holding(change) for b in self._given(place)] for place in MANY}
+        meant = self.compensator and replace(self.compensator, model=change(self.compensator.model))
+        estimator = self.estimator and self.estimator.holding(change)
+        return replace(self, compensator=meant, estimator=estimator, **own)
 
-    def values(self) -> dict[str, float]:
-        """The gains of its linear part by name."""
-        return dict(self.gains._asdict())
+    def numbers(self) -> dict[str, Any]:
+        """Its numbers by the names that studies and records know: of the short form its gains, else `values`."""
+        return dict(self.gains._asdict()) if self.is_short and self.gains else self.values()
+
+    def with_values(self, values: Mapping[str, Any]) -> Controller:
+        """The controller with other `values` of parameters, by whole names (``loop_kp``, ``feedforward_friction_fc``).
+
+        Raises
+        ------
+        ParameterError
+            If a value is out of bounds.
+        """
+        own: dict[str, dict[str, Any]] = {part: {} for part in self.blocks}
+        held: dict[str, dict[str, Any]] = {part: {} for part in self.blocks}
+        for f, path in zip(self.fields, self._paths("fields")):
+            if f.name in values:
+                (own if len(path) == 2 else held)[path[0]][path[-1]] = values[f.name]
+        return self.with_blocks(b.with_values(own[part], held[part]) for part, b in self.blocks.items())
+
+    def with_numbers(self, numbers: Mapping[str, Any]) -> Controller:
+        """The controller with others of its `numbers`."""
+        if not (self.is_short and self.gains):
+            return self.with_values(numbers)
+        own = {name: float(numbers[name]) for name in self.gains._fields if name in numbers}
+        return replace(self, gains=self.gains._replace(**own))
+
+    # ---- for people --------------------------------------------------------------------------------------
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data that says everything about it."""
-        return {
-            **self.described(),
-            "sample_time": self.sample_time,
-            "torque_limit": self.torque_limit,
-            "encoder_counts": self.encoder_counts,
-            "velocity_filter": self.velocity_filter,
-        }
+        own = self.described() if self.is_short else {p: block.as_dict() for p, block in self.blocks.items()}
+        names = ("sample_time", "torque_limit", "encoder_counts", *(["velocity_filter"] * self.is_short))
+        return {**own, **{name: getattr(self, name) for name in names}}
 
     def described(self) -> dict[str, Any]:
         """What a record says of it."""
-        compensator = self.compensator
-        return {"gains": self.values(), **({"compensator": compensator.as_dict()} if compensator else {})}
+        if not self.is_short:
+            return {"controller": self.as_dict()}
+        helper = self.compensator
+        return {"gains": self.numbers(), **({"compensator": helper.as_dict()} if helper else {})}
+
+
+def _listed(blocks: Blocks) -> tuple[ControlBlock, ...]:
+    """None, one or several."""
+    if blocks is None:
+        return ()
+    return (blocks,) if isinstance(blocks, ControlBlock) else tuple(blocks)

@@ -1,4 +1,4 @@
-"""From tables of a TOML file to a controller made of control laws.
+"""From tables of a TOML file to a controller.
 
     [controller]
     sample_time = 0.001
@@ -12,6 +12,13 @@ In a file of its own, `read_controller` reads it with the tables that it names: 
 inertia, ``plugins``; what else the file holds (it may be one of `stickslip simulate`) is left alone.
 
 A place may hold a list of tables. Gains that are left out are placed; an inertia that is left out is the axis's.
+Instead of the loop, or of any law at all, a table may have the short form (`stickslip.control.short_tables`):
+
+    [controller]
+    linear = "PD"
+    placement = {bandwidth_hz = 20.0, damping = 1.0}
+    compensator = "feedforward"
+    law = "lugre"
 """
 
 from __future__ import annotations
@@ -19,14 +26,14 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
 from stickslip.config import Table, read_toml
 from stickslip.control.block import ControlBlock
+from stickslip.control.controller import Controller
 from stickslip.control.registry import control_law, control_law_names, law_files
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.short_tables import OF_GAINS, Placement, compensator_in, gains_in, placement
 from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.errors import ConfigError, suggestion
 from stickslip.model import Model
@@ -38,24 +45,6 @@ NUMERICS = ("integrator", "tolerance", "time_step", "output")
 """Keys of a controller's table that are not the controller's: how a simulation integrates it."""
 
 
-@dataclass(frozen=True)
-class Placement:
-    """Where the poles of the loop without friction lie."""
-
-    bandwidth: float
-    """Natural frequency, Hz"""
-    damping: float
-    """Damping ratio of the pair"""
-
-
-def placement(table: Table) -> Placement | None:
-    """Read ``placement = {bandwidth_hz, damping}``, if it is there."""
-    if not table.has("placement"):
-        return None
-    with table.table("placement") as poles:
-        return Placement(poles.positive("bandwidth_hz", "Hz"), poles.positive("damping", ""))
-
-
 def is_composed(table: Table) -> bool:
     """Whether a controller's table names control laws."""
     return any(isinstance(table.values.get(place), (dict, list)) for place in PLACES)
@@ -63,7 +52,7 @@ def is_composed(table: Table) -> bool:
 
 def read_controller(
     path: str | os.PathLike[str], inertia: float | None = None, known: Mapping[str, Model] | None = None
-) -> SampledController:
+) -> Controller:
     """Read the controller of a file.
 
     Parameters
@@ -103,8 +92,8 @@ def composed(
     poles: Placement | None,
     known: Mapping[str, Model],
     laws: Mapping[str, ControlLaw],
-) -> SampledController:
-    """Read a controller made of control laws.
+) -> Controller:
+    """Read a controller.
 
     Parameters
     ----------
@@ -129,11 +118,15 @@ def composed(
     estimator = places.pop("estimator")
     if len(estimator) > 1:
         raise table.error("estimator", "must be one table; a controller has one velocity")
+    short = not is_composed(table)
     with table.blamed():
-        return SampledController(
-            sample_time=table.number("sample_time", "s", 0.0, lower=0.0),
-            torque_limit=table.positive("torque_limit", "N·m") if table.has("torque_limit") else math.inf,
-            encoder_counts=table.number("encoder_counts", "counts per revolution", 0.0, lower=0.0),
+        return Controller(
+            gains_in(table, inertia, poles) if short or any(map(table.has, OF_GAINS)) else None,
+            compensator_in(table, known),
+            table.positive("torque_limit", "N·m") if table.has("torque_limit") else math.inf,
+            table.number("sample_time", "s", 0.0, lower=0.0),
+            table.number("encoder_counts", "counts per revolution", 0.0, lower=0.0),
+            table.number("velocity_filter", "Hz", 0.0, lower=0.0),
             estimator=estimator[0] if estimator else None,
             **places,
         )

@@ -15,8 +15,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from stickslip.config import read_toml
-from stickslip.control.composed import composed_of
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 
 __all__ = [
@@ -74,13 +73,13 @@ class LearnedValue:
 
 
 def learned_values(
-    controller: SampledController, z: SimpleNamespace, sample_time: float = 0.0
+    controller: Controller, z: SimpleNamespace, sample_time: float = 0.0
 ) -> tuple[LearnedValue, ...]:
     """What a controller's laws have learned in the state `z`.
 
     Parameters
     ----------
-    controller : SampledController
+    controller : Controller
     z : SimpleNamespace
         As its method ``state`` gives it.
     sample_time : float
@@ -111,27 +110,24 @@ def told(meta: Mapping[str, Any]) -> list[str]:
     return [LearnedValue(name, **v).text for name, v in meta.get("learned", {}).items()]
 
 
-def after(controller: Any, state: Any, sample_time: float) -> dict[str, dict[str, Any]]:
-    """What `plain` says of a controller of any kind after a run that has left this flat `state`."""
-    own = composed_of(controller)
-    if not own.learned_fields:
+def after(controller: Controller, state: Any, sample_time: float) -> dict[str, dict[str, Any]]:
+    """What `plain` says of a controller after a run that has left this flat `state`."""
+    if not controller.learned_fields:
         return {}
-    return plain(learned_values(own, own.unpacked_state(state.tolist()), sample_time))
+    return plain(learned_values(controller, controller.unpacked_state(state.tolist()), sample_time))
 
 
 # ---- files ---------------------------------------------------------------------------------------------------------
 
 
-def origin_of(controller: SampledController, machine: str) -> dict[str, str]:
+def origin_of(controller: Controller, machine: str) -> dict[str, str]:
     """What says whose learned values they are: the machine, and a hash of the laws with all their parameters."""
     content = {part: block.as_dict() for part, block in controller.blocks.items()}
     text = json.dumps(content, sort_keys=True, default=str)
     return {"machine": machine, "laws": hashlib.sha256(text.encode()).hexdigest()}
 
 
-def write_learned(
-    path: Path, controller: SampledController, learned: Mapping[str, Any], machine: str
-) -> None:
+def write_learned(path: Path, controller: Controller, learned: Mapping[str, Any], machine: str) -> None:
     """Keep what a controller has `learned` (as its method of that name gives it) on a machine.
 
     Raises
@@ -146,7 +142,7 @@ def write_learned(
     write_table(path, {"origin": origin, "learned": dict(learned), "uncertainty": uncertain})
 
 
-def read_learned(path: Path, controller: SampledController, machine: str) -> dict[str, Any]:
+def read_learned(path: Path, controller: Controller, machine: str) -> dict[str, Any]:
     """What `write_learned` has kept, for the method ``state`` of the controller; nothing where there is no file.
 
     Raises

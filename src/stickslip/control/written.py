@@ -7,8 +7,8 @@ from typing import Any
 
 from stickslip import plugins
 from stickslip.control.block import ControlBlock
+from stickslip.control.controller import Controller
 from stickslip.control.registry import control_law_names
-from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.model import Model
 from stickslip.spec import Law
@@ -16,12 +16,12 @@ from stickslip.spec import Law
 __all__ = ["tables_of"]
 
 
-def tables_of(controller: SampledController) -> dict[str, Any]:
+def tables_of(controller: Controller) -> dict[str, Any]:
     """The tables ``controller`` and ``laws`` (where friction laws are held), with every number.
 
     Parameters
     ----------
-    controller : SampledController
+    controller : Controller
     """
     own: dict[str, Any] = {"sample_time": controller.sample_time}
     if math.isfinite(controller.torque_limit):

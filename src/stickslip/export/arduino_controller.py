@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.export import c99_controller
 from stickslip.export._text import render
 from stickslip.export.arduino import tried
@@ -15,9 +15,7 @@ from stickslip.spec import Surroundings
 __all__ = ["CONTROLLER"]
 
 
-def write(
-    controller: SampledController, name: str, single: bool = True, around: Surroundings = STILL
-) -> Export:
+def write(controller: Controller, name: str, single: bool = True, around: Surroundings = STILL) -> Export:
     """Sources, an example, the library's properties, and the check of the C export."""
     c = c99_controller.write(controller, name, single=True, around=around).files
     values: dict[str, Any] = {

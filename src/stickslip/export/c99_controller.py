@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.control.composition import MEMORY, Settings
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.export._analysis import Facts, analyse
 from stickslip.export._c import Dialect, functions, head, safe
 from stickslip.export._step_error import PARTS, about_steps
@@ -54,14 +54,12 @@ WIDE = {
 }
 
 
-def write(
-    controller: SampledController, name: str, single: bool = False, around: Surroundings = STILL
-) -> Export:
+def write(controller: Controller, name: str, single: bool = False, around: Surroundings = STILL) -> Export:
     """Header, source, golden samples, a program that checks them, and how to use it.
 
     Parameters
     ----------
-    controller : SampledController
+    controller : Controller
     name : str
         Prefix of every name in C.
     single : bool
@@ -101,7 +99,7 @@ def check(export: Export, name: str) -> Check:
 # ---- what the templates are filled with ----------------------------------------------------------------------------
 
 
-def code_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
+def code_of(controller: Controller, dialect: Dialect) -> dict[str, Any]:
     """Names, structures and functions."""
     # In single precision the ones with whole positions are `wide`.
     told = [f"_{name}" for name in deviation_functions(controller)]
@@ -125,7 +123,7 @@ def code_of(controller: SampledController, dialect: Dialect) -> dict[str, Any]:
     }
 
 
-def numbers_of(controller: SampledController, dialect: Dialect, around: Surroundings) -> dict[str, Any]:
+def numbers_of(controller: Controller, dialect: Dialect, around: Surroundings) -> dict[str, Any]:
     """Values of the structures."""
     values = controller.values()
     return {
@@ -144,7 +142,7 @@ def rows_of(samples: Samples) -> list[str]:
     return [", ".join("(double)NAN" if np.isnan(x) else repr(float(x)) for x in row) for row in zip(*samples)]
 
 
-def step_error_of(controller: SampledController) -> dict[str, Any]:
+def step_error_of(controller: Controller) -> dict[str, Any]:
     """What a README says of the error of a friction law's step, and of how the controller divides it."""
     for part, block in controller.blocks.items():
         parts = int(block.own.get("substeps", 0))
@@ -164,7 +162,7 @@ def wide(known: Mapping[str, Facts], dialect: Dialect) -> Iterable[Mapping[str, 
         yield {"about": about, "head": own, "call": f"{dialect.prefix}{inner}", "given": rest}
 
 
-def structures(controller: SampledController, dialect: Dialect) -> Iterable[Mapping[str, Any]]:
+def structures(controller: Controller, dialect: Dialect) -> Iterable[Mapping[str, Any]]:
     """The structures of the header."""
     yield structure("parameters", "Parameters of the laws.", controller.fields, dialect)
     yield structure("state", "What the laws remember.", controller.state_fields, dialect)

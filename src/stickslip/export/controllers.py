@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from stickslip.control.block import ControlBlock
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.export._analysis import merged
 from stickslip.export._text import ascii_only
@@ -67,7 +67,7 @@ def checked_name(name: str) -> str:
     return name
 
 
-def trees_of(controller: SampledController, public: Sequence[str]) -> dict[str, ast.FunctionDef]:
+def trees_of(controller: Controller, public: Sequence[str]) -> dict[str, ast.FunctionDef]:
     """The functions of that name of the composition, and what they call, callees first; ``_`` before a name is kept.
 
     Those that tell a deviation of what is learned have the names of `deviation_functions`.
@@ -76,12 +76,12 @@ def trees_of(controller: SampledController, public: Sequence[str]) -> dict[str, 
     return merged(named({name: found[name.strip("_")] for name in public}, controller.layouts))
 
 
-def deviation_functions(controller: SampledController) -> dict[str, Callable[..., float]]:
+def deviation_functions(controller: Controller) -> dict[str, Callable[..., float]]:
     """The functions that tell a standard deviation of what is learned, ``feedforward_scale_deviation`` by name."""
     return {f"{name}_deviation": function for name, function in controller.deviations.items()}
 
 
-def learned_of(controller: SampledController) -> Iterable[Mapping[str, str]]:
+def learned_of(controller: Controller) -> Iterable[Mapping[str, str]]:
     """What it learns: names, units, meanings, and the functions that tell its deviation ("": none)."""
     told = controller.deviations
     for f in controller.learned_fields:
@@ -89,13 +89,13 @@ def learned_of(controller: SampledController) -> Iterable[Mapping[str, str]]:
         yield {"name": f.name, "unit": f.par.unit, "meaning": f.par.meaning, "deviation": deviation}
 
 
-def counts_of(controller: SampledController) -> dict[str, int]:
+def counts_of(controller: Controller) -> dict[str, int]:
     """The numbers of elements by the names that translated functions use (``observer_friction_elements_``)."""
     values = controller.values()
     return {f"{f.par.per}s_": len(values[f.name]) for f in controller.fields if f.per_element}
 
 
-def settings_of(controller: SampledController) -> dict[str, float]:
+def settings_of(controller: Controller) -> dict[str, float]:
     """Numbers of the composition; the samples make the time.
 
     Raises
@@ -110,18 +110,18 @@ def settings_of(controller: SampledController) -> dict[str, float]:
     return controller.settings._replace(clock=1.0)._asdict()
 
 
-def compensates_alone(controller: SampledController) -> bool:
+def compensates_alone(controller: Controller) -> bool:
     """Whether it has no loop: its torque belongs to that of another controller."""
     return not any(block.law.place == "loop" for block in controller.blocks.values())
 
 
-def depends_on(controller: SampledController) -> str:
+def depends_on(controller: Controller) -> str:
     """What the friction laws in it depend on besides velocities, for people."""
     found = [read_by(block.friction) for block in controller.blocks.values() if block.friction]
     return ", ".join(dict.fromkeys(words for words in found if words))
 
 
-def given_by(controller: SampledController) -> str:
+def given_by(controller: Controller) -> str:
     """What its torque is made of, for people."""
     blocks = {part: block for part, block in controller.blocks.items() if block.law.place != "estimator"}
     parts = [_gives(part, block) for part, block in blocks.items()]
@@ -146,7 +146,7 @@ def _gives(part: str, block: ControlBlock) -> str:
     return f"the torque of `{part}` ({block.law.title})"
 
 
-def laws_of(controller: SampledController) -> list[str]:
+def laws_of(controller: Controller) -> list[str]:
     """Its laws, a line each."""
     return [
         ascii_only(f"{part}: {block.law.title}; {', '.join(block.law.source)}")
@@ -154,14 +154,14 @@ def laws_of(controller: SampledController) -> list[str]:
     ]
 
 
-def table_of(controller: SampledController) -> Iterable[Mapping[str, Any]]:
+def table_of(controller: Controller) -> Iterable[Mapping[str, Any]]:
     """Its parameters for a table."""
     values = controller.values()
     for f in controller.fields:
         yield {"name": f.name, "value": values[f.name], "unit": f.par.unit, "meaning": f.par.meaning}
 
 
-def head_of(controller: SampledController, name: str) -> dict[str, Any]:
+def head_of(controller: Controller, name: str) -> dict[str, Any]:
     """What every template begins with: the prefix of its names, the laws, the sample time, the table of parameters.
 
     Raises
@@ -177,7 +177,7 @@ def head_of(controller: SampledController, name: str) -> dict[str, Any]:
 
 
 def golden_samples(
-    controller: SampledController, around: Surroundings = STILL, count: int = 400, seed: int = 1
+    controller: Controller, around: Surroundings = STILL, count: int = 400, seed: int = 1
 ) -> Samples:
     """Random samples and the torque of plain Python, from the first one on, about this load and temperature."""
     n, m = SimpleNamespace(**settings_of(controller)), controller.memory()

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.export import c99, c99_controller
 from stickslip.export._fmu import (
     SURROUNDINGS,
@@ -47,7 +47,7 @@ UNLIMITED = 1e308
 """N·m: stands for no limit, as the files of a unit know no infinite number."""
 
 
-def variables_of(controller: SampledController) -> list[Variable]:
+def variables_of(controller: Controller) -> list[Variable]:
     """Inputs, output, parameters and state."""
     limit = min(controller.torque_limit, UNLIMITED)
     counts = counts_of(controller)
@@ -65,7 +65,7 @@ def variables_of(controller: SampledController) -> list[Variable]:
     )
 
 
-def surroundings_read(controller: SampledController) -> Iterable[Variable]:
+def surroundings_read(controller: Controller) -> Iterable[Variable]:
     """Inputs for what the held friction laws read; position and time are the controller's own."""
     trees = trees_of(controller, ["_sample"])
     read = {
@@ -83,9 +83,7 @@ def surroundings_read(controller: SampledController) -> Iterable[Variable]:
             )
 
 
-def write(
-    controller: SampledController, name: str, single: bool = False, around: Surroundings = STILL
-) -> Export:
+def write(controller: Controller, name: str, single: bool = False, around: Surroundings = STILL) -> Export:
     """A unit of each version, golden samples, and how to use them."""
     c = c99_controller.write(controller, name, around=around).files
     variables, values = variables_of(controller), controller.values()
@@ -105,7 +103,7 @@ def write(
     return Export({**files, "golden_samples.csv": golden, "README.md": readme}, notes)
 
 
-def usable_samples(controller: SampledController, around: Surroundings) -> Samples:
+def usable_samples(controller: Controller, around: Surroundings) -> Samples:
     """Golden samples without inputs that are no numbers, which an importer may not set; within the unit's limit."""
     with_faults = golden_samples(controller, around)
     good = np.isfinite(np.column_stack(with_faults[:4])).all(axis=1)

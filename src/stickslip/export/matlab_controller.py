@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from stickslip.control.composition import MEMORY, Settings
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.export._matlab import functions, local, safe, with_helpers
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.controllers import (
@@ -29,9 +29,7 @@ __all__ = ["CONTROLLER"]
 PUBLIC = ("sample", "follow")
 
 
-def write(
-    controller: SampledController, name: str, single: bool = False, around: Surroundings = STILL
-) -> Export:
+def write(controller: Controller, name: str, single: bool = False, around: Surroundings = STILL) -> Export:
     """One file a function, golden samples and a script that checks them."""
     values, counts = controller.values(), counts_of(controller)
     sizes = [f"    p.{count.strip('_')} = {size};" for count, size in counts.items()]
@@ -60,7 +58,7 @@ def write(
     )
 
 
-def entry_of(controller: SampledController, entry: str) -> list[str]:
+def entry_of(controller: Controller, entry: str) -> list[str]:
     """A public function with the local ones that it calls; every one hands memory, state and surroundings back."""
     *inner, (_, about, lines) = functions(trees_of(controller, [entry]))
     arguments = lines[0].partition(f"{local(entry)}(")[2]
@@ -92,7 +90,7 @@ def number(value: float) -> str:
     return "Inf" if value == math.inf else repr(float(value))
 
 
-def reset(controller: SampledController, counts: Mapping[str, int]) -> list[str]:
+def reset(controller: Controller, counts: Mapping[str, int]) -> list[str]:
     """A function that gives memory and state at the start."""
     lines = [
         "function [m, z] = @()",

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from stickslip.control.composition import MEMORY, Settings
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.export._text import render
 from stickslip.export.controllers import (
     STILL,
@@ -29,9 +29,7 @@ __all__ = ["CONTROLLER"]
 PUBLIC = ("sample", "sample_turns", "follow", "follow_turns")
 
 
-def write(
-    controller: SampledController, name: str, single: bool = False, around: Surroundings = STILL
-) -> Export:
+def write(controller: Controller, name: str, single: bool = False, around: Surroundings = STILL) -> Export:
     """One module, golden samples, and how to use it."""
     counts, trees = counts_of(controller), trees_of(controller, PUBLIC)
     for tree in trees.values():

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from stickslip.control.composition import MEMORY, Settings
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.export._hoist import hoisted
 from stickslip.export._st import Names, functions, number
 from stickslip.export._st_names import RESERVED, named_in_st
@@ -46,9 +46,7 @@ BLOCK = (
 STRUCTURES = {**OF_LAWS, "n": "settings", "m": "memory"}
 
 
-def write(
-    controller: SampledController, name: str, single: bool = False, around: Surroundings = STILL
-) -> Export:
+def write(controller: Controller, name: str, single: bool = False, around: Surroundings = STILL) -> Export:
     """One file with types, functions and the block; golden samples; how to use it."""
     x, counts = named_in_st([checked_name(name)], RESERVED | set(BLOCK))[name], counts_of(controller)
     trees = hoisted(trees_of(controller, ["_sample", "_follow"]))

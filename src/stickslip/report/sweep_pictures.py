@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.control.controller import Controller
 from stickslip.report.plots import Curve, Panel, Style, scaled, style_of
 from stickslip.report.plots import draw as draw_panels
 from stickslip.study.planned_run import PlannedRun
@@ -233,7 +232,7 @@ def _symbol(name: str) -> str:
 
 def _gains(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Path | None:
     what, unit = named(sweep.metrics[0])
-    helped = [run for run in runs if isinstance(run.control, Controller) and run.control.compensator]
+    helped = [run for run in runs if run.control.is_short and run.control.compensator]
     found = {run.controller: recommended(folder, sweep, run) for run in helped}
     found = {name: choice for name, choice in found.items() if choice.gains.size}
     if not found:

@@ -21,7 +21,6 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from stickslip.control.controller import Controller
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, RigError
 from stickslip.record import Record
 from stickslip.rigs.budget import BUDGET, Budget
@@ -163,10 +162,10 @@ class Loop:
 
     # ---- running -------------------------------------------------------------------------------------------
 
-    def prepare(self, controller: Controller | SampledController | PythonController | None) -> Control:
+    def prepare(self, controller: Controller | PythonController | None) -> Control:
         """Lay out and compile a `controller`, best before the rig is armed: an armed one has no torque meanwhile."""
         if id(controller) not in self._controls:
-            compiled = controller if isinstance(controller, (Controller, SampledController)) else None
+            compiled = None if callable(controller) else controller
             control = self.meanwhile(lambda: control_of(compiled, self.limits, self.rig.sample_time))
             self._controls[id(controller)] = (controller, control)
         return self._controls[id(controller)][1]
@@ -174,7 +173,7 @@ class Loop:
     def run(
         self,
         setpoints: Array,
-        controller: Controller | SampledController | PythonController | None = None,
+        controller: Controller | PythonController | None = None,
         *,
         travel: float = math.inf,
     ) -> Array:
@@ -184,7 +183,7 @@ class Loop:
         ----------
         setpoints : array, shape (n, 5)
             A `Setpoint` per sample (`stickslip.rigs.rig.setpoints`).
-        controller : Controller, SampledController, callable or None
+        controller : Controller, callable or None
             None: the setpoints' torques alone.
         travel : float
             The segment ends early, without a fault, when the axis has moved that far from where it began, rad.

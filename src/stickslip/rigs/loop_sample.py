@@ -9,12 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.control.composed import composed_of
 from stickslip.control.composition import MEMORY
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
 from stickslip.control.linear import Gains
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.jit import call_guarded, compiled_guarded, flat, kernel, pointer, pointer_at, record_at
 from stickslip.rigs.rig import Limits, Measurement, Setpoint
@@ -84,7 +82,7 @@ class Control(NamedTuple):
 
 
 def control_of(
-    controller: Controller | SampledController | None,
+    controller: Controller | None,
     limits: Limits,
     sample_time: float,
     travel: float = math.inf,
@@ -93,7 +91,7 @@ def control_of(
 
     Parameters
     ----------
-    controller : Controller, SampledController or None
+    controller : Controller or None
         Sampled at the rig's sample time; one in continuous time (``sample_time`` 0) is sampled too.
     limits : Limits
     sample_time : float
@@ -110,7 +108,7 @@ def control_of(
         raise InputError(
             f"controller: sample_time = {controller.sample_time:g} s, the rig's is {sample_time:g} s; give the rig's"
         )
-    chosen = composed_of(replace(controller or NOTHING, sample_time=sample_time))
+    chosen = replace(controller or NOTHING, sample_time=sample_time)
     # The setpoints' torques alone are given as they are.
     numbers = chosen.settings if controller else chosen.settings._replace(fade=0.0)
     memory = np.zeros(len(NAMES))
@@ -128,21 +126,21 @@ def control_of(
     )
 
 
-def begin_learned(control: Control, controller: Any, learned: Mapping[str, Any] | None) -> None:
+def begin_learned(control: Control, controller: Controller | None, learned: Mapping[str, Any] | None) -> None:
     """Let a controller begin with what it has learned before."""
-    if isinstance(controller, SampledController) and learned:
+    if controller and learned:
         control.state[:] = flat(controller.packed_state(controller.state(learned)))
 
 
 def end_learned(
     control: Control,
-    controller: Any,
+    controller: Controller | None,
     learned: dict[str, Any] | None,
     sample_time: float,
     meta: dict[str, Any],
 ) -> None:
     """`learned` gets what a controller has learned as it keeps it, a record's `meta` what there is to say of it."""
-    if not isinstance(controller, SampledController):
+    if controller is None:
         return
     if learned is not None:
         learned.update(controller.learned(controller.unpacked_state(control.state.tolist())))
@@ -153,7 +151,7 @@ def end_learned(
 _compiled: dict[Any, int] = {}
 
 
-def sampler(controller: SampledController) -> int:
+def sampler(controller: Controller) -> int:
     """Address of one guarded sample of a controller."""
     laws = controller.laws
     if laws not in _compiled:

@@ -177,5 +177,5 @@ def guarded(y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: A
 
 
 def guarded_by(functions: Mapping[str, Callable[..., float]]) -> Callable[..., float]:
-    """`guarded` with the functions of a controller (`SampledController.functions`)."""
+    """`guarded` with the functions of a controller (`Controller.functions`)."""
     return bound(guarded, {name: functions[name] for name in ("sample", "follow")})

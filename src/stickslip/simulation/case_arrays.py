@@ -12,9 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.control.composed import continuous_of
 from stickslip.control.controller import Controller
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import UnknownName
 from stickslip.jit import LawPointers, compiled_law, compiled_profile, flat
 from stickslip.laws.slip_rule import SLIP_RULE
@@ -130,7 +128,7 @@ class Case:
     """
 
     axis: RigidAxis
-    controller: Controller | SampledController
+    controller: Controller
     reference: Reference
     numbers: Array
     plant: Side
@@ -204,9 +202,7 @@ def slip_rules(**models: Model | None) -> dict[str, str]:
     return {name: rule for name, rule in rules.items() if rule}
 
 
-def ruled_in(
-    controller: Controller | SampledController, slip_rule: str | None
-) -> Controller | SampledController:
+def ruled_in(controller: Controller, slip_rule: str | None) -> Controller:
     """The controller whose friction laws are under a run's slip rule, as `ruled` has it."""
     return controller if slip_rule is None else controller.holding(lambda model: ruled(model, slip_rule))
 
@@ -235,7 +231,7 @@ class StepBudget(NamedTuple):
 
 def lay_out(
     axis: RigidAxis,
-    controller: Controller | SampledController,
+    controller: Controller,
     reference: Reference,
     duration: float,
     *,
@@ -249,7 +245,7 @@ def lay_out(
 ) -> Case:
     """Lay a closed loop out in flat arrays (compiles its laws and reference if they are not cached)."""
     controller = ruled_in(controller, slip_rule)
-    moving = None if controller.sample_time > 0.0 else continuous_of(controller)
+    moving = None if controller.sample_time > 0.0 else controller.continuous
     plant = Side.of(ruled(axis.friction, slip_rule))
     assist = Side.of(moving.friction if moving else None)
     numbers = np.zeros(NUMBERS)

@@ -13,7 +13,6 @@ import stickslip
 from stickslip.capacity import insist_on_memory
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import (
     Divergence,
     EventStorm,
@@ -75,7 +74,7 @@ REASONS: dict[int, tuple[type[SimulationError], str]] = {
 
 def simulate(
     axis: RigidAxis | Machine,
-    controller: Controller | SampledController,
+    controller: Controller,
     reference: Reference,
     duration: float,
     *,
@@ -95,7 +94,7 @@ def simulate(
     axis : RigidAxis or Machine
         A machine (`stickslip.load_machine`) runs with all its imperfections under the controller sampled at the
         machine's rate; ``integrator`` and ``time_step`` are then of no account (`stickslip.simulation.machine.loop`).
-    controller : Controller or SampledController
+    controller : Controller
     reference : Reference
     duration : float
         s
@@ -216,7 +215,7 @@ def _in_numbers(case: Case, outcome: Outcome) -> str:
 
 def prepare(
     axis: RigidAxis,
-    controller: Controller | SampledController,
+    controller: Controller,
     reference: Reference,
     duration: float,
     *,
@@ -236,7 +235,7 @@ def prepare(
 
 
 def check_machine_run(
-    machine: Machine, controller: Controller | SampledController, duration: float, output: Any,
+    machine: Machine, controller: Controller, duration: float, output: Any,
     integrator: str = "auto", *, initial: tuple[float, float] = (0.0, 0.0), slip_rule: str | None = None,
 ) -> None:  # fmt: skip
     """Find what is wrong with a run of a machine without running it; compiles its laws.

@@ -7,10 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.control.composed import composed_of
 from stickslip.control.composition import MEMORY as MEMORY_FIELDS
 from stickslip.control.controller import Controller
-from stickslip.control.sampled_controller import SampledController
 from stickslip.jit import call_sample, compiled_sample, flat, kernel, pointer
 
 __all__ = [
@@ -53,18 +51,17 @@ class Sampled(NamedTuple):
     """place of the fault in it"""
 
 
-def compiled(controller: Controller | SampledController) -> Sampled:
+def compiled(controller: Controller) -> Sampled:
     """Compile a controller as the control laws that it is made of."""
-    own = composed_of(controller)
-    laws = own.laws
+    laws = controller.laws
     if laws not in _compiled:
-        _compiled[laws] = compiled_sample("controller", own.functions["sample"], own.layouts)
+        _compiled[laws] = compiled_sample("controller", controller.functions["sample"], controller.layouts)
     return Sampled(
         _compiled[laws],
-        np.array(own.settings),
+        np.array(controller.settings),
         np.zeros(len(MEMORY_FIELDS)),
-        flat(own.packed_state()),
-        flat(own.packed()),
+        flat(controller.packed_state()),
+        flat(controller.packed()),
         COMPENSATION,
         FAULT,
     )

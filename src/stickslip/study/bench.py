@@ -18,7 +18,7 @@ from typing import Any
 from stickslip.capacity import insist_on_jobs
 from stickslip.config import Table, read_toml
 from stickslip.control.catalogue import CATALOGUE, LOOPS, Belief, compensated
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.controller import Controller
 from stickslip.errors import ConfigError, SimulationError, UnknownName
 from stickslip.machines.machine import Machine
 from stickslip.machines.numbers import with_numbers
@@ -120,7 +120,7 @@ class Planned:
 
     run: BenchRun
     machine: Machine
-    control: SampledController
+    control: Controller
     reference: Reference
     duration: float
     event: float
@@ -151,7 +151,7 @@ def hash_of(machine: Machine) -> str:
     return hashed([described(machine), source_hash(machine.friction.law.Params.__module__)])
 
 
-def hash_of_control(control: SampledController) -> str:
+def hash_of_control(control: Controller) -> str:
     """Of a controller, and of the text of its laws."""
     laws = [*(m.law for m in control.frictions.values()), *control.control_laws]
     return hashed([control.as_dict(), [source_hash(law.Params.__module__) for law in laws]])

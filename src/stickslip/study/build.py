@@ -9,14 +9,11 @@ from dataclasses import dataclass, replace
 
 from stickslip import plugins
 from stickslip.config import Table, refuse_endless
-from stickslip.control.compensator import COMPENSATORS, Compensator
 from stickslip.control.controller import Controller
-from stickslip.control.files import Placement, composed, is_composed, placement
-from stickslip.control.linear import LINEAR, Cascade, Gains, place
+from stickslip.control.files import Placement, composed, placement
 from stickslip.control.registry import law_files
-from stickslip.control.sampled_controller import SampledController
 from stickslip.control_spec import ControlLaw
-from stickslip.errors import ConfigError, InputError
+from stickslip.errors import InputError
 from stickslip.machines.files import machine
 from stickslip.machines.machine import IMPERFECTIONS, Machine
 from stickslip.machines.rigid import RigidAxis
@@ -172,15 +169,12 @@ def controller(
     default: Placement | None,
     laws: Mapping[str, Model],
     files: Mapping[str, Law | ControlLaw],
-) -> Controller | SampledController:
-    """Read a controller; one made of control laws has a table ``loop`` (`stickslip.control.files`).
+) -> Controller:
+    """Read a controller, of control laws or in its short form (`stickslip.control.files`).
 
     Parameters
     ----------
     table : Table
-        ``linear`` and ``placement``, or ``gains``, or ``cascade``; ``compensator``, ``law``, ``gain``, ``filter_hz``,
-        ``lead``, ``deadband``, ``offset``, ``inertia_feedforward``, ``substeps``;
-        ``torque_limit``, ``sample_time``, ``encoder_counts``, ``velocity_filter``.
     inertia : float
         Of the axis, kg·m²: used for pole placement.
     default : Placement or None
@@ -190,74 +184,5 @@ def controller(
     files : mapping of str to Law or ControlLaw
         Laws from files, by name.
     """
-    if is_composed(table):
-        own = {name: law for name, law in files.items() if isinstance(law, ControlLaw)}
-        return composed(table, inertia, placement(table) or default, laws, own)
-    with table.blamed():
-        return Controller(
-            _gains(table, inertia, default),
-            _compensator(table, laws),
-            table.positive("torque_limit", "N·m") if table.has("torque_limit") else math.inf,
-            table.number("sample_time", "s", 0.0, lower=0.0),
-            table.number("encoder_counts", "counts per revolution", 0.0, lower=0.0),
-            table.number("velocity_filter", "Hz", 0.0, lower=0.0),
-        )
-
-
-def _gains(table: Table, inertia: float, default: Placement | None) -> Gains | Cascade:
-    own = placement(table)
-    if table.has("cascade"):
-        for other in ("gains", "linear", "placement"):
-            if table.has(other):
-                raise ConfigError(
-                    f"{table.label()}: cascade and {other} exclude each other; give one of them"
-                )
-        with table.table("cascade") as given:
-            return Cascade(
-                given.number("kv", "1/s", lower=0.0), given.number("kvp", "N·m·s/rad", lower=0.0),
-                given.number("kvi", "N·m/rad", 0.0, lower=0.0), given.number("feed", "", 1.0, lower=0.0),
-            )  # fmt: skip
-    if table.has("gains"):
-        if table.has("linear") or own:
-            raise ConfigError(f"{table.label()}: gains and linear exclude each other; give one of them")
-        with table.table("gains") as gains:
-            kp = gains.number("kp", "N·m/rad", lower=0.0)
-            ki = gains.number("ki", "N·m/(rad·s)", 0.0, lower=0.0)
-            kd = gains.number("kd", "N·m·s/rad", 0.0, lower=0.0)
-            return Gains(kp, ki, kd, gains.number("kr", "N·m·s/rad", 0.0, lower=0.0))
-    kind = table.choice("linear", LINEAR)
-    poles = own or default
-    if poles is None:
-        raise ConfigError(
-            f"{table.label('placement')} is missing; give {{bandwidth_hz = ..., damping = ...}}"
-        )
-    return place(kind, inertia, poles.bandwidth, poles.damping)
-
-
-def _compensator(table: Table, laws: Mapping[str, Model]) -> Compensator | None:
-    if not table.has("compensator"):
-        for key in (
-            "law",
-            "gain",
-            "filter_hz",
-            "lead",
-            "deadband",
-            "offset",
-            "inertia_feedforward",
-            "substeps",
-        ):
-            if key in table.values:
-                table.choice("compensator", COMPENSATORS)
-        return None
-    kind = COMPENSATORS[table.choice("compensator", COMPENSATORS)]
-    law = laws[table.choice("law", laws, family="laws")]
-    gain = table.number("gain", "", 1.0)
-    corner = table.positive("filter_hz", "Hz") if table.has("filter_hz") else None
-    parts = table.number("substeps", "", 1.0, lower=1.0)
-    if not parts.is_integer():
-        raise table.error("substeps", "must be a whole number")
-    return kind(
-        law, gain, corner, table.number("lead", "s", 0.0), table.number("deadband", "rad/s", 0.0),
-        table.number("offset", "N·m", 0.0), table.number("inertia_feedforward", "kg·m²", 0.0),
-        int(parts),
-    )  # fmt: skip
+    own = {name: law for name, law in files.items() if isinstance(law, ControlLaw)}
+    return composed(table, inertia, placement(table) or default, laws, own)

@@ -15,8 +15,8 @@ from typing import Any
 from stickslip.analyse.controller_margins import about
 from stickslip.analyse.machine_axis import axis_of
 from stickslip.analyse.presliding_loop import Loop
+from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.control.sampled_controller import SampledController
 from stickslip.machines.machine import Machine
 from stickslip.rigs.virtual import VirtualRig
 from stickslip.study.stability_map import RESTLESS, moved
@@ -96,7 +96,7 @@ class ConfirmedController:
         yield f"{agreed} of {len(self.points)} loops do what the poles say"
 
 
-def scaled(controller: SampledController, factor: float) -> SampledController | None:
+def scaled(controller: Controller, factor: float) -> Controller | None:
     """The controller with its loop's gains times a factor; None where its loops are not gains alone."""
     values: dict[str, float] = {}
     for part, block in controller.blocks.items():
@@ -109,7 +109,7 @@ def scaled(controller: SampledController, factor: float) -> SampledController | 
 
 
 def confirmed_controller(
-    machine: Machine, controller: SampledController, factors: Sequence[float] = FACTORS
+    machine: Machine, controller: Controller, factors: Sequence[float] = FACTORS
 ) -> ConfirmedController:
     """Simulate a controller as it is, and with its loop softer and stiffer where that is made of gains.
 
@@ -117,7 +117,7 @@ def confirmed_controller(
     ----------
     machine : Machine
         With the imperfections that it has.
-    controller : SampledController
+    controller : Controller
         At the machine's sample time.
     factors : sequence of float
         On the gains of the loop.

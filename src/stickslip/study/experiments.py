@@ -20,7 +20,6 @@ from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.control.files import is_composed
 from stickslip.control.linear import LINEAR
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import Interrupted, RigError
 from stickslip.machines.files import LIBRARY, library
 from stickslip.machines.machine import IMPERFECTIONS, Machine
@@ -242,12 +241,12 @@ def _experiment(name: str, table: Table, plants: Mapping[str, Any], motions: Map
 def _controllers(
     e: Experiment, plant: Machine, inertia: float, tables: Mapping[str, Table], laws: Mapping[str, Model],
     files: Mapping[str, Any],
-) -> Iterator[tuple[str, Controller | SampledController]]:  # fmt: skip
+) -> Iterator[tuple[str, Controller]]:  # fmt: skip
     """Its controllers by name, sampled with the machine and limited as its rig is."""
     limit, placed_with = VirtualRig(plant).limits.torque, inertia or plant.inertia
     known = {**plant.models, **laws}
 
-    def made(table: Table) -> Controller | SampledController:
+    def made(table: Table) -> Controller:
         with table:
             found = build.controller(table, placed_with, e.poles, known, files)
         return replace(found, torque_limit=min(found.torque_limit, limit), sample_time=plant.sample_time)

@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 
 from stickslip.config import Table, read_toml
 from stickslip.control.controller import Controller
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ConfigError, UnknownName
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
@@ -207,7 +206,7 @@ def _axis(table: Table, files: Mapping[str, Any]) -> RigidAxis | Machine:
     return found[""]
 
 
-def named_rule(rule: str | None, axis: RigidAxis | Machine, control: Controller | SampledController) -> str:
+def named_rule(rule: str | None, axis: RigidAxis | Machine, control: Controller) -> str:
     """The rule by which a run's name calls it: what its file gives; where it gives none, "own" if one of its laws
     brings another one than the default."""
     kept = {m.law.option_of("slip_rule") for m in (axis.friction, *control.frictions.values())} - {""}
@@ -277,7 +276,7 @@ class _Parts:
         controllers: Iterable[str],
     ) -> list[PlannedRun]:
         """Every one of each with every one of the others."""
-        made: dict[tuple[str, str], tuple[Controller | SampledController, Numerics]] = {}
+        made: dict[tuple[str, str], tuple[Controller, Numerics]] = {}
         inertia = self.inertia
         for c in controllers:
             for m in motions:

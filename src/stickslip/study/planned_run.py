@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from stickslip.control.controller import Controller
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ConfigError, InputError, SimulationError
 from stickslip.machines.machine import Machine
 from stickslip.machines.numbers import machine_numbers
@@ -52,7 +51,7 @@ class PlannedRun:
     friction: str
     controller: str
     axis: RigidAxis | Machine
-    control: Controller | SampledController
+    control: Controller
     motion: Reference
     duration: float
     numerics: Numerics

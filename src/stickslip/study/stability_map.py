@@ -21,7 +21,6 @@ from stickslip.analyse.stability_result import Map, Recommended
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import RigError
 from stickslip.machines.machine import Machine
 from stickslip.model import Model
@@ -220,7 +219,7 @@ def _background(machine: Machine, gains: Gains, name: str, model: Model, most: f
     return Map(name, growth, frequency)
 
 
-def moved(machine: Machine, controller: Controller | SampledController | None) -> float:
+def moved(machine: Machine, controller: Controller | None) -> float:
     """Motion at the end of a push and a rest, rad; without a controller the axis is left to itself."""
     dt = machine.sample_time
     before, after = round(0.2 / dt), round(REST / dt)

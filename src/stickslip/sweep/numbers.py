@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.control.controller import Controller
-from stickslip.control.linear import Cascade, Gains, place
-from stickslip.control.sampled_controller import SampledController
+from stickslip.control.linear import Gains, place
 from stickslip.errors import UnknownName
 from stickslip.machines.machine import Machine
 from stickslip.machines.numbers import machine_numbers, with_friction, with_numbers
@@ -61,38 +60,23 @@ def known(run: PlannedRun) -> dict[str, Any]:
     else:
         found["axis.inertia"] = run.axis.inertia
     found |= {f"friction.{k}": v for k, v in run.axis.friction.parameters._asdict().items()}
-    if isinstance(control, SampledController):
-        found |= {f"controller.{k}": v for k, v in control.values().items()}
-        found |= _of_loop(control, run.axis.inertia)
-    else:
-        found |= _of_gains(control, run.axis.inertia)
+    if control.is_short and (helper := control.compensator):
+        found |= {f"law.{k}": v for k, v in helper.model.parameters._asdict().items()}
+        found |= {"controller.gain": helper.gain, "controller.filter_hz": helper.filter_hz or math.inf}
+    if gains := _placeable(control):
+        _, found["controller.bandwidth_hz"], found["controller.damping"] = poles(gains, run.axis.inertia)
+    found |= {f"controller.{k}": v for k, v in control.numbers().items()}
     found["controller.torque_limit"] = run.control.torque_limit
     found["controller.sample_time"] = run.control.sample_time
     return found | {f"reference.{k}": v for k, v in run.motion.parameters._asdict().items()}
 
 
-def _of_loop(control: SampledController, inertia: float) -> dict[str, Any]:
-    """Bandwidth (Hz) and damping of a loop that can be placed by them."""
-    block = control.blocks.get("loop")
-    if block is None or block.law.placed is None or block.law.continuous is None:
-        return {}
-    gains = block.law.continuous(block.parameters)
-    if not gains.kp > 0.0:
-        return {}
-    _, bandwidth, damping = poles(gains, inertia)
-    return {"controller.bandwidth_hz": bandwidth, "controller.damping": damping}
-
-
-def _of_gains(control: Controller, inertia: float) -> dict[str, Any]:
-    """The numbers of a controller with gains and a compensator."""
-    compensator, gains, found = control.compensator, control.gains, dict[str, Any]()
-    if compensator:
-        found |= {f"law.{k}": v for k, v in compensator.model.parameters._asdict().items()}
-        found["controller.gain"] = compensator.gain
-        found["controller.filter_hz"] = compensator.filter_hz or math.inf
-    if isinstance(gains, Gains) and gains.kp > 0.0:
-        _, found["controller.bandwidth_hz"], found["controller.damping"] = poles(gains, inertia)
-    return found | {f"controller.{k}": v for k, v in gains._asdict().items()}
+def _placeable(control: Controller) -> Gains | None:
+    """The gains of a loop that bandwidth and damping can place; None of another."""
+    gains, block = control.gains, control.blocks.get("loop")
+    if gains is None and block and block.law.placed and block.law.continuous:
+        gains = block.law.continuous(block.parameters)
+    return gains if isinstance(gains, Gains) and gains.kp > 0.0 else None
 
 
 def belongs(run: PlannedRun, name: str) -> bool:
@@ -157,46 +141,33 @@ def with_values(model: Model, values: Mapping[str, Any]) -> Model:
     return Model(model.law, **{**model.parameters._asdict(), **values}) if values else model
 
 
-def _control(run: PlannedRun, settings: Mapping[str, Any], law: Mapping[str, Any]) -> Any:
+def _control(run: PlannedRun, settings: Mapping[str, Any], law: Mapping[str, Any]) -> Controller:
+    """The controller with other numbers, and other parameters of the compensator's law."""
     control = run.control
-    if isinstance(control, SampledController):
-        both = {k: float(settings[k]) for k in ("torque_limit", "sample_time") if k in settings}
-        return replace(
-            control.with_values({**_placed(control, run.axis.inertia, settings), **settings}), **both
-        )
-    compensator = control.compensator
-    own = {k: float(v) for k, v in settings.items()}
-    if compensator:
-        hz = own.get("filter_hz", compensator.filter_hz or math.inf)
-        compensator = replace(
-            compensator, model=with_values(compensator.model, law), gain=own.get("gain", compensator.gain),
+    both: dict[str, Any] = {k: float(settings[k]) for k in ("torque_limit", "sample_time") if k in settings}
+    helper = control.compensator
+    if helper and control.is_short:
+        hz = float(settings.get("filter_hz", helper.filter_hz or math.inf))
+        helper = replace(
+            helper, model=with_values(helper.model, law), gain=float(settings.get("gain", helper.gain)),
             filter_hz=hz if math.isfinite(hz) else None,
         )  # fmt: skip
-    return replace(
-        control, gains=_gains(control, run.axis.inertia, own), compensator=compensator,
-        torque_limit=own.get("torque_limit", control.torque_limit),
-        sample_time=own.get("sample_time", control.sample_time),
-    )  # fmt: skip
+        both["compensator"] = helper
+    return replace(control.with_numbers({**_placed(control, run.axis.inertia, settings), **settings}), **both)
 
 
-def _placed(control: SampledController, inertia: float, settings: Mapping[str, Any]) -> dict[str, float]:
-    """Gains of a loop made of a control law, by bandwidth and damping, under their whole names."""
-    place_by = control.blocks["loop"].law.placed if any(name in settings for name in POLES) else None
-    if place_by is None:
+def _placed(control: Controller, inertia: float, settings: Mapping[str, Any]) -> dict[str, float]:
+    """The gains of the loop by bandwidth and damping, under the names that the controller has for them."""
+    before = _placeable(control) if any(name in settings for name in POLES) else None
+    if before is None:
         return {}
-    asked = {**_of_loop(control, inertia), **{f"controller.{name}": float(v) for name, v in settings.items()}}
-    gains = place_by(inertia, asked["controller.bandwidth_hz"], asked["controller.damping"])
-    return {f"loop_{name}": value for name, value in gains.items()}
-
-
-def _gains(control: Controller, inertia: float, settings: Mapping[str, float]) -> Gains | Cascade:
-    gains = control.gains
-    if isinstance(gains, Gains) and any(name in settings for name in POLES):
-        kind, bandwidth, damping = poles(gains, inertia)
-        gains = place(
-            kind, inertia, settings.get("bandwidth_hz", bandwidth), settings.get("damping", damping)
-        )
-    return gains._replace(**{k: v for k, v in settings.items() if k in gains._fields})
+    kind, *own = poles(before, inertia)
+    bandwidth, damping = (float(settings.get(name, usual)) for name, usual in zip(POLES, own))
+    placed = control.blocks["loop"].law.placed
+    gains = (
+        placed(inertia, bandwidth, damping) if placed else place(kind, inertia, bandwidth, damping)._asdict()
+    )
+    return {name if control.is_short else f"loop_{name}": value for name, value in gains.items()}
 
 
 # ---- columns of a batch ------------------------------------------------------------------------------------
@@ -212,7 +183,7 @@ def as_columns(run: PlannedRun, values: Mapping[str, Array]) -> dict[str, Array]
     """
     out: dict[str, Array] = {}
     settings: dict[str, Array] = {}
-    if isinstance(run.control, SampledController) and run.control.sample_time == 0.0:
+    if not run.control.is_short and run.control.sample_time == 0.0:
         out, values = _of_blocks(run, values)
     for name, column in values.items():
         family, rest, element = parts(name)
@@ -229,10 +200,9 @@ def as_columns(run: PlannedRun, values: Mapping[str, Array]) -> dict[str, Array]
             settings[rest] = column
         else:
             out["gain" if name == "controller.gain" else name] = column
-    if settings and isinstance(run.control, Controller):
+    if settings and run.control.is_short:
         rows = zip(*settings.values())
-        inertia = run.axis.inertia
-        gains = [_gains(run.control, inertia, dict(zip(settings, map(float, row)))) for row in rows]
+        gains = [_control(run, dict(zip(settings, map(float, row))), {}).linear for row in rows]
         out |= {field: np.array([getattr(g, field) for g in gains]) for field in Gains._fields}
     return out
 
@@ -249,7 +219,7 @@ def _of_blocks(run: PlannedRun, values: Mapping[str, Array]) -> tuple[dict[str, 
         return {}, rest
     out = {field: np.array([getattr(c.gains, field) for c in made]) for field in Gains._fields}
     if made[0].compensation:
-        out["gain"] = np.array([c.compensation.gain for c in made])
+        out["gain"] = np.array([c.compensation.gain for c in made if c.compensation])
     for held in (name.split("_friction_", 1)[1] for name in names if "_friction_" in name):
-        out[f"law.{held}"] = np.array([getattr(c.friction.parameters, held) for c in made])
+        out[f"law.{held}"] = np.array([getattr(c.friction.parameters, held) for c in made if c.friction])
     return out, rest

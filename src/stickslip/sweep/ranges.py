@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.spec import Par
 from stickslip.study.planned_run import PlannedRun
@@ -22,7 +21,7 @@ def described(run: PlannedRun, name: str) -> Par | None:
     """What a number means where a law describes it: of a controller made of control laws, or of the axis's friction."""
     family, rest, _ = parts(name)
     fields = ()
-    if family == "controller" and isinstance(run.control, SampledController):
+    if family == "controller" and not run.control.is_short:
         fields = run.control.fields
     elif family == "friction":
         fields = run.axis.friction.law.fields

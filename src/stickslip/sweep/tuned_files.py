@@ -44,4 +44,4 @@ def tuned_gains(tuned: Tuned) -> dict[str, float]:
     """The linear gains of the chosen setting, for the drive; of a controller made of control laws all its numbers."""
     from stickslip.sweep.numbers import varied
 
-    return varied(tuned.run, dict(zip(tuned.names, tuned.after.tolist()))).control.values()
+    return varied(tuned.run, dict(zip(tuned.names, tuned.after.tolist()))).control.numbers()

@@ -12,12 +12,10 @@ from typing import Any, Literal
 
 from stickslip.config import Document, Table, read_toml
 from stickslip.control.compensator import Feedback, Feedforward
-from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.linear import Gains
 from stickslip.control.recommended import recommended_in
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError
 from stickslip.export import CONTROLLER_TARGETS, TARGETS, controller_target, target_named
 from stickslip.export.job import Check, Export, Job
@@ -38,7 +36,7 @@ from stickslip.verbs.recommend import RecommendationResult
 __all__ = ["CompensatorOptions", "ExportResult", "export"]
 
 Source = (
-    IdentificationResult | RecommendationResult | Model | Controller | SampledController | PositionMap | str
+    IdentificationResult | RecommendationResult | Model | Controller | PositionMap | str
     | os.PathLike[str]
 )  # fmt: skip
 """What can be exported; a path is that of a model.toml, a recommended.toml or a `stickslip simulate` file."""
@@ -152,7 +150,7 @@ def export(
 
     Parameters
     ----------
-    source : IdentificationResult, RecommendationResult, Model, Controller, SampledController, PositionMap or path
+    source : IdentificationResult, RecommendationResult, Model, Controller, PositionMap or path
         A path is that of model.toml, recommended.toml or, with `controller`, a `stickslip simulate` file.
     to : str
         The target, one of `stickslip.export.TARGETS`: "c99", "arduino", "st", "fmu", ...; of a map over the angle one
@@ -208,7 +206,7 @@ def export(
     advised = isinstance(source, RecommendationResult) and chosen.name in CONTROLLER_TARGETS
     if compensator is None and advised and not options.given:
         compensator = "recommended"
-    controller = controller or isinstance(source, (Controller, SampledController)) or own_loop(source)
+    controller = controller or isinstance(source, Controller) or own_loop(source)
     refuse_controllers(chosen, controller, compensator)
     content = content_of(source)
     own = name or re.sub(r"[^A-Za-z0-9_]+", "_", Path(content.document.name).stem)
@@ -249,9 +247,8 @@ def exported_controller(
         offset = made.compensator.offset if made.compensator else 0.0
     else:
         made, offset = controller_in(source), 0.0
-    whole = composed_of(made)
-    result = carried(source, whole, chosen, name, single, check)
-    return replace(result, notes=(*result.notes, *notes_on_controller(content, whole, compensator, offset)))
+    result = carried(source, made, chosen, name, single, check)
+    return replace(result, notes=(*result.notes, *notes_on_controller(content, made, compensator, offset)))
 
 
 def exported_law(content: Table, job: Job, chosen: Target, check: bool) -> ExportResult:
@@ -265,7 +262,7 @@ def exported_law(content: Table, job: Job, chosen: Target, check: bool) -> Expor
 
 def own_loop(source: Source) -> bool:
     """Whether a recommendation is the whole controller, made of control laws."""
-    return isinstance(source, RecommendationResult) and isinstance(source.loop, SampledController)
+    return isinstance(source, RecommendationResult) and not source.loop.is_short
 
 
 def saved(result: ExportResult, folder: str | os.PathLike[str] | None) -> ExportResult:
@@ -295,7 +292,7 @@ def content_of(source: Source) -> Table:
         return source.table()
     if isinstance(source, Model):
         return Table({}, Document("friction", Path()))
-    if isinstance(source, (Controller, SampledController)):
+    if isinstance(source, Controller):
         return Table({}, Document("controller", Path()))
     assert not isinstance(source, PositionMap)
     require(Path(source), "model", "simulation")
@@ -309,9 +306,9 @@ def model_of(source: Source, content: Table) -> Model:
     return Model.from_table(content)
 
 
-def controller_in(source: Source) -> Controller | SampledController:
+def controller_in(source: Source) -> Controller:
     """The controller given, or that of a file for `stickslip simulate`."""
-    if isinstance(source, (Controller, SampledController)):
+    if isinstance(source, Controller):
         return source
     if isinstance(source, (Model, IdentificationResult, RecommendationResult, PositionMap)):
         raise InputError(
@@ -324,7 +321,7 @@ def controller_in(source: Source) -> Controller | SampledController:
 
 
 def carried(
-    source: Source, made: SampledController, chosen: Target, name: str, single: bool, check: bool
+    source: Source, made: Controller, chosen: Target, name: str, single: bool, check: bool
 ) -> ExportResult:
     """A controller as the target has it."""
     around = Surroundings()

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
 from stickslip.config import Table
+from stickslip.control.controller import Controller
 from stickslip.control.recommended import Recommended, recommended_in
-from stickslip.control.sampled_controller import SampledController
 from stickslip.export.controllers import depends_on, given_by
 from stickslip.export.job import Job
 from stickslip.export.nearest import read_by
@@ -43,7 +43,7 @@ def notes_on(content: Table, job: Job) -> Iterator[str]:
 
 
 def notes_on_controller(
-    content: Table, made: SampledController, compensator: str | None, offset: float = 0.0
+    content: Table, made: Controller, compensator: str | None, offset: float = 0.0
 ) -> Iterator[str]:
     """What the user must know of a controller besides what the target says; ``offset``: the constant torque in it."""
     if read := depends_on(made):

@@ -15,10 +15,8 @@ from stickslip.analyse.learning import Convergence, over_angle, over_time, wides
 from stickslip.analyse.machine_axis import axis_of
 from stickslip.analyse.presliding_loop import Axis
 from stickslip.control.block import ControlBlock
-from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.learning import TimeTable, low_pass
-from stickslip.control.sampled_controller import SampledController
 from stickslip.control.written import tables_of
 from stickslip.errors import InputError, UnknownName
 from stickslip.machines.drivetrain import Drivetrain
@@ -53,7 +51,7 @@ class LearningResult:
         RMS position error of every repetition, rad; the first is that of the controller alone.
     block : ControlBlock
         A `table_feedforward` that gives what was learned: over time, the table of the repetition with the least error.
-    controller : SampledController
+    controller : Controller
         The controller with it.
     convergence : Convergence
         The condition that was checked before.
@@ -66,7 +64,7 @@ class LearningResult:
     over: str
     errors: tuple[float, ...]
     block: ControlBlock
-    controller: SampledController
+    controller: Controller
     convergence: Convergence
     record: Record
     inertia: float
@@ -112,7 +110,7 @@ class LearningResult:
 
 def learn(
     axis: RigidAxis | Machine,
-    controller: Controller | SampledController,
+    controller: Controller,
     reference: Reference,
     duration: float,
     *,
@@ -134,7 +132,7 @@ def learn(
     Parameters
     ----------
     axis : RigidAxis or Machine
-    controller : Controller or SampledController
+    controller : Controller
         Sampled; a disturbance observer in it sees the residual.
     reference : Reference
     duration : float
@@ -181,10 +179,10 @@ class _Repeated:
     """A loop and the motion that it repeats."""
 
     def __init__(
-        self, axis: RigidAxis | Machine, controller: Controller | SampledController, reference: Reference,
+        self, axis: RigidAxis | Machine, controller: Controller, reference: Reference,
         duration: float,
     ) -> None:  # fmt: skip
-        own = composed_of(controller)
+        own = controller.with_blocks(controller.blocks.values())
         if isinstance(axis, Machine):
             own = replace(own, sample_time=axis.sample_time)
         if own.sample_time == 0.0:
@@ -220,12 +218,11 @@ class _Repeated:
         """Bound of what is learned, N·m."""
         return min(self.controller.torque_limit, LARGEST)
 
-    def having(self, block: ControlBlock) -> SampledController:
+    def having(self, block: ControlBlock) -> Controller:
         """The controller with one more feedforward."""
-        before = [b for b in self.controller.blocks.values() if b.law.place == "feedforward"]
-        return replace(self.controller, feedforward=[*before, block])
+        return replace(self.controller, feedforward=[*self.controller.feedforward, block])
 
-    def run(self, controller: SampledController, repetitions: int = 1) -> Record:
+    def run(self, controller: Controller, repetitions: int = 1) -> Record:
         """The record, a row a sample."""
         if isinstance(self.axis, Machine):
             return simulate(
@@ -296,7 +293,7 @@ def _over_time(
     return LearningResult("time", tuple(errors), block, loop.having(block), found, best[1], loop.axis.inertia)
 
 
-def _replayed(controller: SampledController, inputs: Array) -> tuple[Array, Any]:
+def _replayed(controller: Controller, inputs: Array) -> tuple[Array, Any]:
     """What the loop gave besides the feedforwards, N·m, shape (n,), and the state of the laws at the end."""
     sampled, torque, ahead = compiled(controller), np.zeros(len(inputs)), np.zeros(len(inputs))
     around = np.array(Surroundings())

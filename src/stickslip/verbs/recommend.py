@@ -16,8 +16,6 @@ from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.linear import Cascade, Gains
-from stickslip.control.recommended import recommended_in
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.motion import Motion, motion_of
@@ -70,7 +68,7 @@ class RecommendationResult:
         return self.recommendation.model
 
     @property
-    def controller(self) -> Controller | SampledController:
+    def controller(self) -> Controller:
         """The loop that it was tried in with the compensator, for `simulate` and `export`.
 
         Raises
@@ -81,14 +79,12 @@ class RecommendationResult:
         if self.recommendation.instead is not None:
             assert self.recommendation.instead.controller is not None
             return self.recommendation.instead.controller
-        loop, model = self.loop, self.model
+        model = self.model
         assert self.chosen is not None
-        if isinstance(loop, SampledController):
-            return self.chosen.setting.beside(loop, model)
-        return replace(loop, compensator=recommended_in(self.table()).on(model))
+        return self.chosen.setting.on(self.loop, model)
 
     @property
-    def loop(self) -> Controller | SampledController:
+    def loop(self) -> Controller:
         """The loop alone."""
         return self.recommendation.drive.loop(self.recommendation.inertia)
 
@@ -177,7 +173,7 @@ def recommend(
     damping: float = 1.0,
     linear: Literal["PD", "PID", "PR"] = "PD",
     loop: str | Mapping[str, float] | None = None,
-    controller: SampledController | str | os.PathLike[str] | None = None,
+    controller: Controller | str | os.PathLike[str] | None = None,
     machine: Machine | str | os.PathLike[str] | None = None,
     sample_time: float | None = None,
     counts_per_rev: float | None = None,
@@ -210,7 +206,7 @@ def recommend(
         The drive's own loop instead: kp (N·m/rad), ki, kd, kr of a PID, or kv (1/s), kvp (N·m·s/rad), kvi (N·m/rad),
         feed (part of the reference velocity fed forward) of position P around velocity PI; with filter (Hz, low-pass
         on its velocity) and limit (N·m).
-    controller : SampledController or path, optional
+    controller : Controller or path, optional
         The drive's own loop made of control laws instead, observers and all, but without friction laws; a path is that
         of a file with a table [controller].
     machine : Machine or path, optional
@@ -368,7 +364,7 @@ def compensators_of(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def drive_with(
-    controller: SampledController | str | os.PathLike[str], inertia: float | None, counts: float, limit: float,
+    controller: Controller | str | os.PathLike[str], inertia: float | None, counts: float, limit: float,
     amplitude: float | None, frequency: float | None, motion: Motion | None,
 ) -> Drive:  # fmt: skip
     """The drive whose loop is made of control laws; sample time, limit and counts are the controller's.
@@ -377,11 +373,7 @@ def drive_with(
     ------
     InputError
     """
-    made = (
-        controller
-        if isinstance(controller, SampledController)
-        else read_controller(Path(controller), inertia)
-    )
+    made = controller if isinstance(controller, Controller) else read_controller(Path(controller), inertia)
     return Drive(
         sample_time=made.sample_time, encoder_counts=counts or made.encoder_counts, torque_limit=limit,
         amplitude=amplitude, frequency=frequency or 0.5, motion=motion, controller=made,

@@ -19,7 +19,6 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.catalogue import CATALOGUE, LOOPS, compensated
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
 from stickslip.identify.setting.candidate_run import AT_REST, Drive, Trial, dangers, run, simulated
 from stickslip.identify.setting.candidates import NEAR, Bench
@@ -45,7 +44,7 @@ class Beside:
         first; empty where it was not run.
     why_not : str
         Why it is not to be switched on, or "".
-    controller : SampledController or None
+    controller : Controller or None
         None where it cannot be made for this axis.
     learned : mapping
         What it has learned on the best estimate, along the motion (`stickslip.control.learned.plain`).
@@ -57,7 +56,7 @@ class Beside:
     loop: str
     errors: tuple[float, ...]
     why_not: str
-    controller: SampledController | None
+    controller: Controller | None
     learned: Mapping[str, Any] = field(default_factory=dict[str, Any])
     confirmed: tuple[float, ...] = ()
 
@@ -171,24 +170,22 @@ def judged(
     return on_axes(Beside(name, loop, (), "", made), bench, " ")
 
 
-def fed(made: SampledController, inertia: float, offset: float) -> SampledController:
+def fed(made: Controller, inertia: float, offset: float) -> Controller:
     """The controller with inertia and offset fed forward; without the inertia where it feeds one forward itself."""
     inertia = 0.0 if made.answers_to_acceleration else inertia
     if inertia == offset == 0.0:
         return made
-    own = [block for block in made.blocks.values() if block.law.place == "feedforward"]
-    return replace(
-        made, feedforward=[*own, ControlBlock("inertia_feedforward", inertia=inertia, offset=offset)]
-    )
+    more = ControlBlock("inertia_feedforward", inertia=inertia, offset=offset)
+    return replace(made, feedforward=[*made.feedforward, more])
 
 
-def feeds_friction(made: SampledController) -> bool:
+def feeds_friction(made: Controller) -> bool:
     """Whether it feeds forward more than inertia and offset."""
     laws = [block.law for block in made.blocks.values() if block.law.place == "feedforward"]
     return any(law.accelerating is None for law in laws)
 
 
-def refused(name: str, made: SampledController, belief: Belief, drive: Drive) -> str:
+def refused(name: str, made: Controller, belief: Belief, drive: Drive) -> str:
     """Why it is not even run, or ""."""
     if name == "lugre-observer":
         delay = math.ceil(drive.machine.delay) if drive.machine else 0
@@ -249,7 +246,7 @@ def unsafe_at(beside: Beside, before: Trial, after: Trial, drive: Drive) -> list
     return found
 
 
-def limit_cycle(controller: Controller | SampledController, bench: Bench, axis: int) -> str:
+def limit_cycle(controller: Controller, bench: Bench, axis: int) -> str:
     """What it does at rest for long after the motion on one of the axes, where it goes to and fro, or ""."""
     drive, before = bench.drive, bench.before(axis)
     assert isinstance(before, Trial)

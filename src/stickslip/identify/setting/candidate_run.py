@@ -14,7 +14,6 @@ import numpy as np
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
 from stickslip.control.linear import Cascade, Gains, place
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import ParameterError
 from stickslip.identify.motion import HOLD, Motion, sinusoid
 from stickslip.identify.setting.plant import Plant, laid_out
@@ -85,7 +84,7 @@ class Drive:
         Corner of the first-order low-pass on the velocity that the linear controller sees, Hz; 0 for none.
     motion : Motion or None
         None: that of the log, or the sinusoid.
-    controller : SampledController or None
+    controller : Controller or None
         The loop as it is where it is made of control laws, without friction laws: gains, placement and filter are not
         used then, and its sample time is the drive's.
     machine : Machine or None
@@ -103,7 +102,7 @@ class Drive:
     gains: Gains | Cascade | None = None
     velocity_filter: float = 0.0
     motion: Motion | None = None
-    controller: SampledController | None = None
+    controller: Controller | None = None
     machine: Machine | None = None
 
     def __post_init__(self) -> None:
@@ -149,7 +148,7 @@ class Drive:
         """Whether the loop is somebody's own, and not placed by bandwidth and damping."""
         return self.gains is not None or self.controller is not None
 
-    def loop(self, inertia: float) -> Controller | SampledController:
+    def loop(self, inertia: float) -> Controller:
         """The linear controller, or the one made of control laws, alone."""
         if self.controller is not None:
             limit = min(self.torque_limit, self.controller.torque_limit)
@@ -227,7 +226,7 @@ def refuse_other(machine: Machine, sample_time: float, counts: float) -> None:
             )
 
 
-def refuse_unfit(controller: SampledController, sample_time: float) -> None:
+def refuse_unfit(controller: Controller, sample_time: float) -> None:
     """Refuse a loop made of control laws that the drive cannot be.
 
     Raises
@@ -285,7 +284,7 @@ class Trial:
         return max(SWINGS[0] * count, SWINGS[1] * self.moving["position_rms_rad"])
 
 
-def run(plant: RigidAxis, controller: Controller | SampledController, drive: Drive) -> Trial | str:
+def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
     """The motion and the rest behind it; the reason where it cannot be run to its end."""
     reference = drive.reference_backward if isinstance(plant, Plant) and plant.backward else drive.reference
     position, state = followed(plant, controller, reference)
@@ -304,9 +303,7 @@ def run(plant: RigidAxis, controller: Controller | SampledController, drive: Dri
     )  # fmt: skip
 
 
-def simulated(
-    plant: RigidAxis, controller: Controller | SampledController, reference: Array, start: float = 0.0
-) -> Array | None:
+def simulated(plant: RigidAxis, controller: Controller, reference: Array, start: float = 0.0) -> Array | None:
     """Positions of the axis itself at every sample along a reference, rad; None where it diverges.
 
     The axis starts at rest at `start`, rad.
@@ -315,7 +312,7 @@ def simulated(
 
 
 def followed(
-    plant: RigidAxis, controller: Controller | SampledController, reference: Array, start: float = 0.0
+    plant: RigidAxis, controller: Controller, reference: Array, start: float = 0.0
 ) -> tuple[Array | None, Array]:
     """As `simulated`, and the state in which it leaves the controller's laws."""
     control = control_of(controller, UNLIMITED, controller.sample_time)
@@ -348,7 +345,7 @@ def follow(laid: Laid, control: Control, path: Any, row: Any, positions: Any) ->
     return path.shape[0]
 
 
-def rings(plant: RigidAxis, linear: Controller | SampledController, drive: Drive, alone: Trial | str) -> str:
+def rings(plant: RigidAxis, linear: Controller, drive: Drive, alone: Trial | str) -> str:
     """Where the linear controller alone oscillates on an axis, "at rest" or "in motion"; empty where it is calm.
 
     `alone` is its trial. Besides, it holds a position between two counts, from near it: whether it happens to stop

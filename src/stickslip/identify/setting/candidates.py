@@ -13,7 +13,6 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import COMPENSATORS
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
-from stickslip.control.sampled_controller import SampledController
 from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.identify.setting.candidate_run import Drive, Trial, dangers, rings, run
 from stickslip.machines.rigid import RigidAxis
@@ -40,7 +39,6 @@ TRIES = 4
 """Times as many axes are drawn at most, for so many that are held."""
 LOOKED_AT = 16
 """Axes on which the linear controller alone is judged: the best estimate and some drawn ones."""
-Alone = Controller | SampledController
 """The controller without a compensator."""
 SLOWER = (0.7, 0.5, 0.35, 0.25, 0.1)
 """Of the bandwidth: where a linear controller that rings alone is tried for one that is calm."""
@@ -73,9 +71,9 @@ class Setting:
     inertia_feedforward: float = 0.0
     offset: float = 0.0
 
-    def on(self, linear: Alone, model: Model) -> Alone:
+    def on(self, linear: Controller, model: Model) -> Controller:
         """The linear controller with this compensator."""
-        if isinstance(linear, SampledController):
+        if not linear.is_short:
             return self.beside(linear, model)
         compensator = COMPENSATORS[self.kind](
             model, self.gain, lead=self.lead, deadband=self.deadband,
@@ -83,21 +81,18 @@ class Setting:
         )  # fmt: skip
         return replace(linear, compensator=compensator)
 
-    def beside(self, loop: SampledController, model: Model) -> SampledController:
+    def beside(self, loop: Controller, model: Model) -> Controller:
         """The loop made of control laws with this compensator's beside its own."""
-        own = {
-            place: [b for b in loop.blocks.values() if b.law.place == place]
-            for place in ("feedforward", "observer")
-        }
+        more: list[ControlBlock] = []
         if self.inertia_feedforward or self.offset:
-            block = ControlBlock("inertia_feedforward", inertia=self.inertia_feedforward, offset=self.offset)
-            own["feedforward"].append(block)
+            fed = {"inertia": self.inertia_feedforward, "offset": self.offset}
+            more.append(ControlBlock("inertia_feedforward", None, None, **fed))
         numbers: dict[str, Any] = {"gain": self.gain, "deadband": self.deadband}
         if self.kind == "feedforward":
-            own["feedforward"].append(ControlBlock("friction_feedforward", model, lead=self.lead, **numbers))
+            more.append(ControlBlock("friction_feedforward", model, lead=self.lead, **numbers))
         else:
-            own["observer"].append(ControlBlock("friction_feedback", model, **numbers))
-        return replace(loop, feedforward=own["feedforward"], observer=own["observer"])
+            more.append(ControlBlock("friction_feedback", model, **numbers))
+        return loop.with_blocks([*loop.blocks.values(), *more])
 
 
 @dataclass(frozen=True)
@@ -169,7 +164,7 @@ class Bench:
     """
 
     def __init__(
-        self, plants: Sequence[RigidAxis], linear: Alone, drive: Drive, laws: dict[str, Model],
+        self, plants: Sequence[RigidAxis], linear: Controller, drive: Drive, laws: dict[str, Model],
         ran: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self.plants, self.linear, self.drive, self.laws, self.ran = plants, linear, drive, laws, ran
@@ -178,7 +173,7 @@ class Bench:
 
     @staticmethod
     def held(
-        drawn: Iterator[RigidAxis], count: int, linear: Alone, drive: Drive, laws: dict[str, Model],
+        drawn: Iterator[RigidAxis], count: int, linear: Controller, drive: Drive, laws: dict[str, Model],
         ran: Callable[[], None] = lambda: None,
     ) -> Bench:  # fmt: skip
         """The best estimate, which is drawn first, and the first `count` others that the linear controller holds."""
@@ -268,14 +263,15 @@ def rings_alone(bench: Bench, inertia: float, torque: str) -> str:
     drive, count = bench.drive, len(bench.plants[:LOOKED_AT])
     where = " and ".join(sorted({where for _, where in ringing}))
     on = f"on {len(ringing)} of {count} axes" if count > 1 else "on the best estimate"
-    if isinstance(bench.linear, SampledController):
+    gains = bench.linear.gains
+    if gains is None:
         return f"{where} {on}; lower its gains, or take a finer encoder or a shorter sample time"
     push = bench.linear.linear.kd * drive.deadband(1.0)
     why = f": a count of the encoder makes it push {push:.2g} {torque} for a sample" if push else ""
     plants = [plant for plant, _ in ringing]
     finer = ", or take a finer encoder" if push else ", or a shorter sample time"
-    if drive.gains is not None:
-        return f"{where} {on}{why}; lower the gain on the velocity ({velocity_gain(drive.gains):.4g}){finer}"
+    if drive.given:
+        return f"{where} {on}{why}; lower the gain on the velocity ({velocity_gain(gains):.4g}){finer}"
     for share in SLOWER:
         slower = replace(drive, bandwidth=share * drive.bandwidth)
         linear = replace(bench.linear, gains=place(drive.linear, inertia, slower.bandwidth, drive.damping))

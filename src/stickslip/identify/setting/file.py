@@ -11,7 +11,6 @@ import numpy as np
 from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.control.recommended import Recommended
-from stickslip.control.sampled_controller import SampledController
 from stickslip.control.written import tables_of
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
@@ -85,17 +84,17 @@ def _further(advice: Recommendation) -> dict[str, Any]:
     assert advice.chosen is not None
     assert advice.model is not None
     setting, loop = advice.chosen.setting, advice.drive.loop(advice.inertia)
-    if isinstance(loop, SampledController):
-        return tables_of(setting.beside(loop, advice.model))
+    if not loop.is_short:
+        return tables_of(setting.on(loop, advice.model))
     return {"recommended": _recommended(advice, setting, loop)}
 
 
 def _recommended(advice: Recommendation, setting: Setting, loop: Controller) -> dict[str, Any]:
     """The table of a setting beside a linear controller."""
     drive = advice.drive
-    own = drive.gains is not None or drive.linear != "PD"
+    own = drive.given or drive.linear != "PD"
     return Recommended(
         setting.kind, setting.gain, drive.bandwidth, drive.damping, advice.inertia, setting.lead, setting.deadband,
         sample_time=drive.sample_time, offset=setting.offset, inertia_feedforward=setting.inertia_feedforward,
-        gains=loop.gains if own else None, velocity_filter=drive.velocity_filter,
+        gains=loop.gains if own else None, velocity_filter=loop.velocity_filter,
     ).table()  # fmt: skip

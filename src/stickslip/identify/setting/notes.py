@@ -35,12 +35,13 @@ def axes_left_out(bench: Bench, others: Bench, found: Identified) -> Iterator[st
 
 def lag_of(alone: Trial, drive: Drive) -> Iterator[str]:
     """Whether most of the error is the lag of a cascade without velocity feedforward, which no friction makes."""
-    if not isinstance(drive.gains, Cascade) or drive.gains.feed >= 1.0:
+    gains = (drive.controller or drive).gains
+    if not isinstance(gains, Cascade) or gains.feed >= 1.0:
         return
-    lag = (1.0 - drive.gains.feed) / drive.gains.kv * alone.moving["speed_rms_rad_s"]
+    lag = (1.0 - gains.feed) / gains.kv * alone.moving["speed_rms_rad_s"]
     if lag > MOSTLY * alone.moving["position_rms_rad"]:
         yield (
-            f"Most of the error is no friction's: without velocity feedforward (feed = {drive.gains.feed:g}) the "
+            f"Most of the error is no friction's: without velocity feedforward (feed = {gains.feed:g}) the "
             "position lags behind by the velocity over kv; feed the velocity forward first."
         )
 

@@ -224,7 +224,7 @@ def recommend(
         *notes_on(found, chosen, candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine),
     ]  # fmt: skip
     return Recommendation(
-        chosen, laws[chosen.setting.law] if chosen else None, linear.values(),
+        chosen, laws[chosen.setting.law] if chosen else None, linear.numbers(),
         first.moving["position_rms_rad"], margin, unsafe_gain, tuple(candidates), len(bench.plants),
         tuple(notes), drive, rung, j, beside, hunts,
     )  # fmt: skip

@@ -19,7 +19,6 @@ import numpy as np
 
 from stickslip.capacity import insist_on_memory
 from stickslip.control.controller import Controller
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, RigError, suggestion
 from stickslip.record import Record
 from stickslip.rigs.loop import Loop
@@ -116,7 +115,7 @@ class Step:
     """
 
     setpoints: Array
-    controller: Controller | SampledController | None = None
+    controller: Controller | None = None
     keep: bool = False
     average: int = 1
     pause: float = 0.0

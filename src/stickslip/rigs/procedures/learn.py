@@ -11,11 +11,10 @@ import numpy as np
 
 from stickslip.config import read_toml
 from stickslip.control.block import ControlBlock
-from stickslip.control.composed import composed_of
+from stickslip.control.controller import Controller
 from stickslip.control.learned import refuse_others, write_table
 from stickslip.control.learning import AngleTable, TimeTable, low_pass
 from stickslip.control.position import position_feedforward
-from stickslip.control.sampled_controller import SampledController
 from stickslip.control.written import tables_of
 from stickslip.errors import InputError, UnknownName
 from stickslip.machines.position_map import PositionMap
@@ -140,7 +139,7 @@ class Learn(Track):
         rows = yield Step(setpoints(round(0.05 / rig.sample_time)), pause=self.wait)
         motion = self.samples(rig)
         path = np.column_stack([float(rows[-1, POSITION]) + motion[:, 0], motion[:, 1:]])
-        own = with_more(replace(composed_of(self.made(rig)), sample_time=rig.sample_time), self.mapped())
+        own = with_more(replace(self.made(rig), sample_time=rig.sample_time), self.mapped())
         table = self.table(rig, path, own.torque_limit)
         least, best, uncertainty = math.inf, own, math.nan
         for i in range(1, self.times + 1):
@@ -182,13 +181,12 @@ class Learn(Track):
         )  # fmt: skip
 
 
-def with_more(controller: SampledController, more: list[ControlBlock]) -> SampledController:
+def with_more(controller: Controller, more: list[ControlBlock]) -> Controller:
     """The controller with more feedforwards."""
-    ahead = [b for b in controller.blocks.values() if b.law.place == "feedforward"]
-    return replace(controller, feedforward=[*ahead, *more])
+    return replace(controller, feedforward=[*controller.feedforward, *more])
 
 
-def ahead_of(controller: SampledController, position: Array, path: Array) -> Array:
+def ahead_of(controller: Controller, position: Array, path: Array) -> Array:
     """The feedforward of every sample, N·m, shape (n,)."""
     torque, ahead = np.zeros(len(path)), np.zeros(len(path))
     inputs = np.ascontiguousarray(np.column_stack([position, path]))

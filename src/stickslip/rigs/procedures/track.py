@@ -15,13 +15,11 @@ from stickslip.config import read_toml
 from stickslip.control import catalogue
 from stickslip.control.belief import believed
 from stickslip.control.compensator import COMPENSATORS
-from stickslip.control.composed import composed_of
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.learned import read_learned, told, write_learned
 from stickslip.control.linear import LINEAR, Gains, place
 from stickslip.control.recommended import read_recommended
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import InputError, UnknownName
 from stickslip.machines.angle import AngleMap
 from stickslip.model import Model, Reference
@@ -113,7 +111,7 @@ class Track(Procedure):
         reference, seconds = REFERENCES[self.reference]
         return reference, self.duration or seconds
 
-    def made(self, rig: Rig) -> Controller | SampledController:
+    def made(self, rig: Rig) -> Controller:
         """The controller, with what it has room for below the rig's limit.
 
         Raises
@@ -127,7 +125,7 @@ class Track(Procedure):
         limit = ROOM * rig.limits.torque
         return dataclasses.replace(found, torque_limit=min(found.torque_limit, limit))
 
-    def catalogued(self, rig: Rig) -> SampledController:
+    def catalogued(self, rig: Rig) -> Controller:
         """The controller with a compensator of the catalogue, made for the law that is believed of the machine.
 
         Raises
@@ -273,9 +271,9 @@ class Track(Procedure):
         learned = self.learned_before(controller, rig)
         yield Step(sent, controller, keep=True, label=self.reference, learned=learned)
         if self.learned:
-            write_learned(Path(self.learned), composed_of(controller), learned, machine_in(rig.name))
+            write_learned(Path(self.learned), controller, learned, machine_in(rig.name))
 
-    def learned_before(self, controller: Controller | SampledController, rig: Rig) -> dict[str, Any]:
+    def learned_before(self, controller: Controller, rig: Rig) -> dict[str, Any]:
         """What the file ``learned`` holds; nothing where there is none yet.
 
         Raises
@@ -285,10 +283,9 @@ class Track(Procedure):
         """
         if not self.learned:
             return {}
-        own = composed_of(controller)
-        if not own.learned(own.state()):
+        if not controller.learned(controller.state()):
             raise InputError(f"learned = {self.learned}: no law of this controller learns; leave it out")
-        return read_learned(Path(self.learned), own, machine_in(rig.name))
+        return read_learned(Path(self.learned), controller, machine_in(rig.name))
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
         """The error and the torque's saturation; both are what is looked for, so that neither fails."""

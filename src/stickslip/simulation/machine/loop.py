@@ -16,7 +16,6 @@ import numpy as np
 import stickslip
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
-from stickslip.control.sampled_controller import SampledController
 from stickslip.errors import Divergence, InputError
 from stickslip.jit import call_profile, call_sample, compiled_profile, flat, kernel, pointer
 from stickslip.machines.machine import Machine
@@ -61,7 +60,7 @@ ON_TIME = 1e-6
 
 def simulate_machine(
     machine: Machine,
-    controller: Controller | SampledController,
+    controller: Controller,
     reference: Reference,
     duration: float,
     *,
@@ -125,7 +124,7 @@ def simulate_machine(
 
 
 def sampled_on(
-    controller: Controller | SampledController, machine: Machine, slip_rule: str | None = None
+    controller: Controller, machine: Machine, slip_rule: str | None = None
 ) -> tuple[Sampled, dict[str, Any]]:
     """The controller compiled for a machine's samples, and what a record says of it (``laws``: friction laws in it).
 
@@ -139,9 +138,8 @@ def sampled_on(
             f"controller: sample_time = {controller.sample_time:g} s, that of the machine {machine.name} is "
             f"{machine.sample_time:g} s; give the machine's, or none"
         )
-    if isinstance(controller, Controller):
-        controller = _filtered_as(controller, machine)
-    own = replace(ruled_in(controller, slip_rule), sample_time=machine.sample_time)
+    own = _filtered_as(controller, machine)
+    own = replace(ruled_in(own, slip_rule), sample_time=machine.sample_time)
     return compiled(own), {**own.described(), "laws": own.frictions}
 
 
