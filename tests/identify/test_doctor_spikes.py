@@ -75,6 +75,43 @@ def test_what_a_motion_has_is_no_spike(kind):
     assert "spikes" not in codes(record(torque, q))
 
 
+def steps_of_velocity(seed: int = 4) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time, position and torque at 250 Hz of a loop that reaches each speed within a row: a peak of torque there."""
+    rng, dt = np.random.default_rng(seed), 4e-3
+    v = np.repeat(rng.choice([-4.0, -2.0, 2.0, 4.0], 40), 60)
+    v = np.convolve(v, [0.0, 0.7, 0.3])[: v.size]
+    q = np.round(np.cumsum(v) * dt / 1e-4) * 1e-4
+    torque = J * np.diff(v, append=v[-1]) / dt + 0.3 * np.sign(v) + 0.01 * rng.standard_normal(v.size)
+    return np.arange(v.size) * dt, q, torque
+
+
+@pytest.mark.parametrize("late", [0, 1])
+def test_a_peak_of_torque_that_the_axis_follows_is_no_spike(late: int):
+    t, q, torque = steps_of_velocity()
+    torque = np.roll(torque, late)
+    driven = Record(t, {"position": q, "motor_torque": torque}, UNITS)
+    assert float(np.max(np.abs(torque))) > 20.0 * float(np.median(np.abs(torque)))
+    assert "spikes" not in codes(driven)
+    rows = np.array([100, 717, 1234, 1888])
+    torque[rows] += [5.0, -5.0, 5.0, 5.0]
+    torque[718] -= 5.0
+    spiked = Record(t, {"position": q, "motor_torque": torque}, UNITS)
+    assert np.array_equal(spike_rows(spiked), [101, 718, 719, 1235, 1889])
+    by_velocity = {"velocity": np.gradient(q, t), "motor_torque": torque}
+    units = {"velocity": "rad/s", "motor_torque": "N·m"}
+    assert np.array_equal(spike_rows(Record(t, by_velocity, units)), [101, 718, 719, 1235, 1889])
+
+
+def test_a_torque_that_stays_where_it_jumps_is_no_spike():
+    t, q, _ = motion()
+    # Break-away of an axis that sticks: one row above, then another level.
+    torque = np.repeat(np.random.default_rng(5).uniform(-0.1, 0.1, 100), 200) + 0.002 * np.sin(300.0 * t)
+    torque[::200] += 0.6 * np.diff(torque[::200], prepend=0.0)
+    torque[200:400] += 2.0
+    torque[200] += 1.5
+    assert "spikes" not in codes(Record(t, {"position": 1e-4 * q, "motor_torque": torque}, UNITS))
+
+
 def test_identify_without_spikes_gives_the_friction(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     t, q, torque = motion()
     torque[np.random.default_rng(2).choice(np.arange(10, SIZE - 10), 30, replace=False)] = 50.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +87,41 @@ def test_a_position_within_one_turn_is_counted_on(span):
     assert np.ptp(mended["position"] - true) < 1e-3 * span
     assert np.ptp(mended["position_reference"] - true) < 1e-3 * span
     assert "counted on" in mended.meta["derived"]["position"]
+
+
+def fast() -> np.ndarray:
+    """Position of an axis that turns by up to 22 degrees from row to row, in the counts of an encoder."""
+    v = 93.0 * np.sin(np.linspace(0.0, 20.0, 1800)) * np.linspace(0.01, 1.0, 1800)
+    return 2.0 + np.round(np.cumsum(v) * 4e-3 * 2**18 / (2.0 * np.pi)) / 2**18 * 2.0 * np.pi
+
+
+@pytest.mark.parametrize("turn", [2.0 * math.pi, 2.9])
+def test_wraps_of_a_fast_axis_are_found(turn):
+    true = fast()
+    t = np.arange(true.size) * 4e-3
+    columns = {"position": np.mod(true, turn), "motor_torque": np.sign(np.gradient(true))}
+    wrapped = Record(t, columns, {"position": "rad", "motor_torque": "N·m"})
+    (said,) = [f for f in examine(wrapped).errors if f.code == "position-wrap"]
+    turns = np.count_nonzero(np.diff(np.floor(true / turn)))
+    assert f"jumps {turns} times by {turn:.4g} rad" in said.message
+    assert "--unwrap" in said.remedy
+    assert np.ptp(unwrapped(wrapped)["position"] - true) < 1e-3 * turn
+
+
+@pytest.mark.parametrize("kind", ["steps", "one count"])
+def test_what_an_axis_moves_is_no_jump(kind):
+    rise = 1.0 - np.exp(-np.arange(80) / 2.0) * np.cos(np.arange(80) / 3.0)
+    height = 0.01 * np.random.default_rng(SEED).integers(-4, 5, 50)
+    position = np.concatenate([a + (b - a) * rise for a, b in pairwise(height)])
+    if kind == "one count":
+        position = np.where(np.arange(position.size) == 1000, 7.7e-4, 0.0)
+    t = np.arange(position.size) * 4e-3
+    seen = Record(
+        t, {"position": position, "motor_torque": np.sin(t)}, {"position": "rad", "motor_torque": "N·m"}
+    )
+    found = {f.code for f in examine(seen).findings}
+    assert not found & {"position-jump", "position-wrap"}
+    assert ("never-moved" in found) == (kind == "one count")
 
 
 def test_a_position_that_does_not_jump_is_not_counted_on():

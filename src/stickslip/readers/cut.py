@@ -13,9 +13,20 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.record import Record
+from stickslip.record import Record, encoder_step
 
-__all__ = ["BRIDGED", "Cut", "cut", "file_rows", "parse_rows", "pieces", "range_words", "taken", "unwrapped"]
+__all__ = [
+    "BRIDGED",
+    "Cut",
+    "cut",
+    "file_rows",
+    "jumps",
+    "parse_rows",
+    "pieces",
+    "range_words",
+    "taken",
+    "unwrapped",
+]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -23,8 +34,13 @@ BRIDGED = 4
 """Rows that may be left out without cutting the record in two: what filters is interpolated across them."""
 FEWEST = 50
 """Rows of a piece that is worth looking at."""
-JUMP = 20.0
-"""Times the usual step from row to row that a position jumps where its counter starts anew."""
+JUMP, ALONE, COUNTS = 20.0, 3.0, 10.0
+"""What a position jumps by, at least: times what rows usually change by, times the rows beside it, since an axis takes
+several rows to gather speed, and steps of its encoder."""
+RANGE = 0.8
+"""Of all the way that a position goes, from which on one row is no motion: its counter starts anew."""
+TURNS, NEARLY = (2.0 * math.pi, 360.0), 0.05
+"""One turn, in rad and degrees, and how near a jump comes to it."""
 SNAP = 0.01
 
 
@@ -194,19 +210,36 @@ def unwrapped(record: Record) -> Record:
     return replace(record, channels=channels, meta={**record.meta, "derived": said})
 
 
+def jumps(position: Array) -> tuple[Any, Array]:
+    """Where a position jumps, as no axis moves: rows before the jumps, and by how much beyond what it moved meanwhile.
+
+    Parameters
+    ----------
+    position : array, shape (n,)
+        Without missing values and without spikes.
+    """
+    steps = np.diff(position)
+    if np.count_nonzero(steps) < 20:  # it hardly moves: a count of its encoder is all its way
+        return np.empty(0, dtype=int), np.empty(0)
+    padded = np.pad(steps, 2, mode="edge")
+    beside = np.stack([padded[k : k + steps.size] for k in (0, 1, 3, 4)])
+    size: Array = np.abs(steps - np.median(beside, axis=0))
+    least = COUNTS * encoder_step(position)
+    alone = np.abs(steps) > ALONE * np.max(np.abs(beside), axis=0)
+    far = size > max(JUMP * float(np.percentile(size, 95)), least, 1e-12)
+    anew = np.abs(steps) > max(RANGE * float(np.ptp(position)), least, 1e-12)
+    # Fast motion hides the usual step of one that starts anew with every turn, not the turn.
+    turned = np.any([np.abs(size / turn - 1.0) < NEARLY for turn in TURNS], axis=0) & (size > least)
+    at = np.flatnonzero((alone & (far | turned)) | anew)
+    return at, size[at]
+
+
 def _period(record: Record) -> float:
     """After which the position starts anew, in its unit; 0 where it does not."""
-    values = record["position"][np.isfinite(record["position"])]
-    steps = np.diff(values)
-    if steps.size < 20:
+    _, sizes = jumps(record["position"][np.isfinite(record["position"])])
+    if not sizes.size:
         return 0.0
-    usual = float(np.percentile(np.abs(steps), 95))
-    jumps = np.flatnonzero(np.abs(steps) > max(JUMP * usual, 1e-12))
-    if not jumps.size:
-        return 0.0
-    # What the axis moved within the jumping row is what it moved in the rows beside.
-    beside = 0.5 * (steps[np.maximum(jumps - 1, 0)] + steps[np.minimum(jumps + 1, steps.size - 1)])
-    size = float(np.median(np.abs(steps[jumps] - beside)))
+    size = float(np.median(sizes))
     return next((known for known in _known_periods(record) if abs(size / known - 1.0) < SNAP), size)
 
 

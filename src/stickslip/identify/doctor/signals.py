@@ -12,6 +12,7 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.identify.doctor.spikes import sticking_out
 from stickslip.identify.doctor.view import Array, View, is_number, row
+from stickslip.readers.cut import RANGE, jumps
 
 __all__ = ["missing", "quantised", "saturated", "supply", "wrapped"]
 
@@ -160,20 +161,18 @@ def wrapped(view: View) -> Iterator[Finding]:
     if spiky.size:  # a jump that comes back at once is a spike
         values = np.delete(values, spiky)
     rows = np.delete(np.flatnonzero(view.usable), spiky)
-    steps = np.diff(values)
-    usual = float(np.percentile(np.abs(steps), 95))
-    jumps = np.flatnonzero(np.abs(steps) > max(20.0 * usual, 1e-12))
-    if not jumps.size:
+    at, sizes = jumps(values)
+    if not at.size:
         return
-    index = int(rows[jumps[0] + 1])
-    size = float(np.median(np.abs(steps[jumps])))
+    index = int(rows[at[0] + 1])
+    size = float(np.median(sizes))
     unit = view.record.units["position"]
     turn = next((t for t in (2.0 * math.pi, 360.0, 1.0, math.pi) if abs(size / t - 1.0) < 0.05), None)
-    if turn is not None or size > 0.8 * float(np.ptp(values)):
+    if turn is not None or size > RANGE * float(np.ptp(values)):
         yield Finding(
             "error",
             "position-wrap",
-            f"position jumps {jumps.size} times by {size:.4g} {unit}: it is counted within one turn",
+            f"position jumps {at.size} times by {size:.4g} {unit}: it is counted within one turn",
             row(index, view),
             "say --unwrap to count it on, or log the position without overflow",
         )
@@ -181,7 +180,7 @@ def wrapped(view: View) -> Iterator[Finding]:
         yield Finding(
             "warning",
             "position-jump",
-            f"position jumps {jumps.size} times by about {size:.4g} {unit}",
+            f"position jumps {at.size} times by about {size:.4g} {unit}",
             row(index, view),
             f"leave these rows out, such as --leave-out {view.file_rows[index]}, or check the encoder",
         )
