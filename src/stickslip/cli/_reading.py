@@ -119,6 +119,7 @@ def print_columns(opened: Opened) -> None:
         "profile": "profile",
         "file": "unit in the file",
         "name": "unit in the name",
+        "drive": "number of the drive",
         "assumed": "unit assumed",
     }
     rows = [

@@ -29,8 +29,8 @@ class Choice:
         Its name in the file.
     unit : str
         As written, or empty where nobody says it: then SI is taken.
-    source : {"map", "profile", "file", "name", "assumed"}
-        Who says the unit: the user, a profile, the file beside the name, the name, nobody.
+    source : {"map", "profile", "file", "name", "drive", "assumed"}
+        Who says the unit: the user, a profile, the file beside the name, the name, a number of the drive's, nobody.
     side : {"", "motor", "load"}
         The side of the gear it is measured on; empty where nobody says it.
     """

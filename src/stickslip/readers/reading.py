@@ -16,6 +16,7 @@ from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.readers import profiles
 from stickslip.readers._choose import Choice, choose, parse_mapping
+from stickslip.readers._told import told
 from stickslip.readers.convert import Drive, convert, times_of
 from stickslip.readers.table_columns import Column, Format, Table
 from stickslip.record import Record
@@ -151,7 +152,7 @@ def record_of(
     period = sample_time if sample_time is not None or profile is None else profile.sample_time
     # Damaged files hold numbers that overflow: they are infinite then, and the doctor finds them.
     with np.errstate(all="ignore"):
-        return convert(table, choices, settings, period, [*table.findings, *findings])
+        return convert(table, told(choices, table, settings), settings, period, [*table.findings, *findings])
 
 
 def joined(

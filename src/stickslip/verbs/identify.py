@@ -25,7 +25,7 @@ from stickslip.record import Record
 from stickslip.report.identified import Source
 from stickslip.spec import Law
 from stickslip.verbs.identification import IdentificationResult
-from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, named, open_log
+from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, doctor_of, named, open_log
 
 __all__ = ["assumptions", "identify"]
 
@@ -144,9 +144,26 @@ position_map, load, intervals, robust
     kind.check(records, options)
     tell_warnings(sources, tell)
     progress(f"method {kind.name}, {sum(len(r) for r in records)} samples")
-    found = with_notes(kind.identify(records, options), kind, records, options, left_out)
+    found = with_notes(identified(kind, sources, options), kind, records, options, left_out)
     found = replace(found, findings=tuple(f for s in sources for f in s.findings))
     return IdentificationResult(found, tuple(sources), law_file(found, () if inverse else laws))
+
+
+def identified(kind: Method, sources: Sequence[Source], options: Options) -> Identification:
+    """What the method finds; where it finds nothing in records with spikes, the error names these.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        return kind.identify([s.record for s in sources], options)
+    except InputError as error:
+        spiky = [(s.name, f.message) for s in sources for f in s.findings if f.code == "spikes"]
+        if not spiky:
+            raise
+        name, message = spiky[0]
+        raise InputError(f"{error}; in {name} {message}: first try --leave-out spikes") from error
 
 
 def tell_warnings(sources: Sequence[Source], tell: Callable[[str], None]) -> None:
@@ -200,13 +217,13 @@ class Examiner:
     regress: Regress
     tell: Callable[[str], None]
 
-    def pieces(self, record: Record, name: str) -> list[Diagnosis]:
+    def pieces(self, record: Record, log: Log | None) -> list[Diagnosis]:
         """What it says of a record; several pieces where many rows in a row are left out."""
         parts, short = pieces(record)
         every = [examine(part, accept=self.accept, regress=self.regress) for part in parts]
         for found in every:
             if found.errors:
-                raise InputError(f"{name}: {found.errors[0].line()}; see `stickslip doctor {name}`")
+                raise InputError(f"{named(log)}: {found.errors[0].line()}; see {doctor_of(log)}")
         return [replace(every[0], findings=(*every[0].findings, *short)), *every[1:]]
 
 
@@ -223,8 +240,8 @@ def sources_of(
         own["beside"] = more
         name = named(log)
 
-        def doctor(record: Record, name: str = name) -> list[Diagnosis]:
-            return examiner.pieces(record, name)
+        def doctor(record: Record, log: Log | None = log) -> list[Diagnosis]:
+            return examiner.pieces(record, log)
 
         opened = open_log(log, own, doctor)
         if opened.written or opened.tells_numbers:

@@ -22,7 +22,9 @@ from stickslip.readers.table_columns import Table
 from stickslip.record import Record
 from stickslip.verbs.kinds import require
 
-__all__ = ["ARRAYS", "Log", "Opened", "Reading", "beside_of", "columns_of", "named", "open_log", "read"]
+__all__ = [
+    "ARRAYS", "Log", "Opened", "Reading", "beside_of", "columns_of", "doctor_of", "named", "open_log", "read",
+]  # fmt: skip
 
 Log = str | os.PathLike[str] | Record | Any
 """A path, a `Record`, a data frame, a mapping of arrays, or a structured array."""
@@ -144,6 +146,12 @@ def read(log: Log | None = None, **reading: Unpack[Reading]) -> Record:
 def named(log: Log | None) -> str:
     """What messages call a log."""
     return os.fspath(cast("str", log)) if isinstance(log, (str, os.PathLike)) else "the log"
+
+
+def doctor_of(log: Log | None) -> str:
+    """The call that says all that the doctor finds in a log, for a remedy."""
+    name = named(log)
+    return "`ss.doctor(...)`" if name == "the log" else f"`stickslip doctor {name}`"
 
 
 def check_reading(given: Mapping[str, Any]) -> None:

@@ -92,7 +92,7 @@ class Diagnosis:
         """
         if self.errors:
             first, *others = self.errors
-            more = f" (and {len(others)} more errors: `stickslip doctor` lists them)" if others else ""
+            more = f" (and {len(others)} more errors: the doctor lists them)" if others else ""
             raise InputError(f"{name}: {first.line()}{more}")
 
 
@@ -145,6 +145,9 @@ def examine(
                 "change",
             )
             findings = [f for f in findings if f.code not in vain]
+    if any(f.code == "position-wrap" for f in findings):
+        # How far an axis turns is not known before its position is counted on.
+        findings = [f for f in findings if f.code != "less-than-a-revolution"]
     findings = [
         replace(f, level="warning") if f.level == "error" and f.code in accept and f.code not in FINAL else f
         for f in findings

@@ -23,6 +23,14 @@ def channels(view: View) -> Iterator[Finding]:
             "there is neither position nor velocity",
             remedy="say which column it is, such as --map position=COLUMN:deg",
         )
+    elif not view.has("position") and view.torque_channel != "friction_torque":
+        yield Finding(
+            "warning",
+            "missing-column",
+            "there is a velocity but no position, without which `identify` refuses an axis; no option integrates it",
+            remedy="log the position, or add a column of it (the sum of velocity times sample time) and say which "
+            "it is, such as --map position=COLUMN:rad",
+        )
     if not view.torque_channel:
         if view.has("current"):
             yield Finding(
@@ -70,7 +78,7 @@ def _standing(view: View, channel: str) -> Finding | None:
         return Finding(
             "error",
             "never-moved",
-            f"{channel} stays within {span:.3g} {unit}: the axis never moved",
+            f"{channel} stays within {span:.3g} {unit}: the axis {'hardly' if span > 0.0 else 'never'} moved",
             remedy=remedy,
         )
     if float(np.var(np.diff(values))) > 1.2 * float(np.var(values)) and encoder_step(values) < 0.1 * span:

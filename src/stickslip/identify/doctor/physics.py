@@ -14,11 +14,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import Array, Smooth, View
-from stickslip.identify.experiment import Experiment
-from stickslip.machines.servo import ServoAxis
 
 __all__ = ["gravity", "line_of", "sign", "skew", "usable"]
 
@@ -32,6 +29,9 @@ STRETCHES, SURE = 12, 3.0
 """Stretches of the jackknife of friction's work, and its standard deviations below zero that make an error."""
 HARM = 5e-6
 """Of the torque's variance, that a delay must leave unexplained to be told: less spoils nothing."""
+WEIGHT, TOLD = 0.3, 0.25
+"""Of Coulomb friction, from which on a constant torque is worth a word; and half the interval within which it is told,
+of its value."""
 TENTH, STRANGE, STRANGE_TIME = 0.1, 1.5, 1.5e-3
 """Rows by which a torque acts beside its row that are worth a word; rows and s from which on no hold explains it."""
 MANY = 10.0
@@ -113,15 +113,7 @@ def _braking(smooth: Smooth, *, measured: bool) -> tuple[float, float]:
 def skew(view: View) -> Iterator[Finding]:
     """When the torque acted: a note from a tenth of a row on, a warning from where no drive does so."""
     smooth = usable(view)
-    record = view.record
-    if smooth is None or view.torque_channel != "motor_torque" or "position" not in record.channels:
-        return
-    linear = record.units.get("position") == "m"
-    position, torque = (record[n][view.usable] for n in ("position", "motor_torque"))
-    axis = ServoAxis(motion="linear" if linear else "rotary", drive_side="load")
-    try:
-        found = view.regress([Experiment("record", view.time, position, torque)], axis)
-    except (InputError, np.linalg.LinAlgError):
+    if smooth is None or (found := view.sliding) is None:
         return
     low, high = found.interval("skew")
     late, half, row = 0.5 * (low + high), 0.5 * (high - low), found.period
@@ -195,19 +187,23 @@ def gravity(view: View) -> Iterator[Finding]:
             )
             yield Finding("warning", "position-unit", message, remedy=f"say {view.mapped('position', 'deg')}")
             return
-    offset, coulomb = plain.values[3], abs(plain.values[1])
-    if coulomb > 0.0 and abs(offset) > 0.3 * coulomb and plain.explained > 0.5:
-        unit = view.record.units["motor_torque"]
-        message = (
-            f"the torque has a constant part of {offset:.3g} {unit}, {100 * abs(offset) / coulomb:.0f} % of"
-            " Coulomb friction"
-        )
-        yield Finding(
-            "note",
-            "offset",
-            message,
-            remedy="a weight, a spring or an offset of the sensor; identify it along",
-        )
+    yield from _offset(view, smooth, plain)
+
+
+def _offset(view: View, smooth: Smooth, plain: Fit) -> Iterator[Finding]:
+    """A constant torque against Coulomb friction, where certain sliding tells that; else against the whole torque."""
+    offset, part, found = plain.values[3], "", view.sliding
+    large = abs(offset) > WEIGHT * float(np.std(smooth.torque)) and plain.explained > 0.5
+    if found is not None and not found.doubt:
+        (low, high), coulomb = found.interval("fc"), found.numbers["fc"].value
+        if high - low < 2.0 * TOLD * coulomb:
+            offset = found.numbers["offset"].value
+            large = abs(offset) > WEIGHT * coulomb
+            part = f", {100 * abs(offset) / coulomb:.0f} % of Coulomb friction"
+    if large:
+        message = f"the torque has a constant part of {offset:.3g} {view.record.units['motor_torque']}{part}"
+        remedy = "a weight, a spring or an offset of the sensor; identify it along"
+        yield Finding("note", "offset", message, remedy=remedy)
 
 
 def usable(view: View) -> Smooth | None:

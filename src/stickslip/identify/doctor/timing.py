@@ -37,13 +37,20 @@ def ascending(view: View) -> Iterator[Finding]:
             if back.size < 10
             else "rows are out of order"
         )
-        yield Finding(
-            "error",
-            "backward-time",
-            f"time goes back {back.size} times; {piece}",
-            row(int(back[0]), view),
-            f"take a part, such as --rows 1:{view.file_rows[back[0] - 1]}, or sort the file by time",
-        )
+        parts = np.split(known, np.flatnonzero(steps < 0.0) + 1)
+        longest = max(parts, key=len)
+        remedy = "sort the file by time"
+        if longest.size >= FEWEST:
+            first, last = view.file_rows[longest[[0, -1]]]
+            remedy = f"take a part, such as --rows {first}:{last}, or {remedy}"
+        else:
+            name = view.name("time")
+            remedy += (
+                f", say which column is the time if {name!r} is not, or give --sample-time SECONDS if the rows follow"
+                " one another and only their times are wrong"
+            )
+        message = f"time goes back {back.size} times; {piece}"
+        yield Finding("error", "backward-time", message, row(int(back[0]), view), remedy)
     same = known[1:][steps == 0.0]
     if same.size:
         share = same.size / max(steps.size, 1)

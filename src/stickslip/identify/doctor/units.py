@@ -43,10 +43,8 @@ def assumed(view: View) -> Iterator[Finding]:
 
 def counted(view: View) -> Iterator[Finding]:
     """Whole numbers where an angle or a length is expected: counts."""
-    if not view.has("position"):
-        return
-    values = view.values("position")
-    if _whole(values) and np.ptp(values) >= 10.0:
+    if _in_counts(view):
+        values = view.values("position")
         level = "warning" if view.stated("position") else "error"
         unit = view.record.units["position"]
         message = (
@@ -57,8 +55,22 @@ def counted(view: View) -> Iterator[Finding]:
             level,
             "position-unit",
             message,
-            remedy=f"say {view.mapped('position', 'counts')} --counts-per-rev N",
+            remedy=f"say {view.mapped('position', 'counts')}{_more(view, 'counts_per_rev', 'N')}",
         )
+
+
+def _in_counts(view: View) -> bool:
+    """Whether every position is a whole number: what depends on its unit then has this one remedy."""
+    if not view.has("position"):
+        return False
+    values = view.values("position")
+    return _whole(values) and float(np.ptp(values)) >= 10.0
+
+
+def _more(view: View, number: str, value: str) -> str:
+    """The option of a number of the drive's, unless it is given."""
+    given = view.record.meta.get("reading", {}).get("drive", {})
+    return "" if number in given else f" --{number.replace('_', '-')} {value}"
 
 
 def degrees(view: View) -> Iterator[Finding]:
@@ -122,6 +134,8 @@ def velocity_scale(view: View) -> Iterator[Finding]:
     """The velocity against the derivative of the position: another unit, another sign."""
     smooth = view.smooth
     if smooth is None or not (view.has("position") and view.has("velocity")) or smooth.fast <= 0.0:
+        return
+    if _in_counts(view) and not view.stated("position"):
         return
     grid = np.linspace(float(view.time[0]), float(view.time[-1]), smooth.velocity.size)
     given: Array = np.interp(grid, view.time, view.values("velocity"))
@@ -199,7 +213,7 @@ def _explained(ratio: float, view: View) -> list[tuple[str, str, str]]:
 def too_fast(view: View) -> Iterator[Finding]:
     """Speeds and torques that no axis has."""
     smooth = view.smooth
-    if smooth is None or not view.has("position"):
+    if smooth is None or not view.has("position") or (_in_counts(view) and not view.stated("position")):
         return
     angle = view.record.units["position"] == "rad"
     doubtful, absurd = (1000.0, 10000.0) if angle else (20.0, 1000.0)
@@ -234,7 +248,7 @@ def torque_scale(view: View) -> Iterator[Finding]:
             "torque-unit",
             message,
             remedy=(
-                f"say {view.mapped('motor_torque', unit)} --rated-torque TORQUE, or"
+                f"say {view.mapped('motor_torque', unit)}{_more(view, 'rated_torque', 'TORQUE')}, or"
                 f" {view.mapped('motor_torque', 'Nm')} if it is right"
             ),
         )

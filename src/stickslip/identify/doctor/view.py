@@ -10,9 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.errors import InputError
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.filters import ZeroPhase, butterworth_poles
-from stickslip.identify.regression.regression import regress_axis
+from stickslip.identify.regression.regression import Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
+from stickslip.machines.servo import ServoAxis
 from stickslip.readers.cut import file_rows
 from stickslip.record import Record, encoder_step
 
@@ -146,6 +149,21 @@ class View:
     def step(self) -> float:
         """The step of the position's encoder, in the position's unit; 0 where there is none."""
         return encoder_step(self.values("position")) if self.has("position") else 0.0
+
+    @cached_property
+    def sliding(self) -> Regression | None:
+        """The regression on certain sliding; None where the record has none, or no position and torque of a motor."""
+        if self.torque_channel != "motor_torque" or not self.has("position"):
+            return None
+        motion = "linear" if self.record.units.get("position") == "m" else "rotary"
+        torque = self.values("motor_torque")
+        try:
+            return self.regress(
+                [Experiment("record", self.time, self.values("position"), torque)],
+                ServoAxis(motion=motion, drive_side="load"),
+            )
+        except (InputError, np.linalg.LinAlgError):
+            return None
 
     @cached_property
     def smooth(self) -> Smooth | None:

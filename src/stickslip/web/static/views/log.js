@@ -222,7 +222,7 @@ function torque(planes, plots) {
 }
 
 function chosen(log) {
-  const BY = { map: "you", profile: "profile", file: "the file's unit", name: "the column's name", assumed: "assumed" };
+  const BY = { map: "you", profile: "profile", file: "the file's unit", name: "the column's name", drive: "a number of the drive's", assumed: "assumed" };
   return h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Columns and units" }, h("table", {}, h("thead", {}, h("tr", {}, ["channel", "column", "unit", "unit known by"].map((t) => h("th", { scope: "col" }, t)))),
     h("tbody", {}, log.chosen.map((c) => h("tr", {}, h("td", {}, c.channel.replaceAll("_", " ")), h("td", {}, c.column), h("td", {}, c.unit), h("td", { class: c.source === "assumed" ? "fair" : "" }, BY[c.source] ?? c.source))))));
 }
