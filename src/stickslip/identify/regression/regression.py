@@ -46,6 +46,8 @@ SKEW_ROWS, SKEW_TIME = 1.0, 1e-3
 """Rows, or s if longer, by which a torque column usually lies off at most (one standard deviation)."""
 UNSURE = 0.3
 """Part of Fc to which the torque that accelerates must be known for friction to be believed."""
+FINEST = 0.01
+"""Rows: standard deviation of a skew that is found, at least: a hold, a lag and a mean are a delay to that only."""
 GIVEN = 0.05
 """Rows to which a skew that is given is known."""
 LEVEL, EXCLUDED = 0.05, 0.05
@@ -286,8 +288,10 @@ def regress_axis(
     speed = np.abs(stacked(seen.rows, "speed"))
     falls, vs = fall_of(bands)
     numbers = {name: together(name, bands) for name in bands[0].numbers}
-    if skew is not None:
-        numbers["skew"] = Number(skew, size)
+    found = numbers["skew"]
+    numbers["skew"] = (
+        Number(found.value, math.hypot(found.std, FINEST * period)) if skew is None else Number(skew, size)
+    )
     return Regression(
         numbers, bands, seen.orders, falls, vs, float(np.quantile(speed, 0.01)), float(np.max(speed)), period,
         seen.rows, seen.widened,
