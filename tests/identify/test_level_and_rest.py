@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from stickslip.identify.axis.agreed import AT_REST, BAND_ALONE, as_moved, with_level, with_rest
+from stickslip.identify.axis.agreed import AT_REST, BAND_ALONE, widened, with_level, with_rest
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
@@ -85,7 +85,7 @@ def test_static_friction_is_no_better_known_than_the_velocity_of_its_fall() -> N
 def test_a_moved_torque_widens_what_reversals_tell() -> None:
     p = Parameter("fs", Par("N·m", "F_S", "static friction", positive=True), 0.3)
     e = estimate("fs", 0.3, 0.3 / 1.05, 0.3 * 1.05)
-    same, wider = as_moved(e, p, 1.0), as_moved(e, p, 1.3)
+    same, wider = widened(e, p, 1.0), widened(e, p, 1.3)
     assert math.log(same.upper / 0.3) == pytest.approx(math.hypot(math.log(1.05), 0.01))
     assert math.log(0.3 / wider.lower) == pytest.approx(math.hypot(1.3 * math.log(1.05), 0.01))
     assert wider.identified

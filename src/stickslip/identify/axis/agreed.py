@@ -55,8 +55,8 @@ TOLD_BY_SLIDING = ("inertia", "offset", "gravity", "gravity_angle", "fc", "sigma
 FALL = ("fs", "vs")
 """What friction's fall with velocity is told by."""
 MOVED, UNLIKE = 1.3, 0.01
-"""Factor on the interval of these where the torque had to be moved to where it acted: reversals are then blurred by a
-part of a row; and half-width of what a law that is none of nature's leaves unsure in any case."""
+"""Factor on the interval of these (in logarithms) where the torque had to be moved to where it acted, since reversals
+are then blurred by a part of a row; and the half-width, in parts of the value, that no law's form is true to."""
 DOUBT = "the prediction error, the only evidence for it, contradicts certain sliding on {name}: {other} against {own}"
 
 ONE_BAND = (
@@ -290,11 +290,11 @@ def fall_together(e: Estimate, found: Regression, p: Parameter, *, held: bool) -
             f"{e.name}: certain sliding says {own.value:.4g}, the prediction error {e.value:.4g} {e.unit}; the "
             "interval holds both."
         )
-    return (as_moved(e, p, 1.0 if held else MOVED) if e.identified else e), notes
+    return (widened(e, p, 1.0 if held else MOVED) if e.identified else e), notes
 
 
-def as_moved(e: Estimate, p: Parameter, factor: float) -> Estimate:
-    """An estimate whose interval is so many times as wide, in logarithms, and not narrower than the law is true."""
+def widened(e: Estimate, p: Parameter, factor: float) -> Estimate:
+    """An estimate whose interval is so many times as wide, in logarithms, and not narrower than `UNLIKE`."""
     below, above = (math.hypot(factor * math.log(end / e.value), UNLIKE) for end in (e.lower, e.upper))
     return told(e, p, e.value, e.value * math.exp(-below), e.value * math.exp(above), math.nan)
 
