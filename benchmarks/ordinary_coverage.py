@@ -77,10 +77,10 @@ def four_lines(log: logs.Log) -> dict[str, float]:
     return dict(zip(("inertia", "sigma2", "fc", "offset"), values.tolist(), strict=True))
 
 
-def study(task: tuple[tuple[int, str, int, str, str, str], str, bool]) -> tuple[list[Row], float]:
+def study(task: tuple[tuple[int, str, int, str, str, str], str, bool, float]) -> tuple[list[Row], float]:
     """The numbers of one log, and the seconds that they took."""
-    cell, law, plain = task
-    log = logs.draw(*cell)
+    cell, law, plain, exponent = task
+    log = logs.draw(*cell, exponent=exponent)
     experiment = Experiment("log", log.time, log.position, log.torque)
     begin = time.process_time()
     try:
@@ -173,9 +173,10 @@ def main() -> int:
     parser.add_argument("--every", type=int, default=1, help="every so many cells")
     parser.add_argument("--law", default="", help="one law; otherwise chosen as `identify` does")
     parser.add_argument("--plain", action="store_true", help="the regression on certain sliding alone")
+    parser.add_argument("--exponent", type=float, default=2.0, help="of friction's fall in the logs")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     args = parser.parse_args()
-    tasks = [(c, args.law, args.plain) for c in cells(args.first, args.every)]
+    tasks = [(c, args.law, args.plain, args.exponent) for c in cells(args.first, args.every)]
     with ProcessPoolExecutor(args.processes) as pool:
         results = list(pool.map(study, tasks, chunksize=2))
     rows = [r for found, _ in results for r in found]

@@ -88,9 +88,10 @@ class Log:
 
 
 @numba.njit(cache=True)
-def bristle(z, v, fc, ratio, vs, sigma0, sigma1, sigma2):
+def bristle(z, v, fc, ratio, vs, sigma0, sigma1, sigma2, exponent):
     """LuGre's deflection after a step at constant velocity, exactly, and the torque."""
-    goal = fc * (1.0 + (ratio - 1.0) * math.exp(-((v / vs) ** 2))) / sigma0
+    power = (v / vs) ** 2 if exponent == 2.0 else abs(v / vs) ** exponent
+    goal = fc * (1.0 + (ratio - 1.0) * math.exp(-power)) / sigma0
     after = math.copysign(goal, v)
     after += (z - after) * math.exp(-abs(v) * 2e-5 / goal)
     return after, sigma0 * after + sigma1 * (after - z) / 2e-5 + sigma2 * v
@@ -101,10 +102,14 @@ def simulate(axis, loop, reference, control_steps, row_controls, encoder, cog_or
     """Position, reference and three torque columns, a row each `row_controls` control periods of `control_steps` steps.
 
     axis: motor and load inertia, coupling stiffness and damping, gap, offset, Fc+, Fc-, Fs/Fc, vs, sigma0, sigma1,
-    sigma2, current loop's time constant, the load's share of friction. loop: kp, kv, ki of the position P or PID,
-    velocity filter's share, limit, acceleration, velocity and friction feedforward, 1 for a PID.
+    sigma2, current loop's time constant, the load's share of friction, exponent of friction's fall. loop: kp, kv, ki
+    of the position P or PID, velocity filter's share, limit, acceleration, velocity and friction feedforward, 1 for a
+    PID.
     """
-    jm, jl, stiff, damp, gap, offset, fc_up, fc_down, ratio, vs, sigma0, sigma1, sigma2, lag, at_load = axis
+    jm, jl, stiff, damp, gap, offset, fc_up, fc_down, ratio, vs, sigma0, sigma1, sigma2, lag, at_load = axis[
+        :15
+    ]
+    exponent = axis[15]
     kp, kv, ki, share, limit, ff_a, ff_v, ff_f, is_pid = loop
     h = 2e-5
     period = control_steps * h
@@ -141,7 +146,9 @@ def simulate(axis, loop, reference, control_steps, row_controls, encoder, cog_or
         for _ in range(control_steps):
             actual = command + (actual - command) * decay
             summed += actual
-            z, contact = bristle(z, v, fc_up if v > 0.0 else fc_down, ratio, vs, sigma0, sigma1, sigma2)
+            z, contact = bristle(
+                z, v, fc_up if v > 0.0 else fc_down, ratio, vs, sigma0, sigma1, sigma2, exponent
+            )
             contact *= 1.0 - at_load
             for i in range(cog_order.shape[0]):
                 contact += cog_size[i, 0] * math.sin(cog_order[i] * q + cog_size[i, 1])
@@ -152,7 +159,9 @@ def simulate(axis, loop, reference, control_steps, row_controls, encoder, cog_or
                     spring = stiff * (twist - 0.5 * gap) + damp * (v - vl)
                 elif twist < -0.5 * gap:
                     spring = stiff * (twist + 0.5 * gap) + damp * (v - vl)
-                zl, drag = bristle(zl, vl, fc_up if vl > 0.0 else fc_down, ratio, vs, sigma0, sigma1, sigma2)
+                zl, drag = bristle(
+                    zl, vl, fc_up if vl > 0.0 else fc_down, ratio, vs, sigma0, sigma1, sigma2, exponent
+                )
                 vl += h * (spring - at_load * drag) / jl
                 ql += h * vl
             v += h * (actual - contact - offset - spring) / jm
@@ -216,8 +225,10 @@ def motion(
 def draw(
     seed: int, column: str = "actual", rate: int = 1000, loop: str = "p-pi", moves: str = "production",
     imperfection: str = "clean", duration: float = 12.0, orders: tuple[int, ...] = (),
+    exponent: float = 2.0,
 ) -> Log:  # fmt: skip
-    """One random axis, its drive and its log; `orders` are those of the cogging a revolution where they are given."""
+    """One random axis, its drive and its log; `orders` are those of the cogging a revolution where they are given,
+    `exponent` is the power of v/vs with which friction falls."""
     rng = np.random.default_rng(seed)
     inertia = 10.0 ** rng.uniform(-4.2, -2.2)
     fastest, acceleration = rng.uniform(5.0, 40.0), rng.uniform(60.0, 400.0)
@@ -241,7 +252,7 @@ def draw(
     lag = 0.0 if column == "held" else rng.uniform(0.2e-3, 0.5e-3)
     axis = np.array([
         jm, jl, stiff, 2.0 * 0.03 * mode * jl * jm / inertia, gap, offset, fc * (1.0 + 0.5 * uneven), fc * (1.0 - 0.5
-        * uneven), ratio, vs, sigma0, sigma1, sigma2, lag, 0.5 if load else 0.0,
+        * uneven), ratio, vs, sigma0, sigma1, sigma2, lag, 0.5 if load else 0.0, exponent,
     ])  # fmt: skip
     period = 1.0 / rate if column == "held" else 1e-3
     controls = 1 if column == "held" else 1000 // rate

@@ -57,13 +57,18 @@ PLAIN = 0.8
 @numba.njit(cache=True)
 def advance(x, axis, orders, sizes, torque):
     """One sample of `ordinary_logs.simulate`'s machine; x: motor and load (position, velocity, bristle), torque."""
-    jm, jl, stiff, damp, gap, offset, fc_up, fc_down, ratio, vs, sigma0, sigma1, sigma2, lag, at_load = axis
+    jm, jl, stiff, damp, gap, offset, fc_up, fc_down, ratio, vs, sigma0, sigma1, sigma2, lag, at_load = axis[
+        :15
+    ]
+    exponent = axis[15]
     h = 2e-5
     decay = math.exp(-h / lag) if lag > 0.0 else 0.0
     q, v, z, ql, vl, zl, actual = x
     for _ in range(50):
         actual = torque + (actual - torque) * decay
-        z, contact = logs_bristle(z, v, fc_up if v > 0.0 else fc_down, ratio, vs, sigma0, sigma1, sigma2)
+        z, contact = logs_bristle(
+            z, v, fc_up if v > 0.0 else fc_down, ratio, vs, sigma0, sigma1, sigma2, exponent
+        )
         contact *= 1.0 - at_load
         for i in range(orders.shape[0]):
             contact += sizes[i, 0] * math.sin(orders[i] * q + sizes[i, 1])
@@ -74,7 +79,9 @@ def advance(x, axis, orders, sizes, torque):
                 spring = stiff * (twist - 0.5 * gap) + damp * (v - vl)
             elif twist < -0.5 * gap:
                 spring = stiff * (twist + 0.5 * gap) + damp * (v - vl)
-            zl, drag = logs_bristle(zl, vl, fc_up if vl > 0.0 else fc_down, ratio, vs, sigma0, sigma1, sigma2)
+            zl, drag = logs_bristle(
+                zl, vl, fc_up if vl > 0.0 else fc_down, ratio, vs, sigma0, sigma1, sigma2, exponent
+            )
             vl += h * (spring - at_load * drag) / jl
             ql += h * vl
         v += h * (actual - contact - offset - spring) / jm

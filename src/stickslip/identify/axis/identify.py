@@ -25,6 +25,7 @@ from stickslip.identify.axis.agreed import (
     regressed,
 )
 from stickslip.identify.axis.choice import Candidate, asked_of, chosen_of, compared, foreseen, sentence_on
+from stickslip.identify.axis.exponent import is_open, shown
 from stickslip.identify.axis.law_fit import Evidence, estimated
 from stickslip.identify.axis.output import judged
 from stickslip.identify.axis.result import assembled, narrow_note, noted
@@ -131,7 +132,11 @@ def identify_axis(
         require_start(evidence.experiments, axis, tried, asked)
     if per_direction or not plain_axis(asked):
         evidence = replace(evidence, sliding=None)
-    automatic = tuple(laws) == AUTOMATIC
+    automatic, given = tuple(laws) == AUTOMATIC, asked
+    if is_open(asked, tried):
+        evidence = replace(evidence, exponent_open=True)
+        asked, more = shown(asked, evidence.sliding, tried)
+        notes = [*notes, *more]
     if automatic:
         tried = shortlist(tried, evidence.sliding)
     chosen, own = tried[0], asked_of(tried[0], asked, tried)
@@ -146,8 +151,8 @@ def identify_axis(
     if intervals == "prediction":
         try:
             found = estimated(chosen, own, evidence, notes)
-            if automatic and not per_direction and nothing_more(found, {*free, *frozen, *asked.values}):
-                return simplest_of(chosen, asked, evidence, notes)
+            if automatic and not per_direction and nothing_more(found, {*free, *frozen, *given.values}):
+                return simplest_of(chosen, given, evidence, notes)
             return found
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."

@@ -22,6 +22,7 @@ from stickslip.identify.axis.agreed import (
     with_level,
 )
 from stickslip.identify.axis.choice import Candidate
+from stickslip.identify.axis.exponent import predicted_with, with_other
 from stickslip.identify.axis.prediction import axis_prediction
 from stickslip.identify.axis.problem import Problem
 from stickslip.identify.axis.result import assembled, evident, noted, untold_by_reversals
@@ -61,6 +62,8 @@ class Evidence:
         Whether the drive's signal is known, but no regression on certain sliding: the inverse dynamics stand in.
     candidates : sequence of Candidate
         The laws that were compared.
+    exponent_open : bool
+        Whether nobody named the exponent with which friction falls.
     """
 
     experiments: Sequence[Experiment]
@@ -70,6 +73,7 @@ class Evidence:
     sliding: Regression | None
     unchecked: bool
     candidates: Sequence[Candidate] = ()
+    exponent_open: bool = False
 
 
 def estimated(law: Law, asked: Asked, evidence: Evidence, notes: Sequence[str]) -> Identification:
@@ -180,11 +184,15 @@ def predicted(law: Law, asked: Asked, evidence: Evidence, notes: Sequence[str]) 
         experiments, axis, law, first=inverse, values=asked.values, free=asked.free, frozen=asked.frozen,
         extras=asked.extras,
     )  # fmt: skip
-    estimates, u, said = result.estimates, result.u, list[str]()
+    other, said = dict[str, float](), list[str]()
+    if evidence.exponent_open:
+        result, other, said = predicted_with(experiments, axis, law, inverse, asked, result, sliding)
+    estimates, u = with_other(result.estimates, result, other), result.u
     if sliding is not None:
         level = abs(sliding.numbers["fc"].value)
         scale = {p.name: 1.0 if p.par.unit == "rad" else level for p in result.vector.free}
-        estimates, said = agreed(estimates, sliding, result.vector, inverse, scale)
+        estimates, more = agreed(estimates, sliding, result.vector, inverse, scale)
+        said = [*said, *more]
         if not sliding.held_for(HELD):
             estimates = untold_by_reversals(estimates, result.model, sliding)
         u = result.vector.coordinates(

@@ -42,6 +42,8 @@ ROUNDS = ((BEST + SPREAD, 20), (3, 50))
 """Descents, the best so far, that go on until they have taken so many simulations."""
 HOPS, EVALUATIONS = 3, 60
 """Hops from the best of them; simulations that each may take."""
+NEARBY = 30
+"""Simulations that a rival of the minimum may take."""
 SETTLED = 1e-3
 """Relative decrease of the sum of squares below which a descent ends."""
 ALIKE = 0.03
@@ -99,6 +101,44 @@ def axis_prediction(
         seen.motions, law, criterion.vector, criterion.mechanics, inertia=criterion.vector.named(u)["inertia"],
         friction=abs(start.coulomb), start=u, signed_scale=abs(start.coulomb), band=seen.band, seed=seed,
     )  # fmt: skip
+
+
+class Rival(NamedTuple):
+    """The same law with another value of what it holds fixed."""
+
+    better: float
+    """Twice the logarithm of its likelihood over that of the law as it was; below 0 where it explains less."""
+    values: dict[str, float]
+    """Its free parameters, by name."""
+
+
+def rival(
+    experiments: Sequence[Experiment], axis: ServoAxis, law: Law, first: InverseDynamics, asked: Asked,
+    found: PredictionError, fixed: Mapping[str, float],
+) -> Rival:  # fmt: skip
+    """A prediction error's result beside what the same records say with other fixed values of the law.
+
+    Raises
+    ------
+    InputError
+        If it cannot be simulated with them.
+    """
+    seen = watched(experiments, axis, asked)
+    named = found.vector.named(found.u)
+    records = [prepare(m, law, named["inertia"], abs(first.coulomb), seen.band) for m in seen.motions]
+    own = {f.name for f in law.fields}
+    beside = {k: v for k, v in named.items() if k.partition("[")[0] not in own}
+    known: dict[str, Any] = {**found.model.parameters._asdict(), **fixed}
+    model = Model(law, **known)
+    vector, _ = laid_out(
+        experiments, axis, law, first, model, replace(asked, values={**asked.values, **beside, **fixed})
+    )
+    mechanics = functools.partial(mechanics_of, harmonic_period=asked.extras.harmonic_period)
+    criterion = Criterion.first(records, law, found.vector, mechanics).adapted(found.u)
+    search = replace(criterion, vector=vector).search(vector.start)
+    search.run(NEARBY, SETTLED)
+    better = cost_of(criterion.residuals(found.u)) - search.cost
+    return Rival(better, dict(zip(vector.names, vector.values(search.u).tolist(), strict=True)))
 
 
 class Watched(NamedTuple):

@@ -1,9 +1,9 @@
 """What certain sliding says in one band of frequencies: linear least squares, averaged over what is not known.
 
-T = J dv/dt + sigma2 v + (Fc + A exp(-(v/vs)²)) sign(v) + T0 (+ gravity, + cogging): linear but for vs and for the skew
-between the columns of torque and motion. vs is averaged over (Bayesian model averaging, ``hoeting1999``): a level
-that the record does not reach is then as uncertain as it should be. The skew is the one at which the jerk explains
-nothing more.
+T = J dv/dt + sigma2 v + (Fc + A exp(-|v/vs|^d)) sign(v) + T0 (+ gravity, + cogging): linear but for vs, the exponent d
+and the skew between the columns of torque and motion. vs and d (1 or 2: Tustin's and the Gaussian form) are averaged
+over (Bayesian model averaging, ``hoeting1999``): a level that the record does not reach is then as uncertain as it
+should be. The skew is the one at which the jerk explains nothing more.
 
 The columns, and what no law holds among them, are those of `stickslip.identify.regression.band_system`.
 """
@@ -26,7 +26,7 @@ from stickslip.identify.regression.band_system import (
     Candidate,
     System,
 )
-from stickslip.identify.regression.sliding_rows import SlidingRows
+from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import memory_of
 
 __all__ = ["BandFit", "Number", "fit_band"]
@@ -70,9 +70,9 @@ class BandFit:
     falls : float
         Probability that friction falls by more than `SHOWN` of Fc.
     probability : array, shape (m,)
-        Of no fall of friction (the first), and of every vs tried.
-    stribeck : array, shape (m,)
-        Those vs, rad/s (m/s); the first is 0.
+        Of no fall of friction (the first), and of every one tried.
+    tried : tuple of Fall
+        Those, one fewer.
     harmonics : array, shape (k, 2)
         Cosine and sine of every order taken in, N·m (N).
     correlation : array, shape (p, p)
@@ -88,7 +88,7 @@ class BandFit:
     numbers: dict[str, Number]
     falls: float
     probability: Array
-    stribeck: Array
+    tried: tuple[Fall, ...]
     harmonics: Array
     correlation: Array
     misfit: float
@@ -98,7 +98,7 @@ class BandFit:
 
 
 def fit_band(
-    records: Sequence[SlidingRows], stribeck: Sequence[float], *, orders: Sequence[float] = (),
+    records: Sequence[SlidingRows], tried: Sequence[Fall], *, orders: Sequence[float] = (),
     background: Sequence[float] = (), pendulum: bool = False, skew_size: float = 3e-3, skew: float | None = None,
     start: float = 0.0, blurred: bool = False,
 ) -> BandFit:  # fmt: skip
@@ -107,9 +107,9 @@ def fit_band(
     Parameters
     ----------
     records : sequence of SlidingRows
-        Fitted together, each with a column of `falling` for every vs.
-    stribeck : sequence of float
-        Those vs, rad/s (m/s).
+        Fitted together, each with a column of `falling` for every fall of friction.
+    tried : sequence of Fall
+        Those.
     orders, background : sequence of float
         Cycles a radian (m) of a torque over the position: free ones, and such that are small.
     pendulum : bool
@@ -123,7 +123,7 @@ def fit_band(
     blurred : bool
         Whether the way is too short to tell orders apart: what is near those found is then not small.
     """
-    system = System(records, stribeck, orders, background, pendulum, skew_size)
+    system = System(records, tried, orders, background, pendulum, skew_size)
     at = start if skew is None else skew
     system.expected = at
     torque = system.torque(at)
@@ -152,7 +152,7 @@ def fit_band(
         )
         torque = system.torque(at)
         candidates = system.candidates(torque, at)
-    out = summed_up(system, torque, candidates, weight, at, stribeck, len(orders), pendulum)
+    out = summed_up(system, torque, candidates, weight, at, tried, len(orders), pendulum)
     if not (blurred and orders):
         return out
     most_likely = candidates[int(np.argmax(weight))]
@@ -200,7 +200,7 @@ def element(i: int) -> Callable[[Array, Array], tuple[float, float]]:
 
 def summed_up(
     system: System, torque: Array, candidates: Sequence[Candidate], weight: Array, skew: float,
-    stribeck: Sequence[float], orders: int, pendulum: bool,
+    tried: Sequence[Fall], orders: int, pendulum: bool,
 ) -> BandFit:  # fmt: skip
     """Means over the candidates, their spread among the variances."""
     kept = [(w, c) for w, c in zip(weight, candidates, strict=True) if w > 1e-4]
@@ -250,6 +250,6 @@ def summed_up(
     each = np.sqrt(np.diag(joint))
     return BandFit(
         system.records[0].window.corner, numbers, float(falls / total), weight,
-        np.array([0.0, *(stribeck[k] for k in system.levels)]), harmonics, joint / np.outer(each, each), misfit,
+        tuple(tried[k] for k in system.levels), harmonics, joint / np.outer(each, each), misfit,
         misfit / max(float(np.sqrt(np.mean(torque**2))), 1e-300), torque.size, int(system.piece[-1]) + 1,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The columns of the regression in one band of frequencies, and its solution for every Stribeck velocity.
+"""The columns of the regression in one band of frequencies, and its solution for every fall of friction.
 
 Friction that no law holds (a curve a little other than assumed, memory after a reversal, friction that lags behind
 velocity, a torque over the position) takes part as columns whose coefficients are small, and what they could do to a
@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.regression.sliding_rows import SlidingRows
+from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
 
-__all__ = ["COULOMB", "INERTIA", "JERK", "OFFSET", "VISCOUS", "Candidate", "System"]
+__all__ = ["COULOMB", "INERTIA", "JERK", "OFFSET", "USUAL_EXPONENTS", "VISCOUS", "Candidate", "System"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Places = np.ndarray[Any, np.dtype[np.int64]]
@@ -31,6 +31,7 @@ USUAL, OFTEN = (
     0.2,
     0.9,
 )  # of the speed exceeded in a tenth of calm rows: a greater vs is less likely, with its square
+USUAL_EXPONENTS = {2.0: 0.8, 1.0: 0.2}  # of the fall, and how likely each is before the record
 FALL = 0.4  # of Fc: what the fall is expected to be at most, one standard deviation
 RISE, DEEPEST = -0.05, 2.0  # of Fc: bounds of A
 
@@ -53,7 +54,7 @@ LEAST = 1e-14  # of the largest eigenvalue of products: below it there is roundi
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """The fit with one vs (or none): places of its columns, and its solution in columns of norm 1."""
+    """The fit with one fall of friction (or none): places of its columns, and its solution in columns of norm 1."""
 
     level: int
     columns: Places
@@ -138,7 +139,7 @@ class System:
     """The columns of one band, and their products; only the torque changes with the skew."""
 
     def __init__(
-        self, records: Sequence[SlidingRows], stribeck: Sequence[float], orders: Sequence[float], background:
+        self, records: Sequence[SlidingRows], falls: Sequence[Fall], orders: Sequence[float], background:
         Sequence[float], pendulum: bool, skew_size: float,
     ):  # fmt: skip
         self.records, self.skew_size, self.expected = records, skew_size, 0.0
@@ -163,9 +164,10 @@ class System:
         calm = self.inertia * np.abs(plain[:, INERTIA]) < self.fc
         often = float(np.quantile(pace[calm] if np.any(calm) else pace, OFTEN))
         # Levels of friction are told by rows that hardly accelerate: beyond their speeds nothing speaks against a fall.
-        speed = np.array([stribeck[k] for k in self.levels])
+        speed = np.array([falls[k].vs / Fall.like(1.0, falls[k].exponent).vs for k in self.levels])
         beyond = np.maximum(speed / max(USUAL * often, 1e-300), 1.0)
-        self.before = beyond**-2.0 / max(float(np.sum(beyond**-2.0)), 1e-300)
+        before = beyond**-2.0 * np.array([USUAL_EXPONENTS[falls[k].exponent] for k in self.levels])
+        self.before = before / max(float(np.sum(before)), 1e-300)
         small, self.std = small_columns(records, self.fc, background)
         columns = np.column_stack([plain, falling[:, self.levels], small])
         scale = np.linalg.norm(columns, axis=0)
@@ -188,7 +190,7 @@ class System:
         return np.concatenate([r.torque(skew) for r in self.records])
 
     def candidates(self, torque: Array, skew: float) -> list[Candidate]:
-        """The fit without a fall of friction, and with one at every vs."""
+        """The fit without a fall of friction, and with every one."""
         products, small = self.products, self.small
         seen = self.columns.T @ torque
         held = np.diag(self.noise * self.memory / (self.std * self.scale[small]) ** 2)

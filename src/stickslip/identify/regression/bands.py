@@ -17,8 +17,9 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.fit.smooth import Window, seen
 from stickslip.identify.regression.band_fit import BandFit, Number, fit_band
+from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.orders import candidate_orders, goes_round, shown_orders
-from stickslip.identify.regression.sliding_rows import FEWEST, Signals, SlidingRows, sliding_rows
+from stickslip.identify.regression.sliding_rows import FEWEST, Fall, Signals, SlidingRows, sliding_rows
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
@@ -172,16 +173,16 @@ def in_bands(
             if not bands:
                 known = options["skew"]
                 start = clear_skew(signals, factor * width) if known is None else known
-                widest, levels = rows_of(signals, factor * width, start)
+                widest, falls = rows_of(signals, factor * width, start)
                 own = {**options, "start": start}
                 chosen = {
                     "start": start,
-                    **(orders_in(widest, levels, axis, period, own) if harmonics else {}),
+                    **(orders_in(widest, falls, axis, period, own) if harmonics else {}),
                 }
                 rows = widest
             else:
-                rows, levels = rows_of(signals, factor * width, bands[0].numbers["skew"].value)
-            bands.append(fit_band(rows, levels, **{**options, **chosen}))
+                rows, falls = rows_of(signals, factor * width, bands[0].numbers["skew"].value)
+            bands.append(fit_band(rows, falls, **{**options, **chosen}))
         except InputError as error:
             lacking = error
     if not bands:
@@ -196,11 +197,11 @@ def follows(band: BandFit, rows: Sequence[SlidingRows], size: float) -> bool:
 
 
 def orders_in(
-    rows: Sequence[SlidingRows], levels: Sequence[float], axis: ServoAxis, period: float | None,
+    rows: Sequence[SlidingRows], falls: Sequence[Fall], axis: ServoAxis, period: float | None,
     options: Mapping[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
     """Orders of a torque over the position that show, and the lowest others, which may be there but are small."""
-    skew = fit_band(rows, levels, **options).numbers["skew"].value
+    skew = fit_band(rows, falls, **options).numbers["skew"].value
     candidates = candidate_orders(rows, axis.motion == "rotary", period)
     candidates = candidates[axis.gravity == "pendulum" :]  # the first is a pendulum's own
     shown = shown_orders(rows, skew, candidates)
@@ -229,19 +230,20 @@ def clear_skew(signals: Sequence[Signals], width: float) -> float:
     return (best - reach) * rows[0].signals.period
 
 
-def rows_of(signals: Sequence[Signals], width: float, skew: float) -> tuple[list[SlidingRows], list[float]]:
-    """Rows seen through one window, without those where friction is still being rebuilt; and the vs tried."""
+def rows_of(signals: Sequence[Signals], width: float, skew: float) -> tuple[list[SlidingRows], list[Fall]]:
+    """Rows seen through one window, without those where friction is still being rebuilt; and the falls tried."""
     windows = [Window(width, s.period) for s in signals]
     first = [sliding_rows(s, w) for s, w in zip(signals, windows, strict=True)]
     speed = np.abs(stacked(first, "speed"))
     top = float(np.max(speed))
     levels = np.geomspace(max(float(np.min(speed)), SLOWEST * top), FASTEST * top, LEVELS).tolist()
+    falls = [Fall.like(vs, exponent) for exponent in USUAL_EXPONENTS for vs in levels]
     way = rebuilding_way(first, skew)
-    rows = [r.falling_at(levels).farther(way) for r in first]
+    rows = [r.falling_at(falls).farther(way) for r in first]
     rows = [r for r in rows if r.time.size >= FEWEST]
     if not rows:
         raise InputError("friction is rebuilt over the whole of every stroke; record longer strokes")
-    return rows, levels
+    return rows, falls
 
 
 def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:

@@ -23,7 +23,7 @@ from stickslip.errors import InputError
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.band_fit import BandFit, Number
-from stickslip.identify.regression.band_system import least_squares
+from stickslip.identify.regression.band_system import USUAL_EXPONENTS, least_squares
 from stickslip.identify.regression.bands import (
     QUANTILE,
     ROTATED,
@@ -34,13 +34,15 @@ from stickslip.identify.regression.bands import (
     telling,
     together,
 )
-from stickslip.identify.regression.sliding_rows import SlidingRows, narrowest_width, signals_of
+from stickslip.identify.regression.sliding_rows import Fall, SlidingRows, narrowest_width, signals_of
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
 __all__ = ["FALLS", "QUANTILE", "Regression", "regress_axis"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Falling = Mapping[float, tuple[float, Number]]
+"""By exponent of a fall of friction: how probable it is if there is one, and its velocity, rad/s (m/s)."""
 
 SKEW_ROWS, SKEW_TIME = 1.0, 1e-3
 """Rows, or s if longer, by which a torque column usually lies off at most (one standard deviation)."""
@@ -98,8 +100,8 @@ class Regression:
         Cycles a radian (m) of the torque over the position that were found.
     falls : float
         Probability that friction falls with velocity within the recorded speeds (Stribeck effect).
-    vs : Number
-        Of its velocity, if it does; rad/s (m/s).
+    falling : Falling
+        How, if it does.
     slowest, fastest : float
         Speeds of certain sliding: their first percentile and the highest.
     period : float
@@ -114,7 +116,7 @@ class Regression:
     bands: tuple[BandFit, ...]
     orders: tuple[float, ...]
     falls: float
-    vs: Number
+    falling: Falling
     slowest: float
     fastest: float
     period: float
@@ -136,8 +138,8 @@ class Regression:
         known = known + values.get("gravity_cos", 0.0) * np.cos(position)
         if {"fs", "vs"} <= values.keys():
             speed = stacked(self.rows, "speed")
-            falls = np.exp(-((speed / values["vs"]) ** 2))
-            known = known + (values["fs"] - values["fc"]) * falls * np.sign(speed)
+            left = Fall(values["vs"], self.exponent).at(speed)
+            known = known + (values["fs"] - values["fc"]) * left * np.sign(speed)
         return np.asarray(torque - known, dtype=np.float64)
 
     def left_by(self, values: Mapping[str, float]) -> float:
@@ -152,6 +154,16 @@ class Regression:
             columns = np.concatenate(waves, axis=1)
             rest = rest - columns @ least_squares(columns, rest)
         return root_mean_square(rest)
+
+    @property
+    def exponent(self) -> float:
+        """Of friction's fall, the more probable one."""
+        return max(self.falling, key=lambda d: self.falling[d][0])
+
+    @property
+    def vs(self) -> Number:
+        """Velocity of friction's fall with that exponent, rad/s (m/s)."""
+        return self.falling[self.exponent][1]
 
     @property
     def own(self) -> dict[str, float]:
@@ -286,14 +298,14 @@ def regress_axis(
         seen = replace(in_bands(signals, seen.widened * width, *ask), widened=seen.widened)
     bands = seen.fits
     speed = np.abs(stacked(seen.rows, "speed"))
-    falls, vs = fall_of(bands)
+    falls, falling = fall_of(bands)
     numbers = {name: together(name, bands) for name in bands[0].numbers}
     found = numbers["skew"]
     numbers["skew"] = (
         Number(found.value, math.hypot(found.std, FINEST * period)) if skew is None else Number(skew, size)
     )
     return Regression(
-        numbers, bands, seen.orders, falls, vs, float(np.quantile(speed, 0.01)), float(np.max(speed)), period,
+        numbers, bands, seen.orders, falls, falling, float(np.quantile(speed, 0.01)), float(np.max(speed)), period,
         seen.rows, seen.widened,
     )  # fmt: skip
 
@@ -303,20 +315,29 @@ def root_mean_square(x: Array) -> float:
     return float(np.sqrt(np.mean(x * x)))
 
 
-def fall_of(bands: Sequence[BandFit]) -> tuple[float, Number]:
-    """Probability that friction falls within the recorded speeds in every band, and vs if it does."""
-    falls = min(b.falls for b in bands)
-    logs: list[Mapping[str, float]] = []
-    for b in bands:
-        weight = b.probability[1:]
-        if weight.sum() <= 0.0:
-            continue
-        weight = weight / weight.sum()
-        place = np.log(b.stribeck[1:])
-        middle = float(weight @ place)
-        logs.append({"middle": middle, "variance": float(weight @ (place - middle) ** 2)})
-    if not logs:
-        return falls, Number(math.nan, math.inf)
-    middle = math.fsum(x["middle"] for x in logs) / len(logs)
-    variance = math.fsum(x["variance"] + (x["middle"] - middle) ** 2 for x in logs) / len(logs)
-    return falls, Number(math.exp(middle), math.exp(middle) * math.sqrt(variance))
+def fall_of(bands: Sequence[BandFit]) -> tuple[float, Falling]:
+    """Probability that friction falls within the recorded speeds in every band, and how if it does."""
+    out: Falling = {}
+    shares = [b.probability[1:] / max(float(b.probability[1:].sum()), 1e-300) for b in bands]
+    for exponent in USUAL_EXPONENTS:
+        chances: list[float] = []
+        places: list[tuple[float, float]] = []
+        for b, share in zip(bands, shares, strict=True):
+            mine = np.array([fall.exponent == exponent for fall in b.tried])
+            weight, place = share[mine], np.log([fall.vs for fall in b.tried if fall.exponent == exponent])
+            chances.append(float(weight.sum()))
+            if weight.sum() > 0.0:
+                weight = weight / weight.sum()
+                middle = float(weight @ place)
+                places.append((middle, float(weight @ (place - middle) ** 2)))
+        out[exponent] = (math.fsum(chances) / len(chances), velocity_of(places))
+    return min(b.falls for b in bands), out
+
+
+def velocity_of(places: Sequence[tuple[float, float]]) -> Number:
+    """One velocity from mean and variance of its logarithm in every band; unknown without any."""
+    if not places:
+        return Number(math.nan, math.inf)
+    middle = math.fsum(m for m, _ in places) / len(places)
+    variance = math.fsum(v + (m - middle) ** 2 for m, v in places) / len(places)
+    return Number(math.exp(middle), math.exp(middle) * math.sqrt(variance))

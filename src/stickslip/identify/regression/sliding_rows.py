@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from stickslip.identify.fit.smooth import CORNER, NARROWEST, Window, seen
 from stickslip.identify.regression.inverse import uniform, white_noise
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["Signals", "SlidingRows", "narrowest_width", "signals_of", "sliding_rows"]
+__all__ = ["Fall", "Signals", "SlidingRows", "narrowest_width", "signals_of", "sliding_rows"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -32,6 +32,26 @@ CERTAIN = 6.0  # standard deviations of the fine velocity's noise from which on 
 CREEPING = 3e-3  # of the usual speed
 FEWEST = 30  # rows
 DIRECTION = 2  # its column
+VANISHED = 700.0  # exponent beyond which a fall of friction is 0
+
+
+class Fall(NamedTuple):
+    """How friction falls with velocity: as exp(-|v/vs|^exponent); vs in rad/s (m/s)."""
+
+    vs: float
+    exponent: float
+
+    @classmethod
+    def like(cls, vs: float, exponent: float) -> Fall:
+        """The one of which a tenth is left where it is of that with exponent 2, rad/s (m/s)."""
+        return cls(vs * math.log(10.0) ** (0.5 - 1.0 / exponent), exponent)
+
+    def at(self, speed: Array) -> Array:
+        """What is left of it at a speed, shape as that."""
+        ratio = np.abs(speed) / self.vs
+        # A square is exact, and much faster than a power.
+        power = ratio * ratio if self.exponent == 2.0 else ratio**self.exponent
+        return np.asarray(np.exp(-np.minimum(power, VANISHED)), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +133,7 @@ class SlidingRows:
     jerk : array, shape (n,)
         rad/s³ (m/s³).
     falling : array, shape (n, m)
-        exp(-(v/vs)²) in the direction of motion, for every Stribeck velocity that `falling_at` was asked for.
+        What is left of friction's fall, in the direction of motion, for every one that `falling_at` was asked for.
     stroke : array of int, shape (n,)
         Stretch of sliding in one direction that a row belongs to, 0 ...
     signals : Signals
@@ -139,12 +159,10 @@ class SlidingRows:
     gone: Array
     quick: Array
 
-    def falling_at(self, stribeck: Sequence[float]) -> SlidingRows:
-        """The same rows, with the fall of friction laid out for every Stribeck velocity vs, rad/s (m/s)."""
+    def falling_at(self, falls: Sequence[Fall]) -> SlidingRows:
+        """The same rows, with every one of these falls of friction laid out."""
         sign, middle = self.fixed[:, DIRECTION], self.window.weights(0)
-        falling = [
-            seen(np.exp(-np.minimum((self.quick / vs) ** 2, 700.0)), middle)[0][self.places] * sign for vs in stribeck
-        ]  # fmt: skip
+        falling = [seen(fall.at(self.quick), middle)[0][self.places] * sign for fall in falls]
         return replace(self, falling=np.column_stack(falling))
 
     @property

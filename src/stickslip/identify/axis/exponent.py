@@ -1,0 +1,109 @@
+"""The exponent with which friction falls: Tustin's form exp(-|v/vs|), or the Gaussian exp(-(v/vs)²).
+
+Both look alike, and the wrong one moves the levels at rest and at speed by several percent. Certain sliding is averaged
+over both (`stickslip.identify.regression.band_fit`); a law is fitted with the one that it shows, and the other must
+explain the whole record worse (`stickslip.identify.axis.prediction.rival`). A law's exponent is otherwise left at its
+default: neither form tells it as a number.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from stickslip.errors import InputError
+from stickslip.identify.axis.agreed import told
+from stickslip.identify.axis.prediction import axis_prediction, rival
+from stickslip.identify.axis.search import Asked
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.experiment import Experiment
+from stickslip.identify.observer.prediction_error import PredictionError
+from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identify.regression.regression import Regression
+from stickslip.machines.servo import ServoAxis
+from stickslip.spec import Law
+
+__all__ = ["is_open", "predicted_with", "shown", "with_other"]
+
+EXPONENT = "delta_s"
+FORMS = {1.0: 2.0, 2.0: 1.0}
+"""Every exponent that is tried, and the other."""
+CLEARLY = 0.1
+"""Part of the sum of squares by which one of both must explain the record better for the other to be out. Of friction
+that no curve describes (GMS fitted as a curve, exponent 2) the wrong one explained 2 to 8 % more; of curves the right
+one explained more than a tenth more (`benchmarks/ordinary_coverage.py --exponent`)."""
+SURE = 0.99
+"""Probability by certain sliding from which on the record is not asked."""
+TOLD = ("fs", "vs")
+"""What depends on it most."""
+SHOWN = (
+    "Friction falls as exp(-|v/vs|^delta_s) with delta_s = {found:g}, not the usual {usual:g}: {by} (--set "
+    "delta_s={usual:g} fits that all the same)."
+)
+SLIDING, RECORD = "certain sliding shows it", "the record is explained better"
+UNDECIDED = (
+    "Whether friction falls with delta_s = 1 or 2 the record does not decide; the intervals of Fs and vs hold what "
+    "both say."
+)
+
+
+def is_open(asked: Asked, laws: Iterable[Law]) -> bool:
+    """Whether a law has an exponent that nobody named."""
+    return EXPONENT not in {*asked.values, *asked.free} and any(usual_of(law) is not None for law in laws)
+
+
+def usual_of(law: Law) -> float | None:
+    """The exponent that a law takes where nothing is said; none where it has none of those that are tried."""
+    usual = next((f.par.default for f in law.fields if f.name == EXPONENT), None)
+    return usual if isinstance(usual, float) and usual in FORMS else None
+
+
+def shown(asked: Asked, sliding: Regression | None, laws: Sequence[Law]) -> tuple[Asked, list[str]]:
+    """What is asked, with the exponent that certain sliding shows; and what is to be said."""
+    usual = next((u for u in map(usual_of, laws) if u is not None), None)
+    if sliding is None or usual is None or not sliding.shows_a_fall or sliding.exponent == usual:
+        return asked, []
+    said = SHOWN.format(found=sliding.exponent, usual=usual, by=SLIDING)
+    return replace(asked, values={**asked.values, EXPONENT: sliding.exponent}), [said]
+
+
+def predicted_with(
+    experiments: Sequence[Experiment], axis: ServoAxis, law: Law, first: InverseDynamics | None, asked: Asked,
+    found: PredictionError, sliding: Regression | None,
+) -> tuple[PredictionError, dict[str, float], list[str]]:  # fmt: skip
+    """The prediction error with the exponent that explains the record better, what the other says of `TOLD` where the
+    record does not decide, and what is to be said."""
+    usual, estimates = usual_of(law), {e.name: e for e in found.estimates}
+    if usual is None or first is None or not any(n in estimates and estimates[n].identified for n in TOLD):
+        return found, {}, []
+    own = float(getattr(found.model.parameters, EXPONENT))
+    if sliding is not None and sliding.shows_a_fall and sliding.falling[own][0] >= SURE:
+        return found, {}, []
+    try:
+        other = rival(experiments, axis, law, first, asked, found, {EXPONENT: FORMS[own]})
+    except InputError:
+        return found, {}, []
+    least = CLEARLY * found.cost
+    if not math.isfinite(other.better) or other.better < -least:
+        return found, {}, []
+    if other.better <= least:
+        return found, {n: other.values[n] for n in TOLD if n in other.values}, [UNDECIDED]
+    values = {**asked.values, **other.values, EXPONENT: FORMS[own]}
+    better = axis_prediction(
+        experiments, axis, law, first=first, values=values, free=asked.free, frozen=asked.frozen, extras=asked.extras
+    )  # fmt: skip
+    said = [] if FORMS[own] == usual else [SHOWN.format(found=FORMS[own], usual=usual, by=RECORD)]
+    return better, {}, said
+
+
+def with_other(
+    estimates: Iterable[Estimate], found: PredictionError, other: dict[str, float]
+) -> tuple[Estimate, ...]:
+    """The estimates, their intervals holding what the other exponent says."""
+    parameters = {p.name: p for p in found.vector.free}
+    return tuple(
+        told(e, parameters[e.name], e.value, min(e.lower, other[e.name]), max(e.upper, other[e.name]), math.nan)
+        if e.name in other and e.identified else e
+        for e in estimates
+    )  # fmt: skip

@@ -1,0 +1,112 @@
+"""The exponent with which friction falls: found from the record, or named; what it leaves open is in the intervals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip import plugins
+from stickslip.identify.axis import exponent
+from stickslip.identify.axis.exponent import is_open, shown, with_other
+from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.axis.prediction import Rival, axis_prediction
+from stickslip.identify.axis.search import Asked
+from stickslip.identify.experiment import Experiment
+from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identify.regression.regression import regress_axis
+from stickslip.identify.regression.sliding_rows import Fall
+from stickslip.machines.servo import ServoAxis
+
+AXIS = ServoAxis(drive_side="load")
+MOVES = ("held", 1000, "p-pi", "production", "clean")
+LAW = plugins.law("stribeck")
+
+
+def drawn(logs: Any, seed: int, power: float) -> tuple[Experiment, dict[str, float]]:
+    """An ordinary log whose friction falls with this exponent, and the truth."""
+    log = logs.draw(seed, *MOVES, exponent=power)
+    return Experiment("log", log.time, log.position, log.torque), log.truth
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_certain_sliding_tells_the_exponent_and_the_levels_of_both_forms(logs: Any, power: float) -> None:
+    record, truth = drawn(logs, 970000, power)
+    found = regress_axis([record], AXIS)
+    assert found.exponent == power
+    assert found.falling[power][0] > 0.99
+    assert math.fsum(chance for chance, _ in found.falling.values()) == pytest.approx(1.0)
+    for name in ("fc", "sigma2", "inertia"):
+        low, high = found.interval(name)
+        assert low <= truth[name] <= high
+    assert found.vs.value == pytest.approx(truth["vs"], rel=0.3)
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_a_law_is_fitted_with_the_exponent_that_the_record_shows(logs: Any, power: float) -> None:
+    record, truth = drawn(logs, 970060, power)
+    found = identify_axis([record], AXIS, ["stribeck"])
+    assert found.model is not None
+    assert found.model.as_dict()["delta_s"] == power
+    for name in ("fs", "fc", "vs"):
+        assert found[name].lower <= truth[name] <= found[name].upper
+    assert any("delta_s = 1" in note for note in found.notes) == (power == 1.0)
+
+
+def test_an_exponent_that_is_named_is_taken(logs: Any) -> None:
+    record, _ = drawn(logs, 970000, 1.0)
+    found = identify_axis([record], AXIS, ["stribeck"], values={"delta_s": 2.0})
+    assert found.model is not None
+    assert found.model.as_dict()["delta_s"] == 2.0
+    assert not any("delta_s" in note for note in found.notes)
+    assert not is_open(Asked(values={"delta_s": 2.0}), [LAW])
+    assert not is_open(Asked(free=["delta_s"]), [LAW])
+    assert is_open(Asked(), [LAW])
+    assert not is_open(Asked(), [plugins.law("coulomb")])
+
+
+def test_certain_sliding_says_nothing_without_a_fall() -> None:
+    asked = Asked()
+    assert shown(asked, None, [LAW]) == (asked, [])
+
+
+@pytest.mark.parametrize(("better", "taken"), [(-1.0, "own"), (0.0, "both"), (1.0, "other")])
+def test_the_record_decides_by_a_tenth_or_both_are_held(
+    logs: Any, monkeypatch: pytest.MonkeyPatch, better: float, taken: str
+) -> None:
+    record, _ = drawn(logs, 970000, 2.0)
+    first, asked = inverse_dynamics([record], AXIS), Asked()
+    found = axis_prediction([record], AXIS, LAW, first=first)
+    levels = {e.name: 1.2 * e.upper for e in found.estimates if e.name in ("fs", "vs")}
+    beside = {e.name: e.value for e in found.estimates} | levels
+    sliding = regress_axis([record], AXIS)
+    open_ = replace(sliding, falling={d: (0.5, vs) for d, (_, vs) in sliding.falling.items()})
+    monkeypatch.setattr(exponent, "rival", lambda *_: Rival(better * found.cost, beside))
+    monkeypatch.setattr(exponent, "axis_prediction", lambda *_, values, **__: values)
+    result, other, said = exponent.predicted_with([record], AXIS, LAW, first, asked, found, open_)
+    if taken == "other":
+        assert dict(result)["delta_s"] == 1.0  # type: ignore[call-overload]
+        assert "delta_s = 1" in said[0]
+        return
+    assert result is found
+    assert bool(other) == bool(said) == (taken == "both")
+    for before, after in zip(found.estimates, with_other(found.estimates, found, other), strict=True):
+        assert after.value == before.value
+        assert after.upper == (
+            levels[after.name] if after.name in other and before.identified else before.upper
+        )
+    # Where certain sliding is sure the record is not asked.
+    assert exponent.predicted_with([record], AXIS, LAW, first, asked, found, sliding) == (found, {}, [])
+
+
+def test_a_fall_of_either_form_has_a_tenth_left_at_the_same_speed() -> None:
+    gaussian, tustin = Fall.like(2.0, 2.0), Fall.like(2.0, 1.0)
+    speed = np.array([2.0 * math.sqrt(math.log(10.0))])
+    assert gaussian.vs == pytest.approx(2.0)
+    assert gaussian.at(speed) == pytest.approx(0.1)
+    assert tustin.at(speed) == pytest.approx(0.1)
+    assert tustin.at(-speed) == pytest.approx(0.1)
+    assert Fall(1.0, 2.0).at(np.array([1e9])) == pytest.approx(0.0)
