@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.interpolate import PchipInterpolator
 
 from stickslip import plugins
 from stickslip.errors import ParameterError
+from stickslip.laws.sliding_curve import stribeck
 from stickslip.model import Model, Reference
 from stickslip.simulation.prescribed.open_loop import respond
 from stickslip.spec import Surroundings
@@ -165,6 +167,17 @@ def test_eq_4_5_with_unit_shape_factors_is_eq_4_4():
     q = other.parameters({**shared, "beta0": 0.1, "beta1": 0.2, "beta2": 0.05, "beta3": 1.0, "beta4": 1.0})
     for v in (-20.0, -0.3, 0.001, 0.02, 1.0):
         assert one.steady(v, p) == pytest.approx(other.steady(v, q), rel=1e-12)
+
+
+@given(
+    static=st.floats(0.01, 11.0),
+    power=st.floats(0.1, 20.0),
+    speed=st.floats(-70.0, 70.0).filter(lambda x: abs(x) > 1e-9),
+)
+def test_where_nothing_is_left_of_the_static_torque_the_curve_is_the_same_number(static, power, speed):
+    p = SimpleNamespace(fs=0.2951 * static, fc=0.2951, vs=0.003, delta_s=power)
+    x = abs(0.003 * speed / 0.003)
+    assert stribeck(0.003 * speed, p) == p.fc + (p.fs - p.fc) * math.exp(-min(x**power, 800.0))
 
 
 def test_a_curve_that_is_not_positive_is_refused():

@@ -71,6 +71,23 @@ def test_the_torque_now_moves_no_element():
     assert z.force[0] == 0.95 * 0.335 / 3.0
 
 
+def test_elements_that_slip_together_are_each_as_if_alone():
+    shares = [0.2, 0.3, 0.5]
+    together = ss.Model("gms", **(VALUES | {"k": [K[0]] * 3, "alpha": shares}))
+    z = together.law.state(together.parameters)
+    # One slips on, one breaks away inside the step, one slips on after it.
+    z.force[0], z.force[1], z.force[2], z.mode[0], z.mode[2] = 0.06, 0.08, 0.15, 1.0, 1.0
+    before = list(z.force), list(z.mode)
+    together.law.step(0.01, 0.012, TIME, z, together.parameters, U)
+    assert list(z.mode) == [1.0] * 3
+    for i, share in enumerate(shares):
+        alone = together.parameters._replace(k=(K[0],), alpha=(share,))
+        y = together.law.state(alone)
+        y.force[0], y.mode[0] = before[0][i], before[1][i]
+        together.law.step(0.01, 0.012, TIME, y, alone, U)
+        assert y.force[0] == z.force[i]
+
+
 def test_options_wrap_it_as_they_wrap_the_step():
     ripple = ss.Model(
         "gms", {"position_dependence": "spectrum"}, **VALUES, ripple=[0.2], order=[1.0], ripple_phase=[0.0]

@@ -108,6 +108,9 @@ def advance(v0: float, v1: float, dt: float, z: Any, p: Any) -> None:
     s1 = sliding(v1, p)
     s0 = 0.0  # with the rate of slip, of use only where something slips
     rate_of_slip = 0.0
+    known = 0.0  # elements that slip all the way share one exponent
+    gain = 0.0
+    follow = 0.0
     for i in range(len(p.k)):
         part = 1.0
         if z.mode[i] * direction < 0.0:
@@ -133,11 +136,13 @@ def advance(v0: float, v1: float, dt: float, z: Any, p: Any) -> None:
                     z.force[i] = z.force[i] + (1.0 - part) * (stuck - z.force[i])
                     start = s0 + (1.0 - part) * (s1 - s0)
             exponent = part * rate_of_slip
-            gain = -math.expm1(-exponent)
-            if exponent > 1e-4:
-                follow = 1.0 - gain / exponent
-            else:
-                follow = 0.5 * exponent
+            if exponent != known:
+                known = exponent
+                gain = -math.expm1(-exponent)
+                if exponent > 1e-4:
+                    follow = 1.0 - gain / exponent
+                else:
+                    follow = 0.5 * exponent
             goal = p.alpha[i] * z.mode[i]
             z.force[i] = z.force[i] * (1.0 - gain) + goal * (start * gain + (s1 - start) * follow)
 

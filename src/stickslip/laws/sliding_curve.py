@@ -72,6 +72,9 @@ def stribeck(v: float, p: Any) -> float:
     x = abs(v / p.vs)
     if p.delta_s == 2.0:
         return p.fc + (p.fs - p.fc) * decay(x * x)
+    # exp(-40) of ten times F_C is less than half of its last digit: nothing is left to add.
+    if x > 40.0 and p.delta_s >= 1.0 and abs(p.fs - p.fc) < 10.0 * p.fc:
+        return p.fc
     return p.fc + (p.fs - p.fc) * decay(x**p.delta_s)
 
 
