@@ -12,6 +12,7 @@ from stickslip.jit import compiled_law, flat, kernel
 from stickslip.machines.drivetrain import INPUTS, Flow, StateSpace
 from stickslip.machines.machine import Machine
 from stickslip.simulation.machine.plant import (
+    CHANNELS,
     FINEST,
     IN_ANGLE,
     IN_BEARING,
@@ -35,9 +36,6 @@ from stickslip.spec import Surroundings
 __all__ = ["CHANNELS", "Laid", "lay_out_machine", "look", "run", "stand_at", "wait"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-
-CHANNELS = ("time", "position", "motor_torque", "sensor_torque", "temperature", "status")
-"""What a sample measures, in the order of `stickslip.rigs.rig.Measurement`."""
 
 RESOLVED = 1.5
 """omega h of the contact's spring that a sub-step takes at most where the spring, or a part of it, sticks."""

@@ -17,26 +17,15 @@ import stickslip
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
 from stickslip.errors import Divergence, InputError
-from stickslip.jit import call_profile, call_sample, compiled_profile, flat, kernel, pointer
+from stickslip.jit import compiled_profile, flat
 from stickslip.machines.machine import Machine
 from stickslip.model import Reference
 from stickslip.record import Record
-from stickslip.simulation._meter import (
-    MAX_WINDOW,
-    SIGNALS,
-    close_standstill,
-    meter,
-    new_meter,
-    turning_points,
-)
-from stickslip.simulation.case_arrays import COLUMNS as OF_AXES
-from stickslip.simulation.case_arrays import UNITS as OF_AXES_UNITS
+from stickslip.simulation._meter import SIGNALS, new_meter, turning_points
 from stickslip.simulation.case_arrays import ruled, ruled_in, slip_rules
 from stickslip.simulation.compiled_controller import Sampled, compiled
-from stickslip.simulation.fixed.loop import NUDGE
-from stickslip.simulation.machine.layout import TOLERANCE, lay_out_machine, look, stand_at
-from stickslip.simulation.machine.plant import Laid, Plant, plant_of
-from stickslip.simulation.machine.step import axis_itself, sample
+from stickslip.simulation.machine.drive import COLUMNS, NO_NUMBER, TRIPPED, UNITS, Loop, Output, drive
+from stickslip.simulation.machine.layout import TOLERANCE, lay_out_machine, stand_at
 from stickslip.simulation.metrics import metrics, settle_band_of
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout
@@ -45,14 +34,9 @@ __all__ = ["COLUMNS", "UNITS", "sampled_on", "simulate_machine"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-UNITS = {
-    **OF_AXES_UNITS, "position_measured": "rad", "torque_command": "N·m", "sensor_torque": "N·m", "temperature": "°C",
-}  # fmt: skip
-COLUMNS = (*OF_AXES, *(name for name in UNITS if name not in OF_AXES))
-"""Of a row: what an ideal axis has (position and torques are the axis's own), then what the sensors show."""
 REASONS = {
-    1: "the drive switched off: faster than its encoder follows, or no longer a number",
-    2: "the controller's torque is no number",
+    TRIPPED: "the drive switched off: faster than its encoder follows, or no longer a number",
+    NO_NUMBER: "the controller's torque is no number",
 }
 ON_TIME = 1e-6
 """Samples by which output times may lie beside a sample."""
@@ -189,12 +173,11 @@ def rows_at(
 class _Ran:
     """What a run left."""
 
-    def __init__(
-        self, laid: Laid, rows: Array, meter: Array, turns: Array, samples: int, code: int, ended: float,
-        state: Array,
-    ):  # fmt: skip
-        self.laid, self.rows, self.meter, self.turns, self.state = laid, rows, meter, turns, state
-        self.samples, self.code, self.ended = samples, code, ended
+    def __init__(self, loop: Loop, output: Output, code: int):
+        self.laid, self.state, self.code = loop.laid, loop.control.state, code
+        self.samples, rows = (int(count) for count in output.counts)
+        self.rows, self.meter, self.turns = output.rows[:rows], output.acc, output.turns
+        self.ended = self.samples * float(loop.laid.machine["sample_time"])
 
 
 def _run(
@@ -206,123 +189,14 @@ def _run(
     stand_at(laid, *initial)
     samples = math.floor(duration / machine.sample_time * (1.0 + 1e-12))
     own = control._replace(memory=control.memory.copy(), state=control.state.copy())
-    measured = np.zeros(6)
-    look(laid, measured)
-    rows = np.zeros((places.size, len(COLUMNS)))
-    accumulator = new_meter(samples * machine.sample_time, settle_band_of(reference, duration))
-    turns, counts = np.zeros((4096, 2)), np.zeros(2, dtype=np.int64)
-    around, kind = np.array(Surroundings()), reference.kind
-    code = drive(
-        laid, own, compiled_profile(kind.name, kind.profile, Layout.of(kind.fields, counted=True)),
-        flat(kind.pack(reference.parameters)), around,
-        samples, places, measured, rows, accumulator, turns, counts,
-    )  # fmt: skip
-    done = int(counts[0])
-    return _Ran(
-        laid,
-        rows[: int(counts[1])],
-        accumulator,
-        turns,
-        done,
-        int(code),
-        done * machine.sample_time,
-        own.state,
+    kind = reference.kind
+    profile = compiled_profile(kind.name, kind.profile, Layout.of(kind.fields, counted=True))
+    loop = Loop(
+        laid, own, profile, flat(kind.pack(reference.parameters)), np.array(Surroundings()), np.zeros(3)
     )
-
-
-# ---- the loop ---------------------------------------------------------------------------------------------------
-
-AT, SPEED, FRICTION, MOTOR, COMPENSATING, ENDS = range(6)
-"""Of one end of a sample: position, velocity, and the torques of friction, motor and compensator."""
-TEMPERATURE, TIME = Surroundings._fields.index("temperature"), Surroundings._fields.index("time")
-TRIPPED, NO_NUMBER = 1, 2
-
-
-@kernel()
-def drive(
-    laid: Laid, control: Sampled, profile: int, reference: Any, around: Any, samples: int, places: Any,
-    measured: Any, rows: Any, accumulator: Any, turns: Any, counts: Any,
-) -> int:  # fmt: skip
-    """Controller and machine, sample by sample; `counts` gets the samples run and the rows written."""
-    plant = plant_of(laid)
-    period = plant.machine.sample_time
-    begin, end, motion, nodes = np.zeros(ENDS), np.zeros(ENDS), np.zeros(3), np.zeros((SIGNALS, 5))
-    now(plant, measured, begin)
-    for k in range(samples + 1):
-        torque = act(control, measured, k * period, profile, reference, around, motion)
-        begin[COMPENSATING] = control.memory[control.compensation]
-        if counts[1] < places.size and places[counts[1]] == k:
-            row(rows[counts[1]], k * period, motion, begin, measured, torque)
-            counts[1] += 1
-        if not math.isfinite(torque):
-            return NO_NUMBER
-        if k == samples:
-            break
-        sample(plant, torque, measured)
-        now(plant, measured, end)
-        end[COMPENSATING] = begin[COMPENSATING]
-        gather(accumulator, turns, k * period, period, begin, end, profile, reference, motion, nodes)
-        begin[:] = end
-        counts[0] = k + 1
-        if plant.now.tripped != 0:
-            return TRIPPED
-    close_standstill(accumulator, samples * period)
-    return 0
-
-
-@kernel()
-def now(plant: Plant, measured: Any, out: Any) -> None:
-    """The axis itself at this moment; the motor's torque is the one that the amplifier reports."""
-    axis_itself(plant, out)
-    out[MOTOR] = measured[2]
-
-
-@kernel()
-def act(
-    control: Sampled, measured: Any, time: float, profile: int, reference: Any, around: Any, motion: Any
-) -> float:
-    """What the controller commands at a sample, N·m; `motion` gets the reference there."""
-    call_profile(profile, time + NUDGE, pointer(reference, 0), pointer(motion, 0))
-    motion[0] -= NUDGE * motion[1]
-    around[TEMPERATURE], around[TIME] = measured[4], time
-    torque = call_sample(
-        control.address, measured[1], motion[0], motion[1], motion[2], pointer(control.settings, 0),
-        pointer(control.memory, 0), pointer(control.state, 0), pointer(control.parameters, 0), pointer(around, 0),
+    output = Output(
+        places, np.zeros((places.size, len(COLUMNS))),
+        new_meter(samples * machine.sample_time, settle_band_of(reference, duration)), np.zeros((4096, 2)),
+        np.zeros((SIGNALS, 5)), np.zeros(2, dtype=np.int64),
     )  # fmt: skip
-    return math.nan if control.memory[control.fault] != 0.0 else torque
-
-
-@kernel()
-def row(out: Any, time: float, motion: Any, begin: Any, measured: Any, torque: float) -> None:
-    """A row of the record, in the order of `COLUMNS`."""
-    out[0], out[1], out[2] = time, motion[0], motion[1]
-    out[3], out[4], out[5], out[6], out[7], out[8] = (
-        begin[AT], begin[SPEED], begin[MOTOR], begin[FRICTION], begin[COMPENSATING], 0.0,
-    )  # fmt: skip
-    out[9], out[10], out[11], out[12] = measured[1], torque, measured[3], measured[4]
-
-
-@kernel()
-def gather(
-    accumulator: Any, turns: Any, t: float, h: float, a: Any, b: Any, profile: int, reference: Any, motion: Any,
-    nodes: Any,
-) -> None:  # fmt: skip
-    """Hand a sample to the meter, in windows of at most its longest."""
-    windows = math.ceil(h / MAX_WINDOW * (1.0 - 1e-9))
-    for window in range(windows):
-        for i in range(5):
-            x = (window + 0.25 * i) / windows
-            y = 1.0 - x
-            inside = min(max(t + x * h, t + NUDGE), t + h - NUDGE)
-            call_profile(profile, inside, pointer(reference, 0), pointer(motion, 0))
-            at = (
-                y * y * (1.0 + 2.0 * x) * a[AT] + x * x * (3.0 - 2.0 * x) * b[AT]
-                + x * y * h * (y * a[SPEED] - x * b[SPEED])
-            )  # fmt: skip
-            speed = a[SPEED] + x * (b[SPEED] - a[SPEED])
-            nodes[0, i], nodes[1, i], nodes[2, i], nodes[3, i] = motion[0] - at, motion[1] - speed, at, speed
-            nodes[4, i] = motion[1]
-            nodes[5, i] = b[MOTOR]
-            nodes[6, i] = a[FRICTION] + x * (b[FRICTION] - a[FRICTION])
-            nodes[7, i] = b[COMPENSATING]
-        meter(accumulator, turns, t + h * window / windows, h / windows, nodes)
+    return _Ran(loop, output, int(drive(loop, samples, output)))

@@ -8,7 +8,9 @@ import numpy as np
 
 from stickslip.jit import pointer, record_at, spliced
 
-__all__ = ["FINEST", "INPUTS", "LEVELS", "MACHINE", "NOW", "SPRINGS", "Laid", "Plant", "plant_of"]
+__all__ = [
+    "CHANNELS", "FINEST", "INPUTS", "LEVELS", "MACHINE", "NOW", "SHOWN", "SPRINGS", "Laid", "Plant", "plant_of",
+]  # fmt: skip
 
 FINEST = 8
 """Halvings of a sample down to its shortest sub-step."""
@@ -64,6 +66,12 @@ the part of the contact's stiffness that it takes as a spring, sub-steps so far;
 contact's temperature, °C, and s of pauses; torques of contact and bearings, N·m, what ripple, drift and warmth make of
 the contact's; of the sub-step that is tried, the contact's torque at its end beside its spring, N·m, and by how much
 that rises with the angle."""
+
+
+CHANNELS = ("time", "position", "motor_torque", "sensor_torque", "temperature", "status")
+"""What a sample measures, in the order of `stickslip.rigs.rig.Measurement`."""
+SHOWN = np.dtype([(name, np.float64) for name in CHANNELS])
+"""The same as a record."""
 
 
 class Laid(NamedTuple):

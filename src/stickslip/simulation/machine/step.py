@@ -14,11 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.jit import kernel
-from stickslip.simulation.machine.plant import FINEST, Plant
+from stickslip.jit import kernel, pointer, record_at
+from stickslip.simulation.machine.plant import FINEST, SHOWN, Plant
 from stickslip.simulation.machine.substep import cross, harmonics
 
 OVERSPEED = 33792.0  # 8400h of CiA 402: velocity speed controller
+ITSELF = ("position", "velocity", "friction")
+"""What `axis_itself` tells, by the name of the record's number: rad, rad/s, N·m."""
 
 
 # ---- noise, converters ----------------------------------------------------------------------------------------
@@ -54,7 +56,7 @@ def converted(x: float, step: float) -> float:
 
 @kernel()
 def sample(plant: Plant, torque: float, measured: Any) -> None:
-    """Let a torque command (N·m) act for a sample, and measure."""
+    """Let a torque command (N·m) act for a sample, and measure: `measured` holds a `SHOWN`."""
     n, now = plant.machine, plant.now
     tick, x = now.tick, plant.axis
     demand = converted(torque / n.torque_constant, n.command_step)
@@ -86,7 +88,7 @@ def state_factor(n: Any, time: float, temperature: float) -> float:
 
 @kernel()
 def measure(plant: Plant, drive: float, factor: float, measured: Any) -> None:
-    """Write time, position, motor torque, sensor torque, temperature and status as the sensors see them now."""
+    """Write a `SHOWN`: what the sensors see now."""
     n, now = plant.machine, plant.now
     tick, x = now.tick, plant.axis
     angle = x[n.shaft]
@@ -100,12 +102,12 @@ def measure(plant: Plant, drive: float, factor: float, measured: Any) -> None:
     sensor = contact_torque(plant, factor)
     if n.sensor_noise > 0.0:
         sensor += n.sensor_noise * gaussian(n.seed, tick, 3)
-    measured[0] = tick * n.sample_time + now.paused
-    measured[1] = converted(angle, n.count)
-    measured[2] = n.torque_constant * converted(current, n.monitor_step)
-    measured[3] = converted(sensor, n.sensor_step)
-    measured[4] = now.warmth
-    measured[5] = OVERSPEED if now.tripped != 0 else 0.0
+    shown = record_at(pointer(measured, 0), SHOWN)
+    shown.time, shown.temperature = tick * n.sample_time + now.paused, now.warmth
+    shown.position = converted(angle, n.count)
+    shown.motor_torque = n.torque_constant * converted(current, n.monitor_step)
+    shown.sensor_torque = converted(sensor, n.sensor_step)
+    shown.status = OVERSPEED if now.tripped != 0 else 0.0
 
 
 @kernel(inline=True)
@@ -120,8 +122,8 @@ def contact_torque(plant: Plant, factor: float) -> float:
 
 @kernel()
 def axis_itself(plant: Plant, out: Any) -> None:
-    """Position and velocity at the encoder's inertia, and all friction that acts, as no sensor shows them."""
+    """Position and velocity at the encoder's inertia, and all friction that acts, as no sensor shows them: `ITSELF`."""
     n, now = plant.machine, plant.now
     factor = state_factor(n, now.tick * n.sample_time + now.paused, now.warmth)
-    out[0], out[1] = plant.axis[n.shaft], plant.axis[n.shaft + 1]
-    out[2] = contact_torque(plant, factor) + now.bearing + n.viscous * out[1]
+    out.position, out.velocity = plant.axis[n.shaft], plant.axis[n.shaft + 1]
+    out.friction = contact_torque(plant, factor) + now.bearing + n.viscous * out.velocity
