@@ -8,8 +8,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+
 import stickslip
-from stickslip.jit import cache_folder, loaded
+from stickslip.jit import WIDTH, cache_folder, columns_times, kernel, loaded, pointer
 
 HEAD = "from stickslip.jit import compile_entry, compile_inner\n"
 INNER = "@compile_inner\ndef {}(v):\n    return {}\n"
@@ -179,3 +181,20 @@ def test_a_text_is_the_same_in_every_process():
         told.add(done.stdout)
     (names,) = told
     assert len(names.split()) > 20
+
+
+@kernel()
+def summed(columns, factors, out):
+    """For the test below."""
+    columns_times(pointer(columns, 0), pointer(factors, 0), factors.size, pointer(out, 0))
+
+
+def test_columns_are_summed_one_after_another():
+    rng = np.random.default_rng(5)
+    columns, factors, out = rng.normal(size=(13, WIDTH)), rng.normal(size=13), np.full(WIDTH, np.nan)
+    summed(columns.ravel(), factors, out)
+    for i in range(WIDTH):
+        total = 0.0
+        for column, factor in zip(columns.tolist(), factors.tolist(), strict=True):
+            total += column[i] * factor
+        assert out[i] == total

@@ -83,9 +83,11 @@ def test_the_virtual_machine_moves_by_this_flow(without):
     m = machine("thesis-grease").without(*without)
     laid, system = lay_out_machine(m), m.linear().state_space()
     n = len(system.states)
-    blocks = laid.matrix.reshape(-1, plant.LEVELS, n, n + plant.INPUTS)
+    blocks = laid.matrix.reshape(-1, plant.LEVELS, plant.COLUMNS, plant.SLOTS)
+    assert n + plant.GIVEN <= plant.SLOTS
+    assert not np.any(blocks[..., n:])
     for level in (0, 3, plant.FINEST):
-        rows, flow = blocks[0, level], system.over(m.sample_time / 2**level)
+        rows, flow = blocks[0, level].T[:n], system.over(m.sample_time / 2**level)
         assert rows[:, :n] == pytest.approx(flow.moved, rel=1e-9, abs=1e-12)
         assert rows[:, n : n + 3] == pytest.approx(flow.held[:, :3], rel=1e-9, abs=1e-12)
 
@@ -98,7 +100,7 @@ def test_a_sticking_contact_is_a_spring_of_the_flow(without):
     stiff = contact_spring(m)
     system = m.linear(LinearContact(stiff)).state_space()
     n = len(system.states)
-    rows = laid.matrix.reshape(-1, plant.LEVELS, n, n + plant.INPUTS)[plant.SPRINGS, 3]
+    rows = laid.matrix.reshape(-1, plant.LEVELS, plant.COLUMNS, plant.SLOTS)[plant.SPRINGS, 3].T[:n]
     assert rows[:, :n] == pytest.approx(system.over(m.sample_time / 8).moved, rel=1e-8, abs=1e-9)
     angles = np.array([name.startswith("angle") or name == "mode" for name in system.states], dtype=float)
     # At rest about any angle it stays: what the spring pulls is taken back.

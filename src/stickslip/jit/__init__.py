@@ -39,6 +39,8 @@ from stickslip.jit.entries import (
 )
 from stickslip.jit.kept import cache_folder, loaded
 from stickslip.jit.simd import (
+    WIDTH,
+    columns_times,
     compile_inlined,
     compile_lanes,
     compiled_lanes,
@@ -49,6 +51,7 @@ from stickslip.jit.simd import (
 
 __all__ = [
     "LAW",
+    "WIDTH",
     "LawPointers",
     "cache_folder",
     "call_guarded",
@@ -60,6 +63,7 @@ __all__ = [
     "call_step",
     "call_switch",
     "call_value",
+    "columns_times",
     "compile_entry",
     "compile_inlined",
     "compile_inner",

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from stickslip.jit import call_holding, call_step, kernel, pointer
-from stickslip.simulation.machine.plant import FINEST, IN_FIRST, IN_LAST, INPUTS, SPRINGS, Plant
+from stickslip.simulation.machine.plant import FINEST, FIRST, LAST, SLOTS, SPRINGS, Plant
 from stickslip.simulation.root import MOST, ROOT
 from stickslip.simulation.root import compiled as root
 
@@ -58,8 +58,7 @@ class Tried(NamedTuple):
 @kernel(inline=True)
 def gain(plant: Plant, block: int, place: int, column: int) -> float:
     """What a torque of the contact takes off a state of the disk (its angle, or the velocity after it)."""
-    size = plant.machine.size
-    return plant.matrix[block + (plant.machine.disk + place) * (size + INPUTS) + size + column]
+    return plant.matrix[block + column * SLOTS + plant.machine.disk + place]
 
 
 @kernel(inline=True)
@@ -75,19 +74,19 @@ def torque_after(plant: Plant, v0: float, v: float, h: float, out: int) -> float
 def sliding(plant: Plant, tried: Tried, start: float) -> float:
     """Finish a sub-step; returns how many tolerances it is wrong by. `start` is the contact's torque before it, N·m."""
     n, now, x = plant.machine, plant.now, plant.axis
-    r, after, h = plant.search, n.size, tried.length
+    r, h = plant.search, tried.length
     at, v0, scale = x[n.disk], x[n.disk + 1], now.scale
     stiff = n.stiffness * float(tried.spring) / SPRINGS
     flat = n.unresolved != 0 or (n.states == 0 and r[INVERSE] * STIFF < 1.0)
-    first, last = gain(plant, tried.block, 1, IN_FIRST), gain(plant, tried.block, 1, IN_LAST)
+    first, last = gain(plant, tried.block, 1, FIRST), gain(plant, tried.block, 1, LAST)
     if flat:
         first, last = 0.0, first + last
-    free = x[after + n.disk + 1] - first * start
+    free = x[SLOTS + n.disk + 1] - first * start
     farther, turning = 0.0, 0.0
     if tried.spring > 0:
         # The angle at the end belongs to the velocity there.
-        turning = gain(plant, tried.block, 0, IN_LAST) / last
-        farther = x[after + n.disk] - gain(plant, tried.block, 0, IN_FIRST) * start - turning * free - at
+        turning = gain(plant, tried.block, 0, LAST) / last
+        farther = x[SLOTS + n.disk] - gain(plant, tried.block, 0, FIRST) * start - turning * free - at
         rises = 1.0 + last * now.rate * turning
         r[INVERSE] = 1.0 / rises
         begin(r, (free - last * (start + now.rate * farther)) / rises)
@@ -121,10 +120,10 @@ def beside(plant: Plant, tried: Tried, start: float, end: float, v0: float) -> f
     """How many tolerances the torque in the middle of the sub-step lies beside the straight line."""
     n, half = plant.machine, tried.half
     mean = 0.5 * (start + end)
-    v = tried.speed - gain(plant, half, 1, IN_FIRST) * start - gain(plant, half, 1, IN_LAST) * mean
+    v = tried.speed - gain(plant, half, 1, FIRST) * start - gain(plant, half, 1, LAST) * mean
     way = 0.0
     if tried.spring > 0:
-        way = tried.middle - gain(plant, half, 0, IN_FIRST) * start - gain(plant, half, 0, IN_LAST) * mean
+        way = tried.middle - gain(plant, half, 0, FIRST) * start - gain(plant, half, 0, LAST) * mean
         way -= plant.axis[n.disk]
         v0 = 4.0 * way / tried.length - v
     torque = plant.now.scale * torque_after(plant, v0, v, 0.5 * tried.length, 2 * n.states)
@@ -135,11 +134,10 @@ def beside(plant: Plant, tried: Tried, start: float, end: float, v0: float) -> f
 @kernel(inline=True)
 def finish(plant: Plant, block: int, start: float, end: float) -> None:
     """Write the states after the sub-step, under a torque of the contact from `start` to `end` beside its springs."""
-    size, matrix = plant.machine.size, plant.matrix
     plant.now.rest = end
-    for i in range(size):
-        row = block + i * (size + INPUTS) + size
-        plant.axis[size + i] -= matrix[row + IN_FIRST] * start + matrix[row + IN_LAST] * end
+    first, last = block + FIRST * SLOTS, block + LAST * SLOTS
+    for i in range(SLOTS):
+        plant.axis[SLOTS + i] -= plant.matrix[first + i] * start + plant.matrix[last + i] * end
 
 
 # ---- a law that jumps at rest -----------------------------------------------------------------------------------
@@ -149,18 +147,18 @@ def finish(plant: Plant, block: int, start: float, end: float) -> None:
 def with_rest(plant: Plant, tried: Tried) -> float:
     """Finish a sub-step of a law that holds at rest: it rests, leaves, slides or lands; returns as `sliding`."""
     n, now, x = plant.machine, plant.now, plant.axis
-    base, v0, start = x[n.size + n.disk + 1], x[n.disk + 1], now.scale * now.friction
-    first, last = gain(plant, tried.block, 1, IN_FIRST), gain(plant, tried.block, 1, IN_LAST)
+    base, v0, start = x[SLOTS + n.disk + 1], x[n.disk + 1], now.scale * now.friction
+    first, last = gain(plant, tried.block, 1, FIRST), gain(plant, tried.block, 1, LAST)
     if v0 == 0.0:
         mean = base / (first + last)
-        early = tried.speed / (gain(plant, tried.half, 1, IN_FIRST) + gain(plant, tried.half, 1, IN_LAST))
+        early = tried.speed / (gain(plant, tried.half, 1, FIRST) + gain(plant, tried.half, 1, LAST))
         # At both ends, where the load grows evenly.
         soon, late = 2.0 * early - mean, 3.0 * mean - 2.0 * early
         side = 1.0 if late > 0.0 else -1.0
         held = held_at_rest(plant, side)
         if max(abs(mean), abs(late)) <= held:
             rests(plant, tried, mean, mean)
-            now.rest, x[n.size + n.disk] = late, x[n.disk]
+            now.rest, x[SLOTS + n.disk] = late, x[n.disk]
             return 0.0
         if side * soon <= held and tried.length * PARTS > 1.5 * n.sample_time:
             return CUT
@@ -213,4 +211,4 @@ def rests(plant: Plant, tried: Tried, start: float, end: float) -> None:
     n = plant.machine
     torque_after(plant, 0.0, 0.0, tried.length, n.states)
     finish(plant, tried.block, start, end)
-    plant.axis[n.size + n.disk + 1] = 0.0
+    plant.axis[SLOTS + n.disk + 1] = 0.0

@@ -13,21 +13,22 @@ from stickslip.machines.drivetrain import INPUTS, Flow, StateSpace
 from stickslip.machines.machine import Machine
 from stickslip.simulation.machine.plant import (
     CHANNELS,
+    COLUMNS,
     FINEST,
+    FIRST,
     IN_ANGLE,
     IN_BEARING,
     IN_COG,
-    IN_FIRST,
-    IN_LAST,
     IN_MOTOR,
+    LAST,
     LEVELS,
     MACHINE,
     NOW,
+    SLOTS,
     SPRINGS,
     Laid,
     plant_of,
 )
-from stickslip.simulation.machine.plant import INPUTS as COLUMNS
 from stickslip.simulation.machine.step import measure, sample
 from stickslip.simulation.root import ROOT
 from stickslip.simulation.root import compiled as root
@@ -80,7 +81,7 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE) -> Laid:
     contact[:states] = state[:states]
     return Laid(
         numbers.view(np.float64), memory.view(np.float64), waves_of(machine), matrix, search,
-        np.zeros(2 * places["size"]), contact, flat(model.law.pack(model.parameters)), np.array(Surroundings()),
+        np.zeros(2 * SLOTS), contact, flat(model.law.pack(model.parameters)), np.array(Surroundings()),
         pointers.step, pointers.holding,
     )  # fmt: skip
 
@@ -115,8 +116,7 @@ def transition(machine: Machine, stiff: float) -> tuple[dict[str, int], Array]:
         "rotor": 0, "shaft": 2 if machine.flexible else 0, "disk": 4 if machine.flexible else 0,
         "lag": place_of("torque", system), "mode": place_of("mode", system), "size": len(system.states),
     }  # fmt: skip
-    size = places["size"]
-    out = np.zeros((SPRINGS + 1 if stiff > 0.0 else 1, LEVELS, size, size + COLUMNS))
+    out = np.zeros((SPRINGS + 1 if stiff > 0.0 else 1, LEVELS, COLUMNS, SLOTS))
     for part in range(out.shape[0]):
         spring = stiff * part / SPRINGS
         a = system.a.copy()
@@ -130,13 +130,13 @@ def transition(machine: Machine, stiff: float) -> tuple[dict[str, int], Array]:
 
 def columns(out: Array, flow: Flow, spring: float) -> None:
     """Write one flow as `stickslip.simulation.machine.substep` reads it."""
-    size = out.shape[0]
-    out[:, :size] = flow.moved
-    for column, source in ((IN_MOTOR, "command"), (IN_COG, "motor"), (IN_BEARING, "encoder")):
-        out[:, size + column] = flow.held[:, INPUTS.index(source)]
+    size = len(flow.moved)
+    out[:size, :size] = flow.moved.T
+    for place, source in ((IN_MOTOR, "command"), (IN_COG, "motor"), (IN_BEARING, "encoder")):
+        out[size + place, :size] = flow.held[:, INPUTS.index(source)]
     held, rising = flow.held[:, INPUTS.index("load")], flow.rising[:, INPUTS.index("load")]
-    out[:, size + IN_FIRST], out[:, size + IN_LAST] = held - rising, rising
-    out[:, size + IN_ANGLE] = spring * held
+    out[FIRST, :size], out[LAST, :size] = held - rising, rising
+    out[size + IN_ANGLE, :size] = spring * held
 
 
 def place_of(name: str, system: StateSpace) -> int:

@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.jit import pointer, record_at, spliced
+from stickslip.jit import WIDTH, pointer, record_at, spliced
 
 __all__ = [
-    "CHANNELS", "FINEST", "INPUTS", "LEVELS", "MACHINE", "NOW", "SHOWN", "SPRINGS", "Laid", "Plant", "plant_of",
+    "BLOCK", "CHANNELS", "COLUMNS", "FINEST", "FIRST", "GIVEN", "IN_ANGLE", "IN_BEARING", "IN_COG", "IN_MOTOR", "LAST",
+    "LEVELS", "MACHINE", "NOW", "SHOWN", "SLOTS", "SPRINGS", "Laid", "Plant", "plant_of",
 ]  # fmt: skip
 
 FINEST = 8
@@ -19,8 +20,14 @@ LEVELS = FINEST + 2
 SPRINGS = 4
 """Parts of the contact's stiffness: a matrix for none of it, one part, ... all of it."""
 
-IN_MOTOR, IN_COG, IN_BEARING, IN_FIRST, IN_LAST, IN_ANGLE, INPUTS = range(7)
-"""Columns of a sub-step's matrix behind those of the states: what each input adds."""
+IN_MOTOR, IN_COG, IN_BEARING, IN_ANGLE, GIVEN = range(5)
+"""Places behind the states of what acts on a sub-step beside them, and of its columns in the matrix."""
+SLOTS = WIDTH
+"""Places of a vector of states and what is given with them, of which a machine has at most 13; what is free is 0."""
+FIRST, LAST, COLUMNS = SLOTS, SLOTS + 1, SLOTS + 2
+"""Columns of a sub-step's matrix: one a slot, and what the contact's torque at both ends takes off the states."""
+BLOCK = COLUMNS * SLOTS
+"""Numbers of a matrix; the numbers of a column lie side by side."""
 
 MACHINE = np.dtype(
     [
@@ -84,11 +91,11 @@ class Laid(NamedTuple):
     waves : array, shape (3 n,)
         Order, amplitude and phase of every harmonic: those of the contact's ripple, then of the cogging.
     matrix : array
-        By part of the contact's stiffness and length of the sub-step: rows of the transition, then `INPUTS` columns.
+        By part of the contact's stiffness and length of the sub-step: `COLUMNS` columns of `SLOTS` numbers.
     search : array
         What the root finder keeps (`stickslip.simulation.root.ROOT`).
-    axis : array, shape (2 size,)
-        The linear states, and after the sub-step that is tried.
+    axis : array, shape (2 SLOTS,)
+        The linear states with what is given, and from `SLOTS` on the states after the sub-step that is tried.
     contact : array, shape (3 states,)
         The law's states; after the sub-step that is tried; in its middle.
     parameters, surroundings : array

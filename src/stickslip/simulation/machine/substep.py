@@ -19,16 +19,18 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stickslip.jit import kernel
+from stickslip.jit import columns_times, kernel, pointer
 from stickslip.simulation.machine.contact import ENOUGH, PARTS, Tried, sliding, with_rest
 from stickslip.simulation.machine.plant import (
+    BLOCK,
     FINEST,
+    GIVEN,
     IN_ANGLE,
     IN_BEARING,
     IN_COG,
     IN_MOTOR,
-    INPUTS,
     LEVELS,
+    SLOTS,
     SPRINGS,
     Plant,
 )
@@ -126,46 +128,37 @@ def rolled(n: Any, torque: float, distance: float) -> float:
 def attempt(plant: Plant, drive: float, factor: float, spring: int, level: int) -> float:
     """Try a sub-step; returns how many times its tolerance it is wrong by. `keep` makes it the machine's."""
     n, now = plant.machine, plant.now
-    size, x = n.size, plant.axis
+    x = plant.axis
     h = n.sample_time / float(1 << level)
     plant.search[ENOUGH] = UNBALANCE / float(1 << level)
-    scale, cog, bearing = factor, 0.0, 0.0
+    given = n.size  # behind the states
+    x[given + IN_MOTOR], x[given + IN_ANGLE], now.scale = drive, x[n.disk], factor
     if n.ripples > 0:
         angle = x[n.disk] + 0.5 * h * x[n.disk + 1]
-        scale *= 1.0 + near(plant.waves, n.order, now.ripple, 0, n.ripples, angle)
+        now.scale = factor * (1.0 + near(plant.waves, n.order, now.ripple, 0, n.ripples, angle))
     if n.cogs > 0:
         angle = x[n.rotor] + 0.5 * h * x[n.rotor + 1]
-        cog = near(plant.waves, n.order, now.cogging, n.ripples, n.cogs, angle)
+        x[given + IN_COG] = near(plant.waves, n.order, now.cogging, n.ripples, n.cogs, angle)
     if n.bearing > 0.0:
-        bearing = rolled(n, now.bearing, 0.5 * h * x[n.shaft + 1])
-    now.scale = scale
-    block = (spring * LEVELS + level) * size * (size + INPUTS)
-    for i in range(size):
-        x[size + i] = moved(plant, block, i, drive, cog, bearing)
-    half = block + size * (size + INPUTS)
-    place = n.disk
+        x[given + IN_BEARING] = -rolled(n, now.bearing, 0.5 * h * x[n.shaft + 1])
+    block = (spring * LEVELS + level) * BLOCK
+    columns_times(pointer(plant.matrix, block), x, n.size + GIVEN, pointer(x, SLOTS))
+    half = block + BLOCK
     middle, speed = 0.0, 0.0
     if n.unresolved == 0:
-        middle = moved(plant, half, place, drive, cog, bearing)
-        speed = moved(plant, half, place + 1, drive, cog, bearing)
+        middle, speed = disk_after(plant, half + n.disk)
     tried = Tried(block, half, middle, speed, h, spring)
-    return with_rest(plant, tried) if plant.holding != 0 else sliding(plant, tried, scale * now.friction)
+    return with_rest(plant, tried) if plant.holding != 0 else sliding(plant, tried, now.scale * now.friction)
 
 
 @kernel(inline=True)
-def moved(plant: Plant, block: int, i: int, drive: float, cog: float, bearing: float) -> float:
-    """A state after a sub-step in which the contact's springs alone act."""
-    n, matrix = plant.machine, plant.matrix
-    size = n.size
-    row = block + i * (size + INPUTS)
-    total = 0.0
-    for j in range(size):
-        total += matrix[row + j] * plant.axis[j]
-    row += size
-    return (
-        total + matrix[row + IN_MOTOR] * drive + matrix[row + IN_COG] * cog
-        - matrix[row + IN_BEARING] * bearing + matrix[row + IN_ANGLE] * plant.axis[n.disk]
-    )  # fmt: skip
+def disk_after(plant: Plant, row: int) -> tuple[float, float]:
+    """Angle and velocity of the disk after a sub-step in which the contact's springs alone act; its matrix's row."""
+    angle, velocity = 0.0, 0.0
+    for j in range(plant.machine.size + GIVEN):
+        angle += plant.matrix[row + j * SLOTS] * plant.axis[j]
+        velocity += plant.matrix[row + j * SLOTS + 1] * plant.axis[j]
+    return angle, velocity
 
 
 # ---- a sub-step that is kept ------------------------------------------------------------------------------------
@@ -177,7 +170,7 @@ def spring_seen(plant: Plant) -> int:
     n, now, x = plant.machine, plant.now, plant.axis
     if n.stiffness == 0.0 or n.unresolved != 0:
         return 0
-    way = x[n.size + n.disk] - x[n.disk]
+    way = x[SLOTS + n.disk] - x[n.disk]
     if way == 0.0:
         return now.spring
     part = now.spring + SPRINGS * (now.rest - now.scale * now.friction) / (way * n.stiffness)
@@ -188,19 +181,19 @@ def spring_seen(plant: Plant) -> int:
 def keep(plant: Plant) -> None:
     """Make the sub-step that was tried the machine's."""
     n, now, x = plant.machine, plant.now, plant.axis
-    after, z = n.size, plant.contact
+    z = plant.contact
     seen, part = spring_seen(plant), n.stiffness / SPRINGS
-    way = x[after + n.disk] - x[n.disk]
+    way = x[SLOTS + n.disk] - x[n.disk]
     if way != 0.0:
         rate = (now.rest - now.scale * now.friction) / way + part * (now.spring - seen)
         now.rate = min(max(rate, -part), part)
     # What is left of the unbalance goes to the torque: axis and law have moved alike.
     whole = now.rest + part * now.spring * way
     if n.bearing > 0.0:
-        now.bearing = rolled(n, now.bearing, x[after + n.shaft] - x[n.shaft])
+        now.bearing = rolled(n, now.bearing, x[SLOTS + n.shaft] - x[n.shaft])
     now.friction, now.spring = whole / now.scale, seen
     for i in range(n.size):
-        x[i] = x[after + i]
+        x[i] = x[SLOTS + i]
     for i in range(n.states):
         z[i] = z[n.states + i]
     now.taken += 1
