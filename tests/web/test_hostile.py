@@ -12,13 +12,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from support.hostile import NAMES, contents
+from support.hostile import FILES, NAMES, contents
 from support.serving import DEMO, Served, ended, start_server
 
 SMALL = b"time [s],position [rad],torque [Nm]\n" + b"".join(
     b"%.3f,%.3f,0.1\n" % (i / 1000, i / 500) for i in range(80)
 )
-FILES = contents()
 KINDS = [f"name {i}" for i in range(len(NAMES))] + list(FILES)
 MOST = 2**30
 
@@ -29,12 +28,14 @@ def sent(served: Served) -> dict[str, Any]:
     client = served.client()
     project = client.post("/api/projects", json={"name": "hostile"}).json()["id"]
     out: dict[str, Any] = {"project": project, "client": client}
+    files = contents()
+    assert tuple(files) == FILES
     peak = Peak(served.process.pid)
     for kind in KINDS:
         name, content = (
             (NAMES[int(kind[5:])], SMALL if kind == "name 0" else b"nothing here\n")
             if kind.startswith("name ")
-            else (kind, FILES[kind])
+            else (kind, files[kind])
         )
         answer = client.post(f"/api/projects/{project}/logs", params={"name": name}, content=content)
         about = answer.json()
