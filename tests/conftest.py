@@ -11,12 +11,17 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from support import kept_compilers
+
 # What tests approve stays with them; set before anything is imported, so that other processes inherit it.
 os.environ["STICKSLIP_CONFIG"] = tempfile.mkdtemp(prefix="stickslip-tests-")
 # The tests share the cores already: linear algebra in threads of its own waits in a loop for them, at four times the
 # processor's time, and the commands do without as well. Before NumPy is imported, which reads it.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+# What C compilers made is kept where compiled kernels are; set before anything is tried, so that workers inherit it.
+kept_compilers.put_first()
 
 # The first example of a test may compile for seconds: no example is held to a time.
 settings.register_profile("stickslip", deadline=None)
