@@ -21,7 +21,8 @@ from typing import Any
 from stickslip.errors import LawError
 from stickslip.returning import MUST, gives, missing_return
 from stickslip.subset.layout import Layout, law_layouts
-from stickslip.subset.translator import Names, Target, Translator, View, parsed
+from stickslip.subset.source import parsed
+from stickslip.subset.translator import Names, Target, Translator, View
 
 __all__ = ["Layout", "law_layouts", "lower", "named"]
 
@@ -115,8 +116,10 @@ def _translate(
     arguments = ast.arguments([], given, None, [], [], None, [])
     if not flat:
         body = [*_docstring(tree), *body]
-    done[name] = ast.fix_missing_locations(
-        ast.FunctionDef(name=name, args=arguments, body=body or [ast.Pass()], decorator_list=[])
+    # Of places in a file only those of statements, which printing asks for: to give every node one takes as long as
+    # to translate.
+    done[name] = ast.FunctionDef(
+        name=name, args=arguments, body=body or [ast.Pass()], decorator_list=[], lineno=1
     )
 
 

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import ast
-import functools
-import inspect
 import math
-import textwrap
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -15,8 +12,9 @@ from typing import Any
 from stickslip.binding import NEGATIVE, negative
 from stickslip.errors import LawError, suggestion
 from stickslip.subset.layout import Layout
+from stickslip.subset.source import Place, arguments_of
 
-__all__ = ["Names", "Target", "Translator", "View", "parsed"]
+__all__ = ["Names", "Target", "Translator", "View"]
 
 BUILTINS = {"abs", "min", "max", "range", "len", "float", "int"}
 MATH = {
@@ -38,6 +36,7 @@ EXPRESSIONS = (
     ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp, ast.Constant, ast.Name, ast.Attribute,
     ast.Subscript, ast.Call, ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.expr_context,
 )  # fmt: skip
+ALLOWED = (*STATEMENTS, *EXPRESSIONS)
 REMEDY: dict[type[ast.AST], str] = {
     ast.While: "use `for i in range(n)` with a `break`",
     ast.ListComp: "use a `for` loop over the elements",
@@ -97,38 +96,6 @@ class Names:
         return name
 
 
-@dataclass(frozen=True)
-class Place:
-    file: str
-    first_line: int
-
-    def at(self, node: ast.AST) -> str:
-        return f"{self.file}, line {self.first_line + getattr(node, 'lineno', 1) - 1}"
-
-
-@functools.lru_cache(maxsize=4096)
-def source_of(function: Callable[..., Any]) -> tuple[str, Place]:
-    """The text of a function and where it stands; to find its end, Python reads it token by token."""
-    try:
-        lines, first = inspect.getsourcelines(function)
-    except (OSError, TypeError) as error:
-        name = getattr(function, "__name__", str(function))
-        raise LawError(
-            f"the source of {name!r} cannot be read; write the law in a file of its own"
-        ) from error
-    text = textwrap.dedent("".join(lines))
-    return text, Place(inspect.getsourcefile(function) or "<unknown>", max(first, 1))
-
-
-def parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, Place]:
-    """The tree of a function, for the caller to change, and where it stands."""
-    text, where = source_of(function)
-    tree = ast.parse(text).body[0]
-    if not isinstance(tree, ast.FunctionDef):
-        raise LawError(f"{where.at(tree)}: a law's function is a `def`; write it as one")
-    return tree, where
-
-
 @dataclass
 class Translator(ast.NodeTransformer):
     where: Place
@@ -169,7 +136,7 @@ class Translator(ast.NodeTransformer):
     # ---- statements ----------------------------------------------------------------------------------
 
     def visit(self, node: ast.AST) -> Any:
-        if not isinstance(node, (*STATEMENTS, *EXPRESSIONS)):
+        if not isinstance(node, ALLOWED):
             kind = type(node).__name__
             raise self.refuse(
                 node, f"`{kind}`", REMEDY.get(type(node), "use arithmetic, if/else and for loops")
@@ -281,7 +248,7 @@ class Translator(ast.NodeTransformer):
         if not isinstance(function, types.FunctionType) or function is negative:
             known = [n for n, v in self.scope.items() if isinstance(v, types.FunctionType)]
             raise self.refuse(node, f"{name}()", suggestion(name, [*known, *BUILTINS]))
-        takes = len(inspect.signature(function).parameters)
+        takes = len(arguments_of(function))
         if len(node.args) != takes:
             raise self.refuse(node, f"{name}() with {len(node.args)} arguments", f"it takes {takes}")
         target = self.aimed(node, function)
@@ -297,7 +264,7 @@ class Translator(ast.NodeTransformer):
         """The callee, for the parts of structures that it is called with."""
         views: list[tuple[str, View]] = []
         numbers: list[str] = []
-        for formal, actual in zip(inspect.signature(function).parameters, node.args):
+        for formal, actual in zip(arguments_of(function), node.args):
             view = self.view(self.positive(actual))
             if view is None and formal in self.layouts:
                 numbers.append(formal)
@@ -311,7 +278,7 @@ class Translator(ast.NodeTransformer):
     def passed(self, node: ast.Call, target: Target) -> list[ast.expr]:
         """The arguments of a call; a structure of which several parts are meant is passed once."""
         views, out, bases = dict(target.views), list[ast.expr](), dict[str, str]()
-        for formal, actual in zip(inspect.signature(target.function).parameters, node.args):
+        for formal, actual in zip(arguments_of(target.function), node.args):
             view = self.view(self.positive(actual))
             if view is None:
                 out.append(self.visit(actual))
@@ -384,7 +351,7 @@ class Translator(ast.NodeTransformer):
         place = ast.Constant(len(view.layout.scalars) + view.layout.counts.index(per))
         read = ast.Subscript(ast.Name(view.base, ast.Load()), place, ast.Load())
         count = ast.Call(ast.Name("int", ast.Load()), [read], [])
-        return ast.Assign([ast.Name(f"{per}s_", ast.Store())], count)
+        return ast.Assign([ast.Name(f"{per}s_", ast.Store())], count, lineno=1)
 
     def length(self, node: ast.Call) -> ast.expr:
         of = node.args[0] if len(node.args) == 1 else None

@@ -1,0 +1,66 @@
+"""The text of a function of the scalar subset, where it stands, and its arguments."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+import textwrap
+import types
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from stickslip.errors import LawError
+
+__all__ = ["Place", "arguments_of", "parsed"]
+
+VARIADIC = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
+
+
+@dataclass(frozen=True)
+class Place:
+    file: str
+    first_line: int
+
+    def at(self, node: ast.AST) -> str:
+        return f"{self.file}, line {self.first_line + getattr(node, 'lineno', 1) - 1}"
+
+
+def source_of(function: Callable[..., Any]) -> tuple[str, Place]:
+    """The text of a function and where it stands."""
+    try:
+        code = function.__code__
+        return _source_of(code, code.co_filename)
+    except (AttributeError, OSError, TypeError) as error:
+        name = getattr(function, "__name__", str(function))
+        raise LawError(
+            f"the source of {name!r} cannot be read; write the law in a file of its own"
+        ) from error
+
+
+@functools.lru_cache(maxsize=4096)
+def _source_of(code: types.CodeType, file: str) -> tuple[str, Place]:
+    """By the code, which copies with other globals share: to find its end, Python reads it token by token.
+
+    Code of two files may be equal, and their comments and places are not.
+    """
+    lines, first = inspect.getsourcelines(code)
+    return textwrap.dedent("".join(lines)), Place(inspect.getsourcefile(code) or "<unknown>", max(first, 1))
+
+
+def arguments_of(function: Callable[..., Any]) -> tuple[str, ...]:
+    """The names of a function's arguments, read off its code where it has only those that the subset knows."""
+    code = getattr(function, "__code__", None)
+    if code is None or code.co_kwonlyargcount or code.co_flags & VARIADIC or hasattr(function, "__wrapped__"):
+        return tuple(inspect.signature(function).parameters)
+    return code.co_varnames[: code.co_argcount]
+
+
+def parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, Place]:
+    """The tree of a function, for the caller to change, and where it stands."""
+    text, where = source_of(function)
+    tree = ast.parse(text).body[0]
+    if not isinstance(tree, ast.FunctionDef):
+        raise LawError(f"{where.at(tree)}: a law's function is a `def`; write it as one")
+    return tree, where
