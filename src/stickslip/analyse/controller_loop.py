@@ -242,7 +242,7 @@ class _Sample:
         return self._after(change) - self.unchanged
 
     def _after(self, change: Array) -> Array:
-        m, z, u = copy.deepcopy((self.m, self.z, self.u))
+        m, z, u = _copied(self.m), _copied(self.z), _copied(self.u)
         self._set(m, z, self.rest + change[:-1])
         torque = self.run(float(change[-1]), 0.0, 0.0, 0.0, self.n, m, z, self.p, u)
         return np.append(self._flat(m, z), torque)
@@ -255,6 +255,17 @@ class _Sample:
         for name in CARRIED:
             setattr(m, name, next(numbers))
         _fill(z, numbers)
+
+
+def _copied(part: Any) -> Any:
+    """A state of its own; `copy.deepcopy`, which looks for what is shared, takes as long as a sample."""
+    out = copy.copy(part)
+    for name, value in cast("dict[str, Any]", vars(part)).items():
+        if isinstance(value, SimpleNamespace):
+            setattr(out, name, _copied(value))
+        elif isinstance(value, list):
+            setattr(out, name, list(value))  # type: ignore[reportUnknownArgumentType]
+    return out
 
 
 def _numbers(part: Any) -> list[float]:
