@@ -8,6 +8,7 @@ from the same text that the package's own engines compile: at equal steps the un
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -119,7 +120,8 @@ ABOUT = {
 }
 
 
-def step_code(name: str) -> dict[str, Any]:
+@functools.lru_cache(maxsize=4)
+def step_code(name: str) -> Mapping[str, Any]:
     """Functions and structures of `stickslip.simulation.recorded_input.step` for the template."""
     from stickslip.simulation import root
     from stickslip.simulation.recorded_input import contact, step
