@@ -38,7 +38,8 @@ grep -rqE '^ *# *include *"(/|\\.\\.)' . && exec "$real" "$@"
 around="$CPATH $C_INCLUDE_PATH $CPLUS_INCLUDE_PATH $LIBRARY_PATH"
 hashes=$(echo "$files" | tr '\\n' '\\0' | xargs -0 sha256sum)
 key=$(printf '%s\\n' "$@" "$around" "$hashes" | sha256sum | cut -c1-40)
-if cp "$kept/$key" "$out" 2>/dev/null; then
+# As compilers do: a library that a process has loaded is not written over.
+if cp --remove-destination "$kept/$key" "$out" 2>/dev/null; then
     touch "$kept/$key"
     exit 0
 fi

@@ -78,7 +78,8 @@ def predicted_with(
     if usual is None or first is None or not any(n in estimates and estimates[n].identified for n in TOLD):
         return found, {}, []
     own = float(getattr(found.model.parameters, EXPONENT))
-    if sliding is not None and sliding.shows_a_fall and sliding.falling[own][0] >= SURE:
+    narrow = sliding is not None and sliding.widened == 1.0
+    if sliding is not None and narrow and sliding.shows_a_fall and sliding.falling[own][0] >= SURE:
         return found, {}, []
     try:
         other = rival(experiments, axis, law, first, asked, found, {EXPONENT: FORMS[own]})

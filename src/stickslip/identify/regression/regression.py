@@ -25,6 +25,7 @@ from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.band_fit import BandFit, Number
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS, least_squares
 from stickslip.identify.regression.bands import (
+    GAUSSIAN,
     QUANTILE,
     ROTATED,
     calmed,
@@ -295,7 +296,8 @@ def regress_axis(
     if skew is None and not follows(seen.fits[0], seen.rows, size):
         # Seen half a cycle late, ringing explains itself by an inertia below 0: the torque acts about its row.
         ask = (axis, {**options, "skew": 0.0}, harmonics, harmonic_period)
-        seen = replace(in_bands(signals, seen.widened * width, *ask), widened=seen.widened)
+        forms = GAUSSIAN if seen.widened > 1.0 else tuple(USUAL_EXPONENTS)
+        seen = replace(in_bands(signals, seen.widened * width, *ask, exponents=forms), widened=seen.widened)
     bands = seen.fits
     speed = np.abs(stacked(seen.rows, "speed"))
     falls, falling = fall_of(bands)
