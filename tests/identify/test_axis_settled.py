@@ -280,13 +280,17 @@ def test_held_out_force_errors_of_the_same_values_are_the_same_in_the_same_band(
 
 
 @pytest.mark.parametrize("name", ["inertia", "fc", "sigma2"])
-def test_without_certain_sliding_a_number_that_plain_least_squares_contradict_takes_all_down(
+def test_without_certain_sliding_no_level_is_identified_and_nothing_that_plain_least_squares_contradict(
     name: str,
 ) -> None:
-    """Of tuning steps sigma2 was called identified at nine times the truth, which least squares had within 50 %."""
+    """Of tuning steps sigma2 was called identified at nine times the truth, which least squares had within 50 %; of
+    others Fc 16 % off (990356)."""
     inverse = inverse_dynamics([moving()], AXIS)
     right = [estimate(n, x, 0.05 * x) for n, x in TRUE.items()]
-    assert all(e.identified for e in held_against(right, inverse))
+    # What slides too little tells inertia and offset, but no level.
+    kept = {e.name: e for e in held_against(right, inverse)}
+    assert {n for n, e in kept.items() if e.identified} == kept.keys() - {"fc", "sigma2", "fs", "vs"}
+    assert "too little in one direction to tell a level" in kept["fc"].verdict
     wrong = [replace(e, value=4.0 * e.value, upper=4.1 * e.value, lower=3.9 * e.value) if e.name == name else e
              for e in right]  # fmt: skip
     found = held_against(wrong, inverse)

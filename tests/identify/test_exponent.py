@@ -86,7 +86,9 @@ def test_the_record_decides_by_a_tenth_or_both_are_held(
     open_ = replace(sliding, falling={d: (0.5, vs) for d, (_, vs) in sliding.falling.items()})
     monkeypatch.setattr(exponent, "rival", lambda *_: Rival(better * found.cost, beside))
     monkeypatch.setattr(exponent, "axis_prediction", lambda *_, values, **__: values)
-    result, other, said = exponent.predicted_with([record], AXIS, LAW, first, asked, found, open_)
+    result, other, said = exponent.predicted_with(
+        [record], AXIS, LAW, first, asked, found, open_, found.estimates
+    )
     if taken == "other":
         assert dict(result)["delta_s"] == 1.0  # type: ignore[call-overload]
         assert "delta_s = 1" in said[0]
@@ -99,7 +101,15 @@ def test_the_record_decides_by_a_tenth_or_both_are_held(
             levels[after.name] if after.name in other and before.identified else before.upper
         )
     # Where certain sliding is sure the record is not asked.
-    assert exponent.predicted_with([record], AXIS, LAW, first, asked, found, sliding) == (found, {}, [])
+    own = found.estimates
+    assert exponent.predicted_with([record], AXIS, LAW, first, asked, found, sliding, own) == (found, {}, [])
+    # Nor where nothing is left that depends on it.
+    doubted = [replace(e, identified=False) for e in own]
+    assert exponent.predicted_with([record], AXIS, LAW, first, asked, found, open_, doubted) == (
+        found,
+        {},
+        [],
+    )
 
 
 def test_a_fall_of_either_form_has_a_tenth_left_at_the_same_speed() -> None:

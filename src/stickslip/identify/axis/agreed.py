@@ -66,6 +66,12 @@ ONE_BAND = (
 BAND_ALONE = (
     "one band of frequencies alone tells it, where level and slope, or motor and load, are not told apart"
 )
+LEVELS = ("fc", "sigma2", "fs", "vs")
+"""What sliding alone tells of friction."""
+UNSEEN = (
+    "the record slides too little in one direction to tell a level of friction, or when the torque acted; record "
+    "longer motion in one direction"
+)
 AT_REST = "extrapolated to rest: at which velocity friction falls to its level is not told"
 UNDECIDED = (
     "the prediction error says {name} {own}, the plain inverse dynamics {other}, and the record slides too little in "
@@ -305,8 +311,12 @@ def half_width(e: Estimate) -> float:
 
 
 def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tuple[Estimate, ...]:
-    """The estimates of a record without certain sliding: nothing is identified where inertia, level or slope
-    contradicts the plain inverse dynamics, since nothing decides between the two."""
+    """The estimates of a record without certain sliding: no level of friction is identified, since neither the level
+    nor when the torque acted was seen.
+
+    Nothing at all is where inertia, level or slope contradicts the plain inverse dynamics: nothing decides between
+    the two.
+    """
     out = tuple(estimates)
     for e in out:
         other = plain_value(e.name, inverse)
@@ -316,7 +326,9 @@ def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tup
         if apart and abs(other[0] - e.value) > SAME * abs(e.value):
             why = UNDECIDED.format(name=e.name, own=f"{e.value:.4g}", other=f"{other[0]:.4g} {e.unit}")
             return tuple(replace(x, identified=False, verdict=why) if x.identified else x for x in out)
-    return out
+    return tuple(
+        replace(e, identified=False, verdict=UNSEEN) if e.identified and e.name in LEVELS else e for e in out
+    )
 
 
 def as_good(inverse: InverseDynamics, found: Regression, times: float = AS_GOOD) -> bool:

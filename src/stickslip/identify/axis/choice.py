@@ -98,7 +98,8 @@ def foreseen(
     def search(law: Law) -> tuple[Criterion, Array] | str:
         progress(f"{law.name}: law {laws.index(law) + 1} of {len(laws)}")
         try:
-            return searched(fitted, axis, law, followed, inverse, asked_of(law, asked, laws), hops=0)
+            own = asked_of(law, asked, laws)
+            return searched(fitted, axis, law, followed, inverse, own, hops=0, tolerance=COMPARABLE)
         except InputError as error:
             return str(error)
 

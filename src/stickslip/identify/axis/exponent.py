@@ -70,12 +70,12 @@ def shown(asked: Asked, sliding: Regression | None, laws: Sequence[Law]) -> tupl
 
 def predicted_with(
     experiments: Sequence[Experiment], axis: ServoAxis, law: Law, first: InverseDynamics | None, asked: Asked,
-    found: PredictionError, sliding: Regression | None,
+    found: PredictionError, sliding: Regression | None, judged: Iterable[Estimate],
 ) -> tuple[PredictionError, dict[str, float], list[str]]:  # fmt: skip
     """The prediction error with the exponent that explains the record better, what the other says of `TOLD` where the
-    record does not decide, and what is to be said."""
-    usual, estimates = usual_of(law), {e.name: e for e in found.estimates}
-    if usual is None or first is None or not any(n in estimates and estimates[n].identified for n in TOLD):
+    record does not decide, and what is to be said. Nothing is asked where none of them is identified as `judged`."""
+    usual = usual_of(law)
+    if usual is None or first is None or not any(e.identified for e in judged if e.name in TOLD):
         return found, {}, []
     own = float(getattr(found.model.parameters, EXPONENT))
     narrow = sliding is not None and sliding.widened == 1.0

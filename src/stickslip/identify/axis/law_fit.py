@@ -31,6 +31,7 @@ from stickslip.identify.axis.settled import ALIKE, settled
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Vector
+from stickslip.identify.observer.prediction_error import PredictionError
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
@@ -184,28 +185,14 @@ def predicted(law: Law, asked: Asked, evidence: Evidence, notes: Sequence[str]) 
         experiments, axis, law, first=inverse, values=asked.values, free=asked.free, frozen=asked.frozen,
         extras=asked.extras,
     )  # fmt: skip
-    other, said = dict[str, float](), list[str]()
+    estimates, said = checked(result, evidence)
     if evidence.exponent_open:
-        result, other, said = predicted_with(experiments, axis, law, inverse, asked, result, sliding)
-    estimates, u = with_other(result.estimates, result, other), result.u
-    if sliding is not None:
-        level = abs(sliding.numbers["fc"].value)
-        scale = {p.name: 1.0 if p.par.unit == "rad" else level for p in result.vector.free}
-        estimates, more = agreed(estimates, sliding, result.vector, inverse, scale)
-        said = [*said, *more]
-        if not sliding.held_for(HELD):
-            estimates = untold_by_reversals(estimates, result.model, sliding)
-        u = result.vector.coordinates(
-            result.vector.named(u) | {e.name: e.value for e in estimates if e.name in TOLD_BY_SLIDING}
-        )
-    estimates = evident(estimates, result.vector, u, experiments, axis)
-    if evidence.unchecked and inverse is not None:
-        estimates = held_against(estimates, inverse)
-    if sliding is not None and inverse is not None:
-        estimates, more = beside_plain(estimates, result.model, inverse, sliding)
-        said = [*said, *more]
-    estimates = with_level(estimates, sliding) if sliding is not None else estimates
-    u = result.vector.coordinates(result.vector.named(u) | {e.name: e.value for e in estimates})
+        better, other, by = predicted_with(experiments, axis, law, inverse, asked, result, sliding, estimates)
+        if better is not result:
+            result = better
+            estimates, said = checked(result, evidence)
+        estimates, said = with_other(estimates, result, other), [*by, *said]
+    u = result.vector.coordinates(result.vector.named(result.u) | {e.name: e.value for e in estimates})
     fitted = with_values(experiments, axis, law, result.vector, u, asked.extras)
     estimates = tuple(replace(e, unit=axis.unit(e.unit)) for e in estimates)
     found = assembled(
@@ -219,3 +206,32 @@ def predicted(law: Law, asked: Asked, evidence: Evidence, notes: Sequence[str]) 
         sliding,
     )
     return noted(replace(found, details={**found.details, "prediction": result}))
+
+
+def checked(result: PredictionError, evidence: Evidence) -> tuple[tuple[Estimate, ...], list[str]]:
+    """A prediction error's estimates, held against what else the records tell; and what is to be said."""
+    experiments, axis, inverse, sliding = (
+        evidence.experiments,
+        evidence.axis,
+        evidence.inverse,
+        evidence.sliding,
+    )
+    estimates, u, said = result.estimates, result.u, list[str]()
+    if sliding is not None:
+        level = abs(sliding.numbers["fc"].value)
+        scale = {p.name: 1.0 if p.par.unit == "rad" else level for p in result.vector.free}
+        estimates, said = agreed(estimates, sliding, result.vector, inverse, scale)
+        if not sliding.held_for(HELD):
+            estimates = untold_by_reversals(estimates, result.model, sliding)
+        u = result.vector.coordinates(
+            result.vector.named(u) | {e.name: e.value for e in estimates if e.name in TOLD_BY_SLIDING}
+        )
+    estimates = evident(estimates, result.vector, u, experiments, axis)
+    if evidence.unchecked and inverse is not None:
+        estimates = held_against(estimates, inverse)
+    if sliding is None:
+        return estimates, said
+    if inverse is not None:
+        estimates, more = beside_plain(estimates, result.model, inverse, sliding)
+        said = [*said, *more]
+    return with_level(estimates, sliding), said

@@ -163,9 +163,12 @@ def watched(experiments: Sequence[Experiment], axis: ServoAxis, asked: Asked) ->
 
 def searched(
     experiments: Sequence[Experiment], axis: ServoAxis, law: Law, seen: Watched, start: InverseDynamics, asked: Asked,
-    *, seed: int = 0, hops: int = HOPS,
+    *, seed: int = 0, hops: int = HOPS, tolerance: float = SETTLED,
 ) -> tuple[Criterion, Array]:  # fmt: skip
-    """The criterion of the best minimum met under the firm observer, and its coordinates."""
+    """The criterion of the best minimum met under the firm observer, and its coordinates.
+
+    Descents end where a step lowers the sum of squares by less than this part of it.
+    """
     records: list[Prepared] = []
     criteria: list[Criterion] = []
     mechanics = functools.partial(mechanics_of, harmonic_period=asked.extras.harmonic_period)
@@ -190,15 +193,15 @@ def searched(
     running = mapped(lambda c: (c, c.search(c.vector.start)), ranked)
     for count, evaluations in ROUNDS:
         going = [search for _, search in running[:count]]
-        mapped(lambda search: search.run(evaluations, SETTLED), going)  # noqa: B023 (done at once)
+        mapped(lambda search: search.run(evaluations, tolerance), going)  # noqa: B023 (done at once)
         running = apart(sorted(running[:count], key=lambda entry: entry[1].cost))
     criterion, search = running[0]
     # Outliers would choose among hops by plain squares: from here on the likelihood that weighs them decides.
     adapted = criterion.adapted(search.u)
-    best = descended(adapted, search.u)
+    best = descended(adapted, search.u, tolerance)
     rng, own = np.random.default_rng(seed), {f.name for f in law.fields}
     others = [hop(adapted.vector, best[1], own, rng) for _ in range(hops)]
-    reached = mapped(functools.partial(descended, adapted), others)
+    reached = mapped(lambda u: descended(adapted, u, tolerance), others)
     return adapted, min([best, *reached], key=lambda entry: entry[0])[1]
 
 
@@ -217,13 +220,13 @@ def apart(running: Sequence[tuple[Criterion, Secants]]) -> list[tuple[Criterion,
     return kept
 
 
-def descended(criterion: Criterion, start: Array) -> tuple[float, Array]:
+def descended(criterion: Criterion, start: Array, tolerance: float) -> tuple[float, Array]:
     """Sum of squares and coordinates that a few steps from a start reach; infinite where it cannot be simulated."""
     try:
         search = criterion.search(start)
     except InputError:
         return math.inf, start
-    search.run(EVALUATIONS, SETTLED)
+    search.run(EVALUATIONS, tolerance)
     return search.cost, search.u
 
 

@@ -8,7 +8,7 @@ and a load that depends on the position, whatever the law of friction.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -34,6 +34,8 @@ WEIGHT, TOLD = 0.3, 0.25
 of its value."""
 TENTH, STRANGE, STRANGE_TIME = 0.1, 1.5, 1.5e-3
 """Rows by which a torque acts beside its row that are worth a word; rows and s from which on no hold explains it."""
+RANK = 1e-10
+"""Part of the largest singular value below which a direction is not told."""
 MANY = 10.0
 """Rows from which on a delay that reversals alone show is told: play, wind-up and stick-slip shift them by fewer."""
 
@@ -150,7 +152,7 @@ def _skew_at_reversals(view: View, smooth: Smooth) -> float | None:
     Play, wind-up and a feedforward shift reversals too: it is asked only where sliding does not tell.
     """
     reach = int(min(max(0.03 / smooth.period, 10), 60, smooth.velocity.size // 8))
-    rests = np.array([_fit(smooth, k).rest for k in range(-reach, reach + 1)])
+    rests = _rests(smooth, range(-reach, reach + 1))
     best = int(np.argmin(rests))
     shift = best - reach
     known = abs(shift) >= 2 and abs(shift) * smooth.period >= _edge(smooth, view.step)
@@ -240,14 +242,30 @@ def _fit(
     if periodic:
         angle = 2.0 * math.pi / turn * smooth.position[rows]
         matrix = np.column_stack([matrix, np.sin(angle), np.cos(angle)])
-    size: Array = np.sqrt(np.mean(matrix**2, axis=0))
-    size[size == 0.0] = 1.0
+    size = _sizes(matrix)
     torque = smooth.torque[rows + shift]
-    solved = cast("tuple[Array, ...]", np.linalg.lstsq(matrix / size, torque, rcond=1e-10))
+    solved = cast("tuple[Array, ...]", np.linalg.lstsq(matrix / size, torque, rcond=RANK))
     values = solved[0]
     rest = float(np.mean((torque - matrix @ (values / size)) ** 2))
     spread = float(np.var(torque))
     return Fit(values / size, 1.0 - rest / spread if spread > 0.0 else 0.0, rest)
+
+
+def _rests(smooth: Smooth, shifts: Iterable[int]) -> Array:
+    """`Fit.rest` with the torque taken so many samples later, shape (shifts,)."""
+    rows = _rows(smooth)
+    matrix = _matrix(smooth, rows, measured=False)
+    basis, sizes, _ = np.linalg.svd(matrix / _sizes(matrix), full_matrices=False)
+    basis = basis[:, sizes > RANK * sizes[0]]
+    torques = np.stack([smooth.torque[rows + k] for k in shifts])
+    left = torques - (torques @ basis) @ basis.T
+    return np.asarray(np.mean(left**2, axis=1))
+
+
+def _sizes(matrix: Array) -> Array:
+    """Root mean squares of the columns, 1 for those that are 0."""
+    size: Array = np.sqrt(np.mean(matrix**2, axis=0))
+    return np.where(size == 0.0, 1.0, size)
 
 
 def _rows(smooth: Smooth) -> Any:

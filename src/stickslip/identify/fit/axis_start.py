@@ -30,6 +30,7 @@ LENGTHS = (1e-5, 1e-4, 1e-3)  # of the travel: pre-sliding lengths that are trie
 VELOCITIES = (0.03, 0.15)  # of the usual speed: Stribeck velocities that are tried
 ELEMENTS = 2  # of a law with elements; a record rarely determines more, and starting values may give more
 TIE = 0.3  # how strongly the steady fit holds on to the scaled example, in coordinates per relative torque
+NEARLY = 1e-4  # relative decrease of the sum of squares at which it ends: a search goes on from there
 
 
 def dimensions(unit: str) -> tuple[int, int, int]:
@@ -247,7 +248,7 @@ def steady_values(model: Model, v: Array, curve: Array, names: Sequence[str]) ->
         )
 
     squares = Squares(residuals, vector.lower, vector.upper)
-    best = descend(squares, first, iterations=30, tolerance=1e-8, jacobian_there=False)
+    best = descend(squares, first, iterations=30, tolerance=NEARLY, jacobian_there=False)
     p = feasible(law, vector.law_parameters(best.u))
     return {} if p is None else {name: getattr(p, name) for name in names}
 

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["CORNER", "Window"]
+__all__ = ["CORNER", "Window", "seen", "seen_at"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Rows = np.ndarray[Any, np.dtype[np.int64]]
 
 CORNER = 0.1325
 """Corner frequency (-3 dB) of a Gaussian window times its width: sqrt(ln 2) / (2 pi)."""
@@ -23,6 +24,8 @@ REACH = 4.5
 """Widths after which the window ends."""
 BLOCK = 1 << 14
 """Rows of a block of a long series, at least."""
+GATHERED = 1 << 16
+"""Numbers that are gathered at a time where only some rows are asked for."""
 NARROWEST = 1.5
 """Rows of the narrowest window whose derivatives are still those of a Gaussian."""
 
@@ -97,3 +100,12 @@ def seen(series: Array, *weights: Array) -> list[Array]:
         begin = reach + w.size // 2
         out.append(full[:, begin : begin + step].ravel()[: series.size])
     return out
+
+
+def seen_at(series: Array, weights: Array, places: Rows) -> Array:
+    """The same through one set of weights, at some rows alone, shape (places,)."""
+    reach = weights.size // 2
+    frames = np.lib.stride_tricks.sliding_window_view(np.pad(series, reach, mode="edge"), weights.size)
+    count = max(1, GATHERED // weights.size)
+    parts = [frames[places[i : i + count]] @ weights for i in range(0, places.size, count)]
+    return np.concatenate(parts) if parts else np.zeros(0)

@@ -59,6 +59,8 @@ may be left out for that; and how much farther they are left out."""
 GAUSSIAN = (2.0,)
 """The exponent of friction's fall in windows that are wider than noise asks: the slower form of exponent 1 explains by
 level and slope what motor and load do apart (680382: Fc 25 % too low)."""
+CURVE = 3
+"""Every so many of the falls tried make up friction's curve where orders are looked for."""
 BACKGROUND = 12
 """Lowest orders of a torque over the position that is small, but may be there."""
 QUANTILE = 1.96
@@ -218,7 +220,8 @@ def orders_in(
     skew = fit_band(rows, falls, **options).numbers["skew"].value
     candidates = candidate_orders(rows, axis.motion == "rotary", period)
     candidates = candidates[axis.gravity == "pendulum" :]  # the first is a pendulum's own
-    shown = shown_orders(rows, skew, candidates)
+    curve = [k for k, fall in enumerate(falls) if fall.exponent in GAUSSIAN][::CURVE]
+    shown = shown_orders(rows, skew, candidates, curve)
     return {
         "orders": shown, "background": [o for o in candidates[:BACKGROUND] if o not in shown],
         "blurred": not goes_round(rows, axis.motion == "rotary", period),

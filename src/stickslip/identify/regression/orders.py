@@ -62,11 +62,25 @@ def way_of(records: Sequence[SlidingRows]) -> float:
     return max(float(np.ptp(r.position)) for r in records)
 
 
-def shown_orders(records: Sequence[SlidingRows], skew: float, candidates: Sequence[float]) -> list[float]:
-    """Those of the candidates that the records show, the largest first."""
+def shown_orders(
+    records: Sequence[SlidingRows], skew: float, candidates: Sequence[float], falls: Sequence[int]
+) -> list[float]:
+    """Those of the candidates that the records show, the largest first.
+
+    Parameters
+    ----------
+    records : sequence of SlidingRows
+    skew : float
+        s by which the column of the torque lies behind the torque that acted.
+    candidates : sequence of float
+        Cycles a radian (m).
+    falls : sequence of int
+        Columns of `falling` that make up friction's curve: of one form, since more of them explain what is left by
+        chance, and an order then stands out of it that is not there.
+    """
     torque = np.concatenate([r.torque(skew) for r in records])
     columns = np.column_stack(
-        [stacked(records, "fixed"), stacked(records, "jerk"), stacked(records, "falling")[:, ::3]]
+        [stacked(records, "fixed"), stacked(records, "jerk"), stacked(records, "falling")[:, list(falls)]]
     )
     size = np.linalg.norm(columns, axis=0)
     columns = columns[:, size > 0.0] / size[size > 0.0]

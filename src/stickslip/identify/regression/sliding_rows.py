@@ -16,7 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.experiment import Experiment
-from stickslip.identify.fit.smooth import CORNER, NARROWEST, Window, seen
+from stickslip.identify.fit.smooth import CORNER, NARROWEST, Window, seen, seen_at
 from stickslip.identify.regression.inverse import uniform, white_noise
 from stickslip.machines.servo import ServoAxis
 
@@ -162,7 +162,7 @@ class SlidingRows:
     def falling_at(self, falls: Sequence[Fall]) -> SlidingRows:
         """The same rows, with every one of these falls of friction laid out."""
         sign, middle = self.fixed[:, DIRECTION], self.window.weights(0)
-        falling = [seen(fall.at(self.quick), middle)[0][self.places] * sign for fall in falls]
+        falling = [seen_at(fall.at(self.quick), middle, self.places) * sign for fall in falls]
         return replace(self, falling=np.column_stack(falling))
 
     @property
@@ -186,8 +186,8 @@ class SlidingRows:
         window whose variance is greater, or less, by that of the spread, it goes with the motion.
         """
         window = replace(self.window, width=math.sqrt(self.window.width**2 + self.spread(skew)))
-        (drive,) = seen(self.signals.drive, window.weights(0, late=skew))
-        return drive[self.places] - self.signals.loss * self.speed
+        drive = seen_at(self.signals.drive, window.weights(0, late=skew), self.places)
+        return drive - self.signals.loss * self.speed
 
     def spread(self, skew: float) -> float:
         """Variance of the time over which a row's torque acts, s²; below 0 where the column is a mean.
