@@ -97,9 +97,9 @@ def test_the_record_decides_by_a_tenth_or_both_are_held(
     assert bool(other) == bool(said) == (taken == "both")
     for before, after in zip(found.estimates, with_other(found.estimates, found, other), strict=True):
         assert after.value == before.value
-        assert after.upper == (
-            levels[after.name] if after.name in other and before.identified else before.upper
-        )
+        # As wide about the other as about its own.
+        wide = after.name in other and before.identified
+        assert after.upper == pytest.approx(1.2 * before.upper**2 / before.value if wide else before.upper)
     # Where certain sliding is sure the record is not asked.
     own = found.estimates
     assert exponent.predicted_with([record], AXIS, LAW, first, asked, found, sliding, own) == (found, {}, [])

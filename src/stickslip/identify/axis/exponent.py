@@ -21,6 +21,7 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.observer.prediction_error import PredictionError
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
+from stickslip.identify.regression.sliding_rows import Fall
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
 
@@ -81,8 +82,13 @@ def predicted_with(
     narrow = sliding is not None and sliding.widened == 1.0
     if sliding is not None and narrow and sliding.shows_a_fall and sliding.falling[own][0] >= SURE:
         return found, {}, []
+    # Of either form a tenth is left at the same speed.
+    slower = Fall.like(1.0, FORMS[own]).vs / Fall.like(1.0, own).vs
+    start = {
+        p.name: found.vector.named(found.u)[p.name] * slower for p in found.vector.free if p.name == "vs"
+    }
     try:
-        other = rival(experiments, axis, law, first, asked, found, {EXPONENT: FORMS[own]})
+        other = rival(experiments, axis, law, first, asked, found, {EXPONENT: FORMS[own]}, start)
     except InputError:
         return found, {}, []
     least = CLEARLY * found.cost
@@ -101,10 +107,12 @@ def predicted_with(
 def with_other(
     estimates: Iterable[Estimate], found: PredictionError, other: dict[str, float]
 ) -> tuple[Estimate, ...]:
-    """The estimates, their intervals holding what the other exponent says."""
+    """The estimates, their intervals holding those that the other exponent would give, as wide in logarithms."""
     parameters = {p.name: p for p in found.vector.free}
-    return tuple(
-        told(e, parameters[e.name], e.value, min(e.lower, other[e.name]), max(e.upper, other[e.name]), math.nan)
-        if e.name in other and e.identified else e
-        for e in estimates
-    )  # fmt: skip
+
+    def wider(e: Estimate) -> Estimate:
+        moved = other[e.name] / e.value
+        low, high = min(e.lower, moved * e.lower), max(e.upper, moved * e.upper)
+        return told(e, parameters[e.name], e.value, low, high, math.nan)
+
+    return tuple(wider(e) if e.name in other and e.identified else e for e in estimates)

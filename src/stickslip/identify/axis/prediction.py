@@ -114,9 +114,11 @@ class Rival(NamedTuple):
 
 def rival(
     experiments: Sequence[Experiment], axis: ServoAxis, law: Law, first: InverseDynamics, asked: Asked,
-    found: PredictionError, fixed: Mapping[str, float],
+    found: PredictionError, fixed: Mapping[str, float], start: Mapping[str, float],
 ) -> Rival:  # fmt: skip
     """A prediction error's result beside what the same records say with other fixed values of the law.
+
+    `start` are values that it begins with in place of those found.
 
     Raises
     ------
@@ -128,7 +130,7 @@ def rival(
     records = [prepare(m, law, named["inertia"], abs(first.coulomb), seen.band) for m in seen.motions]
     own = {f.name for f in law.fields}
     beside = {k: v for k, v in named.items() if k.partition("[")[0] not in own}
-    known: dict[str, Any] = {**found.model.parameters._asdict(), **fixed}
+    known: dict[str, Any] = {**found.model.parameters._asdict(), **start, **fixed}
     model = Model(law, **known)
     vector, _ = laid_out(
         experiments, axis, law, first, model, replace(asked, values={**asked.values, **beside, **fixed})
