@@ -27,9 +27,10 @@ __all__ = [
     "GAUSSIAN",
     "QUANTILE",
     "ROTATED",
+    "USUALLY",
     "Bands",
     "calmed",
-    "follows",
+    "decided",
     "in_bands",
     "rough",
     "telling",
@@ -52,7 +53,11 @@ SLOWEST, FASTEST = 1e-3, 3.0
 LOOKED, CLEAR = 0.04, 0.5
 """s over which a skew is looked for at a glance; part of the misfit without one that it must leave at most."""
 USUALLY = 2.0
-"""Standard deviations of the usual skew that need no inertia above 0 to be believed."""
+"""Standard deviations of the usual skew from which on one is unusual."""
+CLEARLY, THROUGHOUT = 3.0, 1.7
+"""Misfit that none must then leave in the first band, or in every band of several, in those with it. Of 37 that torque
+over the position and ringing had made, 36 were below both (the other shows no inertia); of 48 delays of 5 rows on
+production moves 45 above one (`benchmarks/ordinary_logs.py`)."""
 REBUILT, SHORT, MARGIN = -0.15, 0.6, 2.5
 """Friction this far below the level, in parts of it, is still being rebuilt after a reversal; the part of the rows that
 may be left out for that; and how much farther they are left out."""
@@ -206,10 +211,20 @@ def in_bands(
     return Bands(tuple(bands), tuple(widest), tuple(chosen.get("orders", [])))
 
 
-def follows(band: BandFit, rows: Sequence[SlidingRows], size: float) -> bool:
-    """Whether a fit's skew may be one: a small one, or one with an inertia above 0."""
-    inertia, skew = band.numbers["inertia"], band.numbers["skew"]
-    return abs(skew.value) <= USUALLY * size or inertia.value > QUANTILE * inertia.std
+def decided(found: Bands, none: Bands) -> Bands:
+    """What was found with an unusual skew, `none` where the torque acts about its row, or both where neither is clear.
+
+    Torque over the position, or a train that rings, looks like a skew of many rows in a slow sine or tuning steps, and
+    seen half a cycle late ringing explains itself by an inertia below 0. A delay that is one leaves several times less
+    where the axis accelerates, or less in every band.
+    """
+    inertia = found.fits[0].numbers["inertia"]
+    less = [n.misfit / max(f.misfit, 1e-300) for f, n in zip(found.fits, none.fits, strict=False)]
+    if inertia.value <= QUANTILE * inertia.std or less[0] < 1.0:
+        return none
+    if less[0] >= CLEARLY or (len(less) > 1 and min(less) >= THROUGHOUT):
+        return found
+    return replace(found, fits=(*found.fits, *none.fits))
 
 
 def orders_in(

@@ -28,8 +28,9 @@ from stickslip.identify.regression.bands import (
     GAUSSIAN,
     QUANTILE,
     ROTATED,
+    USUALLY,
     calmed,
-    follows,
+    decided,
     in_bands,
     rough,
     telling,
@@ -293,11 +294,11 @@ def regress_axis(
     options: dict[str, Any] = {"pendulum": axis.gravity == "pendulum", "skew_size": size, "skew": skew}
     ask = (axis, options, harmonics, harmonic_period)
     seen = calmed(in_bands(signals, width, *ask), signals, width, *ask)
-    if skew is None and not follows(seen.fits[0], seen.rows, size):
-        # Seen half a cycle late, ringing explains itself by an inertia below 0: the torque acts about its row.
+    if skew is None and abs(seen.fits[0].numbers["skew"].value) > USUALLY * size:
         ask = (axis, {**options, "skew": 0.0}, harmonics, harmonic_period)
         forms = GAUSSIAN if seen.widened > 1.0 else tuple(USUAL_EXPONENTS)
-        seen = replace(in_bands(signals, seen.widened * width, *ask, exponents=forms), widened=seen.widened)
+        none = in_bands(signals, seen.widened * width, *ask, exponents=forms)
+        seen = decided(seen, replace(none, widened=seen.widened))
     bands = seen.fits
     speed = np.abs(stacked(seen.rows, "speed"))
     falls, falling = fall_of(bands)
