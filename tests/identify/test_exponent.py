@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -16,8 +17,9 @@ from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.prediction import Rival, axis_prediction
 from stickslip.identify.axis.search import Asked
 from stickslip.identify.experiment import Experiment
+from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.inverse import inverse_dynamics
-from stickslip.identify.regression.regression import regress_axis
+from stickslip.identify.regression.regression import Regression, regress_axis
 from stickslip.identify.regression.sliding_rows import Fall
 from stickslip.machines.servo import ServoAxis
 
@@ -73,6 +75,30 @@ def test_certain_sliding_says_nothing_without_a_fall() -> None:
     assert shown(asked, None, [LAW]) == (asked, [])
 
 
+def preferring(sliding: Regression, chances: Mapping[float, float]) -> Regression:
+    """The regression with other probabilities of friction's forms."""
+    return replace(sliding, falling={d: (chances[d], vs) for d, (_, vs) in sliding.falling.items()})
+
+
+@pytest.mark.parametrize(("better", "form"), [(-1.0, 1.0), (1.0, 2.0)])
+def test_where_record_and_certain_sliding_contradict_each_other_both_forms_are_held(
+    logs: Any, monkeypatch: pytest.MonkeyPatch, better: float, form: float
+) -> None:
+    record, _ = drawn(logs, 970000, 2.0)
+    first, asked = inverse_dynamics([record], AXIS), Asked()
+    found = axis_prediction([record], AXIS, LAW, first=first)
+    beside = {e.name: 1.1 * e.value for e in found.estimates}
+    chances = {form: 0.98, 3.0 - form: 0.02}
+    sliding = preferring(regress_axis([record], AXIS), chances)
+    monkeypatch.setattr(exponent, "rival", lambda *_: Rival(better * found.cost, beside))
+    result, other, said = exponent.predicted_with(
+        [record], AXIS, LAW, first, asked, found, sliding, found.estimates
+    )
+    assert result is found
+    assert other.keys() == {"fs", "vs"}
+    assert "does not decide" in said[0]
+
+
 @pytest.mark.parametrize(("better", "taken"), [(-1.0, "own"), (0.0, "both"), (1.0, "other")])
 def test_the_record_decides_by_a_tenth_or_both_are_held(
     logs: Any, monkeypatch: pytest.MonkeyPatch, better: float, taken: str
@@ -83,7 +109,7 @@ def test_the_record_decides_by_a_tenth_or_both_are_held(
     levels = {e.name: 1.2 * e.upper for e in found.estimates if e.name in ("fs", "vs")}
     beside = {e.name: e.value for e in found.estimates} | levels
     sliding = regress_axis([record], AXIS)
-    open_ = replace(sliding, falling={d: (0.5, vs) for d, (_, vs) in sliding.falling.items()})
+    open_ = preferring(sliding, USUAL_EXPONENTS)
     monkeypatch.setattr(exponent, "rival", lambda *_: Rival(better * found.cost, beside))
     monkeypatch.setattr(exponent, "axis_prediction", lambda *_, values, **__: values)
     result, other, said = exponent.predicted_with(

@@ -19,6 +19,7 @@ from stickslip.identify.axis.search import Asked
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.observer.prediction_error import PredictionError
+from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
 from stickslip.identify.regression.sliding_rows import Fall
@@ -34,6 +35,9 @@ CLEARLY = 0.1
 """Part of the sum of squares by which one of both must explain the record better for the other to be out. Of friction
 that no curve describes (GMS fitted as a curve, exponent 2) the wrong one explained 2 to 8 % more; of curves the right
 one explained more than a tenth more (`benchmarks/ordinary_coverage.py --exponent`)."""
+MORE = 3.0
+"""Times as probable as before the record, for certain sliding to contradict the whole record: nothing then decides.
+Another friction each way, or a train that winds up, lets the wrong form explain a tenth more (998035, 998121)."""
 SURE = 0.99
 """Probability by certain sliding from which on the record is not asked."""
 TOLD = ("fs", "vs")
@@ -92,9 +96,11 @@ def predicted_with(
     except InputError:
         return found, {}, []
     least = CLEARLY * found.cost
-    if not math.isfinite(other.better) or other.better < -least:
+    if not math.isfinite(other.better):
         return found, {}, []
-    if other.better <= least:
+    if other.better < -least and not prefers(sliding, FORMS[own]):
+        return found, {}, []
+    if other.better <= least or prefers(sliding, own):
         return found, {n: other.values[n] for n in TOLD if n in other.values}, [UNDECIDED]
     values = {**asked.values, **other.values, EXPONENT: FORMS[own]}
     better = axis_prediction(
@@ -102,6 +108,15 @@ def predicted_with(
     )  # fmt: skip
     said = [] if FORMS[own] == usual else [SHOWN.format(found=FORMS[own], usual=usual, by=RECORD)]
     return better, {}, said
+
+
+def prefers(sliding: Regression | None, exponent: float) -> bool:
+    """Whether certain sliding says clearly more for an exponent than was thought before it; wider windows know the
+    Gaussian form alone."""
+    if sliding is None or sliding.widened > 1.0:
+        return False
+    (own, _), (other, _) = sliding.falling[exponent], sliding.falling[FORMS[exponent]]
+    return own * USUAL_EXPONENTS[FORMS[exponent]] > MORE * other * USUAL_EXPONENTS[exponent]
 
 
 def with_other(
