@@ -58,3 +58,12 @@ def test_rough_windows_of_which_one_width_alone_tells_the_level_are_not_taken(lo
     """Its level was 5 % too low, known to 4, and a motor's with cogging was lost on a quarter of its record."""
     _, found = drawn(logs, (415462, "actual", 500, "feedforward", "production", "backlash"))
     assert found.widened == 1.0
+
+
+def test_in_a_rough_record_friction_falls_as_gaussian(logs: Any) -> None:
+    """Which form it has play and cogging hide: both made a motor's level unsure on a quarter of its record."""
+    _, rough = drawn(logs, (415462, "actual", 500, "feedforward", "production", "backlash"))
+    assert rough.rough
+    assert not rough.both_forms
+    _, calm = drawn(logs, (4, "held", 1000, "p-pi", "production", "clean"))
+    assert calm.both_forms

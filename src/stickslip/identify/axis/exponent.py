@@ -83,8 +83,8 @@ def predicted_with(
     if usual is None or first is None or not any(e.identified for e in judged if e.name in TOLD):
         return found, {}, []
     own = float(getattr(found.model.parameters, EXPONENT))
-    narrow = sliding is not None and sliding.widened == 1.0
-    if sliding is not None and narrow and sliding.shows_a_fall and sliding.falling[own][0] >= SURE:
+    seen = sliding is not None and sliding.both_forms and sliding.shows_a_fall
+    if sliding is not None and seen and sliding.falling[own][0] >= SURE:
         return found, {}, []
     # Of either form a tenth is left at the same speed.
     slower = Fall.like(1.0, FORMS[own]).vs / Fall.like(1.0, own).vs
@@ -111,9 +111,8 @@ def predicted_with(
 
 
 def prefers(sliding: Regression | None, exponent: float) -> bool:
-    """Whether certain sliding says clearly more for an exponent than was thought before it; wider windows know the
-    Gaussian form alone."""
-    if sliding is None or sliding.widened > 1.0:
+    """Whether certain sliding, where both were looked at, clearly says more for an exponent than was thought before."""
+    if sliding is None or not sliding.both_forms:
         return False
     (own, _), (other, _) = sliding.falling[exponent], sliding.falling[FORMS[exponent]]
     return own * USUAL_EXPONENTS[FORMS[exponent]] > MORE * other * USUAL_EXPONENTS[exponent]

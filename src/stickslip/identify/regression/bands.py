@@ -62,8 +62,8 @@ REBUILT, SHORT, MARGIN = -0.15, 0.6, 2.5
 """Friction this far below the level, in parts of it, is still being rebuilt after a reversal; the part of the rows that
 may be left out for that; and how much farther they are left out."""
 GAUSSIAN = (2.0,)
-"""The exponent of friction's fall in windows that are wider than noise asks: the slower form of exponent 1 explains by
-level and slope what motor and load do apart (680382: Fc 25 % too low)."""
+"""The exponent of friction's fall in windows that are wider than noise asks, and where what is left is rough: the
+slower form of exponent 1 explains by level and slope what motor and load do apart (680382: Fc 25 % too low)."""
 CURVE = 3
 """Every so many of the falls tried make up friction's curve where orders are looked for."""
 BACKGROUND = 12
@@ -106,7 +106,7 @@ def calmed(found: Bands, signals: Sequence[Signals], width: float, *ask: Any) ->
     """What was found; where its first band is rough, what wider windows show, if they tell as much.
 
     The narrowest windows that are not rough; else, of those that leave half as much, the ones in which the level of
-    friction is surest.
+    friction is surest; else the narrowest, beside which friction falls as `GAUSSIAN`.
 
     Play that opens while the motor slides (the drive brakes, the load runs ahead, meets the other flank and rebounds)
     moves the load against the motor by no more than the play: seen through a window, the torque of that falls with
@@ -124,7 +124,8 @@ def calmed(found: Bands, signals: Sequence[Signals], width: float, *ask: Any) ->
             if tells_as_much(other.fits[0], found.fits[0]) or as_sure(other, found):
                 return other
             break
-    return surest(found, tried, signals, width, *ask)
+    best = surest(found, tried, signals, width, *ask)
+    return best if best.widened > 1.0 else in_bands(signals, width, *ask, exponents=GAUSSIAN)
 
 
 def surest(

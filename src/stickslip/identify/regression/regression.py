@@ -158,6 +158,11 @@ class Regression:
         return root_mean_square(rest)
 
     @property
+    def both_forms(self) -> bool:
+        """Whether friction's fall was looked for in every usual form."""
+        return {fall.exponent for fall in self.bands[0].tried} == USUAL_EXPONENTS.keys()
+
+    @property
     def exponent(self) -> float:
         """Of friction's fall, the more probable one."""
         return max(self.falling, key=lambda d: self.falling[d][0])
@@ -296,7 +301,7 @@ def regress_axis(
     seen = calmed(in_bands(signals, width, *ask), signals, width, *ask)
     if skew is None and abs(seen.fits[0].numbers["skew"].value) > USUALLY * size:
         ask = (axis, {**options, "skew": 0.0}, harmonics, harmonic_period)
-        forms = GAUSSIAN if seen.widened > 1.0 else tuple(USUAL_EXPONENTS)
+        forms = GAUSSIAN if seen.widened > 1.0 or rough(seen.fits[0]) else tuple(USUAL_EXPONENTS)
         none = in_bands(signals, seen.widened * width, *ask, exponents=forms)
         seen = decided(seen, replace(none, widened=seen.widened))
     bands = seen.fits
