@@ -43,6 +43,8 @@ GROWS = 0.125
 """Of the tolerance, below which the next sub-step is twice as long."""
 WAVE = 0.3
 """rad of the fastest ripple or cogging in a sub-step, which takes it at its middle."""
+SLIDES = 0.999
+"""Of the bearings' Coulomb torque, from which they have no spring to resolve."""
 NEAR = 0.02
 """rad of the fastest ripple or cogging, within which both follow a parabola to a millionth of themselves."""
 
@@ -59,13 +61,13 @@ def cross(plant: Plant, before: float, drive: float, late: int, factor: float) -
     while place < PARTS:
         torque = before if place < late else drive
         room = (late if place < late else PARTS) - place
-        level = max(now.level, least_level(n, plant.axis[turning], now.spring))
+        level = max(now.level, least_level(plant))
         while PARTS >> level > room or place % (PARTS >> level) != 0:
             level += 1
         wrong = attempt(plant, torque, factor, now.spring, level)
         while wrong > 1.0 and level < FINEST:
             now.spring = spring_seen(plant)
-            level = max(level + 1, least_level(n, plant.axis[turning], now.spring))
+            level = max(level + 1, least_level(plant))
             wrong = attempt(plant, torque, factor, now.spring, level)
         now.level = level - (1 if wrong < GROWS else 0)
         keep(plant)
@@ -75,12 +77,17 @@ def cross(plant: Plant, before: float, drive: float, late: int, factor: float) -
 
 
 @kernel(inline=True)
-def least_level(n: Any, v: float, spring: int) -> int:
-    """Halvings of the sample that a sub-step needs whatever its error is: of its springs, and of ripple and cogging."""
-    level = n.coarsest
-    if spring > 0:
+def least_level(plant: Plant) -> int:
+    """Halvings of the sample that a sub-step needs whatever its error is: of its springs, and of ripple and cogging.
+
+    Bearings that slide have no spring: their torque stays what it is until the shaft turns round.
+    """
+    n, now, x = plant.machine, plant.now, plant.axis
+    slides = n.unresolved == 0 and now.bearing * math.copysign(1.0, x[n.shaft + 1]) > SLIDES * n.bearing
+    level = 0 if slides else n.coarsest
+    if now.spring > 0:
         level = max(level, n.resolving)
-    way = n.order * abs(v) * n.sample_time
+    way = n.order * abs(x[n.disk + 1]) * n.sample_time
     while way > WAVE and level < FINEST:
         way *= 0.5
         level += 1
