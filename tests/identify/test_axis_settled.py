@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from stickslip.binding import NEGATIVE
 from stickslip.identify.axis.agreed import held_against
 from stickslip.identify.axis.choice import Candidate, chosen_of, sentence_on
 from stickslip.identify.axis.identify import nothing_more
@@ -291,6 +292,8 @@ def test_without_certain_sliding_no_level_is_identified_and_nothing_that_plain_l
     kept = {e.name: e for e in held_against(right, inverse)}
     assert {n for n, e in kept.items() if e.identified} == kept.keys() - {"fc", "sigma2", "fs", "vs"}
     assert "too little in one direction to tell a level" in kept["fc"].verdict
+    (backward,) = held_against([estimate("fc" + NEGATIVE, 0.3, 0.01)], inverse)
+    assert not backward.identified
     wrong = [replace(e, value=4.0 * e.value, upper=4.1 * e.value, lower=3.9 * e.value) if e.name == name else e
              for e in right]  # fmt: skip
     found = held_against(wrong, inverse)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +16,9 @@ from stickslip.identify.axis.exponent import is_open, shown, with_other
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.prediction import Rival, axis_prediction
 from stickslip.identify.axis.search import Asked
+from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
+from stickslip.identify.observer.prediction_error import PredictionError
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.identify.regression.regression import Regression, regress_axis
@@ -80,19 +82,36 @@ def preferring(sliding: Regression, chances: Mapping[float, float]) -> Regressio
     return replace(sliding, falling={d: (chances[d], vs) for d, (_, vs) in sliding.falling.items()})
 
 
+def deciding(
+    logs: Any, monkeypatch: pytest.MonkeyPatch
+) -> tuple[
+    Callable[[Rival, Regression, Sequence[Estimate]], tuple[Any, Any, Any]], PredictionError, Regression
+]:
+    """What decides, given the other form's result, certain sliding and estimates; and what an ordinary log says.
+
+    Where the other form is taken, the values that it is fitted with stand for the result.
+    """
+    record, _ = drawn(logs, 970000, 2.0)
+    first, asked = inverse_dynamics([record], AXIS), Asked()
+    found = axis_prediction([record], AXIS, LAW, first=first)
+    monkeypatch.setattr(exponent, "axis_prediction", lambda *_, values, **__: values)
+
+    def decide(other: Rival, sliding: Regression, judged: Sequence[Estimate]) -> tuple[Any, Any, Any]:
+        monkeypatch.setattr(exponent, "rival", lambda *_: other)
+        return exponent.predicted_with([record], AXIS, LAW, first, asked, found, sliding, judged)
+
+    return decide, found, regress_axis([record], AXIS)
+
+
 @pytest.mark.parametrize(("better", "form"), [(-1.0, 1.0), (1.0, 2.0)])
 def test_where_record_and_certain_sliding_contradict_each_other_both_forms_are_held(
     logs: Any, monkeypatch: pytest.MonkeyPatch, better: float, form: float
 ) -> None:
-    record, _ = drawn(logs, 970000, 2.0)
-    first, asked = inverse_dynamics([record], AXIS), Asked()
-    found = axis_prediction([record], AXIS, LAW, first=first)
+    decide, found, told = deciding(logs, monkeypatch)
     beside = {e.name: 1.1 * e.value for e in found.estimates}
     chances = {form: 0.98, 3.0 - form: 0.02}
-    sliding = preferring(regress_axis([record], AXIS), chances)
-    monkeypatch.setattr(exponent, "rival", lambda *_: Rival(better * found.cost, beside))
-    result, other, said = exponent.predicted_with(
-        [record], AXIS, LAW, first, asked, found, sliding, found.estimates
+    result, other, said = decide(
+        Rival(better * found.cost, beside), preferring(told, chances), found.estimates
     )
     assert result is found
     assert other.keys() == {"fs", "vs"}
@@ -103,20 +122,13 @@ def test_where_record_and_certain_sliding_contradict_each_other_both_forms_are_h
 def test_the_record_decides_by_a_tenth_or_both_are_held(
     logs: Any, monkeypatch: pytest.MonkeyPatch, better: float, taken: str
 ) -> None:
-    record, _ = drawn(logs, 970000, 2.0)
-    first, asked = inverse_dynamics([record], AXIS), Asked()
-    found = axis_prediction([record], AXIS, LAW, first=first)
+    decide, found, told = deciding(logs, monkeypatch)
     levels = {e.name: 1.2 * e.upper for e in found.estimates if e.name in ("fs", "vs")}
     beside = {e.name: e.value for e in found.estimates} | levels
-    sliding = regress_axis([record], AXIS)
-    open_ = preferring(sliding, USUAL_EXPONENTS)
-    monkeypatch.setattr(exponent, "rival", lambda *_: Rival(better * found.cost, beside))
-    monkeypatch.setattr(exponent, "axis_prediction", lambda *_, values, **__: values)
-    result, other, said = exponent.predicted_with(
-        [record], AXIS, LAW, first, asked, found, open_, found.estimates
-    )
+    other_one, open_ = Rival(better * found.cost, beside), preferring(told, USUAL_EXPONENTS)
+    result, other, said = decide(other_one, open_, found.estimates)
     if taken == "other":
-        assert dict(result)["delta_s"] == 1.0  # type: ignore[call-overload]
+        assert result["delta_s"] == 1.0
         assert "delta_s = 1" in said[0]
         return
     assert result is found
@@ -127,15 +139,10 @@ def test_the_record_decides_by_a_tenth_or_both_are_held(
         wide = after.name in other and before.identified
         assert after.upper == pytest.approx(1.2 * before.upper**2 / before.value if wide else before.upper)
     # Where certain sliding is sure the record is not asked.
-    own = found.estimates
-    assert exponent.predicted_with([record], AXIS, LAW, first, asked, found, sliding, own) == (found, {}, [])
+    assert decide(other_one, told, found.estimates) == (found, {}, [])
     # Nor where nothing is left that depends on it.
-    doubted = [replace(e, identified=False) for e in own]
-    assert exponent.predicted_with([record], AXIS, LAW, first, asked, found, open_, doubted) == (
-        found,
-        {},
-        [],
-    )
+    doubted = [replace(e, identified=False) for e in found.estimates]
+    assert decide(other_one, open_, doubted) == (found, {}, [])
 
 
 def test_a_fall_of_either_form_has_a_tenth_left_at_the_same_speed() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from stickslip.identify.axis.agreed import AT_REST, BAND_ALONE, widened, with_level, with_rest
+from stickslip.identify.axis.agreed import AT_REST, BAND_ALONE, told_apart, widened, with_rest
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
@@ -68,7 +68,7 @@ def test_a_slope_that_one_band_alone_tells_beside_no_level_is_not_identified(log
     assert low > 10.0 * truth["sigma2"]
     assert high < 2.0 * low
     assert not found.confirmed("sigma2")
-    (judged,) = with_level([estimate("sigma2", 0.5 * (low + high), low, high)], found)
+    (judged,) = told_apart([estimate("sigma2", 0.5 * (low + high), low, high)], found)
     assert not judged.identified
     assert judged.verdict == BAND_ALONE
 
@@ -120,10 +120,10 @@ def test_inertia_and_level_that_one_band_alone_tells_are_not_identified(logs: An
     found, truth = regressed(logs, 1030398, "actual", 1000, "pid", "steps", "flexible")
     assert not found.confirmed("inertia")
     value = 1.117 * truth["inertia"]
-    (judged,) = with_level([estimate("inertia", value, 0.97 * value, 1.03 * value)], found)
+    (judged,) = told_apart([estimate("inertia", value, 0.97 * value, 1.03 * value)], found)
     assert judged.verdict == BAND_ALONE
     calm, _ = regressed(logs, 4, "held", 1000, "p-pi", "production", "clean")
-    (kept,) = with_level([estimate("inertia", value, 0.97 * value, 1.03 * value)], calm)
+    (kept,) = told_apart([estimate("inertia", value, 0.97 * value, 1.03 * value)], calm)
     assert kept.identified
 
 

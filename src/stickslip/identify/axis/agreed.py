@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.axis.settled import ALONE, APART, TWO_METHODS
@@ -39,7 +40,7 @@ __all__ = [
     "on_width",
     "regressed",
     "sliding_values",
-    "with_level",
+    "told_apart",
 ]
 
 ALIGNED = 0.1
@@ -66,8 +67,8 @@ ONE_BAND = (
 BAND_ALONE = (
     "one band of frequencies alone tells it, where level and slope, or motor and load, are not told apart"
 )
-LEVELS = ("fc", "sigma2", "fs", "vs")
-"""What sliding alone tells of friction."""
+LEVELS = ("fc", "sigma2", *FALL)
+"""What sliding alone tells of friction; that of v < 0 too where it has parameters of its own."""
 UNSEEN = (
     "the record slides too little in one direction to tell a level of friction, or when the torque acted; record "
     "longer motion in one direction"
@@ -179,29 +180,8 @@ def agreed(
         Whether the prediction error was asked.
     """
     sliding, parameters = sliding_values(found), {p.name: p for p in vector.free}
-    taken: dict[str, Estimate] = {}
-    notes: list[str] = []
-    doubts = ""
-    held = found.held_for(ALIGNED) and not found.orders
-    estimates, stands = list(estimates), inverse is not None and as_good(inverse, found)
-    for e in estimates:
-        if e.name not in sliding or e.name not in parameters:
-            continue
-        size = scale.get(e.name, math.nan)
-        own = told(e, parameters[e.name], *sliding[e.name], size)
-        apart = abs(e.value - own.value) > math.hypot(e.upper - e.lower, own.upper - own.lower) / 2.0
-        if fine and not apart:
-            # Its intervals are narrow, and hold where the torque acted as simulations take it.
-            taken[e.name] = e if held and e.identified and not own.identified else own
-            continue
-        if fine and abs(e.value - own.value) > SAME * abs(own.value) and e.name in ("inertia", "fc"):
-            doubts = DOUBT.format(name=e.name, other=f"{e.value:.4g}", own=f"{own.value:.4g} {e.unit}")
-        if fine and e.identified and not found.confirmed(e.name):
-            own = both_told(own, e, parameters[e.name])
-        if stands:
-            own, said = held_together(own, plain_value(e.name, inverse), parameters[e.name], size)
-            notes += said
-        taken[e.name] = own
+    held, estimates = known_to_act(found), list(estimates)
+    taken, notes, doubts = of_sliding(estimates, found, parameters, inverse, scale, fine)
     if doubts:
         # Where both disagree on what both can tell, neither value nor interval of the fine one is to be trusted.
         taken |= {
@@ -227,6 +207,43 @@ def agreed(
     return out, notes
 
 
+def known_to_act(found: Regression) -> bool:
+    """Whether the torque is known to act from row to row, and nothing else over the position."""
+    return found.held_for(ALIGNED) and not found.orders
+
+
+def of_sliding(
+    estimates: Iterable[Estimate], found: Regression, parameters: Mapping[str, Parameter],
+    inverse: InverseDynamics | None, scale: Mapping[str, float], fine: bool,
+) -> tuple[dict[str, Estimate], list[str], str]:  # fmt: skip
+    """What certain sliding tells, by name, what is to be said, and why the prediction error is to be doubted, where it
+    contradicts that; arguments as in `agreed`."""
+    sliding, held = sliding_values(found), known_to_act(found)
+    stands = inverse is not None and as_good(inverse, found)
+    taken: dict[str, Estimate] = {}
+    notes: list[str] = []
+    doubts = ""
+    for e in estimates:
+        if e.name not in sliding or e.name not in parameters:
+            continue
+        size = scale.get(e.name, math.nan)
+        own = told(e, parameters[e.name], *sliding[e.name], size)
+        apart = abs(e.value - own.value) > math.hypot(e.upper - e.lower, own.upper - own.lower) / 2.0
+        if fine and not apart:
+            # Its intervals are narrow, and hold where the torque acted as simulations take it.
+            taken[e.name] = e if held and e.identified and not own.identified else own
+            continue
+        if fine and abs(e.value - own.value) > SAME * abs(own.value) and e.name in ("inertia", "fc"):
+            doubts = DOUBT.format(name=e.name, other=f"{e.value:.4g}", own=f"{own.value:.4g} {e.unit}")
+        if fine and e.identified and not found.confirmed(e.name):
+            own = both_told(own, e, parameters[e.name])
+        if stands:
+            own, said = held_together(own, plain_value(e.name, inverse), parameters[e.name], size)
+            notes += said
+        taken[e.name] = own
+    return taken, notes, doubts
+
+
 def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale: float) -> Estimate:
     """An estimate with another value and interval, judged by the same rules, within the parameter's bounds."""
     std = (high - low) / (2.0 * QUANTILE)
@@ -236,7 +253,7 @@ def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale
     return replace(e, value=value, std=std, lower=low, upper=high, identified=not why, verdict=why)
 
 
-def with_level(estimates: Iterable[Estimate], found: Regression) -> tuple[Estimate, ...]:
+def told_apart(estimates: Iterable[Estimate], found: Regression) -> tuple[Estimate, ...]:
     """The estimates, inertia, level and slope of friction not identified where certain sliding does not tell them
     apart; values stay.
 
@@ -329,7 +346,10 @@ def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tup
             why = UNDECIDED.format(name=e.name, own=f"{e.value:.4g}", other=f"{other[0]:.4g} {e.unit}")
             return tuple(replace(x, identified=False, verdict=why) if x.identified else x for x in out)
     return tuple(
-        replace(e, identified=False, verdict=UNSEEN) if e.identified and e.name in LEVELS else e for e in out
+        replace(e, identified=False, verdict=UNSEEN)
+        if e.identified and e.name.removesuffix(NEGATIVE) in LEVELS
+        else e
+        for e in out
     )
 
 

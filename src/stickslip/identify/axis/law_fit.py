@@ -19,7 +19,7 @@ from stickslip.identify.axis.agreed import (
     as_good,
     held_against,
     sliding_values,
-    with_level,
+    told_apart,
 )
 from stickslip.identify.axis.choice import Candidate
 from stickslip.identify.axis.exponent import predicted_with, with_other
@@ -123,7 +123,7 @@ def by_sliding(
     u = vector.coordinates(vector.named(vector.start) | {e.name: e.value for e in estimates})
     estimates = evident(estimates, vector, u, experiments, axis)
     estimates, more = beside_plain(estimates, model, inverse, sliding)
-    estimates = with_level(estimates, sliding)
+    estimates = told_apart(estimates, sliding)
     u = vector.coordinates(vector.named(u) | {e.name: e.value for e in estimates})
     found = with_values(experiments, axis, law, vector, u, asked.extras)
     shown = [replace(e, unit=axis.unit(e.unit)) for e in estimates]
@@ -234,4 +234,4 @@ def checked(result: PredictionError, evidence: Evidence) -> tuple[tuple[Estimate
     if inverse is not None:
         estimates, more = beside_plain(estimates, result.model, inverse, sliding)
         said = [*said, *more]
-    return with_level(estimates, sliding), said
+    return told_apart(estimates, sliding), said

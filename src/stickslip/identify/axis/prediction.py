@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -195,7 +196,7 @@ def searched(
     running = mapped(lambda c: (c, c.search(c.vector.start)), ranked)
     for count, evaluations in ROUNDS:
         going = [search for _, search in running[:count]]
-        mapped(lambda search: search.run(evaluations, tolerance), going)  # noqa: B023 (done at once)
+        mapped(operator.methodcaller("run", evaluations, tolerance), going)
         running = apart(sorted(running[:count], key=lambda entry: entry[1].cost))
     criterion, search = running[0]
     # Outliers would choose among hops by plain squares: from here on the likelihood that weighs them decides.

@@ -29,7 +29,7 @@ from stickslip.identify.regression.band_system import (
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import memory_of
 
-__all__ = ["BandFit", "Number", "fit_band"]
+__all__ = ["QUANTILE", "BandFit", "Number", "fit_band"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Places = np.ndarray[Any, np.dtype[np.int64]]
@@ -38,6 +38,7 @@ CORE = 5
 ROUNDS = 12
 SETTLED = 1e-6  # s: the skew's change at which its search ends
 FARTHEST, STRIDE = 40.0, 4.0  # times the skew's usual size: as far as it is looked for, and in a step
+QUANTILE = 1.96  # standard deviations on either side of 95 %
 SHOWN = 0.03  # of Fc: a fall of friction that is one
 FORM = 0.003  # of Fc: misfit that is assumed at least
 TENSION, FAR = (
@@ -54,6 +55,11 @@ class Number:
 
     value: float
     std: float
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Of 95 %."""
+        return self.value - QUANTILE * self.std, self.value + QUANTILE * self.std
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,11 +22,9 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.uncertainty import RATIO
-from stickslip.identify.regression.band_fit import BandFit, Number
+from stickslip.identify.regression.band_fit import QUANTILE, BandFit, Number
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS, least_squares
 from stickslip.identify.regression.bands import (
-    GAUSSIAN,
-    QUANTILE,
     ROTATED,
     USUALLY,
     calmed,
@@ -130,8 +128,7 @@ class Regression:
 
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval of a number."""
-        n = self.numbers[name]
-        return n.value - QUANTILE * n.std, n.value + QUANTILE * n.std
+        return self.numbers[name].interval
 
     def remainder(self, values: Mapping[str, float]) -> Array:
         """Torque that inertia, sigma2, fc, offset and gravity leave in the rows of certain sliding, N·m (N), shape
@@ -303,8 +300,7 @@ def regress_axis(
     seen = calmed(in_bands(signals, width, *ask), signals, width, *ask)
     if skew is None and abs(seen.fits[0].numbers["skew"].value) > USUALLY * size:
         ask = (axis, {**options, "skew": 0.0}, harmonics, harmonic_period)
-        forms = GAUSSIAN if seen.widened > 1.0 or rough(seen.fits[0]) else tuple(USUAL_EXPONENTS)
-        none = in_bands(signals, seen.widened * width, *ask, exponents=forms)
+        none = in_bands(signals, seen.widened * width, *ask, exponents=seen.exponents)
         seen = decided(seen, replace(none, widened=seen.widened))
     bands = seen.fits
     speed = np.abs(stacked(seen.rows, "speed"))
@@ -323,7 +319,7 @@ def regress_axis(
 
 def told_to_two(number: Number) -> bool:
     """Whether its interval spans a factor of two at most."""
-    low, high = number.value - QUANTILE * number.std, number.value + QUANTILE * number.std
+    low, high = number.interval
     return 0.0 < high <= RATIO * low
 
 

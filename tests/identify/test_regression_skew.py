@@ -1,0 +1,112 @@
+"""When the torque acted, as certain sliding tells it: parts of a row, many rows, and what only looks like them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip.identify.axis.agreed import aligned, on_timing
+from stickslip.identify.doctor import examine
+from stickslip.identify.experiment import Experiment
+from stickslip.identify.regression.regression import regress_axis
+from stickslip.machines.servo import ServoAxis
+from stickslip.record import Record
+
+AXIS = ServoAxis(drive_side="load")
+
+
+def experiment(log: Any) -> Experiment:
+    return Experiment("log", log.time, log.position, log.torque)
+
+
+def record(log: Any) -> Record:
+    return Record(
+        log.time,
+        {"position": log.position, "motor_torque": log.torque},
+        {"position": "rad", "motor_torque": "N·m"},
+    )
+
+
+@pytest.mark.parametrize("column", ["held", "commanded", "actual", "mean"])
+def test_the_skew_is_found_to_a_tenth_of_a_row(logs: Any, column: str) -> None:
+    log = logs.draw(4242, column, 1000, "p-pi", "production", "clean")
+    found = regress_axis([experiment(log)], AXIS)
+    assert found.numbers["skew"].value == pytest.approx(log.truth["skew"], abs=1e-4)
+    low, high = found.interval("skew")
+    assert low <= log.truth["skew"] <= high
+    (sentence,) = on_timing(found)
+    assert ("after" if log.truth["skew"] < 0.0 else "before") in sentence
+
+
+def test_a_skew_of_many_rows_is_found_and_taken_out(logs: Any) -> None:
+    log = logs.draw(4242, "held", 1000, "p-pi", "production", "clean")
+    late = Experiment("late", log.time, log.position, np.interp(log.time - 8e-3, log.time, log.torque))
+    found = regress_axis([late], AXIS)
+    assert found.numbers["skew"].value == pytest.approx(log.truth["skew"] + 8e-3, abs=1e-4)
+    (moved,) = aligned([late], found)
+    assert moved.drive is not None
+    assert np.max(np.abs(moved.drive - log.torque)[20:-20]) < 0.05 * np.max(np.abs(log.torque))
+
+
+@pytest.mark.parametrize("rows", [-5, 5])
+@pytest.mark.parametrize("motion", ["production", "staircase"])
+def test_a_delay_of_many_rows_is_one_beside_play_and_noise(logs: Any, motion: str, rows: int) -> None:
+    for seed, kind in ((996180, "clean"), (996204, "asymmetry"), (996012, "backlash")):
+        log = logs.draw(seed, "held", 1000, "pid", motion, kind)
+        inside = slice(abs(rows), -abs(rows))
+        late = Experiment("late", log.time[inside], log.position[inside], np.roll(log.torque, rows)[inside])
+        found = regress_axis([late], AXIS)
+        low, high = found.interval("skew")
+        wrong = abs(found.numbers["skew"].value - log.truth["skew"] - rows * 1e-3)
+        assert wrong <= max(0.75 * (high - low), 0.1e-3)  # one lies 1.003 half-widths off
+        low, high = found.interval("inertia")
+        assert low <= log.truth["inertia"] <= high
+
+
+def test_a_skew_that_is_given_is_kept(logs: Any) -> None:
+    log = logs.draw(4242, "actual", 1000, "p-pi", "production", "clean")
+    found = regress_axis([experiment(log)], AXIS, skew=0.0)
+    assert found.numbers["skew"].value == 0.0
+    free = regress_axis([experiment(log)], AXIS)
+    assert found.numbers["inertia"].value != free.numbers["inertia"].value
+
+
+@pytest.mark.parametrize(
+    ("loop", "imperfection"), [("feedforward", "clean"), ("p-pi", "backlash"), ("p-pi", "flexible")]
+)
+def test_feedforward_backlash_and_flexibility_are_no_time_skew(
+    logs: Any, loop: str, imperfection: str
+) -> None:
+    log = logs.draw(321, "commanded", 1000, loop, "production", imperfection)
+    assert "time-skew" not in {f.code for f in examine(record(log)).findings}
+
+
+def test_the_doctor_says_when_the_torque_acted(logs: Any) -> None:
+    log = logs.draw(4242, "commanded", 1000, "p-pi", "production", "clean")
+    (said,) = (f for f in examine(record(log)).findings if f.code == "torque-timing")
+    assert said.level == "note"
+    assert f"{abs(log.truth['skew']) * 1e3:.1f}" in said.message
+
+
+def test_ringing_is_not_explained_half_a_cycle_late_by_an_inertia_below_0(logs: Any) -> None:
+    """Tuning steps with cogging: a skew of 5 rows made J -0.3 of the truth, Fc half as high again."""
+    log = logs.draw(140636, "mean", 500, "pid", "steps", "cogging")
+    found = regress_axis([experiment(log)], AXIS)
+    assert abs(found.numbers["skew"].value - log.truth["skew"]) < 0.5 * found.period
+    assert found.numbers["inertia"].value == pytest.approx(log.truth["inertia"], rel=0.2)
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [(993426, "actual", 500, "p-pi", "sine", "cogging"), (993436, "actual", 500, "p-pi", "steps", "cogging"),
+     (990286, "commanded", 500, "feedforward", "sine", "cogging")],
+    ids=lambda cell: str(cell[0]),
+)  # fmt: skip
+def test_cogging_is_no_skew_of_many_rows(logs: Any, cell: Any) -> None:
+    """It was: 3.6, 17 and 5 rows, J 41 % above and 96 % below the truth, both identified."""
+    log = logs.draw(*cell)
+    found = regress_axis([experiment(log)], AXIS)
+    low, high = found.interval("inertia")
+    assert low <= log.truth["inertia"] <= high
