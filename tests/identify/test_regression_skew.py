@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -110,3 +111,9 @@ def test_cogging_is_no_skew_of_many_rows(logs: Any, cell: Any) -> None:
     found = regress_axis([experiment(log)], AXIS)
     low, high = found.interval("inertia")
     assert low <= log.truth["inertia"] <= high
+
+
+def test_one_band_fitted_with_two_skews_confirms_nothing(logs: Any) -> None:
+    found = regress_axis([experiment(logs.draw(4242, "held", 1000, "p-pi", "production", "clean"))], AXIS)
+    assert found.confirmed("inertia")
+    assert not replace(found, bands=(found.bands[0], found.bands[0])).confirmed("inertia")

@@ -32,7 +32,7 @@ __all__ = [
     "decided",
     "in_bands",
     "rough",
-    "telling",
+    "that_tell",
     "together",
 ]
 
@@ -316,12 +316,20 @@ def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:
 # ---- what the bands say together ------------------------------------------------------------
 
 
-def telling(name: str, bands: Sequence[BandFit]) -> list[Number]:
-    """What the bands that tell of a number say."""
-    numbers = [b.numbers[name] for b in bands]
-    least = min(n.std for n in numbers)
+def that_tell(name: str, bands: Sequence[BandFit]) -> list[BandFit]:
+    """The fits that tell of a number."""
+    least = min(b.numbers[name].std for b in bands)
     signed = name in ROTATED or name in ("skew", "offset")
-    return [n for n in numbers if n.std <= max(TELLING * least, 0.0 if signed else NARROW * abs(n.value))]
+
+    def tells(n: Number) -> bool:
+        return n.std <= max(TELLING * least, 0.0 if signed else NARROW * abs(n.value))
+
+    return [b for b in bands if tells(b.numbers[name])]
+
+
+def telling(name: str, bands: Sequence[BandFit]) -> list[Number]:
+    """What the fits that tell of a number say."""
+    return [b.numbers[name] for b in that_tell(name, bands)]
 
 
 def together(name: str, bands: Sequence[BandFit]) -> Number:

@@ -31,7 +31,7 @@ from stickslip.identify.regression.bands import (
     decided,
     in_bands,
     rough,
-    telling,
+    that_tell,
     together,
 )
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows, narrowest_width, signals_of
@@ -198,8 +198,8 @@ class Regression:
         return UNMOVED if swings and not any(self.above_chance(n) for n in unseen) else ""
 
     def confirmed(self, name: str) -> bool:
-        """Whether more than one band tells a number."""
-        return len(telling(name, self.bands)) > 1
+        """Whether more than one band of frequencies tells a number, whatever the skews they were fitted with."""
+        return len({b.corner for b in that_tell(name, self.bands)}) > 1
 
     @property
     def rough(self) -> bool:
