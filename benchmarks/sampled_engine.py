@@ -1,6 +1,6 @@
 """What a sample costs: the sampled engine's located flow and its general step, in one run, with the error of each.
 
-    python benchmarks/sampled_engine.py
+    python benchmarks/sampled_engine.py [--prototypes DIR]
 
 The thesis's axis under a PD of 20 Hz at 1 kHz with LuGre feedforward and a torque limit, at low and at high velocity.
 The error is the largest distance in position from the located flow at a tolerance of 1e-12 rad, which
@@ -10,8 +10,13 @@ The error is the largest distance in position from the located flow at a toleran
 
 from __future__ import annotations
 
+import argparse
+import shutil
+import sys
+import tempfile
 import time
 from functools import partial
+from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
@@ -76,10 +81,38 @@ def ways(law, reference, duration, controller):
     return positions(sampled.run(case(1e-12))), flows | runs
 
 
+def prototypes(folder):
+    """Print what a sample costs in C: the prototypes in a folder, compiled here, at tolerances of their own."""
+    with tempfile.TemporaryDirectory() as own:
+        for file in folder.iterdir():
+            if file.is_file():
+                shutil.copy(file, own)
+        sys.path.insert(0, own)
+        from common import REFS, build, params
+        from tabs import runA, tables
+
+        gms = build("a13.c", "gms.so", "-DPLANT=1", "-DNT=8")
+        lugre = build("a2.c", "lugre.so", "-DNT=10")
+        for motion, (_, _, samples) in REFS.items():
+            p = params(1, motion, 0)
+            loops = {
+                "gms": partial(runA, gms, p, samples, 1e-9, tables(1, p)),
+                "lugre": partial(runA, lugre, params(2, motion, 0), samples, 1e-12, np.zeros(1)),
+            }
+            for law, loop in loops.items():
+                _, least = timed(loop, 20)
+                print(f"{law:<16}{motion:<8}{'C text':<14}{1e6 * least / samples:>10.2f}", flush=True)
+
+
 def main() -> None:
     """Print a line a law, motion and way."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--prototypes", type=Path, metavar="DIR", help="with a13.c and a2.c")
+    options = parser.parse_args()
     controller = ss.Controller(ss.place("PD", INERTIA, 20.0, 1.0), ss.Feedforward(LUGRE), 1.0, TIME)
     print(f"{'law':<16}{'motion':<8}{'way':<14}{'us/sample':>10}{'error, rad':>12}{'events':>8}")
+    if options.prototypes:
+        prototypes(options.prototypes)
     for law in (*LAWS, *OTHERS):
         for motion, (reference, duration) in MOTIONS.items():
             truth, runs = ways(law, reference, duration, controller)

@@ -44,7 +44,7 @@ from stickslip.simulation.recorded_input.contact import Plant
 from stickslip.simulation.sampled.axis import axis_of, general_axis
 from stickslip.simulation.sampled.general import Contact, act_on, contact_of, hold, plant_of, step_on
 from stickslip.simulation.sampled.modes import creep, friction, rest, sign
-from stickslip.simulation.sampled.output import PROGRESS, Output, measure, put_out, write
+from stickslip.simulation.sampled.output import PROGRESS, Output, measure, put_out, with_room, write
 from stickslip.simulation.sampled.rates import BENDS, HOLDS, RESTS, SLIPS, STEPS, STUCK
 from stickslip.simulation.sampled.slip import slip
 from stickslip.simulation.sampled.stick import stick
@@ -144,7 +144,8 @@ def stops_of(case: Case) -> Array:
     others = np.concatenate([case.breaks, case.grid[case.grid > 0.0]])
     times = np.concatenate([samples, others])
     marks = np.concatenate([np.ones(samples.size), np.zeros(others.size)])
-    order = np.lexsort((-marks, times))
+    # Stable: the controller's own stop stands before another at the same time.
+    order = np.argsort(times, kind="stable")
     times, marks = times[order], marks[order]
     first = np.concatenate([[True], np.diff(times) > 1e-12 * max(1.0, duration)])
     out = np.zeros((int(first.sum()), 3))
@@ -165,14 +166,14 @@ def integrate(
     control: Control, axes: Any, states: Any, contact: Contact, stops: Any, output: Output
 ) -> tuple[Any, int]:  # fmt: skip
     """Run from 0 to the last stop; returns rows and code."""
-    axis, z, reached = axes[0], states[0], output.reached[0]
+    axis, z, reached, grid = axes[0], states[0], output.reached[0], output.grid
     starts = states.copy()
-    rows = np.zeros((output.grid.size + 256, len(COLUMNS)))
+    rows = np.zeros((grid.size + 256, len(COLUMNS)))
     storm = np.full(STORM_EVENTS, -1.0)
     code = DONE
     plant = plant_of(contact)
     act(control, axis, z, contact, plant, 0.0)
-    rows = put_out(control, axis, z, 0.0, output, rows)
+    put_out(control, axis, z, 0.0, grid, reached, rows)
     for i in range(stops.shape[0]):
         left = stops[i, 1]
         while left > 0.0 and code == DONE:
@@ -186,27 +187,31 @@ def integrate(
             if axis.metered and taken > 0.0:
                 measure(control, axis, starts[0], z, time, taken, output)
             if z.events != happened:
-                rows = write(control, axis, z, time + taken, 1.0, reached, rows)
+                # Room for the rows of the output times to come is kept.
+                if rows.shape[0] - reached.rows <= grid.size - reached.outputs:
+                    rows = with_room(rows)
+                write(control, axis, z, time + taken, 1.0, reached, rows)
                 code = stormy(z, time + taken, storm)
                 if z.mode < STEPS:
                     refresh(axis, z)
             if z.failed:
                 code = NO_STEP
+            # Here and not once a stop: a stretch that gets nowhere ends, too.
+            if reached.asked or z.steps + z.rejected > MOST_STEPS:
+                code = TOO_STIFF
         reached.time = stops[i, 0] - left
         code = verdict(axis, z) if code == DONE else code
-        if reached.asked or z.steps + z.rejected > MOST_STEPS:
-            code = TOO_STIFF
         if code != DONE:
             break
         if stops[i, 2] > 0.0:
             act(control, axis, z, contact, plant, stops[i, 0])
-        rows = put_out(control, axis, z, stops[i, 0], output, rows)
+        put_out(control, axis, z, stops[i, 0], grid, reached, rows)
     if axis.metered:
         close_standstill(output.acc, reached.time)
-    return rows[: reached.rows].copy(), code
+    return rows[: reached.rows], code
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def advance(axis: Any, z: Any, contact: Contact, plant: Plant, t: float, left: float) -> float:
     """Move on by at most `left` s under the held torque, until something changes; returns the time taken."""
     if z.mode == STEPS:
@@ -222,7 +227,7 @@ def advance(axis: Any, z: Any, contact: Contact, plant: Plant, t: float, left: f
     return creep(axis, z, left)
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def act(control: Control, axis: Any, z: Any, contact: Contact, plant: Plant, t: float) -> None:
     """Let the controller sample, and hold what it answers."""
     motion, sampled = control.motion, control.sampled

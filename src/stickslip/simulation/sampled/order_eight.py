@@ -62,8 +62,8 @@ def text() -> str:
         "from stickslip.simulation.sampled.rates import Trial, combined, rates",
         "",
         "@kernel(exact=False)",
-        "def attempt(m, v0, s0, h):",
-        "    a0, g0, q0 = rates(m, 0.0, v0, s0)",
+        "def attempt(m, start, h):",
+        "    v0, s0, a0, g0, q0 = start",
     ]
     for i, row in enumerate(STAGES, start=1):
         lines += [
@@ -85,4 +85,4 @@ def text() -> str:
 
 _TEXT = text()
 attempt: Any = loaded(f"order_eight_{hashlib.sha256(_TEXT.encode()).hexdigest()[:16]}", _TEXT).attempt
-"""``attempt(m, v0, s0, h)``: the `Trial` of a step of h from velocity v0 and slipping force s0."""
+"""``attempt(m, start, h)``: the `Trial` of a step of h s."""

@@ -14,7 +14,7 @@ from stickslip.simulation.sampled.modes import friction
 from stickslip.simulation.sampled.rates import CREEPS, STUCK
 from stickslip.simulation.sampled.stretch import Stretch, velocity_in, within
 
-__all__ = ["PROGRESS", "Output", "measure", "put_out", "write"]
+__all__ = ["PROGRESS", "Output", "measure", "put_out", "with_room", "write"]
 
 BESIDE = 1e-11
 """s, by which one-sided values of the reference lie inside a stretch."""
@@ -53,33 +53,36 @@ class Output(NamedTuple):
     nodes: Any
 
 
-@kernel(exact=False)
-def write(control: Any, axis: Any, z: Any, t: float, event: float, reached: Any, rows: Any) -> Any:
-    """Write the row at t; returns the rows, grown where they were full."""
-    count = reached.rows
-    if count == rows.shape[0]:
-        grown = np.zeros((2 * count, rows.shape[1]))
-        grown[:count] = rows
-        rows = grown
-    call_profile(control.profile, t, pointer(control.reference_parameters, 0), pointer(control.motion, 0))
-    row = rows[count]
-    row[0], row[1], row[2] = t, control.motion[0], control.motion[1]
-    row[3], row[4] = z.position + z.moved, z.velocity
-    row[5], row[6] = z.torque, friction(axis, z)
-    row[7] = control.sampled.memory[control.sampled.compensation]
-    row[8] = event
-    reached.rows += 1
-    return rows
+@kernel(exact=False, inline=True)
+def write(control: Any, axis: Any, z: Any, t: float, event: float, reached: Any, rows: Any) -> None:
+    """Write the row at t, for which `rows` have room.
+
+    Single elements, and no array handed back: counting references to arrays would cost more than the row.
+    """
+    i, motion = reached.rows, control.motion
+    call_profile(control.profile, t, pointer(control.reference_parameters, 0), pointer(motion, 0))
+    rows[i, 0], rows[i, 1], rows[i, 2] = t, motion[0], motion[1]
+    rows[i, 3], rows[i, 4] = z.position + z.moved, z.velocity
+    rows[i, 5], rows[i, 6] = z.torque, friction(axis, z)
+    rows[i, 7] = control.sampled.memory[control.sampled.compensation]
+    rows[i, 8] = event
+    reached.rows = i + 1
 
 
-@kernel(exact=False)
-def put_out(control: Any, axis: Any, z: Any, t: float, output: Output, rows: Any) -> Any:
-    """Write the rows of the output times up to t; returns the rows."""
-    grid, reached = output.grid, output.reached[0]
+@kernel(exact=False, inline=True)
+def put_out(control: Any, axis: Any, z: Any, t: float, grid: Any, reached: Any, rows: Any) -> None:
+    """Write the rows of the output times up to t."""
     while reached.outputs < grid.size and grid[reached.outputs] <= t + 1e-12 * max(1.0, t):
-        rows = write(control, axis, z, grid[reached.outputs], 0.0, reached, rows)
+        write(control, axis, z, grid[reached.outputs], 0.0, reached, rows)
         reached.outputs += 1
-    return rows
+
+
+@kernel(exact=False)
+def with_room(rows: Any) -> Any:
+    """Twice as many rows, the first ones those that are there."""
+    grown = np.zeros((2 * rows.shape[0], rows.shape[1]))
+    grown[: rows.shape[0]] = rows
+    return grown
 
 
 @kernel(exact=False)

@@ -19,12 +19,14 @@ __all__ = [
     "SPRING",
     "STATE",
     "Slip",
+    "Start",
     "Trial",
     "combined",
     "curve_at",
     "rates",
     "slip_of",
     "spring_of",
+    "start_of",
 ]
 
 RELAXES, FOLLOWS, BENDS = range(3)
@@ -95,6 +97,19 @@ class Slip(NamedTuple):
     of_force: float
 
 
+class Start(NamedTuple):
+    """Where a step starts: the motion, and the rates that every step from there begins with."""
+
+    velocity: float
+    slipping: float
+    """slipping force, N·m"""
+    acceleration: float
+    building: float
+    """rate of the slipping force, N·m/s"""
+    decay: float
+    """rate of its relaxation, 1/s"""
+
+
 class Trial(NamedTuple):
     """A step that may be taken."""
 
@@ -154,6 +169,13 @@ def rates(m: Slip, d: float, v: float, s: float) -> tuple[float, float, float]:
         ds = m.bristle * v * (1.0 - m.direction * s / level)
         force = s + m.lag * ds
     return m.mobility * (m.free - m.spring * d - force - m.viscous * v), ds, decay
+
+
+@kernel(exact=False, inline=True)
+def start_of(m: Slip, z: Any) -> Start:
+    """Where the next step starts."""
+    a, ds, decay = rates(m, 0.0, z.velocity, z.slipping)
+    return Start(z.velocity, z.slipping, a, ds, decay)
 
 
 @kernel(exact=False, inline=True)

@@ -7,12 +7,22 @@ quintic through both of its ends and then located on real steps from the same st
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
 from stickslip.simulation.sampled.modes import break_away, heaviest, sign, stays_below, turn
 from stickslip.simulation.sampled.order_eight import attempt
-from stickslip.simulation.sampled.rates import BENDS, FOLLOWS, Slip, Trial, curve_at, rates, slip_of
+from stickslip.simulation.sampled.rates import (
+    BENDS,
+    FOLLOWS,
+    Slip,
+    Start,
+    Trial,
+    curve_at,
+    rates,
+    slip_of,
+    start_of,
+)
 from stickslip.simulation.sampled.stretch import Stretch, lowest, velocity_in, within
 
 __all__ = ["slip"]
@@ -21,13 +31,15 @@ SHORTEST = 1e-13
 """Of the sample time: a step that must be shorter does not exist."""
 UNSEEN = 0.1
 """Of the tolerance of a step: what a bristle may move on beyond its turn without the turn being located."""
-LOOKS = 4
+LOOKS = 1
 """Pieces of a step in which loads of sticking elements are first compared with the curve."""
 FINEST = 1e-6
 """Of the sample time: what a load may be above the curve for without being seen."""
 ROOT_STEPS = 60
-ARRIVED = 1e-14
-"""rad/s, relative above 1 rad/s: a velocity at its goal."""
+SOON = 1e-3
+"""Of a step: a turn expected sooner is looked for inside it."""
+NEARBY = 0.1
+"""Of a step: what its end may lie beside where it is to end without a step of its own."""
 
 
 @kernel(exact=False)
@@ -36,10 +48,10 @@ def slip(axis: Any, z: Any, left: float) -> float:
     if left == axis.sample_time and z.direction * z.velocity > axis.far and glides(axis, z):
         return left
     m = slip_of(axis, z)
-    way, edge, v0 = z.direction, axis.layer, z.velocity
-    a0, _, _ = rates(m, 0.0, v0, z.slipping)
-    if way * v0 <= edge and way * a0 <= 0.0:
-        if way == 0.0 and a0 == 0.0:
+    start = start_of(m, z)
+    way, edge = z.direction, axis.layer
+    if way * start.velocity <= edge and way * start.acceleration <= 0.0:
+        if way == 0.0 and start.acceleration == 0.0:
             z.acceleration = 0.0
             return left
         turn(axis, z)
@@ -48,22 +60,55 @@ def slip(axis: Any, z: Any, left: float) -> float:
     if z.spring > 0.0:
         h = min(h, math.sqrt(axis.inertia / z.spring))
     h = min(h, axis.longest)
+    expected = turning_expected(m, start, edge)
+    if expected > SOON * h:
+        h = min(h, expected)
     while True:
-        trial, turns, breaks = ended(axis, z, m, a0, accepted(axis, z, m, h))
+        end = ended(axis, z, m, start, accepted(axis, z, m, start, h), left)
+        trial = end.trial
         if trial.error <= axis.local or z.failed:
             break
         # Cut where the axis turns, the step meets the curve's peak there, which the whole one had jumped over unseen.
         h = z.next = shorter(axis, z, trial)
     z.moved, z.velocity, z.slipping = z.moved + trial.moved, trial.velocity, trial.slipping
     z.relaxed += trial.relaxed
-    z.acceleration = acceleration_after(m, trial)
-    if breaks:
+    z.acceleration = end.acceleration
+    if end.breaks:
         break_away(axis, z, way)
-    elif turns:
+    elif end.turns:
         turn(axis, z)
     elif axis.kind == BENDS and way * trial.velocity < edge:
         z.direction = sign(trial.velocity)
     return trial.time
+
+
+class End(NamedTuple):
+    """How a step ends."""
+
+    trial: Trial
+    acceleration: float
+    """rad/s²; before what ends it"""
+    turns: bool
+    """whether the axis turns there"""
+    breaks: bool
+    """whether an element breaks away"""
+
+
+@kernel(exact=False, inline=True)
+def turning_expected(m: Slip, start: Start, edge: float) -> float:
+    """When the velocity should have fallen to the edge, s; infinite where nothing says so.
+
+    As an oscillation about the edge on its way there; by its bend where it still rises.
+    """
+    way = m.direction
+    gap, a = way * start.velocity - edge, way * start.acceleration
+    jerk = -way * m.mobility * (m.spring * start.velocity + start.building + m.viscous * start.acceleration)
+    if jerk >= 0.0:
+        return gap / -a if a < 0.0 else math.inf
+    if a >= 0.0:
+        return (a + math.sqrt(max(a * a - 2.0 * jerk * gap, 0.0))) / -jerk
+    frequency = math.sqrt(-jerk / gap)
+    return math.atan2(gap * frequency, -a) / frequency
 
 
 @kernel(exact=False, inline=True)
@@ -74,32 +119,39 @@ def acceleration_after(m: Slip, trial: Trial) -> float:
 
 
 @kernel(exact=False, inline=True)
-def stretch_of(z: Any, m: Slip, a0: float, trial: Trial) -> Stretch:
+def stretch_of(m: Slip, start: Start, trial: Trial) -> Stretch:
     """What both ends of a step say of the motion inside it."""
-    return Stretch(trial.time, trial.moved, z.velocity, a0, trial.velocity, acceleration_after(m, trial))
+    a1 = acceleration_after(m, trial)
+    return Stretch(trial.time, trial.moved, start.velocity, start.acceleration, trial.velocity, a1)
 
 
 @kernel(exact=False)
-def ended(axis: Any, z: Any, m: Slip, a0: float, trial: Trial) -> tuple[Trial, bool, bool]:
-    """Cut an accepted step where something ends; whether the axis turns there, and whether an element breaks away."""
+def ended(axis: Any, z: Any, m: Slip, start: Start, trial: Trial, left: float) -> End:
+    """Cut an accepted step where something ends, or lead it on to the turn that lies just ahead."""
     way, edge = z.direction, axis.layer
-    whole = stretch_of(z, m, a0, trial)
+    whole = stretch_of(m, start, trial)
     turns = breaks = False
-    if way * trial.velocity < edge:
+    gap, braking = way * trial.velocity - edge, -way * whole.a1
+    if gap < 0.0:
         if axis.kind != BENDS or 2.0 * abs(trial.velocity) * trial.time > UNSEEN * axis.local:
-            trial = arrival(axis, z, m, whole)
-            turns = True
-    elif way * a0 < 0.0 < way * whole.a1:
+            trial, turns = arrival(axis, m, start, whole, trial), True
+    elif 0.0 < gap <= NEARBY * trial.time * braking and gap < braking * (left - trial.time):
+        there = at_velocity(m, trial, way * edge, axis.sample_time)
+        if there.error <= axis.local and there.time <= left:
+            trial, turns = there, True
+    elif way * start.acceleration < 0.0 < -braking:
         low = lowest(whole, way)
-        if way * velocity_in(whole, low) < edge + 0.1 * abs(z.velocity - trial.velocity):
-            trial = attempt(m, z.velocity, z.slipping, low)
+        if way * velocity_in(whole, low) < edge + 0.1 * abs(start.velocity - trial.velocity):
+            trial = attempt(m, start, low)
+            whole = stretch_of(m, start, trial)
             if way * trial.velocity < edge:
-                trial = arrival(axis, z, m, stretch_of(z, m, a0, trial))
-                turns = True
+                trial, turns = arrival(axis, m, start, whole, trial), True
     if z.spring > 0.0:
-        trial, breaks = next_break(axis, z, m, a0, trial)
+        if turns:
+            whole = stretch_of(m, start, trial)
+        trial, breaks = next_break(axis, z, m, start, whole, trial)
         turns = turns and not breaks and way * trial.velocity < edge + 1e-9
-    return trial, turns, breaks
+    return End(trial, whole.a1, turns, breaks)
 
 
 @kernel(exact=False)
@@ -125,16 +177,16 @@ def glides(axis: Any, z: Any) -> bool:
 
 
 @kernel(exact=False)
-def accepted(axis: Any, z: Any, m: Slip, h: float) -> Trial:
+def accepted(axis: Any, z: Any, m: Slip, start: Start, h: float) -> Trial:
     """The first step of at most h that keeps the tolerance; `z.next` is the length that the next one may have."""
     cut = h < z.next
-    trial = attempt(m, z.velocity, z.slipping, h)
+    trial = attempt(m, start, h)
     while not trial.error <= axis.local:
         cut = False
         h = shorter(axis, z, trial)
         if z.failed:
             break
-        trial = attempt(m, z.velocity, z.slipping, h)
+        trial = attempt(m, start, h)
     grown = 4.0
     if trial.error > 1e-5 * axis.local:
         grown = 0.9 * eighth_root(axis.local / trial.error)
@@ -161,55 +213,93 @@ def eighth_root(x: float) -> float:
 
 
 @kernel(exact=False)
-def arrival(axis: Any, z: Any, m: Slip, whole: Stretch) -> Trial:
-    """The step inside one that ends where the velocity has fallen to the edge: Newton's rule on real steps."""
-    way, edge, h = z.direction, axis.layer, whole.time
-    low, high = 0.0, h
-    # A start from where it now arrives: the motion first goes out, so that the cubic's later root is meant.
-    for _ in range(40):
+def arrival(axis: Any, m: Slip, start: Start, whole: Stretch, trial: Trial) -> Trial:
+    """The step from `start` that ends where the velocity has fallen to the edge, in place of one that went on."""
+    way, edge, h = m.direction, axis.layer, whole.time
+    low, high, a = 0.0, h, whole.a1
+    for i in range(ROOT_STEPS):
+        gap = way * trial.velocity - edge
+        if gap == 0.0 or high - low <= 1e-15 * h:
+            break
+        ahead = -gap / (way * a) if a != 0.0 else math.inf
+        if way * a < 0.0 and abs(ahead) <= NEARBY * trial.time:
+            there = at_velocity(m, trial, way * edge, axis.sample_time)
+            if there.error <= axis.local:
+                return there
+        if gap > 0.0:
+            low = trial.time
+        else:
+            high = trial.time
+        t = met(whole, way, edge) if i == 0 else trial.time + ahead
+        if i > 20 or not low < t < high:
+            t = 0.5 * (low + high)
+        trial = attempt(m, start, t)
+        a = acceleration_after(m, trial)
+    return trial
+
+
+@kernel(exact=False)
+def met(whole: Stretch, way: float, edge: float) -> float:
+    """Where the cubic of velocities meets the edge last, to a thousandth of the stretch."""
+    low, high = 0.0, whole.time
+    # A start from the edge itself: the motion first goes out, so that the later of two roots is meant.
+    for _ in range(10):
         t = 0.5 * (low + high)
         if way * velocity_in(whole, t) > edge:
             low = t
         else:
             high = t
-    t, low, high = 0.5 * (low + high), 0.0, h
-    enough = max(ARRIVED * max(1.0, abs(whole.v0)), 1e-3 * (axis.local / axis.sample_time))
-    trial = attempt(m, whole.v0, z.slipping, t)
-    for i in range(ROOT_STEPS):
-        gap = way * trial.velocity - edge
-        if abs(gap) <= enough or high - low <= 1e-15 * h:
-            break
-        if gap > 0.0:
-            low = t
-        else:
-            high = t
-        a = acceleration_after(m, trial)
-        t -= gap / (way * a) if a != 0.0 else 0.0
-        if i > 20 or not low < t < high:
-            t = 0.5 * (low + high)
-        trial = attempt(m, whole.v0, z.slipping, t)
-    return trial
+    return 0.5 * (low + high)
 
 
 @kernel(exact=False)
-def next_break(axis: Any, z: Any, m: Slip, a0: float, trial: Trial) -> tuple[Trial, bool]:
+def at_velocity(m: Slip, trial: Trial, goal: float, span: float) -> Trial:
+    """Lead the end of a step to a velocity nearby, which becomes the independent variable (Henon 1982).
+
+    Runge and Kutta's step of order 4. Its error is taken for that of a step of order 2, over the `span` (s) in which an
+    error of velocity is one of position.
+    """
+    v0, d0, s0 = trial.velocity, trial.moved, trial.slipping
+    dv = goal - v0
+    half = 0.5 * dv
+    a, g, q = rates(m, d0, v0, s0)
+    t1, d1, s1, q1 = 1.0 / a, v0 / a, g / a, q / a
+    v = v0 + half
+    a, g, q = rates(m, d0 + half * d1, v, s0 + half * s1)
+    t2, d2, s2, q2 = 1.0 / a, v / a, g / a, q / a
+    a, g, q = rates(m, d0 + half * d2, v, s0 + half * s2)
+    t3, d3, s3, q3 = 1.0 / a, v / a, g / a, q / a
+    a, g, q = rates(m, d0 + dv * d3, goal, s0 + dv * s3)
+    t4, d4, s4, q4 = 1.0 / a, goal / a, g / a, q / a
+    sixth = dv / 6.0
+    time = trial.time + sixth * (t1 + 2.0 * (t2 + t3) + t4)
+    error = abs(dv * (t2 - t3) * a) * span
+    return Trial(
+        time, d0 + sixth * (d1 + 2.0 * (d2 + d3) + d4), goal, s0 + sixth * (s1 + 2.0 * (s2 + s3) + s4),
+        trial.relaxed + sixth * (q1 + 2.0 * (q2 + q3) + q4), max(error, trial.error),
+    )  # fmt: skip
+
+
+@kernel(exact=False)
+def next_break(
+    axis: Any, z: Any, m: Slip, start: Start, whole: Stretch, trial: Trial
+) -> tuple[Trial, bool]:  # fmt: skip
     """Cut the step where the next element breaks away; whether one does."""
-    way, v0 = z.direction, z.velocity
+    way, v0 = z.direction, start.velocity
     load0 = heaviest(axis, z.moved, way)
     if max(load0, heaviest(axis, z.moved + trial.moved, way)) < axis.lowest:
         return trial, False
     if way * v0 > 0.0 and load0 >= curve_at(axis, v0):
         return Trial(0.0, 0.0, v0, z.slipping, 0.0, 0.0), True
-    whole = stretch_of(z, m, a0, trial)
     h = whole.time
     t, d = 0.0, h / LOOKS
-    w0, b0, before = v0, a0, 0.0
+    w0, b0, before = v0, start.acceleration, 0.0
     while t < h:
         d = min(d, h - t)
         moved, w1, b1 = within(whole, t + d)
         load1 = heaviest(axis, z.moved + moved, way)
         if load1 >= axis.lowest and load1 >= curve_at(axis, w1):
-            return located(axis, z, m, whole, t, t + d)
+            return located(axis, z, m, start, whole, t, t + d)
         piece = Stretch(d, moved - before, w0, b0, w1, b1)
         if stays_below(axis, max(load0, load1), piece, way) or d <= FINEST * axis.sample_time:
             t, load0, w0, b0, before = t + d, load1, w1, b1, moved
@@ -233,7 +323,9 @@ def over(axis: Any, z: Any, trial: Trial) -> float:
 
 
 @kernel(exact=False)
-def located(axis: Any, z: Any, m: Slip, whole: Stretch, low: float, high: float) -> tuple[Trial, bool]:
+def located(
+    axis: Any, z: Any, m: Slip, start: Start, whole: Stretch, low: float, high: float
+) -> tuple[Trial, bool]:  # fmt: skip
     """The step between low and high at whose end the heaviest load meets the curve, and whether it does.
 
     The place is found on the quintic of the whole step (Illinois' rule), then corrected on real steps.
@@ -257,13 +349,13 @@ def located(axis: Any, z: Any, m: Slip, whole: Stretch, low: float, high: float)
             low, f_low, f_high = t, f, 0.5 * f_high
     d = 1e-3 * (end - begin)
     slope = (looked(axis, z, whole, t + d) - looked(axis, z, whole, t - d)) / (2.0 * d)
-    trial = attempt(m, whole.v0, z.slipping, t)
+    trial = attempt(m, start, t)
     for _ in range(ROOT_STEPS):
         f = over(axis, z, trial)
         if abs(f) <= axis.near:
             return trial, True
         t = min(max(t - f / slope, 0.0), h) if slope > 0.0 else end
-        trial = attempt(m, whole.v0, z.slipping, t)
+        trial = attempt(m, start, t)
         if slope <= 0.0 or t == 0.0 or t == h:
             break
     # The quintic has seen more than there is, or the crossing is another one: go on from there.

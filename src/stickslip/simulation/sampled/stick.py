@@ -19,6 +19,8 @@ __all__ = ["Swing", "first_break", "stick"]
 PHASE = 0.5
 """rad of the oscillation between two looks at the loads."""
 ROOT_STEPS = 60
+EARLY = 1.0 - 1e-12
+"""Of the time of a turn, so that rounding does not place it behind."""
 FINEST = 1e-6
 """Of the sample time: what a load may be above the curve for without being seen."""
 
@@ -173,22 +175,23 @@ def meeting(axis: Any, swing: Swing, begin: Moment, end: Moment, way: float) -> 
 @kernel(exact=False)
 def turning_time(swing: Swing, low: float, high: float, way: float) -> float:
     """The time between low and high at which the motion turns, from the side on which it still moves `way`."""
+    lin = swing.lin
+    if lin.discriminant > 0.0:
+        # Every turn lies half a period after the one before.
+        first = math.atan2(
+            swing.velocity * lin.frequency, lin.square * swing.off + lin.decay * swing.velocity
+        )
+        turns = math.ceil((low * lin.frequency - first) / math.pi)
+        t = (first + turns * math.pi) / lin.frequency
+        return min(max(t * EARLY, low), high)
     for _ in range(ROOT_STEPS):
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high or high - low < 1e-9 * high:
             break
-        there = after(swing, middle)
-        slope = acceleration_at(swing.lin, there)
-        guess = middle - there.velocity / slope if slope != 0.0 else middle
-        if there.velocity * way > 0.0:
+        if after(swing, middle).velocity * way > 0.0:
             low = middle
         else:
             high = middle
-        if low < guess < high:
-            if after(swing, guess).velocity * way > 0.0:
-                low = guess
-            else:
-                high = guess
     return low
 
 
