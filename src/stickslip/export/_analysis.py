@@ -7,11 +7,11 @@ indices and conditions.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Facts", "Kind", "analyse", "kind_of", "merged"]
+__all__ = ["Facts", "Kind", "analyse", "fields_read", "kind_of", "merged"]
 
 Kind = Literal["real", "int", "bool"]
 
@@ -54,6 +54,16 @@ class Facts:
     structures: frozenset[str]
     writes: frozenset[str]
     uses: frozenset[str]
+
+
+def fields_read(trees: Iterable[ast.AST], owners: Container[str] = ("u",)) -> set[str]:
+    """The fields of structures, of the surroundings unless others are named, that functions read or write."""
+    return {
+        node.attr
+        for tree in trees
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in owners
+    }
 
 
 def analyse(functions: Mapping[str, ast.FunctionDef]) -> dict[str, Facts]:

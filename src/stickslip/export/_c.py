@@ -78,6 +78,8 @@ class _C(Language):
     }  # fmt: skip
 
     access: ClassVar[str] = "->"
+    branches: ClassVar[tuple[str, str, str, str]] = ("if ({}) {{", "}} else if ({}) {{", "} else {", "}")
+    counting: ClassVar[tuple[str, str]] = ("for (int {i} = {first}; {i} < {last}; {i}++) {{", "}")
 
     def __init__(self, facts: Facts, dialect: Dialect, known: Mapping[str, Facts]) -> None:
         super().__init__(facts, known)
@@ -154,33 +156,6 @@ class _C(Language):
     def call_statement(self, node: ast.Call) -> list[str]:
         callee = self.known.get(node.func.id) if isinstance(node.func, ast.Name) else None
         return [f"{'(void)' if callee and callee.returns else ''}{self.call(node)};"]
-
-    def leave(self) -> str:
-        return "break;"
-
-    def condition(self, node: ast.If, depth: int) -> list[str]:
-        pad = self.indent * depth
-        out = [f"{pad}if ({self.expression(node.test)}) {{", *self.block(node.body, depth + 1)]
-        while (
-            len(node.orelse) == 1
-            and isinstance(node.orelse[0], ast.If)
-            and not self.facts.opened.get(id(node.orelse[0]))
-        ):
-            node = node.orelse[0]
-            out += [f"{pad}}} else if ({self.expression(node.test)}) {{", *self.block(node.body, depth + 1)]
-        if node.orelse:
-            out += [f"{pad}}} else {{", *self.block(node.orelse, depth + 1)]
-        return [*out, f"{pad}}}"]
-
-    def loop(self, node: ast.For, depth: int) -> list[str]:
-        assert isinstance(node.target, ast.Name)
-        assert isinstance(node.iter, ast.Call)
-        pad, i = self.indent * depth, safe(node.target.id)
-        first, last = (["0"] if len(node.iter.args) == 1 else []) + [
-            self.expression(a) for a in node.iter.args
-        ]
-        head = f"for (int {i} = {first}; {i} < {last}; {i}++)"
-        return [f"{pad}{head} {{", *self.block(node.body, depth + 1), f"{pad}}}"]
 
 
 def safe(name: str) -> str:

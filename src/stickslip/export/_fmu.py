@@ -22,6 +22,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from stickslip.export import c99
+from stickslip.export._analysis import fields_read
 from stickslip.export._c import safe
 from stickslip.export._text import ascii_only, render
 from stickslip.export.job import Job
@@ -161,14 +162,7 @@ def _of_field(f: Field, owner: str, i: int, causality: str, start: float | None,
 
 def surroundings_read(job: Job) -> Iterable[Variable]:
     """Inputs for what the law reads besides its velocity."""
-    import ast
-
-    read = {
-        node.attr
-        for tree in c99.translated(job).values()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "u"
-    }
+    read = fields_read(c99.translated(job).values())
     defaults = Surroundings()._asdict()
     for name, unit in SURROUNDINGS.items():
         if name in read:

@@ -10,11 +10,33 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.export.job import Check
+from stickslip.export.job import Check, Export
 
-__all__ = ["played"]
+__all__ = ["checked", "played"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+def checked(
+    export: Export,
+    time: Array,
+    dt: Array,
+    inputs: Mapping[str, Array],
+    expected: Mapping[str, Array],
+    bound: float = 0.0,
+    off: str = "N·m off the definition",
+) -> Check:
+    """Validate the units of an export, and play them: their outputs may be `bound` off what is expected, (n,) each."""
+    errors: dict[str, float] = {}
+    for name, unit in export.files.items():
+        if not name.endswith(".fmu"):
+            continue
+        answer = played(unit, time, dt, inputs, tuple(expected))
+        if isinstance(answer, Check):
+            return answer
+        errors[name] = float(np.abs(answer - np.column_stack([*expected.values()])).max())
+    worst = max(errors.values())
+    return Check(worst <= bound, f"FMPy: valid; at most {worst:.3g} {off}", errors)
 
 
 def played(

@@ -31,6 +31,12 @@ class Language(ABC):
         How an operator of Python is spelt.
     access : str
         What stands between a structure and its field.
+    branches : (str, str, str, str)
+        Lines of a condition ({} stands for it), of another where that does not hold, of neither, and of the end.
+    counting : (str, str)
+        Lines of a loop's head (``i`` counts from ``first`` and stays below ``last``) and of its end.
+    counting_at : int
+        How tightly `first` and `last` must bind in there.
     """
 
     indent: ClassVar[str] = "    "
@@ -41,6 +47,9 @@ class Language(ABC):
     }  # fmt: skip
 
     access: ClassVar[str] = "."
+    branches: ClassVar[tuple[str, str, str, str]]
+    counting: ClassVar[tuple[str, str]]
+    counting_at: ClassVar[int] = CONDITION
 
     def __init__(self, facts: Facts, known: Mapping[str, Facts]) -> None:
         self.facts, self.known = facts, known
@@ -76,6 +85,34 @@ class Language(ABC):
         if isinstance(node, (ast.Pass, ast.Expr)):
             return []
         raise self.refused(node)
+
+    def condition(self, node: ast.If, depth: int) -> list[str]:
+        """The lines of a condition with all that is tried where it does not hold."""
+        pad = self.indent * depth
+        first, other, neither, end = self.branches
+        out = [pad + first.format(self.expression(node.test)), *self.block(node.body, depth + 1)]
+        while len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
+            if any(self.declaration(name) for name in self.facts.opened.get(id(node.orelse[0]), ())):
+                break
+            node = node.orelse[0]
+            out += [pad + other.format(self.expression(node.test)), *self.block(node.body, depth + 1)]
+        if node.orelse:
+            out += [pad + neither, *self.block(node.orelse, depth + 1)]
+        return [*out, pad + end]
+
+    def loop(self, node: ast.For, depth: int) -> list[str]:
+        """The lines of a loop over ``range``."""
+        assert isinstance(node.target, ast.Name)
+        assert isinstance(node.iter, ast.Call)
+        pad, (head, end) = self.indent * depth, self.counting
+        bounds = [self.expression(a, self.counting_at) for a in node.iter.args]
+        first, last = (["0"] if len(bounds) == 1 else []) + bounds
+        head = head.format(i=self.word(node.target.id), first=first, last=last)
+        return [pad + head, *self.block(node.body, depth + 1), pad + end]
+
+    def leave(self) -> str:
+        """Out of the loop."""
+        return "break;"
 
     def indented(self, lines: Sequence[str], depth: int) -> list[str]:
         """Lines set in."""
@@ -243,9 +280,3 @@ class Language(ABC):
     def returning(self, node: ast.Return) -> list[str]: ...
     @abstractmethod
     def call_statement(self, node: ast.Call) -> list[str]: ...
-    @abstractmethod
-    def leave(self) -> str: ...
-    @abstractmethod
-    def condition(self, node: ast.If, depth: int) -> list[str]: ...
-    @abstractmethod
-    def loop(self, node: ast.For, depth: int) -> list[str]: ...

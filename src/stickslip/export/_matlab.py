@@ -51,6 +51,8 @@ class _Matlab(Language):
     operators: ClassVar[dict[type[ast.AST], str]] = {
         **Language.operators, ast.And: "&&", ast.Or: "||", ast.Not: "~", ast.NotEq: "~="
     }  # fmt: skip
+    branches: ClassVar[tuple[str, str, str, str]] = ("if {}", "elseif {}", "else", "end")
+    counting: ClassVar[tuple[str, str]] = ("for {i} = {first}:({last} - 1)", "end")
 
     # ---- expressions ---------------------------------------------------------------------------------
 
@@ -125,29 +127,6 @@ class _Matlab(Language):
             return []
         outputs = [*(["~"] if callee.returns else []), *self.changed(node, callee)]
         return [f"[{', '.join(outputs)}] = {self.call(node)};"]
-
-    def leave(self) -> str:
-        return "break;"
-
-    def condition(self, node: ast.If, depth: int) -> list[str]:
-        pad = self.indent * depth
-        out = [f"{pad}if {self.expression(node.test)}", *self.block(node.body, depth + 1)]
-        while len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
-            node = node.orelse[0]
-            out += [f"{pad}elseif {self.expression(node.test)}", *self.block(node.body, depth + 1)]
-        if node.orelse:
-            out += [f"{pad}else", *self.block(node.orelse, depth + 1)]
-        return [*out, f"{pad}end"]
-
-    def loop(self, node: ast.For, depth: int) -> list[str]:
-        assert isinstance(node.target, ast.Name)
-        assert isinstance(node.iter, ast.Call)
-        pad = self.indent * depth
-        first, last = (["0"] if len(node.iter.args) == 1 else []) + [
-            self.expression(a) for a in node.iter.args
-        ]
-        head = f"{pad}for {safe(node.target.id)} = {first}:({last} - 1)"
-        return [head, *self.block(node.body, depth + 1), f"{pad}end"]
 
 
 def safe(name: str) -> str:

@@ -70,6 +70,9 @@ class _Modelica(Language):
     operators: ClassVar[dict[type[ast.AST], str]] = {
         **Language.operators, ast.And: "and", ast.Or: "or", ast.Not: "not ", ast.NotEq: "<>"
     }  # fmt: skip
+    branches: ClassVar[tuple[str, str, str, str]] = ("if {} then", "elseif {} then", "else", "end if;")
+    counting: ClassVar[tuple[str, str]] = ("for {i} in {first}:{last} - 1 loop", "end for;")
+    counting_at: ClassVar[int] = ATOM
 
     def __init__(
         self, facts: Facts, known: Mapping[str, Facts], counts: Mapping[str, int], last: set[int]
@@ -164,33 +167,6 @@ class _Modelica(Language):
             return []
         outputs = [*([""] if callee.returns else []), *self.changed(node, callee)]
         return [f"({', '.join(outputs)}) := {self.call(node)};"]
-
-    def leave(self) -> str:
-        return "break;"
-
-    def condition(self, node: ast.If, depth: int) -> list[str]:
-        pad = self.indent * depth
-        out = [f"{pad}if {self.expression(node.test)} then", *self.block(node.body, depth + 1)]
-        while (
-            len(node.orelse) == 1
-            and isinstance(node.orelse[0], ast.If)
-            and not self.facts.opened.get(id(node.orelse[0]))
-        ):
-            node = node.orelse[0]
-            out += [f"{pad}elseif {self.expression(node.test)} then", *self.block(node.body, depth + 1)]
-        if node.orelse:
-            out += [f"{pad}else", *self.block(node.orelse, depth + 1)]
-        return [*out, f"{pad}end if;"]
-
-    def loop(self, node: ast.For, depth: int) -> list[str]:
-        assert isinstance(node.target, ast.Name)
-        assert isinstance(node.iter, ast.Call)
-        pad = self.indent * depth
-        first, last = (["0"] if len(node.iter.args) == 1 else []) + [
-            self.expression(a, ATOM) for a in node.iter.args
-        ]
-        head = f"{pad}for {safe(node.target.id)} in {first}:{last} - 1 loop"
-        return [head, *self.block(node.body, depth + 1), f"{pad}end for;"]
 
 
 def own_name(name: str) -> str:

@@ -100,11 +100,11 @@ def mujoco_run(text: str, h: float, stiffness: float, end: Reference, count: int
     return position
 
 
-def drift(loaded: Any, torque: float, duration: float = 1.0) -> float:
-    """How far a load moves the joint, rad."""
+def drift(loaded: Any, torque: float) -> float:
+    """How far a load moves the joint in a second, rad."""
     engine: Any = importlib.import_module("mujoco")
     data = engine.MjData(loaded)
     data.qfrc_applied[0] = torque
-    for _ in range(math.ceil(duration / loaded.opt.timestep)):
+    for _ in range(math.ceil(1.0 / loaded.opt.timestep)):
         engine.mj_step(loaded, data)
     return abs(float(data.qpos[0]))

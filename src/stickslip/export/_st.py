@@ -78,6 +78,8 @@ class _St(Language):
     operators: ClassVar[dict[type[ast.AST], str]] = {
         **Language.operators, ast.And: "AND", ast.Or: "OR", ast.Not: "NOT ", ast.NotEq: "<>", ast.Eq: "="
     }  # fmt: skip
+    counting: ClassVar[tuple[str, str]] = ("FOR {i} := {first} TO {last} - 1 DO", "END_FOR;")
+    counting_at: ClassVar[int] = ATOM
 
     def __init__(
         self, name: str, names: Names, facts: Facts, known: Mapping[str, Facts], counts: Mapping[str, int]
@@ -208,16 +210,6 @@ class _St(Language):
         if node.orelse:
             out += [f"{pad}ELSE", *self.block(node.orelse, depth + 1)]
         return [*out, f"{pad}END_IF;"]
-
-    def loop(self, node: ast.For, depth: int) -> list[str]:
-        assert isinstance(node.target, ast.Name)
-        assert isinstance(node.iter, ast.Call)
-        pad = self.indent * depth
-        first, last = (["0"] if len(node.iter.args) == 1 else []) + [
-            self.expression(a, ATOM) for a in node.iter.args
-        ]
-        head = f"{pad}FOR {self.names.words[node.target.id]} := {first} TO {last} - 1 DO"
-        return [head, *self.block(node.body, depth + 1), f"{pad}END_FOR;"]
 
 
 def number(value: float) -> str:

@@ -28,12 +28,7 @@ def _environment() -> jinja2.Environment:
         autoescape=False,
     )
     made.filters["plain"] = ascii_only
-    made.filters["ljust32"] = _padded
     return made
-
-
-def _padded(text: str) -> str:
-    return text.ljust(32)
 
 
 def render(template: str, **values: Any) -> str:

@@ -35,7 +35,7 @@ from stickslip.export.golden import (
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.nearest import read_by
 from stickslip.export.target import Target
-from stickslip.spec import Field, Law, Surroundings
+from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
 __all__ = ["SINGLE_BOUND", "TARGET", "checked", "dialect_of", "translated", "write"]
@@ -110,7 +110,7 @@ def write(job: Job) -> Export:
         small=[n for n in ("expm1f", "log1pf") if f"{n}(" in text],
         extremes=[n for n in ("min", "max") if f"{job.name}_{n}(" in text],
         identified=[*initial(law.fields, p._asdict(), dialect)],
-        reset=[*cleared(law, dialect)],
+        reset=[*cleared(law.state_fields, "z", dialect)],
     )
     columns = [*vectors, *([room] if job.single else [])]
     rows = [", ".join(repr(float(x)) for x in row) for row in zip(*columns)]
@@ -163,15 +163,16 @@ def structures(job: Job, dialect: Dialect) -> Iterable[Mapping[str, Any]]:
     law = job.model.law
     yield structure("parameters", "Parameters of the law.", law.fields, dialect)
     yield structure("state", "What the contact remembers from step to step.", law.state_fields, dialect)
+    yield surroundings("What the contact depends on besides its velocity.", dialect)
+
+
+def surroundings(about: str, dialect: Dialect) -> Mapping[str, Any]:
+    """The structure of what friction depends on."""
     around = [
         {"declared": f"{dialect.real} {name};", "meaning": SURROUNDINGS.get(name, name)}
         for name in Surroundings._fields
     ]
-    yield {
-        "name": "surroundings",
-        "about": "What the contact depends on besides its velocity.",
-        "fields": around,
-    }
+    return {"name": "surroundings", "about": about, "fields": around}
 
 
 def structure(name: str, about: str, fields: Sequence[Field], dialect: Dialect) -> Mapping[str, Any]:
@@ -219,16 +220,17 @@ def initial(
         yield {"value": "0", "about": "this law has none"}
 
 
-def cleared(law: Law, dialect: Dialect) -> Iterable[str]:
-    """Assignments that put a state to rest."""
+def cleared(fields: Sequence[Field], owner: str, dialect: Dialect) -> Iterable[str]:
+    """Assignments of zero to every field of a structure."""
     zero = dialect.number(0.0)
-    for f in law.state_fields:
+    for f in fields:
         if f.per_element:
-            yield f"for (int i = 0; i < {dialect.count(f'{f.par.per}s_')}; i++) {{ z->{safe(f.name)}[i] = {zero}; }}"
+            count = dialect.count(f"{f.par.per}s_")
+            yield f"for (int i = 0; i < {count}; i++) {{ {owner}->{safe(f.name)}[i] = {zero}; }}"
         else:
-            yield f"z->{safe(f.name)} = {zero};"
-    if not law.state_fields:
-        yield "z->none = 0;"
+            yield f"{owner}->{safe(f.name)} = {zero};"
+    if not fields:
+        yield f"{owner}->none = 0;"
 
 
 # ---- the check -------------------------------------------------------------------------------------------------

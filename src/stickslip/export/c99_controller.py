@@ -15,18 +15,19 @@ import numpy as np
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.controller import Controller
 from stickslip.export._analysis import Facts, analyse
-from stickslip.export._c import Dialect, functions, head, safe
+from stickslip.export._c import Dialect, functions, head
 from stickslip.export._step_error import PARTS, about_steps
 from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.c99 import (
     SINGLE_BOUND,
     STRUCTURES,
-    SURROUNDINGS,
     checked,
+    cleared,
     given,
     initial,
     scale_of,
     structure,
+    surroundings,
 )
 from stickslip.export.controllers import (
     STILL,
@@ -42,7 +43,7 @@ from stickslip.export.controllers import (
 )
 from stickslip.export.golden import Samples, as_csv
 from stickslip.export.job import Check, Export
-from stickslip.spec import Field, Surroundings, fields_of
+from stickslip.spec import Surroundings, fields_of
 
 __all__ = ["CONTROLLER", "check", "step_error_of", "write"]
 
@@ -166,27 +167,9 @@ def structures(controller: Controller, dialect: Dialect) -> Iterable[Mapping[str
     """The structures of the header."""
     yield structure("parameters", "Parameters of the laws.", controller.fields, dialect)
     yield structure("state", "What the laws remember.", controller.state_fields, dialect)
-    around = [
-        {"declared": f"{dialect.real} {name};", "meaning": SURROUNDINGS.get(name, name)}
-        for name in Surroundings._fields
-    ]
-    about = "What friction depends on; the controller writes position and time."
-    yield {"name": "surroundings", "about": about, "fields": around}
+    yield surroundings("What friction depends on; the controller writes position and time.", dialect)
     yield structure("settings", "Settings of the controller.", fields_of(Settings), dialect)
     yield structure("memory", "What the laws see, and what the controller remembers.", MEMORY, dialect)
-
-
-def cleared(fields: tuple[Field, ...], owner: str, dialect: Dialect) -> Iterable[str]:
-    """Assignments of zero to every field of a structure."""
-    zero = dialect.number(0.0)
-    for f in fields:
-        if f.per_element:
-            count = dialect.count(f"{f.par.per}s_")
-            yield f"for (int i = 0; i < {count}; i++) {{ {owner}->{safe(f.name)}[i] = {zero}; }}"
-        else:
-            yield f"{owner}->{safe(f.name)} = {zero};"
-    if not fields:
-        yield f"{owner}->none = 0;"
 
 
 CONTROLLER = ControllerTarget(write, check)

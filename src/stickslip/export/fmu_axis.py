@@ -15,12 +15,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.export._analysis import analyse
+from stickslip.export._analysis import analyse, fields_read
 from stickslip.export._c import Dialect, functions
 from stickslip.export._fmu import Variable, contents_of, law_variables, numbered, surroundings_read, units_of
-from stickslip.export._fmu_run import played
+from stickslip.export._fmu_run import checked
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export.golden import csv_of
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.subset import named
@@ -103,7 +104,14 @@ def write(job: Job) -> Export:
         compiled=not notes,
         **about_steps(job.model, SUBSTEPS, held=True),
     )
-    return Export({**files, "golden.csv": as_csv(driven(job)), "README.md": readme}, notes)
+    return Export(
+        {
+            **files,
+            "golden.csv": csv_of("dt_s,torque_Nm,position_rad,velocity_rad_s", driven(job)),
+            "README.md": readme,
+        },
+        notes,
+    )
 
 
 # ---- the step in C ------------------------------------------------------------------------------------------------
@@ -138,7 +146,7 @@ def step_code(name: str) -> Mapping[str, Any]:
         "least": step.LEAST,
         "functions": [{"about": ascii_only(first_line(doc)), "lines": lines} for _, doc, lines in written],
         "structures": [
-            {"name": STRUCTURES[a], "about": about, "fields": fields_read(trees, a, step.LAYOUTS[a].scalars)}
+            {"name": STRUCTURES[a], "about": about, "fields": fields_used(trees, a, step.LAYOUTS[a].scalars)}
             for a, about in ABOUT.items()
         ],
         "extremes": [each for each in ("min", "max") if f"{dialect.prefix}_{each}(" in text],
@@ -157,15 +165,10 @@ def declaration(function: Callable[..., Any]) -> ast.FunctionDef:
     return found
 
 
-def fields_read(trees: Mapping[str, ast.FunctionDef], argument: str, fields: tuple[str, ...]) -> list[str]:
+def fields_used(trees: Mapping[str, ast.FunctionDef], argument: str, fields: tuple[str, ...]) -> list[str]:
     """The fields of a structure that the functions use, in its order."""
     names = [a for a, kind in STRUCTURES.items() if kind == STRUCTURES[argument]]
-    used = {
-        node.attr
-        for tree in trees.values()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in names
-    }
+    used = fields_read(trees.values(), names)
     return [field for field in fields if field in used]
 
 
@@ -187,31 +190,13 @@ def driven(job: Job, count: int = 400, step: float = 1e-3, seed: int = 1) -> Dri
     return Driven(time[1:] - time[:-1], torque, motion[1:, 0], motion[1:, 1])
 
 
-def as_csv(vectors: Driven) -> str:
-    """The vectors as CSV; numbers with all their digits."""
-    rows = "\n".join(",".join(repr(float(x)) for x in row) for row in zip(*vectors))
-    return f"dt_s,torque_Nm,position_rad,velocity_rad_s\n{rows}\n"
-
-
 def check(job: Job, export: Export) -> Check:
     """Validate the units in FMPy and drive them as the package's own axis was driven."""
-    expected = np.genfromtxt(str(export.files["golden.csv"]).splitlines(), delimiter=",", names=True)
-    errors: dict[str, float] = {}
-    still = np.zeros(expected.size)  # the package's axis takes no account of a slow change over time
-    for name, unit in export.files.items():
-        if not name.endswith(".fmu"):
-            continue
-        answer = played(
-            unit, still, expected["dt_s"], {"torque": expected["torque_Nm"]}, ("position", "velocity")
-        )
-        if isinstance(answer, Check):
-            return answer
-        off = np.abs(answer - np.column_stack([expected["position_rad"], expected["velocity_rad_s"]]))
-        errors[name] = float(off.max())
-    worst = max(errors.values())
-    return Check(
-        worst <= BOUND, f"FMPy: valid; at most {worst:.3g} rad or rad/s off the package's axis", errors
-    )
+    golden = np.genfromtxt(str(export.files["golden.csv"]).splitlines(), delimiter=",", names=True)
+    still = np.zeros(golden.size)  # the package's axis takes no account of a slow change over time
+    expected = {"position": golden["position_rad"], "velocity": golden["velocity_rad_s"]}
+    off = "rad or rad/s off the package's axis"
+    return checked(export, still, golden["dt_s"], {"torque": golden["torque_Nm"]}, expected, BOUND, off)
 
 
 TARGET = Target(

@@ -6,7 +6,6 @@ holds its torque in between: the master steps the controller, hands the torque o
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Iterable
 from types import SimpleNamespace
 
@@ -14,6 +13,7 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.export import c99, c99_controller
+from stickslip.export._analysis import fields_read
 from stickslip.export._fmu import (
     SURROUNDINGS,
     Contents,
@@ -23,7 +23,7 @@ from stickslip.export._fmu import (
     units_of,
     wholes_of,
 )
-from stickslip.export._fmu_run import played
+from stickslip.export._fmu_run import checked
 from stickslip.export._text import render
 from stickslip.export.controllers import (
     STILL,
@@ -68,13 +68,9 @@ def variables_of(controller: Controller) -> list[Variable]:
 def surroundings_read(controller: Controller) -> Iterable[Variable]:
     """Inputs for what the held friction laws read; position and time are the controller's own."""
     trees = trees_of(controller, ["_sample"])
-    read = {
-        node.attr
-        for name, tree in trees.items()
-        if name.strip("_") != "unusable"  # which looks at all of them
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "u"
-    }
+    read = fields_read(
+        t for name, t in trees.items() if name.strip("_") != "unusable"
+    )  # it looks at all of them
     for name in ("load", "temperature"):
         if name in read:
             about = c99.SURROUNDINGS[name].rpartition(",")[0]
@@ -127,16 +123,7 @@ def check(export: Export, name: str) -> Check:
     names = (*GIVEN, "torque", "load", "temperature")
     time, given = rows[:, 0], dict(zip(names, rows.T[1:]))
     expected, dt = given.pop("torque"), np.full(len(rows), rows[1, 0])
-    errors: dict[str, float] = {}
-    for file, unit in export.files.items():
-        if not file.endswith(".fmu"):
-            continue
-        answer = played(unit, time, dt, given, ("torque",))
-        if isinstance(answer, Check):
-            return answer
-        errors[file] = float(np.abs(answer[:, 0] - expected).max())
-    worst = max(errors.values())
-    return Check(worst == 0.0, f"FMPy: valid; at most {worst:.3g} N·m off the definition", errors)
+    return checked(export, time, dt, given, {"torque": expected})
 
 
 CONTROLLER = ControllerTarget(write, check)

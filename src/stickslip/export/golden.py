@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +19,7 @@ __all__ = [
     "answered",
     "as_csv",
     "changing",
+    "csv_of",
     "golden",
     "golden_around",
     "random_motion",
@@ -66,13 +66,13 @@ class Surrounded(NamedTuple):
     time: Array
 
 
-def random_steps(count: int, seed: int, scale: float = 1.0) -> tuple[Array, Array, Array, Array]:
+def random_steps(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
     """v0, v1, dt and position of a random motion: speeds over 8 decades, reversals and stops.
 
-    The velocity goes on from step to step; dt runs from 1e-6 to 1e-2 s. ``scale`` is the greatest speed, rad/s.
+    The velocity goes on from step to step, up to 1 rad/s; dt runs from 1e-6 to 1e-2 s.
     """
     draw = np.random.default_rng(seed)
-    speed = scale * 10.0 ** draw.uniform(-8.0, 0.0, count + 1)
+    speed = 10.0 ** draw.uniform(-8.0, 0.0, count + 1)
     speed *= np.cumprod(draw.choice((-1.0, 1.0), count + 1, p=(0.25, 0.75)))
     speed[draw.random(count + 1) < 0.05] = 0.0
     dt = 10.0 ** draw.uniform(-6.0, -2.0, count)
@@ -223,8 +223,10 @@ HEADS: dict[type, str] = {
 
 def as_csv(vectors: Golden | Surrounded | Samples) -> str:
     """The vectors as CSV; numbers with all their digits."""
-    out = io.StringIO()
-    out.write(f"{HEADS[type(vectors)]}\n")
-    for row in zip(*vectors):
-        out.write(",".join(repr(float(x)) for x in row) + "\n")
-    return out.getvalue()
+    return csv_of(HEADS[type(vectors)], vectors)
+
+
+def csv_of(head: str, columns: Iterable[Iterable[float]]) -> str:
+    """Columns of numbers under a head as CSV."""
+    rows = "\n".join(",".join(repr(float(x)) for x in row) for row in zip(*columns))
+    return f"{head}\n{rows}\n"

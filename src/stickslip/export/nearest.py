@@ -7,7 +7,6 @@ with its residual on the model's sliding curve, which `Job.nearest` takes.
 
 from __future__ import annotations
 
-import ast
 import functools
 import importlib
 import math
@@ -20,6 +19,7 @@ import numpy as np
 from stickslip import plugins
 from stickslip.binding import NEGATIVE
 from stickslip.errors import ParameterError
+from stickslip.export._analysis import fields_read
 from stickslip.export._sliding import Curve
 from stickslip.export.job import CannotCarry, Job
 from stickslip.model import Model
@@ -323,13 +323,7 @@ def surroundings_of(model: Model) -> frozenset[str]:
 def _surroundings_in(law: Law) -> frozenset[str]:
     """Of a law: an export asks several times, and translates the law for it."""
     trees = named({"_step": law.step}, law_layouts(law))
-    read = {
-        node.attr
-        for tree in trees.values()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "u"
-    }
-    return frozenset(read - {"applied"})
+    return frozenset(fields_read(trees.values()) - {"applied"})
 
 
 def read_by(model: Model) -> str:

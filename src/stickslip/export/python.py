@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import math
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import render
@@ -17,7 +19,7 @@ from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
-__all__ = ["TARGET", "alone", "constant", "count_by_constant", "indent_docstring"]
+__all__ = ["TARGET", "alone", "assigned", "cleared", "constant", "count_by_constant", "indent_docstring"]
 
 SUBSTEPS = "`contact.step(v0, v1, dt, substeps=4)` divides a step, the velocity linear in between."
 
@@ -35,8 +37,8 @@ def write(job: Job) -> Export:
         law=law,
         source="; ".join(law.source),
         counts={constant(n): size for n, size in counts_in(job.model).items()},
-        parameters=[*_assigned(law.fields, p)],
-        states=[*_cleared(law.state_fields)],
+        parameters=[*assigned(law.fields, p._asdict())],
+        states=[*cleared(law.state_fields)],
         around=[f"{name}={value!r}" for name, value in Surroundings()._asdict().items()],
         functions=[ast.unparse(tree) for tree in trees.values()],
         steady=law.steady is not None,
@@ -73,14 +75,22 @@ def indent_docstring(tree: ast.FunctionDef) -> None:
         tree.body[0].value = ast.Constant("\n".join(lines).strip() + "\n    ")
 
 
-def _assigned(fields: Iterable[Field], p: object) -> Iterable[str]:
-    for f in fields:
-        yield f"{f.name}={getattr(p, f.name)!r},  # {f.par.meaning}, {f.par.unit}"
+def number(value: Any) -> str:
+    """A number, or a list of them, as Python writes it."""
+    return "math.inf" if value == math.inf else repr(value)
 
 
-def _cleared(fields: Iterable[Field]) -> Iterable[str]:
+def assigned(fields: Iterable[Field], values: Mapping[str, Any]) -> Iterable[str]:
+    """Arguments with their values and what they mean."""
     for f in fields:
-        yield f"{f.name}={'[0.0] * ELEMENTS' if f.per_element else '0.0'},  # {f.par.meaning}, {f.par.unit}"
+        yield f"{f.name}={number(values[f.name])},  # {f.par.meaning}, {f.par.unit}"
+
+
+def cleared(fields: Iterable[Field]) -> Iterable[str]:
+    """The same, at the start."""
+    for f in fields:
+        zero = f"[0.0] * {constant(f'{f.par.per}s_')}" if f.per_element else "0.0"
+        yield f"{f.name}={zero},  # {f.par.meaning}, {f.par.unit}"
 
 
 def check(job: Job, export: Export) -> Check:

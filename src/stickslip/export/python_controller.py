@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import ast
-import math
-from collections.abc import Iterable, Mapping
-from typing import Any
 
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.controller import Controller
@@ -21,8 +18,8 @@ from stickslip.export.controllers import (
 )
 from stickslip.export.golden import as_csv
 from stickslip.export.job import Check, Export
-from stickslip.export.python import alone, constant, count_by_constant, indent_docstring
-from stickslip.spec import Field, Surroundings, fields_of
+from stickslip.export.python import alone, assigned, cleared, constant, count_by_constant, indent_docstring
+from stickslip.spec import Surroundings, fields_of
 
 __all__ = ["CONTROLLER"]
 
@@ -54,24 +51,6 @@ def write(controller: Controller, name: str, single: bool = False, around: Surro
             "README.md": render("python_controller_readme.md.j2", **common),
         }
     )
-
-
-def number(value: Any) -> str:
-    """A number, or a list of them, as Python writes it."""
-    return "math.inf" if value == math.inf else repr(value)
-
-
-def assigned(fields: Iterable[Field], values: Mapping[str, Any]) -> Iterable[str]:
-    """Arguments with their values and what they mean."""
-    for f in fields:
-        yield f"{f.name}={number(values[f.name])},  # {f.par.meaning}, {f.par.unit}"
-
-
-def cleared(fields: Iterable[Field]) -> Iterable[str]:
-    """The same, at the start."""
-    for f in fields:
-        zero = f"[0.0] * {constant(f'{f.par.per}s_')}" if f.per_element else "0.0"
-        yield f"{f.name}={zero},  # {f.par.meaning}, {f.par.unit}"
 
 
 def check(export: Export, name: str) -> Check:

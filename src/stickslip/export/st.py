@@ -17,7 +17,7 @@ from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
-__all__ = ["TARGET"]
+__all__ = ["NOTE", "STRUCTURES", "TARGET", "about", "cleared", "declared"]
 
 BLOCK = (
     "velocity",
@@ -49,12 +49,12 @@ def write(job: Job) -> Export:
     """One file with types, functions and the block; golden vectors; how to use it."""
     law, p = job.model.law, job.model.parameters
     x = named_in_st([job.name], RESERVED | set(BLOCK))[job.name]
-    elements = law.elements_in(p)
+    counts = counts_in(job.model)
     trees = hoisted(named({"_step": law.step}, law_layouts(law)))
     fields = [f.name for f in (*law.fields, *law.state_fields)]
     names = Names.of(trees, x, [*fields, *Surroundings._fields])
     word = names.words
-    parts = functions(trees, names, STRUCTURES, counts_in(job.model))
+    parts = functions(trees, names, STRUCTURES, counts)
     around = [f"{word[n]} : LREAL := {number(v)};" for n, v in Surroundings()._asdict().items()]
     values: dict[str, Any] = {
         "x": x,
@@ -62,50 +62,56 @@ def write(job: Job) -> Export:
         "title": ascii_only(law.title),
         "equation": textwrap.wrap(ascii_only(law.equation), 110, break_long_words=False),
         "source": ascii_only("; ".join(law.source)),
-        "parameters": [*_declared(law.fields, p, elements, word)],
-        "states": [*_declared(law.state_fields, None, elements, word)] or ["none : LREAL;"],
+        "parameters": [*declared(law.fields, p._asdict(), counts, word)],
+        "states": [*declared(law.state_fields, {}, counts, word)],
         "around": around,
-        "cleared": [*_cleared(law.state_fields, elements, word)],
+        "cleared": [*cleared("z", law.state_fields, counts, word)],
         "word": word,
         "step": names.functions["_step"],
         "arguments": [word[a.arg] for a in trees["_step"].args.args],
         "note": NOTE,
     }
-    code = [
-        {
-            "about": ascii_only(first_line(doc)) or f"{name.strip('_')}, to full precision near 0",
-            "lines": lines,
-        }
-        for name, doc, lines in parts
-    ]
     files = {
-        f"{job.name}.st": render("st.st.j2", **values, functions=code),
+        f"{job.name}.st": render("st.st.j2", **values, functions=about(parts)),
         "golden.csv": as_csv(golden_around(job.model, PACE)),
         "README.md": render("st_readme.md.j2", **values, **about_steps(job.model, SUBSTEPS)),
     }
     return Export(files, (NOTE,))
 
 
-def _declared(fields: Sequence[Field], p: Any, elements: int, word: Mapping[str, str]) -> Iterable[str]:
+def about(parts: Iterable[tuple[str, str, list[str]]]) -> list[dict[str, Any]]:
+    """The functions as the template takes them."""
+    return [
+        {"about": ascii_only(first_line(doc)) or f"{of.strip('_')}, to full precision near 0", "lines": lines}
+        for of, doc, lines in parts
+    ]
+
+
+def declared(
+    fields: Sequence[Field], values: Mapping[str, Any], counts: Mapping[str, int], word: Mapping[str, str]
+) -> Iterable[str]:
     """Fields of a structure with their meaning, and their values where there are any."""
     for f in fields:
-        size = len(getattr(p, f.name)) if p is not None and f.per_element else elements
-        kind = f"ARRAY[0..{size - 1}] OF LREAL" if f.per_element else "LREAL"
-        start = ""
-        if p is not None:
-            value = getattr(p, f.name)
+        start, kind = "", "LREAL"
+        if f.per_element:
+            kind = f"ARRAY[0..{counts[f'{f.par.per}s_'] - 1}] OF LREAL"
+        if values:
+            value = values[f.name]
             start = f" := [{', '.join(map(number, value))}]" if f.per_element else f" := {number(value)}"
-        meaning = ascii_only(f"{f.par.meaning}, {f.par.unit}")
-        yield f"{word[f.name]} : {kind}{start}; (* {meaning} *)"
+        yield f"{word[f.name]} : {kind}{start}; (* {ascii_only(f'{f.par.meaning}, {f.par.unit}')} *)"
+    if not fields:
+        yield "none : LREAL;"
 
 
-def _cleared(fields: Sequence[Field], elements: int, word: Mapping[str, str]) -> Iterable[str]:
-    """Statements that put the state to rest."""
+def cleared(
+    owner: str, fields: Sequence[Field], counts: Mapping[str, int], word: Mapping[str, str]
+) -> Iterable[str]:
+    """Statements that put a structure to its start."""
     for f in fields:
         if f.per_element:
-            yield from (f"z.{word[f.name]}[{i}] := 0.0;" for i in range(elements))
+            yield from (f"{owner}.{word[f.name]}[{i}] := 0.0;" for i in range(counts[f"{f.par.per}s_"]))
         else:
-            yield f"z.{word[f.name]} := 0.0;"
+            yield f"{owner}.{word[f.name]} := 0.0;"
 
 
 TARGET = Target(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from stickslip.control.composition import MEMORY, Settings
@@ -10,7 +10,7 @@ from stickslip.control.controller import Controller
 from stickslip.export._hoist import hoisted
 from stickslip.export._st import Names, functions, number
 from stickslip.export._st_names import RESERVED, named_in_st
-from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export._text import render
 from stickslip.export.controllers import (
     STILL,
     ControllerTarget,
@@ -23,7 +23,7 @@ from stickslip.export.controllers import (
 )
 from stickslip.export.golden import as_csv
 from stickslip.export.job import Export
-from stickslip.export.st import NOTE
+from stickslip.export.st import NOTE, about, cleared, declared
 from stickslip.export.st import STRUCTURES as OF_LAWS
 from stickslip.spec import Field, Surroundings, fields_of
 
@@ -80,12 +80,8 @@ def write(controller: Controller, name: str, single: bool = False, around: Surro
         },
         "note": NOTE,
     }
-    code = [
-        {"about": ascii_only(first_line(doc)) or f"{of.strip('_')}, to full precision near 0", "lines": lines}
-        for of, doc, lines in parts
-    ]
     files = {
-        f"{name}.st": render("st_controller.st.j2", **values, functions=code),
+        f"{name}.st": render("st_controller.st.j2", **values, functions=about(parts)),
         "golden_samples.csv": as_csv(golden_samples(controller, around)),
         "README.md": render("st_controller_readme.md.j2", **values),
     }
@@ -98,33 +94,6 @@ def call(function: str, arguments: Sequence[str], word: Mapping[str, str]) -> st
     numbers = [*GIVEN, "held"][: len(arguments) - len(structures)]
     given = [*numbers, *(word[a] for a in structures)]
     return f"{function}({', '.join(f'{word[a]} := {g}' for a, g in zip(arguments, given, strict=True))})"
-
-
-def declared(
-    fields: Sequence[Field], values: Mapping[str, Any], counts: Mapping[str, int], word: Mapping[str, str]
-) -> Iterable[str]:
-    """Fields of a structure with their meaning, and their values where there are any."""
-    for f in fields:
-        start, kind = "", "LREAL"
-        if f.per_element:
-            kind = f"ARRAY[0..{counts[f'{f.par.per}s_'] - 1}] OF LREAL"
-        if values:
-            value = values[f.name]
-            start = f" := [{', '.join(map(number, value))}]" if f.per_element else f" := {number(value)}"
-        yield f"{word[f.name]} : {kind}{start}; (* {ascii_only(f'{f.par.meaning}, {f.par.unit}')} *)"
-    if not fields:
-        yield "none : LREAL;"
-
-
-def cleared(
-    owner: str, fields: Sequence[Field], counts: Mapping[str, int], word: Mapping[str, str]
-) -> Iterable[str]:
-    """Statements that put a structure to its start."""
-    for f in fields:
-        if f.per_element:
-            yield from (f"{owner}.{word[f.name]}[{i}] := 0.0;" for i in range(counts[f"{f.par.per}s_"]))
-        else:
-            yield f"{owner}.{word[f.name]} := 0.0;"
 
 
 CONTROLLER = ControllerTarget(write)
