@@ -9,7 +9,7 @@ from collections.abc import Callable
 from queue import SimpleQueue
 from typing import NamedTuple, TypeVar
 
-__all__ = ["Reached", "Watch", "listen", "silence", "watched"]
+__all__ = ["Reached", "Watch", "listen", "watched"]
 
 Result = TypeVar("Result")
 FIRST = 2.0
@@ -33,11 +33,6 @@ _listeners: list[Listener] = []
 def listen(listener: Listener) -> None:
     """Tell this one from now on: it gets a line."""
     _listeners.append(listener)
-
-
-def silence() -> None:
-    """Tell nobody any more."""
-    _listeners.clear()
 
 
 class Watch:

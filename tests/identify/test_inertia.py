@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from stickslip import Model
-from stickslip.cli._identified import show
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.response.inertia import frequency_response, inertia, verdict_on
 from stickslip.machines.servo import ServoAxis
+from stickslip.report.answers import answers_of
 from stickslip.report.identified import shown
+from stickslip.report.result_text import result_lines
 from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, drive_axis
 
 J = 4.2757e-4  # thesis 4.2
@@ -97,12 +98,14 @@ def test_what_cannot_be_fitted_is_said() -> None:
         inertia([], AXIS)
 
 
-def test_a_value_below_zero_and_an_interval_of_many_decades_are_called_what_they_are(capsys):
+def test_a_value_below_zero_and_an_interval_of_many_decades_are_called_what_they_are():
     assert "below 0" in verdict_on(-2.0, -1.0)
     assert verdict_on(-2.0, 1.0) == "the data do not distinguish it from 0"
     wide = Estimate("k", "N·m/rad", "k", 1.0, 1.0, 3e-12, 3e16, False, "")
-    show(Identification("axis", None, (wide, replace(wide, name="fs", lower=0.5, upper=2.0)), np.eye(2), {}))
-    line, other = capsys.readouterr().out.splitlines()[2:4]
+    found = Identification(
+        "axis", None, (wide, replace(wide, name="fs", lower=0.5, upper=2.0)), np.eye(2), {}
+    )
+    line, other = result_lines(found, answers_of(found, []))[2:4]
     assert line.split() == ["k", "not", "determined", "N·m/rad", "not", "identified"]
     assert other.split()[1:4] == ["1", "[0.5,", "2]"]
     assert line.index("N·m/rad") == other.index("N·m/rad")

@@ -17,7 +17,7 @@ from stickslip.identify.presliding.hysteresis import (
 )
 from stickslip.identify.presliding.presliding import cycles, identify_presliding
 from stickslip.machines.files import machine
-from stickslip.report.identification import draw_identification
+from stickslip.report.identification import draw_picture_to
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.presliding import Presliding
 from stickslip.rigs.virtual import VirtualRig
@@ -163,7 +163,8 @@ def test_any_law_is_fitted_along_a_motion(tmp_path: Path) -> None:
     assert name == "Dahl, per direction"
     assert result.misfit["held_out_relative"] < 0.01
     assert table["Dahl"]["cross_validated"] > 2.0 * table[name]["cross_validated"]
-    assert draw_identification(result, tmp_path)[0].exists()
+    draw_picture_to(result.pictures[0], tmp_path / "loop.png")
+    assert (tmp_path / "loop.png").exists()
 
 
 @pytest.mark.slow

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from stickslip import Model
-from stickslip.cli._identified import show
 from stickslip.finding import Finding
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate, Identification
@@ -23,6 +22,7 @@ from stickslip.record import Record
 from stickslip.report.answers import answers_of, counts_of, lacking, meaning_of, one_number_each
 from stickslip.report.axis_pictures import pictures_of
 from stickslip.report.identified import Source, rendered, symbol, tally
+from stickslip.report.result_text import result_lines
 from stickslip.report.sliding_torque import over_all_rows, sliding_of
 from stickslip.report.torque_pictures import friction_points, with_gaps
 
@@ -220,10 +220,9 @@ def test_counts_are_those_of_an_encoder() -> None:
     assert counts_of(smooth) == 0
 
 
-def test_the_command_line_prints_the_same_in_short(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_prints_the_same_in_short() -> None:
     found = identified()
-    show(found, answers_of(found, [log()], "model.toml"))
-    out = capsys.readouterr().out.splitlines()
+    out = "\n".join(result_lines(found, answers_of(found, [log()], "model.toml"))).splitlines()
     assert next(line for line in out if line.startswith("fc ")).endswith("identified      Coulomb torque")
     trust = next(i for i, line in enumerate(out) if line.startswith("trust: "))
     assert "slides for certain" in out[trust + 1]

@@ -223,14 +223,12 @@ def laws_to_try(model: Model, lugre: Model | None) -> dict[str, Model]:
     return laws
 
 
-def candidates_of(
-    known: Known, rig: Rig, laws: Mapping[str, Model], gains: Sequence[float] = GAINS
-) -> list[Candidate]:
+def candidates_of(known: Known, rig: Rig, laws: Mapping[str, Model]) -> list[Candidate]:
     """Every law both ways at every gain, simulated."""
     plants = [known.machine(rig, level) for level in LEVELS]
     return [
         judged(known, rig, plants, laws[name], Candidate(name, kind, gain))
-        for name, kind, gain in itertools.product(laws, COMPENSATORS, gains)
+        for name, kind, gain in itertools.product(laws, COMPENSATORS, GAINS)
     ]
 
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -56,8 +56,6 @@ from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
 
 __all__ = ["VELOCITIES", "Commissioned", "Stage", "commission", "planned"]
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 VELOCITIES = (25.0, 18.0, 10.0, 5.0, 3.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.06, 0.04, 0.02)
 """rad/s; those that the rig can run at are taken."""

@@ -34,12 +34,10 @@ SAME_LOOP = 1e-6, 1e-3
 amplitude of the reference."""
 
 
-def step_errors(
-    law: Law, reference: Reference, counts: tuple[int, ...] = (COARSE, FINE)
-) -> tuple[list[Array], float]:
+def step_errors(law: Law, reference: Reference) -> tuple[list[Array], float]:
     """What the law's steps along a motion are off an accurate solution of its rate, N·m, and the largest torque.
 
-    One array of shape (POINTS,) for every number of steps.
+    One array of shape (POINTS,) for `COARSE` and `FINE` steps each.
     """
     p, length = example(law), LONG
     times = np.linspace(0.0, length, POINTS + 1)
@@ -47,7 +45,7 @@ def step_errors(
         "friction_torque"
     ]
     apart: list[Array] = []
-    for n in counts:
+    for n in (COARSE, FINE):
         z, dt, v = law.state(p), length / n, float(reference.sample([0.0])[0, 1])
         grid = reference.sample(np.arange(n + 1) * dt)[:, 1]
         torque = np.zeros(n + 1)

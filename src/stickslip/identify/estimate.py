@@ -97,7 +97,7 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """One pair of axes as plain numbers; `stickslip.report.identification.draw_picture` draws it.
+    """One pair of axes as plain numbers; `stickslip.report.identification.draw_picture_to` draws it.
 
     Attributes
     ----------

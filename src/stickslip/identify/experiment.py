@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -52,8 +51,6 @@ class Experiment:
         closed loop is simulated; without, the recorded drive.
     supply : array, shape (n,), or None
         Factor on the drive's signal, such as the supply voltage under a duty cycle.
-    gain : float
-        Factor on the controller's output that belongs to this record (a gain of the firmware).
     used : array of bool, shape (n,), or None
         Rows that the fit looks at; all where None. The whole record is simulated in any case.
     """
@@ -66,7 +63,6 @@ class Experiment:
     reference: Array | None = None
     loop: Loop | None = None
     supply: Array | None = None
-    gain: float = 1.0
     used: Mask | None = None
 
     def __post_init__(self) -> None:
@@ -116,7 +112,7 @@ class Experiment:
             return self.drive
         assert self.reference is not None
         assert self.loop is not None
-        return control_signal(self.loop, self.time, self.reference, self.position, self.gain)
+        return control_signal(self.loop, self.time, self.reference, self.position)
 
     def torque(self, axis: ServoAxis, velocity: Array) -> Array:
         """Torque on the axis, N·m, with the motor's own constants."""
@@ -164,22 +160,19 @@ class Experiment:
 
     def since(self, row: int) -> Experiment:
         """Its rows from this one on, at least as many as an experiment needs."""
-        begin = min(row, self.time.size - FEWEST)
-        arrays = ("time", "position", "drive", "reference", "supply", "used")
-        cut = {n: None if (a := getattr(self, n)) is None else a[begin:] for n in arrays}
-        return replace(self, **cut)
+        return self._cut(slice(min(row, self.time.size - FEWEST), None))
 
     def until(self, rows: int) -> Experiment:
         """Its first rows, at least as many as an experiment needs."""
-        end = max(rows, FEWEST)
+        return self._cut(slice(max(rows, FEWEST)))
+
+    def _cut(self, rows: slice) -> Experiment:
         arrays = ("time", "position", "drive", "reference", "supply", "used")
-        cut = {n: None if (a := getattr(self, n)) is None else a[:end] for n in arrays}
-        return replace(self, **cut)
+        return replace(self, **{n: None if (a := getattr(self, n)) is None else a[rows] for n in arrays})
 
 
 def experiment_of(
-    record: Record, axis: ServoAxis, *, loop: Loop | None = None, gain: float = 1.0, name: str = "",
-    channels: Sequence[str] = tuple(DRIVES), output: str = "torque",
+    record: Record, axis: ServoAxis, *, loop: Loop | None = None, name: str = "", output: str = "torque"
 ) -> Experiment:  # fmt: skip
     """Take an experiment from a record.
 
@@ -189,10 +182,8 @@ def experiment_of(
         With ``position`` (rad or m); the drive's signal as ``torque`` or ``motor_torque`` (N·m), ``current`` (A),
         ``torque_percent`` (% of rated) or ``voltage`` (V); perhaps ``position_reference`` and ``supply``.
     axis : ServoAxis
-    loop, gain
+    loop
         As in `Experiment`.
-    channels : sequence of str
-        Channels that may hold the drive's signal, in the order of preference.
     output : str
         What the loop's output is where no drive signal is recorded: one of `DRIVE_QUANTITIES`. Times the channel
         ``supply`` where the record has one: of a voltage the loop then gives the duty cycle.
@@ -204,7 +195,7 @@ def experiment_of(
     """
     if "position" not in record.channels:
         raise InputError("the record has no channel 'position'; map one to it")
-    found = next((c for c in channels if c in record.channels), None)
+    found = next((c for c in DRIVES if c in record.channels), None)
     reference = next((c for c in REFERENCES if c in record.channels), None)
     factor = axis.position_factor
     # A time may occur twice where a simulated signal jumps: the later row counts.
@@ -222,5 +213,4 @@ def experiment_of(
         factor * column(reference) if reference else None,
         loop,
         column("supply") if "supply" in record.channels else None,
-        gain,
     )

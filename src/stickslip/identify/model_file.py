@@ -77,11 +77,11 @@ def model_content(
     return content | further | ({"axis": axis} if axis else {})
 
 
-def in_memory(content: Mapping[str, Any], name: str = "model.toml") -> Table:
+def in_memory(content: Mapping[str, Any]) -> Table:
     """The table that reading such a file gives, where none is written; the law's path must be absolute."""
     import tomli_w
 
-    return Table(tomllib.loads(tomli_w.dumps(content)), Document(name, Path()))
+    return Table(tomllib.loads(tomli_w.dumps(content)), Document("model.toml", Path()))
 
 
 def _relative(law: str, target: Path) -> str:

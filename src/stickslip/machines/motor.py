@@ -97,9 +97,9 @@ class Harmonics:
             for n, a, p in zip(self.order, self.amplitude, self.phase, strict=True)
         )
 
-    def peak_to_peak(self, points: int = 3600) -> float:
+    def peak_to_peak(self) -> float:
         """Greatest less least value over a revolution."""
-        values = [self.at(2.0 * math.pi * i / points) for i in range(points)]
+        values = [self.at(2.0 * math.pi * i / 3600) for i in range(3600)]
         return max(values) - min(values)
 
     def scaled(self, factor: float) -> Harmonics:

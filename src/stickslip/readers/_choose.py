@@ -76,9 +76,7 @@ def parse_mapping(mapping: Mapping[str, str] | Sequence[str]) -> dict[str, str]:
     return out
 
 
-def choose(
-    table: Table, mapping: Mapping[str, str], source: str = "map"
-) -> tuple[list[Choice], list[Finding]]:
+def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list[Finding]]:
     """Assign columns to channels.
 
     Parameters
@@ -86,17 +84,13 @@ def choose(
     table : Table
     mapping : mapping of str to str
         As `parse_mapping` gives it; "none" leaves a channel out.
-    source : {"map", "profile"}
-        Where the mapping comes from.
 
     Raises
     ------
     InputError
         If the mapping names a column that is not there, or a unit that is none or of the wrong kind.
     """
-    chosen = {
-        role: _explicit(table, role, text, source) for role, text in mapping.items() if text.lower() != "none"
-    }
+    chosen = {role: _explicit(table, role, text) for role, text in mapping.items() if text.lower() != "none"}
     taken = {choice.column for choice in chosen.values()}
     names = {c.name: role_of(c.name, c.unit if parse_unit(c.unit) else "") for c in table.columns}
     axis = next((names[c.column].axis for c in chosen.values() if names[c.column].axis), "")
@@ -115,7 +109,7 @@ def choose(
     return [chosen[role] for role in ROLES if role in chosen], findings
 
 
-def _explicit(table: Table, role: str, text: str, source: str) -> Choice:
+def _explicit(table: Table, role: str, text: str) -> Choice:
     """What the user says: COLUMN, COLUMN:UNIT, with @load or @motor behind."""
     side = ""
     if text not in _names_of(table) and (match := re.fullmatch(r"(.+)@(motor|load)", text)):
@@ -139,7 +133,7 @@ def _explicit(table: Table, role: str, text: str, source: str) -> Choice:
                 else f"{role} takes {spellings(KINDS[role])}"
             )
             raise InputError(f"--map {role}={text}: {unit!r} {what}; {remedy}")
-        return Choice(role, column.name, unit, source, side)
+        return Choice(role, column.name, unit, "map", side)
     read = role_of(column.name, column.unit if parse_unit(column.unit) else "")
     guess = _guessed(role, column, read)
     return Choice(role, column.name, guess.unit, guess.source, side or guess.side)

@@ -17,9 +17,7 @@ METHODS = ("butterworth", "savitzky-golay")
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def with_velocity(
-    record: Record, method: str = "butterworth", *, cutoff: float | None = None, order: int | None = None
-) -> Record:
+def with_velocity(record: Record, method: str = "butterworth", *, cutoff: float | None = None) -> Record:
     """The record with the velocity as derivative of its position, without phase.
 
     Parameters
@@ -31,8 +29,6 @@ def with_velocity(
         sliding window (Savitzky and Golay 1964).
     cutoff : float
         Hz; -3 dB of the two passes together. A tenth of the sampling frequency where it is not given.
-    order : int
-        Of each Butterworth pass (4), or of the polynomial (3).
 
     Returns
     -------
@@ -58,9 +54,7 @@ def with_velocity(
     position = record["position"]
     signal: Any = importlib.import_module("scipy.signal")
     if method == "butterworth":
-        order = 4 if order is None else order
-        if not 1 <= order <= 12:
-            raise InputError(f"order = {order} must lie between 1 and 12")
+        order = 4
         # Two passes damp twice: each is 1.5 dB down at the cutoff asked for.
         single = cutoff / (np.sqrt(2.0) - 1.0) ** (0.5 / order)
         sections = signal.butter(order, min(single, 0.499 * rate), fs=rate, output="sos")
@@ -73,9 +67,7 @@ def with_velocity(
             " differences"
         )
     else:
-        order = 3 if order is None else order
-        if not 1 <= order <= 12:
-            raise InputError(f"order = {order} must lie between 1 and 12")
+        order = 3
         points = _window(signal, order, 2.0 * np.pi * cutoff / rate, len(record))
         velocity = np.asarray(signal.savgol_filter(position, points, order, deriv=1, delta=1.0 / rate))
         how = f"Savitzky-Golay slope of the position, order {order}, {points} points ({cutoff:g} Hz)"

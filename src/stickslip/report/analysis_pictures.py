@@ -45,16 +45,16 @@ def draw_analysis(picture: Drawn, path: Path) -> None:
     save([path], title, message, panels, height, option="--plot")
 
 
-def picture_of_spectra(found: Sequence[Spectrum], limit: float = 0.0) -> Drawn:
+def picture_of_spectra(found: Sequence[Spectrum]) -> Drawn:
     """Densities, one panel a record, with the modes as lines across."""
-    panels = [_density(one, limit) for one in found]
+    panels = [_density(one) for one in found]
     first = found[0].peaks[0] if found[0].peaks else None
     where = f"strongest peak at {first.frequency:.0f} Hz" if first else "no peak stands out"
     mode = f", {first.mode}" if first and first.mode else ""
     return f"Spectrum of the {found[0].channel.replace('_', ' ')}", where + mode, panels, 2.0
 
 
-def _density(one: Spectrum, limit: float) -> Panel:
+def _density(one: Spectrum) -> Panel:
     peak = float(one.density[1:].max())
     modes = [
         Curve(np.array([f]), np.array([peak]), f"{name} ({f:.0f} Hz)", style, "vertical")
@@ -64,7 +64,7 @@ def _density(one: Spectrum, limit: float) -> Panel:
     note = one.name + "".join(f"  {p.frequency:.0f} Hz" for p in one.peaks[:3])
     return Panel(
         [Curve(one.frequency[1:], one.density[1:], "measured", MAIN), *modes],
-        f"density ({one.unit}²/Hz)", "frequency (Hz)", (0.0, limit or 0.5 * one.sample_rate),
+        f"density ({one.unit}²/Hz)", "frequency (Hz)", (0.0, 0.5 * one.sample_rate),
         (low, 3.0 * peak), note, y_scale="log",
     )  # fmt: skip
 

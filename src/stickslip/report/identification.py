@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.estimate import Identification, Picture, Trace
+from stickslip.identify.estimate import Picture, Trace
 from stickslip.report import plots
 
-__all__ = ["HEIGHT", "draw_identification", "draw_picture", "draw_picture_to", "panel_of"]
+__all__ = ["HEIGHT", "draw_picture_to", "panel_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -26,18 +26,6 @@ DASHES: tuple[Any, ...] = (
     (0, (7, 1.5, 1.5, 1.5)),
     (0, (1, 1)),
 )
-
-
-def draw_identification(result: Identification, folder: Path) -> tuple[Path, ...]:
-    """Draw every picture of a result; returns the PNG files (an SVG lies beside each)."""
-    return tuple(draw_picture(picture, folder) for picture in result.pictures)
-
-
-def draw_picture(picture: Picture, folder: Path) -> Path:
-    """Draw one picture into `folder` as SVG and PNG; returns the PNG."""
-    stem = folder / picture.name
-    plots.draw(stem, picture.title, picture.message, [panel_of(picture)], HEIGHT)
-    return stem.with_name(stem.name + ".png")
 
 
 def draw_picture_to(picture: Picture, target: Path) -> Path:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Any
 
 from stickslip.errors import InputError, RigError
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, Rig
@@ -15,7 +15,6 @@ __all__ = ["FASTEST", "FIELDS", "answer", "blamed", "checked"]
 FASTEST = 1e-7
 """s, the shortest sample time"""
 FIELDS = len(Measurement._fields)
-Result = TypeVar("Result")
 
 
 def checked(rig: Rig) -> Rig:

@@ -41,9 +41,9 @@ def linear_of(group: str) -> str:
     return f"{group}/{group.rpartition('-')[2].rstrip('0123456789')}"
 
 
-def unstable(group: str, law: str = "gms") -> Check:
-    """Feedback of that law oscillates visibly, and much more than the linear controller alone."""
-    run, quantity = f"{group}/FB-{law}", "late shake" if "step" in group else "shake"
+def unstable(group: str) -> Check:
+    """Feedback of GMS oscillates visibly, and much more than the linear controller alone."""
+    run, quantity = f"{group}/FB-gms", "late shake" if "step" in group else "shake"
     return all_of(oscillates(group, [run], quantity), beats(quantity, [linear_of(group)], [run], UNSTABLE))
 
 

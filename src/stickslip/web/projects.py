@@ -102,11 +102,6 @@ class Project:
         """As people gave it."""
         return str(read_whole(self.folder / "project.json").get("name", self.id))
 
-    def rename(self, name: object) -> None:
-        """Give it another name; the folder stays."""
-        said = read_whole(self.folder / "project.json")
-        written_whole(self.folder / "project.json", {**said, "name": words(name, self.id)})
-
     def add(self, kind: str, **about: Any) -> Item:
         """Make room for a log, model or setting."""
         folder = self.folder / kind / f"{KINDS[kind]}-{secrets.token_hex(4)}"

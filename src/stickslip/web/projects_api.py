@@ -10,7 +10,7 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from stickslip.web.asking import Refused, Table, body
 from stickslip.web.jobs import Job
-from stickslip.web.projects import KINDS, words
+from stickslip.web.projects import KINDS
 from stickslip.web.site import Site
 
 __all__ = ["table"]
@@ -36,14 +36,8 @@ def projects(site: Site) -> Table:
         running = [job.about() for job in site.jobs.of(project.id)]
         return JSONResponse({**project.summary(), "jobs": running})
 
-    async def rename(request: Request) -> Response:
-        project = site.project(request)
-        project.rename((await body(request)).get("name", ""))
-        return JSONResponse({"id": project.id, "name": project.name})
-
     return {
         ("GET", "/projects"): all_projects, ("POST", "/projects"): add, ("GET", "/projects/{project}"): one,
-        ("PATCH", "/projects/{project}"): rename,
     }  # fmt: skip
 
 
@@ -53,11 +47,6 @@ def items(site: Site) -> Table:
     async def about(request: Request) -> Response:
         item = site.item(request, known_kind(request))
         return JSONResponse({**item.about, "result": item.result})
-
-    async def renamed(request: Request) -> Response:
-        item = site.item(request, known_kind(request))
-        name = words((await body(request)).get("name", ""), str(item.about.get("name", item.id)))
-        return JSONResponse(item.update(name=name))
 
     async def removed(request: Request) -> Response:
         kind = known_kind(request)
@@ -70,7 +59,6 @@ def items(site: Site) -> Table:
 
     return {
         ("GET", "/projects/{project}/{kind}/{item}"): about,
-        ("PATCH", "/projects/{project}/{kind}/{item}"): renamed,
         ("DELETE", "/projects/{project}/{kind}/{item}"): removed,
     }
 

@@ -13,8 +13,6 @@ from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from stickslip import plugins
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis.agreed import (
@@ -39,8 +37,6 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
 
 __all__ = ["AUTOMATIC", "Candidate", "identify_axis"]
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 AUTOMATIC = ("coulomb", "stribeck", "lugre")
 """Laws among which the held-out error chooses where none is named."""

@@ -152,7 +152,7 @@ def shown_gains(experiment: Experiment, gain: float = 1.0) -> ShownGains | None:
     experiment : Experiment
         With its drive's signal, reference and loop.
     gain : float
-        Factor on the controller's output, beside the experiment's own.
+        Factor on the controller's output.
 
     Returns
     -------
@@ -172,13 +172,11 @@ def shown_gains(experiment: Experiment, gain: float = 1.0) -> ShownGains | None:
         if velocity_noise < NOISY * own_variance(x, GAINS.index("kd")):
             break
     given = np.array([getattr(experiment.loop, name) for name in GAINS])
-    factor = gain * experiment.gain
-    tries = {0: delayed(experiment, columns, length, factor)}
+    tries = {0: delayed(experiment, columns, length, gain)}
     if unexplained(*best_of(tries[0])[:2], given) >= MISSED:
         for late in LATE[1:]:
-            tries[late] = delayed(
-                experiment, columns_of(shifted(experiment, late), experiment.loop), length, factor
-            )
+            columns = columns_of(shifted(experiment, late), experiment.loop)
+            tries[late] = delayed(experiment, columns, length, gain)
     x, u, time = best_of(tries[likeliest(tries)])
     values, half_widths = with_intervals(x, u, time, velocity_noise)
     parts = np.sqrt(np.mean(x[:, :-1] ** 2, axis=0)) / max(rms(u), 1e-300)

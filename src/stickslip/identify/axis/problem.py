@@ -192,7 +192,7 @@ class Problem:
         mechanics = self.mechanics(named)
         gain = named["controller_gain"]
         return [
-            c.run(mechanics, p, gain=t.gain * gain if t.closed_loop else 1.0)
+            c.run(mechanics, p, gain=gain if t.closed_loop else 1.0)
             for c, t in zip(self.courses, self.experiments, strict=True)
         ]
 
@@ -247,7 +247,7 @@ def drive_of(experiment: Experiment, inertia: float, max_step: float) -> Drive:
         assert experiment.reference is not None
         return Drive(
             experiment.time, experiment.reference, "feedback", experiment.loop, experiment.supply, experiment.start(),
-            experiment.gain, max_step=max_step,
+            max_step=max_step,
         )  # fmt: skip
     omega = 2.0 * math.pi * min(OBSERVER_HZ, 0.02 / experiment.period)
     even = smooth(experiment)

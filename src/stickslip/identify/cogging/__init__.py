@@ -46,8 +46,6 @@ from stickslip.record import Record
 
 __all__ = ["angle_of", "chosen_terms", "identify_cogging", "map_of"]
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
-
 LEVELS = "fc", "sigma2"
 """Parameters of the model that stand among the estimates under another name."""
 LEAST = 60

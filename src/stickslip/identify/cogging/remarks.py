@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.cogging.fitting import Fit
-from stickslip.identify.cogging.orders import Term
 
 __all__ = ["Eccentricity", "Lag", "eccentricities", "lag_of"]
 
@@ -104,8 +103,3 @@ def eccentricities(fit: Fit) -> list[Eccentricity]:
 def _complex(pair: Array) -> complex:
     """A cos(n theta + p) as A exp(i p)."""
     return complex(pair[0], -pair[1])
-
-
-def multiple(term: Term, of: float) -> bool:
-    """Whether a term's order is a whole multiple."""
-    return of > 0.0 and abs(term[1] / of - round(term[1] / of)) < 1e-6 and term[1] >= of

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -18,11 +17,7 @@ from stickslip.identify.monte_carlo import curve_band, sliding_torque
 
 __all__ = ["Change", "common_speeds", "levels_of", "said_of", "unseen"]
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
-
 DRAWS = 400
-PER_STD = 3.92
-"""Width of a 95 % interval in standard deviations."""
 
 
 @dataclass(frozen=True)

@@ -264,13 +264,11 @@ def downhill(
         damping, growth = damping * growth, min(growth * 2.0, 1e3)
 
 
-def spread_starts(
-    start: Array, lower: Array, upper: Array, count: int, *, reach: float = 3.0, seed: int = 0
-) -> Array:
+def spread_starts(start: Array, lower: Array, upper: Array, count: int, reach: float) -> Array:
     """`count` starts: `start` itself, and a Latin hypercube over the bounds, at most `reach` from it."""
     if start.size == 0:  # everything is held
         return start[None, :]
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     low, high = np.maximum(lower, start - reach), np.minimum(upper, start + reach)
     cells = np.stack([rng.permutation(max(count - 1, 0)) for _ in range(start.size)], axis=1)
     inside = (cells + rng.random(cells.shape)) / max(count - 1, 1)

@@ -21,6 +21,8 @@ __all__ = ["bounded_solution", "linear_parameters", "separable_starts"]
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Values = Callable[[Array], Array]
 
+REACH = 4.0
+"""How far the nonlinear parameters are drawn from the vector's start, in coordinates."""
 ITERATIONS = 100
 """Of the linear part of a start: its active set changes once in each. (The reflective method of SciPy halves a step
 without end where rounding lets none succeed.) A start that takes more is as far as it then is; the search goes on."""
@@ -48,9 +50,7 @@ def _affine(model: Values, values: Array, here: Array, size: Array, i: int, j: i
     return bool(np.max(np.abs(bend)) <= 1e-9 * reach)
 
 
-def separable_starts(
-    model: Values, target: Array, vector: Vector, count: int, *, reach: float = 4.0, seed: int = 0
-) -> Array:
+def separable_starts(model: Values, target: Array, vector: Vector, count: int) -> Array:
     """Starts for a vector without shares: its own, and `count` with the linear parameters solved for.
 
     Parameters
@@ -60,9 +60,6 @@ def separable_starts(
     target : array, shape (n,)
     vector : Vector
     count : int
-    reach : float
-        How far the nonlinear parameters are drawn from the vector's start, in coordinates.
-    seed : int
 
     Returns
     -------
@@ -72,8 +69,8 @@ def separable_starts(
     values = vector.values(first)
     single = [i for i, p in enumerate(vector.free) if not p.shares]
     linear = linear_parameters(model, values, single)
-    rng = np.random.default_rng(seed)
-    low, high = np.maximum(vector.lower, first - reach), np.minimum(vector.upper, first + reach)
+    rng = np.random.default_rng(0)
+    low, high = np.maximum(vector.lower, first - REACH), np.minimum(vector.upper, first + REACH)
     floor = [1e-9 * float(np.max(np.abs(target))) if vector.free[i].logarithmic else vector.free[i].par.lower
              for i in linear]  # fmt: skip
     bounds = (np.array(floor), np.array([vector.free[i].par.upper for i in linear]))

@@ -39,9 +39,8 @@ def criteria(cost: float, n: int, p: int, noise: Noise | None = None) -> Criteri
 
 
 def cross_validate(
-    error: Callable[[Indices, Indices], Array], n: int, folds: int = 10, seed: int = 0,
-    together: Indices | None = None,
-) -> float:  # fmt: skip
+    error: Callable[[Indices, Indices], Array], n: int, folds: int = 10, together: Indices | None = None
+) -> float:
     """Root mean square of errors on points left out.
 
     Parameters
@@ -50,13 +49,12 @@ def cross_validate(
         ``error(fitted, left_out)``: errors at the points `left_out` of a fit to the points `fitted` (indices).
     n, folds : int
         Points, and groups in which they are left out; as many as points leaves out one at a time.
-    seed : int
     together : array, shape (n,), optional
         Labels 0, 1, ...: points of the same label are left out together, so that no twin of a point tells it.
     """
     label = np.arange(n) if together is None else together
     count = int(np.max(label)) + 1
-    order = np.random.default_rng(seed).permutation(count)
+    order = np.random.default_rng(0).permutation(count)
     parts = [np.flatnonzero(np.isin(label, order[i :: min(folds, count)])) for i in range(min(folds, count))]
     squares = [error(np.setdiff1d(np.arange(n), part), part) ** 2 for part in parts]
     return math.sqrt(float(np.mean(np.concatenate(squares))))

@@ -93,7 +93,6 @@ def fit(
     reach: float = 3.0,
     profiles: bool = True,
     lags: int = 0,
-    seed: int = 0,
     tolerance: float = 1e-15,
     difference: float = STEP,
 ) -> Fit:
@@ -119,8 +118,6 @@ def fit(
         Follow the profile likelihood; otherwise intervals come from the covariance.
     lags : int
         Samples over which residuals are correlated; 0 where they are independent.
-    seed : int
-        Of the starts.
     tolerance : float
         Relative decrease of the sum of squares at which a descent ends.
     difference : float
@@ -140,7 +137,7 @@ def fit(
     known = as_noise(noise)
     squares = Squares(residuals, vector.lower, vector.upper, difference)
     if isinstance(starts, int):
-        starts = spread_starts(vector.start, vector.lower, vector.upper, starts, reach=reach, seed=seed)
+        starts = spread_starts(vector.start, vector.lower, vector.upper, starts, reach=reach)
     optima = search(squares, starts, tolerance=tolerance)
     if optima[0].residuals.size == 0:
         raise InputError("no data to fit; give at least one point")

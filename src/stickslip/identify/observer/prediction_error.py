@@ -132,7 +132,6 @@ def prediction_error(
     start: Array | None = None,
     signed_scale: float | Mapping[str, float] = math.nan,
     band: float = BAND,
-    rounds: int = 2,
     seed: int = 0,
 ) -> PredictionError:
     """Estimate mechanics and law from torque and motion, with intervals that hold for coloured noise.
@@ -155,9 +154,6 @@ def prediction_error(
         As in `stickslip.identify.fit.uncertainty.fit`.
     band : float
         Hz up to which corrections count.
-    rounds : int
-        Times that weights and parameters are found in turn; behind the last the minimum is found to a tenth of their
-        tolerance.
     seed : int
         Of the noise with which the corrections are perturbed.
 
@@ -176,7 +172,8 @@ def prediction_error(
 
     criterion = Criterion.first(observed(), law, vector, mechanics)
     u = vector.start if start is None else start
-    for _ in range(rounds):
+    # Weights and parameters in turn; behind the last the minimum is found to a tenth of their tolerance.
+    for _ in range(2):
         criterion = criterion.adapted(u)
         # Along a valley a Jacobian kept by secants gets as far as a fresh one, at a step for each sixteen.
         search = criterion.search(u)

@@ -26,13 +26,15 @@ FASTER = (
     "Swing the velocity faster and over the same few degrees: the lag grows with the rate, and what depends on the "
     "angle no longer hides it."
 )
+SKIPPED = 0.2
+"""Part of the record left out at its start: the transient from rest."""
+SUDDEN = (5.0, 1e-3, 0.2)
+"""A velocity that is reached within one time step, how long that is and the response, rad/s, s, s."""
 OVERSHOOT = 1e-3
 """Part of the steady torque beyond which a response overshoots."""
 
 
-def identify_attraction(
-    loop: Loop, template: Model, *, skip: float = 0.2, noise: Noise | float | None = None
-) -> Identification:
+def identify_attraction(loop: Loop, template: Model, *, noise: Noise | float | None = None) -> Identification:
     """Fit C to the lag of friction behind the sliding curve; everything else of the law stays.
 
     Parameters
@@ -41,8 +43,6 @@ def identify_attraction(
         With its velocity, which must not reverse after the transient.
     template : Model
         A GMS law with identified elements and sliding curve.
-    skip : float
-        Part of the record left out at its start: the transient from rest.
     noise : Noise or float, optional
         Standard deviation of a sample, N·m; else from the residual, with its correlation.
 
@@ -57,7 +57,7 @@ def identify_attraction(
     """
     if loop.velocity is None:
         raise InputError("the attraction parameter needs the velocity; give the loop one")
-    rows = np.arange(int(skip * loop.time.size), loop.time.size)
+    rows = np.arange(int(SKIPPED * loop.time.size), loop.time.size)
     v = loop.velocity[rows]
     if float(np.min(v)) * float(np.max(v)) <= 0.0:
         raise InputError(
@@ -99,17 +99,14 @@ def response_to_velocity(
 
 
 def largest_without_overshoot(
-    template: Model, *, velocity: float = 5.0, time_step: float = 1e-3, duration: float = 0.2,
-    lower: float = 1.0, upper: float = 1e4,
-) -> tuple[float, tuple[str, ...]]:  # fmt: skip
+    template: Model, *, lower: float = 1.0, upper: float = 1e4
+) -> tuple[float, tuple[str, ...]]:
     """The largest C whose response to a sudden velocity does not overshoot its steady torque (thesis 4.3.1.1.5).
 
     Parameters
     ----------
     template : Model
         A GMS law.
-    velocity, time_step, duration : float
-        The velocity is reached within one time step, rad/s, s, s.
     lower, upper : float
         Between which C is looked for, N·m/s.
 
@@ -122,9 +119,10 @@ def largest_without_overshoot(
     """
 
     def overshoots(c: float) -> bool:
-        _, torque = response_to_velocity(Model(template.law, {}, **{**template.parameters._asdict(), "c": c}),
-                                         velocity, time_step, duration)  # fmt: skip
-        steady = abs(template.law.steady(velocity, template.parameters)) if template.law.steady else 0.0
+        _, torque = response_to_velocity(
+            Model(template.law, {}, **{**template.parameters._asdict(), "c": c}), *SUDDEN
+        )
+        steady = abs(template.law.steady(SUDDEN[0], template.parameters)) if template.law.steady else 0.0
         return float(np.max(np.abs(torque))) > (1.0 + OVERSHOOT) * steady
 
     if overshoots(lower):

@@ -16,7 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError, ParameterError
 from stickslip.identify.estimate import Identification, Picture, Trace
-from stickslip.identify.fit.noise import Noise, as_noise
+from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.uncertainty import Fit, fit
 from stickslip.model import Model
@@ -32,6 +32,12 @@ Rows = np.ndarray[Any, np.dtype[np.intp]]
 DAMPING = "N·m·s/rad"
 OFFSET = Par("N·m", "T_0", "torque that acts besides friction")
 
+STARTS = 3
+"""Of the search."""
+ENDS, COMPARED = 1e-8, 1e-7
+"""Relative decrease of the sum of squares at which a descent ends: of the result, and of laws that are compared."""
+BLOCKS = 4
+"""Of the fitted rows, left out in turn where laws are compared."""
 ELASTIC = 0.95
 """Correlation of torque and displacement above which a loop is nearly elastic."""
 
@@ -160,13 +166,8 @@ def identify_hysteresis(
     template: Model,
     *,
     fitted: Sequence[int] | Rows | None = None,
-    frozen: Sequence[str] = (),
-    noise: Noise | float | None = None,
-    offset: bool = True,
-    starts: int = 3,
-    tolerance: float = 1e-8,
 ) -> Identification:
-    """Fit any law to a torque along a motion.
+    """Fit any law, and a constant torque beside it, to a torque along a motion.
 
     Parameters
     ----------
@@ -175,16 +176,6 @@ def identify_hysteresis(
         The law with its choices; its values are where the search starts.
     fitted : sequence of int, optional
         Rows to fit; all where not given. The others are the test: ``misfit["held_out_relative"]``.
-    frozen : sequence of str
-        Parameters that stay.
-    noise : Noise or float, optional
-        Standard deviation of a sample, N·m; else from the residual, with its correlation in time.
-    offset : bool
-        Whether a constant torque is fitted along.
-    starts : int
-        Starts of the search.
-    tolerance : float
-        Relative decrease of the sum of squares at which a descent ends.
 
     Returns
     -------
@@ -200,13 +191,11 @@ def identify_hysteresis(
     rows = after_transient(straight, rows)
     if rows.size < 10:
         raise InputError(f"{rows.size} rows are too few to fit a loop; give at least 10")
-    known = as_noise(noise)
-    found, along = fit_loop(straight, template, rows, frozen=frozen, noise=known, offset=offset, starts=starts,
-                            profiles=False, tolerance=tolerance)  # fmt: skip
-    lags = 0 if known else correlation_lags(found.optimum.residuals)
-    found, along = fit_loop(straight, template, rows, frozen=frozen, noise=known, offset=offset,
-                            starts=found.u[None, :], lags=lags, tolerance=tolerance,
-                            profiles=False)  # fmt: skip
+    found, _ = fit_loop(straight, template, rows, starts=STARTS, profiles=False, tolerance=ENDS)
+    lags = correlation_lags(found.optimum.residuals)
+    found, along = fit_loop(
+        straight, template, rows, starts=found.u[None, :], lags=lags, tolerance=ENDS, profiles=False
+    )
     curve = curve_of(along, found.vector, found.u)
     rest = np.setdiff1d(np.arange(loop.time.size), rows if fitted is None else fitted)
     rest = rest[rest > rows[0]]
@@ -273,9 +262,8 @@ def correlation_lags(residuals: Array) -> int:
 
 
 def choose_hysteresis(
-    loop: Loop, templates: Mapping[str, Model], *, fitted: Sequence[int] | Rows | None = None, blocks: int = 4,
-    starts: int = 3, tolerance: float = 1e-7,
-) -> tuple[str, Identification, dict[str, dict[str, float]]]:  # fmt: skip
+    loop: Loop, templates: Mapping[str, Model], *, fitted: Sequence[int] | Rows | None = None
+) -> tuple[str, Identification, dict[str, dict[str, float]]]:
     """Fit several laws and choose the one with the least error on blocks of the fitted rows left out in turn.
 
     Returns
@@ -291,12 +279,13 @@ def choose_hysteresis(
     rows = after_transient(straight, rows)
     table: dict[str, dict[str, float]] = {}
     for name, template in templates.items():
-        first, along = fit_loop(straight, template, rows, starts=starts, profiles=False, tolerance=tolerance)
+        first, along = fit_loop(straight, template, rows, starts=STARTS, profiles=False, tolerance=COMPARED)
         squares: list[Array] = []
-        for block in np.array_split(rows, blocks):
+        for block in np.array_split(rows, BLOCKS):
             kept = np.setdiff1d(rows, block)
-            part, _ = fit_loop(straight, template, kept, starts=first.u[None, :], profiles=False,
-                               tolerance=tolerance)  # fmt: skip
+            part, _ = fit_loop(
+                straight, template, kept, starts=first.u[None, :], profiles=False, tolerance=COMPARED
+            )
             squares.append(((curve_of(along, part.vector, part.u) - straight.torque)[block]) ** 2)
         size = float(np.mean(straight.torque[rows] ** 2))
         table[name] = {
@@ -305,7 +294,7 @@ def choose_hysteresis(
             "cross_validated": math.sqrt(float(np.mean(np.concatenate(squares))) / size),
         }
     chosen = min(table, key=lambda name: table[name]["cross_validated"])
-    result = identify_hysteresis(loop, templates[chosen], fitted=rows, starts=starts)
+    result = identify_hysteresis(loop, templates[chosen], fitted=rows)
     return chosen, replace(result, details={**result.details, "comparison": table}), table
 
 

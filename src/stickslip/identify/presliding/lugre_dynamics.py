@@ -79,13 +79,13 @@ class Response:
         return cls(record.time[kept], record[torque][kept], record["position"][kept])
 
 
-def sticking_pieces(response: Response, fs: float, near: float = NEAR) -> list[Rows]:
+def sticking_pieces(response: Response, fs: float) -> list[Rows]:
     """Runs of samples in which the load is near zero and the axis sticks, at least 4 samples each.
 
     It sticks where the position changes by less than would a spring a hundred times softer than the softest the
     record's own quiet parts show.
     """
-    quiet = np.abs(response.torque) <= near * fs
+    quiet = np.abs(response.torque) <= NEAR * fs
     rate = np.abs(np.gradient(response.position, response.time))
     if not np.any(quiet):
         return []

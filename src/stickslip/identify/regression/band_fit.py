@@ -32,7 +32,6 @@ from stickslip.identify.regression.strokes import memory_of
 __all__ = ["QUANTILE", "BandFit", "Number", "fit_band"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-Places = np.ndarray[Any, np.dtype[np.int64]]
 
 CORE = 5
 ROUNDS = 12

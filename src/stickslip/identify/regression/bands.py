@@ -36,8 +36,6 @@ __all__ = [
     "together",
 ]
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
-
 BANDS = (1.0, 1.6, 2.6)
 """Widths of the windows, in that of the narrowest which noise allows."""
 ROUGH, WIDER = 0.05, (1.6, 2.6, 4.1, 6.6, 10.0)

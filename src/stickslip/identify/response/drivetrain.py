@@ -28,6 +28,10 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 
+LOWEST = 5.0
+"""Hz; windows of a response are four periods of it long."""
+HIGHEST = 0.45
+"""Part of the sample rate up to which a response is taken."""
 COHERENT = 0.5
 PEAK = 2.0
 """Factor over the rigid axis's acceleration that makes a mode."""
@@ -71,9 +75,7 @@ class LoopResponse:
         return float(self.frequency[np.argmax(np.abs(self.response) * self.frequency**2)])
 
 
-def loop_response(
-    record: Record, name: str = "", *, lowest: float = 5.0, highest: float = 0.45
-) -> LoopResponse:
+def loop_response(record: Record, name: str = "") -> LoopResponse:
     """The response of one record that `stickslip rig run resonance` made.
 
     Parameters
@@ -81,10 +83,6 @@ def loop_response(
     record : Record
         Every sample: ``position``, ``position_reference``, ``torque_command``, and the excitation ``torque_setpoint``.
     name : str
-    lowest : float
-        Hz; windows are four periods of it long.
-    highest : float
-        Part of the sample rate.
 
     Raises
     ------
@@ -92,7 +90,7 @@ def loop_response(
         If the record is too short or nothing answers to the excitation.
     """
     dt = float(np.median(np.diff(record.time)))
-    length = math.ceil(4.0 / (lowest * dt))
+    length = math.ceil(4.0 / (LOWEST * dt))
     if len(record) < 4 * length:
         raise InputError(
             f"{name}: {len(record) * dt:.3g} s hold fewer than four windows of {length * dt:.3g} s"
@@ -103,7 +101,7 @@ def loop_response(
     ry = cross_spectrum(sent, position, 1.0 / dt, length)
     f, rr = spectrum(sent, 1.0 / dt, length)
     _, yy = spectrum(position, 1.0 / dt, length)
-    inside = (f >= lowest) & (f <= highest / dt)
+    inside = (f >= LOWEST) & (f <= HIGHEST / dt)
     coherence = np.abs(ry[inside]) ** 2 / (rr[inside] * yy[inside])
     seen = coherence >= COHERENT
     if seen.sum() < 10:

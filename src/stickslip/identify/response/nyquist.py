@@ -136,16 +136,14 @@ class Fastest:
         )
 
 
-def fastest_pd(responses: Sequence[LoopResponse], inertia: float, *, damping: float = 1.0) -> Fastest:
+def fastest_pd(responses: Sequence[LoopResponse], inertia: float) -> Fastest:
     """The bandwidth from which on a PD rings in some response, or is not seen to be calm.
 
     Parameters
     ----------
     responses : sequence of LoopResponse
     inertia : float
-        That places the PD, kg·m².
-    damping : float
-        Of the placement.
+        That places the PD, kg·m², critically damped.
 
     Raises
     ------
@@ -155,7 +153,7 @@ def fastest_pd(responses: Sequence[LoopResponse], inertia: float, *, damping: fl
     tried = np.geomspace(0.5, 0.1 / responses[0].sample_time, 400)
     for place, bandwidth in enumerate(tried):
         for r in responses:
-            count = encirclements(r, inertia, float(bandwidth), damping)
+            count = encirclements(r, inertia, float(bandwidth), 1.0)
             if count.calm:
                 continue
             found = Fastest(

@@ -39,7 +39,6 @@ TRIES = 4
 """Times as many axes are drawn at most, for so many that are held."""
 LOOKED_AT = 16
 """Axes on which the linear controller alone is judged: the best estimate and some drawn ones."""
-"""The controller without a compensator."""
 SLOWER = (0.7, 0.5, 0.35, 0.25, 0.1)
 """Of the bandwidth: where a linear controller that rings alone is tried for one that is calm."""
 

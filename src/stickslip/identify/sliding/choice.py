@@ -92,7 +92,6 @@ def choose_sliding(
     noise: Noise | float | None = None,
     frozen: Sequence[str] = (),
     starts: int = 40,
-    folds: int = 10,
     progress: Callable[[str], None] = silent,
 ) -> tuple[str, Identification, dict[str, dict[str, float]]]:
     """Fit several curves and choose: the fewest parameters whose error on points left out is not worse.
@@ -108,8 +107,6 @@ def choose_sliding(
         Laws to choose from; `candidates` where not given.
     frozen : sequence of str
         Parameters that stay at the template's values, in every template that has them.
-    folds : int
-        Parts of the points that are left out in turn.
     progress : callable
         Is told what begins, in a few words.
 
@@ -144,7 +141,7 @@ def choose_sliding(
 
         table[name] = {
             "parameters": count, "rms_Nm": found.rms, "aicc": scores.aicc, "bic": scores.bic,
-            "cross_validated_Nm": cross_validate(error, len(points), folds, together=points.speeds()),
+            "cross_validated_Nm": cross_validate(error, len(points), together=points.speeds()),
         }  # fmt: skip
     if not table:
         raise InputError(

@@ -74,7 +74,7 @@ def untouched_parameters(template: Model, frozen: Iterable[str], vector: Vector)
 
 def fit_sliding(
     points: SlidingPoints, template: Model, noise: Noise | None, frozen: Iterable[str], starts: int, profiles: bool,
-    seed: int = 0, limits: Mapping[str, tuple[float, float]] | None = None,
+    limits: Mapping[str, tuple[float, float]] | None = None,
 ) -> Fit:  # fmt: skip
     """Weighted least squares of the law's torque at constant velocity, from many starts, perhaps within limits."""
     vector = steady_vector(points, template, frozen)
@@ -94,7 +94,7 @@ def fit_sliding(
     def residuals(u: Array) -> Array:
         return weight * steady.torque(vector.packed(u)) - target
 
-    first = separable_starts(model, target, vector, starts, seed=seed)
+    first = separable_starts(model, target, vector, starts)
     fc = float(np.median(np.abs(points.torque)))
     fast = float(np.max(np.abs(points.velocity)))
     scales = {

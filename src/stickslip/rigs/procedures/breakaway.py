@@ -85,10 +85,6 @@ class Breakaway(Procedure):
                 # It springs back when the torque goes, which is no break-away: not kept.
                 rows = yield Step(setpoints(round(0.15 / dt)))
 
-    def finished(self, record: Record) -> Record:
-        """As it is: without the loop's velocity, whose single counts would hide rest."""
-        return record
-
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
         """Every ramp moved the axis."""
         torque = record["torque_setpoint"]

@@ -18,15 +18,10 @@ from stickslip.rigs.procedures.moves import ROOM, brake, holder, now, uniform
 from stickslip.rigs.procedures.resting import RESTING, resting
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["DRY", "GREASED", "PROCEDURE", "Sliding"]
+__all__ = ["DRY", "PROCEDURE", "Sliding"]
 
 DRY = (1.4, 1.2, 1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.08, 0.06, 0.04, 0.02)
 """rad/s, thesis eq. 4.1"""
-GREASED = (
-    25.0, 20.0, 15.0, 10.0, 5.0, 3.0, 2.0, 1.9, 1.8, 1.6, 1.4, 1.2, 1.1, 1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4,
-    0.3, 0.2, 0.1, 0.08, 0.06, 0.04, 0.02, 0.01, 0.005,
-)  # fmt: skip
-"""rad/s, thesis eq. 4.3"""
 ROWS, LONGEST = 2000, 0.02
 """Rows of a velocity's record, about, and the longest that one may last, s: sticking must show in them."""
 SHORT = 0.5

@@ -32,7 +32,6 @@ const sending = (method) => async (path, data = {}) =>
 
 export const post = sending("POST");
 export const put = sending("PUT");
-export const patch = sending("PATCH");
 export const remove = async (path) => (await ask(path, { method: "DELETE" })).json();
 
 export const numbers = async (path, signal) => new Float64Array(await (await ask(path, { signal })).arrayBuffer());
