@@ -20,10 +20,9 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.files import machine
 from stickslip.machines.machine import IMPERFECTIONS, Machine
-from stickslip.rigs._virtual import run_block
 from stickslip.rigs.loop_sample import COLUMNS, control_of
 from stickslip.rigs.rig import Measurement, setpoints
-from stickslip.rigs.virtual import VirtualRig
+from stickslip.rigs.virtual import VirtualRig, run_block
 from stickslip.simulation.machine.layout import lay_out_machine, look, run
 
 REPEATS = 5

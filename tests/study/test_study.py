@@ -18,8 +18,8 @@ from stickslip.cli import _output
 from stickslip.errors import CodeRefused, InputError
 from stickslip.model import Model
 from stickslip.record import Record
-from stickslip.report._notes import notes
 from stickslip.report._view import StudyView
+from stickslip.report.html import notes
 from stickslip.study import study as studies
 from stickslip.study.files import KEYS
 from stickslip.study.plan import load, load_run, select

@@ -21,11 +21,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from itertools import accumulate
 from typing import Any
 
 from stickslip.errors import ParameterError
-from stickslip.machines.drivetrain import Chain, Modes
+from stickslip.machines.drivetrain import Chain, Modes, all_positive
 
 __all__ = [
     "Flexibility",
@@ -36,29 +35,23 @@ __all__ = [
 ]
 
 
-def _positive(name: str, values: Sequence[float], unit: str) -> None:
-    for value in values:
-        if not (value > 0.0 and math.isfinite(value)):
-            raise ParameterError(f"flexibility: {name} = {value:g} {unit} must be greater than 0")
-
-
 def twist(torque: float, stiffness: float) -> float:
     """Static twist of a spring under a torque (N·m), rad; thesis 4.5."""
-    _positive("stiffness", (stiffness,), "N·m/rad")
+    all_positive("flexibility", "stiffness", (stiffness,), "N·m/rad")
     return torque / stiffness
 
 
 def lowest_first_mode(stiffness: Sequence[float], total: float) -> float:
     """The lowest first elastic mode that any inertias adding up to `total` (kg·m²) can have, Hz."""
-    _positive("stiffness", stiffness, "N·m/rad")
-    _positive("inertia", (total,), "kg·m²")
+    all_positive("flexibility", "stiffness", stiffness, "N·m/rad")
+    all_positive("flexibility", "inertia", (total,), "kg·m²")
     return math.sqrt(4.0 / (total * math.fsum(1.0 / k for k in stiffness))) / (2.0 * math.pi)
 
 
 def far_inertia(stiffness: float, frequency: float) -> float:
     """The inertia that rings at `frequency` (Hz) on a spring whose other end is held, kg·m²."""
-    _positive("stiffness", (stiffness,), "N·m/rad")
-    _positive("frequency", (frequency,), "Hz")
+    all_positive("flexibility", "stiffness", (stiffness,), "N·m/rad")
+    all_positive("flexibility", "frequency", (frequency,), "Hz")
     return stiffness / (2.0 * math.pi * frequency) ** 2
 
 
@@ -164,8 +157,8 @@ def flexibility(
     ------
     ParameterError
     """
-    _positive("inertia", (inertia,), "kg·m²")
-    _positive("first mode", claimed, "Hz")
+    all_positive("flexibility", "inertia", (inertia,), "kg·m²")
+    all_positive("flexibility", "first mode", claimed, "Hz")
     chain = Chain(tuple(inertias), tuple(stiffness)) if inertias else None
     if chain and abs(chain.total - inertia) > 0.01 * inertia:
         raise ParameterError(
@@ -186,12 +179,3 @@ def _free_first(stiffness: float, total: float, last: float) -> float:
     if last >= total:
         return math.nan
     return float(Chain((total - last, last), (stiffness,)).modes().frequencies[1])
-
-
-def sum_of_inverse_squares(chain: Chain) -> float:
-    """Sum over the elastic modes of 1/w^2, s²: the identity that the bound rests on."""
-    before = accumulate(chain.inertias[:-1])
-    return math.fsum(
-        left * (chain.total - left) / (chain.total * k)
-        for left, k in zip(before, chain.stiffness, strict=True)
-    )

@@ -12,14 +12,14 @@ import importlib
 import os
 import sys
 import warnings
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
 from stickslip import compiling, waiting
 from stickslip.approval import allow_code
-from stickslip.cli import _kinds
 from stickslip.errors import InputError, Interrupted, ModelRemark, StickslipError
+from stickslip.verbs.kinds import require
 
 __all__ = ["VERBS", "allow_code_argument", "main", "parser_of"]
 
@@ -43,6 +43,20 @@ CODE = (
     "export",
 )
 """Verbs that read TOML files in which laws may be named; `rig` and `analyse` have the option in their actions."""
+WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "identify": {"model": ("model",)},
+    "compare": {"first": ("model",), "second": ("model",)},
+    "recommend": {"model": ("model",)},
+    "sweep": {"sweep": ("sweep", "tuning")},
+    "tune": {"tune": ("tuning", "sweep")},
+    "simulate": {"file": ("simulation", "model")},
+    "learn": {"file": ("simulation", "model")},
+    "study": {"study": ("study",)},
+    "export": {"file": ("model", "simulation", "map")},
+    "rig": {"rig": ("rig",)},
+}
+"""Per verb and argument, the kinds of file that it takes, or knows better what to say of; records are looked at where
+they are read."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -144,11 +158,23 @@ def _dispatch(argv: list[str]) -> int:
         return 0
     if args.verb is None:
         raise InputError(f"no verb; choose from {', '.join(VERBS)}; see `stickslip --help`")
-    _kinds.check(args)
+    _check_kinds(args)
     with allow_code(getattr(args, "allow_code", False), remember=True), _remarks():
         code: int = args.run(args)
     sys.stdout.flush()
     return code
+
+
+def _check_kinds(args: argparse.Namespace) -> None:
+    """Refuse files of another kind than the verb of `args` takes.
+
+    Raises
+    ------
+    InputError
+    """
+    for name, wanted in WANTED.get(args.verb, {}).items():
+        if (path := getattr(args, name, None)) is not None:  # `rig list` has none
+            require(path, *wanted)
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from stickslip.laws._viscous import linear as viscous
 from stickslip.laws.sliding_curve import CURVE, extremes
 from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
-from stickslip.laws.slip_rule import SLIP_RULE
+from stickslip.laws.slip_rule import SLIP_RULE, switch
 from stickslip.laws.slip_rule import signed as load_of
 from stickslip.spec import Elements, Law, Mode, Par
 
@@ -66,19 +66,6 @@ def guards(v: float, z: Any, p: Any, u: Any, g: Any) -> None:
                 g.mode[i] = min(g.mode[i], -1e-300)
         else:
             g.mode[i] = -z.mode[i] * v
-
-
-def switch(v: float, z: Any, p: Any, u: Any, g: Any) -> None:
-    """Leave the modes whose guard is not negative: slip in the direction of motion, or stick."""
-    direction = 1.0
-    if v < 0.0:
-        direction = -1.0
-    for i in range(len(p.k)):
-        if g.mode[i] >= 0.0:
-            if z.mode[i] == 0.0:
-                z.mode[i] = direction
-            else:
-                z.mode[i] = 0.0
 
 
 def steady(v: float, p: Any) -> float:

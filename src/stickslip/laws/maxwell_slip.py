@@ -12,6 +12,7 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
+from stickslip.laws.slip_rule import switch
 from stickslip.spec import Elements, Law, Mode, Par
 
 __all__ = ["LAW"]
@@ -57,19 +58,6 @@ def guards(v: float, z: Any, p: Any, u: Any, g: Any) -> None:
                 g.mode[i] = min(g.mode[i], -1e-300)
         else:
             g.mode[i] = -z.mode[i] * v
-
-
-def switch(v: float, z: Any, p: Any, u: Any, g: Any) -> None:
-    """Leave the modes whose guard is not negative: slip in the direction of motion, or stick."""
-    direction = 1.0
-    if v < 0.0:
-        direction = -1.0
-    for i in range(len(p.k)):
-        if g.mode[i] >= 0.0:
-            if z.mode[i] == 0.0:
-                z.mode[i] = direction
-            else:
-                z.mode[i] = 0.0
 
 
 def slide(distance: float, z: Any, p: Any) -> None:

@@ -7,9 +7,11 @@ reversal and feeds energy in. The signed reading counts only the load that resis
 
 from __future__ import annotations
 
+from typing import Any
+
 from stickslip.spec import Choice, Option
 
-__all__ = ["SLIP_RULE", "literal", "signed"]
+__all__ = ["SLIP_RULE", "literal", "signed", "switch"]
 
 
 def signed(direction: float, force: float) -> float:
@@ -20,6 +22,19 @@ def signed(direction: float, force: float) -> float:
 def literal(direction: float, force: float) -> float:
     """Load of an element as the thesis prints it: |F_i|, N·m, whatever the direction."""
     return abs(force)
+
+
+def switch(v: float, z: Any, p: Any, u: Any, g: Any) -> None:
+    """Leave the modes whose guard is not negative: slip in the direction of motion, or stick."""
+    direction = 1.0
+    if v < 0.0:
+        direction = -1.0
+    for i in range(len(p.k)):
+        if g.mode[i] >= 0.0:
+            if z.mode[i] == 0.0:
+                z.mode[i] = direction
+            else:
+                z.mode[i] = 0.0
 
 
 SLIP_RULE = Choice(

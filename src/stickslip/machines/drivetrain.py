@@ -17,7 +17,8 @@ import numpy as np
 from stickslip.errors import ParameterError
 
 __all__ = [
-    "FREE", "INPUTS", "Chain", "Drivetrain", "Flow", "LinearContact", "Modes", "StateSpace", "exponential",
+    "FREE", "INPUTS", "Chain", "Drivetrain", "Flow", "LinearContact", "Modes", "StateSpace", "all_positive",
+    "exponential",
 ]  # fmt: skip
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -34,10 +35,11 @@ SWEEPS = 20
 """Of balancing a matrix: after so many the norm of a chain's falls no more."""
 
 
-def _positive(name: str, values: Sequence[float], unit: str) -> None:
+def all_positive(owner: str, name: str, values: Sequence[float], unit: str) -> None:
+    """Refuse numbers of which one is not positive."""
     for value in values:
         if not (value > 0.0 and math.isfinite(value)):
-            raise ParameterError(f"drivetrain: {name} = {value:g} {unit} must be greater than 0")
+            raise ParameterError(f"{owner}: {name} = {value:g} {unit} must be greater than 0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +74,8 @@ class Chain:
     stiffness: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        _positive("inertias", self.inertias, "kg·m²")
-        _positive("stiffness", self.stiffness, "N·m/rad")
+        all_positive("drivetrain", "inertias", self.inertias, "kg·m²")
+        all_positive("drivetrain", "stiffness", self.stiffness, "N·m/rad")
         if len(self.inertias) != len(self.stiffness) + 1:
             raise ParameterError(
                 f"chain: {len(self.inertias)} inertias and {len(self.stiffness)} springs; give one spring fewer"

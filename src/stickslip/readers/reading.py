@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +17,6 @@ from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.readers import profiles
 from stickslip.readers._choose import Choice, choose, parse_mapping
-from stickslip.readers._told import told
 from stickslip.readers.convert import Drive, convert, times_of
 from stickslip.readers.table_columns import Column, Format, Table
 from stickslip.record import Record
@@ -36,6 +36,8 @@ FORMATS = (
     "csv_text",
 )
 """One file a format, asked in this order; text is last, since anything may be text."""
+PER_MILLE = re.compile(r"(?i)(?<![0-9a-f])60(?:77|b2)(?![0-9a-f])")
+"""Objects of CiA 402 (IEC 61800-7-201) in thousandths of the rated torque: actual torque, torque offset."""
 
 
 def formats() -> list[Format]:
@@ -153,6 +155,29 @@ def record_of(
     # Damaged files hold numbers that overflow: they are infinite then, and the doctor finds them.
     with np.errstate(all="ignore"):
         return convert(table, told(choices, table, settings), settings, period, [*table.findings, *findings])
+
+
+def told(choices: Sequence[Choice], table: Table, drive: Drive) -> list[Choice]:
+    """The choices, with the units of whole numbers that the drive's numbers tell: who gives counts a turn has them."""
+    columns = {c.name: c for c in table.columns}
+    known = drive.known()
+    out: list[Choice] = []
+    for choice in choices:
+        unit = ""
+        if choice.role in ("position", "position_reference") and "counts_per_rev" in known:
+            unit = "counts"
+        elif "rated_torque" in known and PER_MILLE.search(choice.column):
+            unit = "permille"
+        if unit and not choice.unit and _whole(columns[choice.column].values):
+            choice = replace(choice, unit=unit, source="drive")
+        out.append(choice)
+    return out
+
+
+def _whole(values: np.ndarray) -> bool:
+    """Whether all values are whole numbers, and not all alike."""
+    finite = values[np.isfinite(values)]
+    return bool(finite.size and np.ptp(finite) > 0.0 and np.all(finite == np.round(finite)))
 
 
 def joined(

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from stickslip.report._notes import notes
 from stickslip.report._tables import metrics_tables
 from stickslip.report._view import StudyView
 from stickslip.report.captions import case_message, figure_of_merit, ranking
@@ -16,10 +15,18 @@ from stickslip.report.figures import COMMON, Figure
 from stickslip.report.page import filled
 from stickslip.report.plots import embedded
 from stickslip.thesis.claims import Claim, Verdict, judge
+from stickslip.thesis.edition import SLIP, Note
 
-__all__ = ["image", "render"]
+__all__ = ["image", "notes", "render"]
 
 MARKS = {True: ("yes", "holds"), False: ("no", "does not hold"), None: ("open", "not run")}
+READING = Note(
+    "Reading the metrics",
+    "A standstill is |v| below 1e-3 rad/s for at least 10 ms while |v_d| is above 2e-3 rad/s. Reversals are sign "
+    "changes of the velocity through a trigger of ±1e-3 rad/s. A limit cycle has at least 5 periods in the last "
+    "40 % whose amplitudes and periods spread by less than 5 %. Settling is the entry for good into 2 % of the "
+    "step. The steady-state error is the mean over the last 20 %.",
+)
 
 
 def render(view: StudyView, figures: Sequence[Figure]) -> str:
@@ -175,3 +182,21 @@ def _brief(manifest: Mapping[str, Any]) -> dict[str, Any]:
     if "runs" in manifest:
         brief["runs"] = f"{len(manifest['runs'])}, listed in manifest.json"
     return brief
+
+
+def notes(view: StudyView) -> list[Note]:
+    """The notes that apply to a study."""
+    edition = view.edition
+    ruled = () if edition.before or view.rules == ["signed"] else (SLIP,)
+    return [*edition.before, *ruled, *starts(view), *edition.after, READING, *edition.last]
+
+
+def starts(view: StudyView) -> list[Note]:
+    """Which runs depend on their start, if any do."""
+    named = [run.key for run in view.runs.values() if run.depends_on_start]
+    text = (
+        "From an initial position shifted by 1e-9 rad, these runs take another branch of the motion, and their "
+        "metrics are those of "
+        f"one branch: {', '.join(named)}."
+    )
+    return [Note("Runs that depend on their start", text)] if named else []

@@ -14,12 +14,14 @@ import numpy as np
 
 from stickslip.config import Table
 from stickslip.errors import InputError
+from stickslip.jit import kernel
 from stickslip.machines.files import machine
 from stickslip.machines.machine import IMPERFECTIONS, Machine
-from stickslip.rigs._virtual import run_block
-from stickslip.rigs.loop_sample import Control
+from stickslip.rigs.loop_sample import Control, decide, finished
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
 from stickslip.simulation.machine.layout import lay_out_machine, look, run, wait
+from stickslip.simulation.machine.plant import Laid, plant_of
+from stickslip.simulation.machine.step import sample
 
 __all__ = ["RIG", "VirtualRig", "virtual_rig"]
 
@@ -31,6 +33,18 @@ SETTLE, LONGEST_SETTLE = 0.05, 2.0
 """s, of which a pause steps through as many as the axis needs to come to rest."""
 AT_REST = 0.05
 """rad/s"""
+
+
+@kernel()
+def run_block(laid: Laid, control: Control, setpoints: Any, rows: Any) -> int:
+    """`stickslip.rigs.rig.BlockRig.exchange_block` on a machine; returns how many samples were run."""
+    plant = plant_of(laid)
+    for k in range(setpoints.shape[0]):
+        torque = decide(control, setpoints[k], rows[k])
+        sample(plant, torque, control.measured)
+        if finished(control):
+            return k + 1
+    return setpoints.shape[0]
 
 
 class VirtualRig:

@@ -191,7 +191,7 @@ def read_bench(study: str | Path = BENCH) -> Bench:
                 raise table.error(key, f"must hold {bare!r}: every compensator is compared with the PD alone")
         machines = _machines(table.tables("machines"))
         laws = build.models(table.tables("laws"), build.law_files(table))
-        motions = {name: _motion(t) for name, t in table.tables("references").items()}
+        motions = {name: build.motion(t) for name, t in table.tables("references").items()}
         changes = {name: _change(t, motions) for name, t in table.tables("changes").items()}
         for family, found in (("machines", machines), ("references", motions), ("changes", changes)):
             if not found:
@@ -212,12 +212,6 @@ def _machines(tables: Mapping[str, Table]) -> dict[str, Machine]:
         if other:
             out[name] = replace(out[name], models=out[other].models)
     return out
-
-
-def _motion(table: Table) -> tuple[Reference, float]:
-    with table:
-        duration = table.positive("duration", "s")
-        return build.reference(table), duration
 
 
 def _change(table: Table, motions: Mapping[str, Any]) -> Change:

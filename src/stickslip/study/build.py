@@ -31,6 +31,7 @@ __all__ = [
     "law_files",
     "model",
     "models",
+    "motion",
     "numerics",
     "placement",
     "reference",
@@ -104,6 +105,13 @@ def machines(tables: Mapping[str, Table]) -> dict[str, Machine]:
 
 
 # ---- references ------------------------------------------------------------------------------------------------
+
+
+def motion(table: Table) -> tuple[Reference, float]:
+    """Read a table as a reference and its ``duration``, s."""
+    with table:
+        duration = table.positive("duration", "s")
+        return reference(table), duration
 
 
 def reference(table: Table) -> Reference:

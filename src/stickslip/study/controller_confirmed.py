@@ -19,7 +19,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.machines.machine import Machine
 from stickslip.rigs.virtual import VirtualRig
-from stickslip.study.stability_map import RESTLESS, moved
+from stickslip.study.stability_map import RESTLESS, Judged, moved
 
 __all__ = ["FACTORS", "ConfirmedController", "Scaled", "confirmed_controller", "scaled"]
 
@@ -28,7 +28,7 @@ FACTORS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0)
 
 
 @dataclass(frozen=True)
-class Scaled:
+class Scaled(Judged):
     """The controller with its loop's gains times a factor.
 
     Attributes
@@ -48,16 +48,6 @@ class Scaled:
     frequency: float
     moved: float
     calm: bool
-
-    @property
-    def stable(self) -> bool:
-        """Whether the poles say so."""
-        return self.growth < 0.0
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the simulation does what the poles say."""
-        return self.stable == self.calm
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from stickslip.control.linear import LINEAR
 from stickslip.errors import Interrupted, RigError
 from stickslip.machines.files import LIBRARY, library
 from stickslip.machines.machine import IMPERFECTIONS, Machine
-from stickslip.model import Model, Reference
+from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import setpoints
@@ -189,7 +189,7 @@ def planned_experiments(table: Table) -> list[ExperimentRun]:
     """
     config = _checked(table)
     plants = build.machines(table.tables("machines"))
-    motions = {name: _motion(t) for name, t in table.tables("references").items()}
+    motions = {name: build.motion(t) for name, t in table.tables("references").items()}
     laws, files = build.models(table.tables("laws"), build.law_files(table)), build.law_files(table)
     inertia = table.positive("design_inertia", "kg·m²") if table.has("design_inertia") else 0.0
     controllers = table.tables("controllers")
@@ -220,12 +220,6 @@ def _checked(table: Table) -> Mapping[str, Any]:
     if not seeds.is_integer():
         raise table.error("seeds", "must be a whole number")
     return {"seeds": int(seeds), "ablation": table.flag("ablation", False)}
-
-
-def _motion(table: Table) -> tuple[Reference, float]:
-    with table:
-        duration = table.positive("duration", "s")
-        return build.reference(table), duration
 
 
 def _experiment(name: str, table: Table, plants: Mapping[str, Any], motions: Mapping[str, Any]) -> Experiment:

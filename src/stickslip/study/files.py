@@ -34,6 +34,7 @@ __all__ = [
     "metric_names",
     "prepared_folder",
     "read_manifest",
+    "save_manifest",
     "unwritable",
     "write_manifest",
     "write_metrics",
@@ -229,20 +230,32 @@ def write_manifest(
     results: Mapping[str, Run],
     timings: Mapping[str, float],
 ) -> dict[str, Any]:
-    """Write manifest.json and copy the study's inputs beside it, so that `stickslip rerun` needs nothing else."""
+    """Write the manifest of a study."""
+    inputs = [(study.source.name, study.source), *study.files.items()]
+    content: dict[str, Any] = {
+        "only": list(only or ()),
+        "configuration": study.config,
+        "timings": dict(timings),
+        "runs": [_entry(folder, p, results[p.key]) for p in planned],
+    }
+    return save_manifest(folder, {"study": study.name, "title": study.title}, inputs, content)
+
+
+def save_manifest(
+    folder: Path, named: Mapping[str, str], inputs: Sequence[tuple[str, Path]], content: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Write manifest.json and copy the inputs beside it, so that `stickslip rerun` needs nothing else.
+
+    It begins with what it is of, and with what the numbers come from.
+    """
     try:
-        inputs = copy_inputs(folder, [(study.source.name, study.source), *study.files.items()])
         manifest: dict[str, Any] = {
-            "study": study.name,
-            "title": study.title,
+            **named,
             "written": datetime.now(UTC).isoformat(timespec="seconds"),
             "versions": versions(),
             "engine_sha256": engine_hash(),
-            "inputs": inputs,
-            "only": list(only or ()),
-            "configuration": study.config,
-            "timings": dict(timings),
-            "runs": [_entry(folder, p, results[p.key]) for p in planned],
+            "inputs": copy_inputs(folder, inputs),
+            **content,
         }
         draft = folder / "manifest.json.part"
         draft.write_text(json.dumps(manifest, indent=1, default=str), encoding="utf-8")

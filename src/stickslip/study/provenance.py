@@ -7,11 +7,12 @@ import hashlib
 import importlib.metadata
 import platform
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import stickslip
 
-__all__ = ["engine_hash", "file_hash", "source_hash", "versions"]
+__all__ = ["engine_hash", "file_hash", "other_versions", "source_hash", "versions"]
 
 WITHOUT_PHYSICS = ("analyse", "cli", "report", "study", "sweep")
 """Folders of the package that cannot change a run's numbers."""
@@ -47,3 +48,9 @@ def versions() -> dict[str, str]:
     found = {"stickslip": stickslip.__version__, "python": platform.python_version()}
     found.update({name: importlib.metadata.version(name) for name in ("numpy", "numba", "llvmlite")})
     return found | {"machine": platform.machine(), "system": platform.system()}
+
+
+def other_versions(then: Mapping[str, str]) -> list[str]:
+    """A line for everything whose version is another one now."""
+    now = versions()
+    return [f"{n} {now.get(n)}, was {then.get(n)}" for n in {**then, **now} if now.get(n) != then.get(n)]

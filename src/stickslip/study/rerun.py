@@ -12,7 +12,7 @@ from typing import Any
 from stickslip.errors import InputError
 from stickslip.study.files import read_manifest
 from stickslip.study.plan import load
-from stickslip.study.provenance import versions
+from stickslip.study.provenance import other_versions
 from stickslip.study.study import Progress, execute
 
 __all__ = ["Comparison", "rerun"]
@@ -104,10 +104,4 @@ def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comp
                     largest = max(largest, abs(b - a) / abs(a) if a and not math.isnan(b - a) else math.inf)
             if progress:
                 progress(done, len(planned))
-    now = versions()
-    notes = [
-        f"{name} {now.get(name)}, was {then.get(name)}"
-        for name in {**then, **now}
-        if now.get(name) != then.get(name)
-    ]
-    return Comparison(len(planned), count, differences, largest, notes)
+    return Comparison(len(planned), count, differences, largest, other_versions(then))

@@ -29,9 +29,18 @@ from stickslip.rigs.loop import Loop as RigLoop
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import VirtualRig
 
-__all__ = ["FILTERS", "FINE", "FINE_GAINS", "GAINS", "OPEN", "Confirmed", "Point", "confirmed", "moved"]
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
+__all__ = [
+    "FILTERS",
+    "FINE",
+    "FINE_GAINS",
+    "GAINS",
+    "OPEN",
+    "Confirmed",
+    "Judged",
+    "Point",
+    "confirmed",
+    "moved",
+]
 
 FILTERS = (4.0, 10.0, 25.0, 60.0, 150.0, 0.0)
 """Hz; 0 for none."""
@@ -52,8 +61,25 @@ RESTLESS = 5.0
 """Times the motion with the linear controller alone, and counts of the encoder, from which a loop is not at rest."""
 
 
+class Judged:
+    """A setting with what the poles (``growth``, 1/s) and the rig (``calm``) say of it."""
+
+    growth: float
+    calm: bool
+
+    @property
+    def stable(self) -> bool:
+        """Whether the poles say so."""
+        return self.growth < 0.0
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the simulation does what the poles say."""
+        return self.stable == self.calm
+
+
 @dataclass(frozen=True)
-class Point:
+class Point(Judged):
     """One setting.
 
     Attributes
@@ -75,16 +101,6 @@ class Point:
     frequency: float
     moved: float
     calm: bool
-
-    @property
-    def stable(self) -> bool:
-        """Whether the poles say so."""
-        return self.growth < 0.0
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the simulation does what the poles say."""
-        return self.stable == self.calm
 
 
 @dataclass(frozen=True, eq=False)

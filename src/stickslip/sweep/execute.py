@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import importlib
 import itertools
-import json
 import os
 import pickle
 import platform
@@ -17,7 +16,6 @@ import warnings
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +23,7 @@ from stickslip.approval import allow_code
 from stickslip.capacity import insist_on_jobs, insist_on_memory
 from stickslip.errors import InputError
 from stickslip.simulation.many import simd_batch
-from stickslip.study.files import claim_folder, copy_inputs, unwritable
-from stickslip.study.provenance import engine_hash, versions
+from stickslip.study.files import claim_folder, save_manifest
 from stickslip.study.study import interrupts_between_runs
 from stickslip.sweep import dataset
 from stickslip.sweep.block import Block, compute, integrator_of
@@ -333,30 +330,19 @@ def compute_undisturbed(parcel: Parcel, run: int, start: int) -> Block:
 def write_manifest(
     folder: Path, sweep: Sweep, timings: Mapping[str, Any], integrators: Sequence[tuple[str, str]]
 ) -> dict[str, Any]:
-    """Write manifest.json and copy the sweep's inputs beside it."""
-    try:
-        everything = [(sweep.source.name, sweep.source), (sweep.study.source.name, sweep.study.source)]
-        manifest: dict[str, Any] = {
-            "sweep": sweep.name,
-            "title": sweep.title,
-            "written": datetime.now(UTC).isoformat(timespec="seconds"),
-            "versions": versions(),
-            "engine_sha256": engine_hash(),
-            "inputs": copy_inputs(folder, [*everything, *sweep.study.files.items(), *sweep.files.items()]),
-            "configuration": sweep.config,
-            "cases": sweep.drawn.cases,
-            "varied": list(sweep.drawn.names),
-            "metrics": list(sweep.metrics),
-            "timings": dict(timings),
-            "runs": [
-                {"run": p.key, "fingerprint": sweep.fingerprint(i), "integrator": name}
-                | ({"because": why} if why else {})
-                for i, (p, (name, why)) in enumerate(zip(sweep.runs, integrators))
-            ],
-        }  # fmt: skip
-        draft = folder / "manifest.json.part"
-        draft.write_text(json.dumps(manifest, indent=1, default=str), encoding="utf-8")
-        os.replace(draft, folder / "manifest.json")
-    except OSError as error:
-        raise unwritable(folder, error) from None
-    return manifest
+    """Write the manifest of a sweep."""
+    files = [(sweep.source.name, sweep.source), (sweep.study.source.name, sweep.study.source)]
+    content: dict[str, Any] = {
+        "configuration": sweep.config,
+        "cases": sweep.drawn.cases,
+        "varied": list(sweep.drawn.names),
+        "metrics": list(sweep.metrics),
+        "timings": dict(timings),
+        "runs": [
+            {"run": p.key, "fingerprint": sweep.fingerprint(i), "integrator": name}
+            | ({"because": why} if why else {})
+            for i, (p, (name, why)) in enumerate(zip(sweep.runs, integrators))
+        ],
+    }
+    inputs = [*files, *sweep.study.files.items(), *sweep.files.items()]
+    return save_manifest(folder, {"sweep": sweep.name, "title": sweep.title}, inputs, content)

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.study.files import read_manifest
-from stickslip.study.provenance import versions
+from stickslip.study.provenance import other_versions
 from stickslip.study.rerun import Comparison
 from stickslip.sweep import dataset
 from stickslip.sweep.block import Block
@@ -71,8 +71,7 @@ def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comp
         if progress:
             progress(done, sweep.cases)
     differences.sort(key=lambda found: found[:2])  # Blocks come as they get done.
-    now, then = versions(), manifest["versions"]
-    notes = [f"{n} {now.get(n)}, was {then.get(n)}" for n in {**then, **now} if now.get(n) != then.get(n)]
+    notes = other_versions(manifest["versions"])
     lines = [line for *_, line in differences]
     return Comparison(sweep.cases, sweep.cases * len(sweep.metrics), lines, largest, notes)
 

@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from stickslip.web.asking import Refused, Table, body
-from stickslip.web.jobs import LONGEST_LINE, ended, last_of, worker_command
+from stickslip.web.jobs import ended, last_of, started
 
 __all__ = ["Bench", "table"]
 
@@ -65,11 +65,7 @@ class Bench:
 
     async def _running(self) -> asyncio.subprocess.Process:
         if self._process is None or self._process.returncode is not None:
-            command, environment = worker_command("stickslip.web.bench_worker")
-            self._process = await asyncio.create_subprocess_exec(
-                *command, env=environment, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
-                stderr=asyncio.subprocess.PIPE, limit=LONGEST_LINE, start_new_session=True,
-            )  # fmt: skip
+            self._process = await started("stickslip.web.bench_worker")
             if self._process.stderr is not None:
                 self._complaints = asyncio.create_task(last_of(self._process.stderr))
         return self._process

@@ -17,7 +17,7 @@ from typing import Any
 from stickslip.errors import InputError
 from stickslip.web.projects import NotThere
 
-__all__ = ["Job", "Jobs", "worker_command"]
+__all__ = ["Job", "Jobs", "ended", "last_of", "started", "worker_command"]
 
 LONGEST_LINE = 64 * 2**20
 KEPT = 200
@@ -281,9 +281,9 @@ class Jobs:
             )
 
 
-async def started() -> asyncio.subprocess.Process:
-    """A process that waits for a job."""
-    command, environment = worker_command()
+async def started(*module: str) -> asyncio.subprocess.Process:
+    """A process that waits for a job, or of another module."""
+    command, environment = worker_command(*module)
     return await asyncio.create_subprocess_exec(
         *command, env=environment, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE, limit=LONGEST_LINE, start_new_session=True,

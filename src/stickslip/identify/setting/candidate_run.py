@@ -334,7 +334,7 @@ def followed(
 
 @kernel()
 def follow(laid: Laid, control: Control, path: Any, row: Any, positions: Any) -> int:
-    """The loop of `stickslip.rigs._virtual.run_block`, that keeps the axis's own positions; how many samples ran."""
+    """The loop of `stickslip.rigs.virtual.run_block`, that keeps the axis's own positions; how many samples ran."""
     plant = plant_of(laid)
     for k in range(path.shape[0]):
         positions[k] = plant.axis[plant.machine.shaft]
