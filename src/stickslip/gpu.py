@@ -14,6 +14,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from numba import config, cuda, float64
 from stickslip.errors import InputError
 from stickslip.jit import loaded
 
-__all__ = ["cuda", "float64", "solve"]
+__all__ = ["cuda", "float64", "solver"]
 
 THREADS = 64
 """In a block."""
@@ -34,7 +35,9 @@ def solve_gpu(c, columns, start, h, reference, cuts, sums, ends):
     case = cuda.grid(1)
     if case < columns.shape[0]:
         z = cuda.local.array(ROOM, float64)
-        solve_block(z, c, columns, start, h, reference, cuts, sums, ends, case)
+        count = begin_block(z, c, columns, start, case)
+        run_parts(z, c, h, reference, cuts, sums, case, count)
+        end_block(z, ends, case, count)
 """
 compile_entry: Any = cuda.jit
 
@@ -93,10 +96,8 @@ def check() -> None:
     )
 
 
-def solve(
-    text: str, lanes: int, c: Any, columns: Any, start: Any, h: float, reference: Any, cuts: Any, sums: Any, ends: Any
-) -> None:  # fmt: skip
-    """What the processor's ``solve_lanes`` does, on the GPU; `text` and `lanes` are the processor's.
+def solver(text: str, lanes: int) -> Callable[..., None]:
+    """What does on the GPU what the processor's ``solve_lanes`` does; `text` and `lanes` are the processor's.
 
     Raises
     ------
@@ -104,11 +105,18 @@ def solve(
         If there is no GPU.
     """
     check()
-    n = len(columns)
-    room = [cuda.to_device(np.ascontiguousarray(a)) for a in (columns, start, reference, cuts, sums, ends)]
-    columns_, start_, reference_, cuts_, sums_, ends_ = room
-    compiled(text_for_gpu(text, lanes))[-(-n // THREADS), THREADS](
-        c, columns_, start_, h, reference_, cuts_, sums_, ends_
-    )
-    sums_.copy_to_host(sums)
-    ends_.copy_to_host(ends)
+    entry = compiled(text_for_gpu(text, lanes))
+
+    def solve(
+        c: Any, columns: Any, start: Any, h: float, reference: Any, cuts: Any, sums: Any, ends: Any
+    ) -> None:  # fmt: skip
+        n = len(columns)
+        room = [
+            cuda.to_device(np.ascontiguousarray(a)) for a in (columns, start, reference, cuts, sums, ends)
+        ]
+        columns_, start_, reference_, cuts_, sums_, ends_ = room
+        entry[-(-n // THREADS), THREADS](c, columns_, start_, h, reference_, cuts_, sums_, ends_)
+        sums_.copy_to_host(sums)
+        ends_.copy_to_host(ends)
+
+    return solve

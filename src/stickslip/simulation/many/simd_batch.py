@@ -9,7 +9,6 @@ short enough.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -215,7 +214,7 @@ def program(text: str, device: str) -> Any:
     # Imported only here: numba.cuda takes long, and few have a GPU.
     from stickslip import gpu
 
-    return functools.partial(gpu.solve, text, LANES)
+    return gpu.solver(text, LANES)
 
 
 def prepare(case: Case, columns: Mapping[str, Array], step: float = STEP) -> Lanes:

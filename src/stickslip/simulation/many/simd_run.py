@@ -195,17 +195,18 @@ def run_parts(z: Any, c: Any, h: float, reference: Any, cuts: Any, sums: Any, ba
                 sums[base + lane, part, i] = z[(SUMS + i) * LANES + lane]
 
 
-def solve_block(
-    z: Any, c: Any, columns: Any, start: Any, h: float, reference: Any, cuts: Any, sums: Any, ends: Any, base: int
-) -> None:  # fmt: skip
-    """Run the LANES cases from `base` on; the last one again where there are fewer."""
+def begin_block(z: Any, c: Any, columns: Any, start: Any, base: int) -> int:
+    """Lay out the LANES cases from `base` on, the last one again where there are fewer; returns how many there are."""
     n = columns.shape[0]
     for lane in range(LANES):
         for j in range(VARIED):
             z[(NUMBERS + j) * LANES + lane] = columns[min(base + lane, n - 1), j]
         begin(z, lane, c, start)
-    count = min(LANES, n - base)
-    run_parts(z, c, h, reference, cuts, sums, base, count)
+    return min(LANES, n - base)
+
+
+def end_block(z: Any, ends: Any, base: int, count: int) -> None:
+    """Where the cases from `base` on have ended."""
     for lane in range(count):
         ends[base + lane, 0] = z[POSITION * LANES + lane]
         ends[base + lane, 1] = z[VELOCITY * LANES + lane]
@@ -225,7 +226,9 @@ def solve_lanes(
     room = aligned((NUMBERS + VARIED) * LANES)
     z = pointer(room, 0)
     for base in range(0, columns.shape[0], LANES):
-        solve_block(z, c, columns, start, h, reference, cuts, sums, ends, base)
+        count = begin_block(z, c, columns, start, base)
+        run_parts(z, c, h, reference, cuts, sums, base, count)
+        end_block(z, ends, base, count)
     room[0] = 0.0  # So long it is needed: an array is freed after its last use, whatever points into it.
 
 

@@ -28,8 +28,8 @@ DECAY = f"_{decay.__name__}"
 """Name that `lower` gives the exponential of the sliding curves."""
 INLINED = frozenset(
     {
-        "trial", "reached", "give", "held_by", "gap_ahead", "accept", "swap", "finish", "first_event", "gap_of",
-        "go_to", "between", "switch", "stick", "weighted", "measure", "measure_all", "highest", "torque",
+        "trial", "over_step", "reached", "give", "held_by", "gap_ahead", "accept", "swap", "finish", "first_event",
+        "gap_of", "go_to", "between", "switch", "stick", "weighted", "measure", "measure_all", "highest", "torque",
     }
 )  # fmt: skip
 """Functions that run for all lanes at once."""

@@ -58,6 +58,9 @@ SUMS = SLIPS + ELEMENTS
 
 # ---- entries of `now`: the reference at begin and end of the step, its feedforward in the mean, at end and begin ----
 GOAL_BEGIN, GOAL_END, RATE_BEGIN, RATE_END, FED_MEAN, FED_END, FED_BEGIN = range(7)
+# ---- entries of what `over_step` tells of a law: part that is left of a force that slips, N·m by which it is pulled,
+# N·m/rad of a bristle, mean torque without what sticks, N·m, and the bristle's lag in steps ----
+KEEP, PULL, BEND, HELD, LAGS = range(5)
 MOST_EVENTS = 16  # in a step
 SHORTEST = 1e-6  # part of a step that is not worth another one
 FAR = 1e300
@@ -73,46 +76,20 @@ def trial(z: Any, lane: int, c: Any, h: float, part: float, now: Any) -> bool:
     x0 = z[POSITION * LANES + lane]
     sigma = z[DIRECTION * LANES + lane]
     # T_f = held + stuck d/2 + damping d/h in the mean over the step, with the displacement d.
-    s0 = z[CURVE_0 * LANES + lane] + 0.5 * part * z[RISE_0 * LANES + lane]
-    give0 = give(z, lane, c, 0, KIND_0, dt, part)
-    inverse0 = 1.0 / (s0 + give0)
-    keep0 = (s0 - give0) * inverse0 if KIND_0 != FOLLOWS else -1.0
-    pull0 = 2.0 * sigma * s0 * (give0 * inverse0 if KIND_0 != FOLLOWS else 1.0)
-    held = 0.0
-    for i in range(FIRST_1):
-        held += held_by(z, lane, c, i, keep0, pull0)
+    first = over_step(z, lane, c, 0, dt, part)
+    second = (0.0, 0.0, 0.0, 0.0, 0.0)
+    held = first[HELD]
     stuck = z[STUCK * LANES + lane]
     damping = viscous(c, z, lane, 0)
-    bend0 = 0.0
-    if RIGID_0:
-        held += rigid(c, z, lane, 0) * sigma * s0
     if KIND_0 == BENDS:
-        bend0 = attraction(c, z, lane, 0) * s0 * inverse0
-        rate = lag(c, z, lane, 0) / dt
-        held += (0.5 * (1.0 + keep0) + rate * (keep0 - 1.0)) * z[BRISTLE_0 * LANES + lane]
-        stuck += (1.0 + 2.0 * rate) * bend0
-    keep1 = 0.0
-    pull1 = 0.0
-    bend1 = 0.0
+        stuck += (1.0 + 2.0 * first[LAGS]) * first[BEND]
     if KIND_1 >= 0:
         weight = gain(c, z, lane)
-        s1 = z[CURVE_1 * LANES + lane] + 0.5 * part * z[RISE_1 * LANES + lane]
-        give1 = give(z, lane, c, 1, KIND_1, dt, part)
-        inverse1 = 1.0 / (s1 + give1)
-        keep1 = (s1 - give1) * inverse1 if KIND_1 != FOLLOWS else -1.0
-        pull1 = 2.0 * sigma * s1 * (give1 * inverse1 if KIND_1 != FOLLOWS else 1.0)
-        helped = 0.0
-        for i in range(FIRST_1, ELEMENTS):
-            helped += held_by(z, lane, c, i, keep1, pull1)
+        second = over_step(z, lane, c, 1, dt, part)
         damping -= weight * viscous(c, z, lane, 1)
-        if RIGID_1:
-            helped += rigid(c, z, lane, 1) * sigma * s1
         if KIND_1 == BENDS:
-            bend1 = attraction(c, z, lane, 1) * s1 * inverse1
-            rate = lag(c, z, lane, 1) / dt
-            helped += (0.5 * (1.0 + keep1) + rate * (keep1 - 1.0)) * z[BRISTLE_1 * LANES + lane]
-            stuck -= weight * (1.0 + 2.0 * rate) * bend1
-        held -= weight * helped
+            stuck -= weight * (1.0 + 2.0 * second[LAGS]) * second[BEND]
+        held -= weight * second[HELD]
     # ---- the end velocity, from a linear equation ----
     goal = now[GOAL_END] - 0.5 * part * (now[GOAL_END] - now[GOAL_BEGIN])
     goal_rate = now[RATE_END] - 0.5 * part * (now[RATE_END] - now[RATE_BEGIN])
@@ -128,34 +105,59 @@ def trial(z: Any, lane: int, c: Any, h: float, part: float, now: Any) -> bool:
     z[(AHEAD + POSITION) * LANES + lane] = x0 + d
     z[(AHEAD + VELOCITY) * LANES + lane] = v1
     z[(AHEAD + INTEGRAL) * LANES + lane] = integral + dt * (goal - x0 - 0.5 * d)
-    gap = reached(z, lane, c, v1, d, keep0, pull0, bend0, keep1, pull1, bend1)
+    gap = reached(z, lane, c, v1, d, first, second)
     turns = (
         sigma * v1 < 0.0 if RIGID_0 or RIGID_1 else (z[SLIPPING * LANES + lane] > 0.0) & (sigma * v1 <= 0.0)
     )
     return (gap <= 0.0) | turns
 
 
-def reached(
-    z: Any, lane: int, c: Any, v1: float, d: float, keep0: float, pull0: float, bend0: float, keep1: float,
-    pull1: float, bend1: float,
-) -> float:  # fmt: skip
+def over_step(z: Any, lane: int, c: Any, which: int, dt: float, part: float) -> Any:
+    """What law `which` does over the last `part` of a step, for `dt`, in which no mode changes: `KEEP` and so on."""
+    kind = KIND_0 if which == 0 else KIND_1
+    sigma = z[DIRECTION * LANES + lane]
+    rise = z[(RISE_0 if which == 0 else RISE_1) * LANES + lane]
+    s = z[(CURVE_0 if which == 0 else CURVE_1) * LANES + lane] + 0.5 * part * rise
+    given = give(z, lane, c, which, kind, dt, part)
+    inverse = 1.0 / (s + given)
+    keep = (s - given) * inverse if kind != FOLLOWS else -1.0
+    pull = 2.0 * sigma * s * (given * inverse if kind != FOLLOWS else 1.0)
+    held = 0.0
+    for i in range(ELEMENTS):
+        if (i < FIRST_1) == (which == 0):
+            held += held_by(z, lane, c, i, keep, pull)
+    if RIGID_0 if which == 0 else RIGID_1:
+        held += rigid(c, z, lane, which) * sigma * s
+    bend = 0.0
+    lags = 0.0
+    if kind == BENDS:
+        bend = attraction(c, z, lane, which) * s * inverse
+        lags = lag(c, z, lane, which) / dt
+        bristle = z[(BRISTLE_0 if which == 0 else BRISTLE_1) * LANES + lane]
+        held += (0.5 * (1.0 + keep) + lags * (keep - 1.0)) * bristle
+    return (keep, pull, bend, held, lags)
+
+
+def reached(z: Any, lane: int, c: Any, v1: float, d: float, first: Any, second: Any) -> float:
     """Curves, bristles and forces at the end velocity into the rows ahead; torque to the next break-away, N·m."""
     side = select(v1 >= 0.0, 1.0, -1.0)
     end0 = curve(v1, c, z, lane, 0)
     z[(AHEAD + CURVE_0) * LANES + lane] = end0
     if KIND_0 == BENDS:
-        z[(AHEAD + BRISTLE_0) * LANES + lane] = keep0 * z[BRISTLE_0 * LANES + lane] + bend0 * d
+        z[(AHEAD + BRISTLE_0) * LANES + lane] = first[KEEP] * z[BRISTLE_0 * LANES + lane] + first[BEND] * d
     gap = FAR
     for i in range(FIRST_1):
-        left = gap_ahead(z, lane, c, i, KIND_0, keep0, pull0, end0, side, d)
+        left = gap_ahead(z, lane, c, i, first, end0, side, d)
         gap = select(left < gap, left, gap)
     if KIND_1 >= 0:
         end1 = curve(v1, c, z, lane, 1)
         z[(AHEAD + CURVE_1) * LANES + lane] = end1
         if KIND_1 == BENDS:
-            z[(AHEAD + BRISTLE_1) * LANES + lane] = keep1 * z[BRISTLE_1 * LANES + lane] + bend1 * d
+            z[(AHEAD + BRISTLE_1) * LANES + lane] = (
+                second[KEEP] * z[BRISTLE_1 * LANES + lane] + second[BEND] * d
+            )
         for i in range(FIRST_1, ELEMENTS):
-            left = gap_ahead(z, lane, c, i, KIND_1, keep1, pull1, end1, side, d)
+            left = gap_ahead(z, lane, c, i, second, end1, side, d)
             gap = select(left < gap, left, gap)
     return gap
 
@@ -176,13 +178,12 @@ def held_by(z: Any, lane: int, c: Any, i: int, keep: float, pull: float) -> floa
     return select(z[(SLIPS + i) * LANES + lane] > 0.0, slides, force)
 
 
-def gap_ahead(
-    z: Any, lane: int, c: Any, i: int, kind: int, keep: float, pull: float, s: float, side: float, d: float
-) -> float:  # fmt: skip
+def gap_ahead(z: Any, lane: int, c: Any, i: int, law: Any, s: float, side: float, d: float) -> float:
     """Torque by which element i misses its break-away at the end of the step, N·m; writes its force there."""
     force = z[(FORCE + i) * LANES + lane]
     level = share(c, z, lane, i) * s
-    slides = keep * force + share(c, z, lane, i) * pull if kind != FOLLOWS else side * level
+    kind = KIND_0 if i < FIRST_1 else KIND_1
+    slides = law[KEEP] * force + share(c, z, lane, i) * law[PULL] if kind != FOLLOWS else side * level
     sticks = force + stiffness(c, z, lane, i) * d
     slips = z[(SLIPS + i) * LANES + lane] > 0.0
     z[(AHEAD + FORCE + i) * LANES + lane] = select(slips, slides, sticks)
