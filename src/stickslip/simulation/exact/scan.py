@@ -214,12 +214,10 @@ def touch(acc: Any, t: float, position: float, v: float) -> None:
 
 
 @kernel(exact=False, inline=True)
-def looked_through(
-    acc: Any, turns: Turns, nodes: Any, span: Span, look: Look, motor: tuple[float, float], may: Farthest,
-    slack: Slack, second: bool,
+def peaks_seen(
+    acc: Any, nodes: Any, width: float, look: Look, motor: tuple[float, float], may: Farthest, second: bool
 ) -> None:  # fmt: skip
-    """Note what a look at a window finds: only signals that may be farther than before are looked at."""
-    width = span.width
+    """Note the peaks that a look at a window finds: only signals that may be farther than before are looked at."""
     if may.error:
         low, high = summits(quartic(nodes, ERROR), quartic(nodes, ERROR_RATE), width, look, -1.0, 0.0)
         reached(acc, second, low, high, 0.0, 0.0)
@@ -231,9 +229,16 @@ def looked_through(
         torque = quartic(nodes, MOTOR)
         low, high = summits(torque, slopes(torque, width), width, look, motor[0], motor[1])
         acc.tm_max = max(acc.tm_max, -low, high)
-    if may.events and creeps(acc, nodes, look.free, slack):
+
+
+@kernel(exact=False, inline=True)
+def events_seen(
+    acc: Any, turns: Turns, nodes: Any, span: Span, look: Look, slack: Slack, second: bool
+) -> None:  # fmt: skip
+    """Note the events that a look at a window finds."""
+    if creeps(acc, nodes, look.free, slack):
         turns_while_creeping(acc, nodes, span, look)
-    elif may.events:
+    else:
         count_events(acc, turns, nodes, span, look, slack, second)
 
 

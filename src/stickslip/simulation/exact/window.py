@@ -36,10 +36,11 @@ from stickslip.simulation.exact.scan import (
     calm,
     count_events,
     creeps,
+    events_seen,
     farther,
-    looked_through,
     passes,
     peak_of,
+    peaks_seen,
     reach,
     slack_of,
     turns_while_creeping,
@@ -184,7 +185,9 @@ def look_through(
             free = Free(p, v, 2.0 * lin.decay, lin.square)
             look = Look(k / parts, 1.0 / parts, steps, flow(lin, long / steps), free)
             motor_shares = (share.motor_p, share.motor_v)
-            looked_through(acc, turns, nodes, span, look, motor_shares, may, slack, second)
+            peaks_seen(acc, nodes, width, look, motor_shares, may, second)
+            if may.events:
+                events_seen(acc, turns, nodes, span, look, slack, second)
         if parts > 1:
             before = nodes[SPEED + k] + v
             p, v = free_motion(m, p, v)

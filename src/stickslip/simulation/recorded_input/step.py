@@ -37,12 +37,10 @@ MOVING = np.dtype([(name, np.float64) for name in MOTION.scalars])
 LAYOUTS = {"n": NUMBERS, "a": MOTION, "r": ROOT, "first": ROOT, "second": ROOT}
 
 
-def stage(
-    c: Any, n: Any, r: Any, q0: float, v0: float, torque: float, h: float, factor: float, guess: float
-) -> float:
-    """The velocity after a stage of backward Euler from q0, v0 and where the contact starts."""
-    begin(r, guess)
+def stage(c: Any, n: Any, r: Any, q0: float, v0: float, torque: float, h: float, factor: float) -> float:
+    """The velocity after a stage of backward Euler from q0, v0 and where the contact starts; its search has begun."""
     if n.holds > 0.0:
+        guess = r.x  # as it was given: powers, which begin at rest, are not looked for where the torque jumps
         impulse = n.inertia * v0 + h * (torque - outer(n, q0))
         side = 1.0 if impulse > 0.0 else -1.0
         held = h * factor * withheld(c, side)
@@ -69,13 +67,15 @@ def step_on(
     q = a.position
     v = a.velocity
     start(c)
-    middle = stage(c, n, first, q, v, torque + rate * part, part, factor, v)
+    begin(first, v)
+    middle = stage(c, n, first, q, v, torque + rate * part, part, factor)
     # The second stage starts from the begin, moved on for `rest` with the slopes of the first.
     tried(c, middle, rest)
     go_on(c)
     base = q + rest * middle
     moved = v + rest / part * (middle - v)
-    end = stage(c, n, second, base, moved, torque + rate * h, part, factor, middle + (middle - v))
+    begin(second, middle + (middle - v))
+    end = stage(c, n, second, base, moved, torque + rate * h, part, factor)
     keep(c)
     a.middle = middle
     a.position = base + part * end
