@@ -152,7 +152,7 @@ def keep_time(n: Any, m: Any, u: Any) -> None:
 
 def see(
     turns: float, position: float, reference_turns: float, reference: float, reference_velocity: float,
-    reference_acceleration: float, n: Any, m: Any, u: Any,
+    reference_acceleration: float, n: Any, m: Any,
 ) -> None:  # fmt: skip
     """Write down what is measured and asked for."""
     m.moved = 0.0
@@ -171,11 +171,11 @@ def see(
         m.rest += 1.0
     else:
         m.rest = 0.0
-    u.position = TURN * turns + position
 
 
 def respond(n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
     """Run the laws in the order of their places. Returns the torque before the limit, N·m."""
+    u.position = TURN * m.turns + m.position
     m.velocity = estimate(m, z, p, u)
     m.slow_velocity += n.slow * (m.velocity - m.slow_velocity)
     m.residual = m.applied - m.feedforward
@@ -233,7 +233,7 @@ def sample_turns(
     ):
         m.waited += n.sample_time
         return faulty(n, m)
-    see(turns, position, reference_turns, reference, reference_velocity, reference_acceleration, n, m, u)
+    see(turns, position, reference_turns, reference, reference_velocity, reference_acceleration, n, m)
     torque = respond(n, m, z, p, u)
     if not abs(torque) < math.inf:
         return faulty(n, m)
@@ -274,7 +274,7 @@ def follow_turns(
         m.waited += n.sample_time
         m.fault = 1.0
     else:
-        see(turns, position, reference_turns, reference, reference_velocity, reference_acceleration, n, m, u)
+        see(turns, position, reference_turns, reference, reference_velocity, reference_acceleration, n, m)
         respond(n, m, z, p, u)
     m.applied = held
     m.commanded = held
