@@ -35,14 +35,14 @@ velocity, as in J dv/dt = T_m - T_f (thesis eq. 3.1).
 from __future__ import annotations
 
 import functools
-import types
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from dataclasses import fields as dataclass_fields
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar
 
 from stickslip.binding import bound, distinct, first_complaint, least, wrapped
+from stickslip.configurable import Configurable, Described
 from stickslip.description import (
     Bristle,
     Choice,
@@ -58,7 +58,6 @@ from stickslip.description import (
     fields_of,
     packed,
 )
-from stickslip.errors import ParameterError, UnknownName, suggestion
 
 __all__ = [
     "Bristle",
@@ -88,77 +87,6 @@ FUNCTIONS = (
 """A law's functions, all of which may call the chosen options."""
 
 
-class Described:
-    """Something with a name and described parameters: a law, a reference."""
-
-    name: str
-    fields: tuple[Field, ...]
-    Parameters: Any
-    check: Callable[[Any], str] | None
-
-    def parameters(self, values: Mapping[str, Any]) -> Any:
-        """Check `values` and return them as this law's NamedTuple.
-
-        Raises
-        ------
-        ParameterError
-            One line that names the parameter, its value and the bound.
-        """
-        names = [f.name for f in self.fields]
-        for name in values:
-            if name not in names:
-                raise ParameterError(f"{self.name}: no parameter {name!r}; {suggestion(name, names)}")
-        given = {f.name: values.get(f.name, values.get(f.like, f.par.default)) for f in self.fields}
-        checked = {f.name: self._checked(f, given[f.name]) for f in self.fields}
-        for per in dict.fromkeys(f.par.per for f in self.fields if f.per_element):
-            sizes = {f.name: len(checked[f.name]) for f in self.fields if f.per_element and f.par.per == per}
-            if len(set(sizes.values())) > 1:
-                listing = ", ".join(f"{name} has {size}" for name, size in sizes.items())
-                raise ParameterError(f"{self.name}: every {per} needs a value of each: {listing}")
-        p = self.Parameters(**checked)
-        complaint = self.check(p) if self.check else ""
-        if complaint:
-            raise ParameterError(f"{self.name}: {complaint}")
-        return p
-
-    def _checked(self, f: Field, value: Any) -> Any:
-        if value is None:
-            raise ParameterError(
-                f"{self.name}: parameter {f.name!r} ({f.par.meaning}, {f.par.unit}) is missing"
-            )
-        if f.per_element:
-            if isinstance(value, str) or not isinstance(value, Sequence):
-                raise ParameterError(
-                    f"{self.name}: {f.name} = {value!r} must be a list, one number per {f.par.per}"
-                )
-            if not value:
-                raise ParameterError(f"{self.name}: {f.name} is empty; give at least one {f.par.per}")
-            numbers = cast(Sequence[Any], value)
-            return tuple(self._number(f, v, f"{f.name}[{i}]") for i, v in enumerate(numbers))
-        return self._number(f, value, f.name)
-
-    def _number(self, f: Field, value: Any, label: str) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ParameterError(f"{self.name}: {label} = {value!r} must be a number in {f.par.unit}")
-        complaint = f.par.complaint(float(value))
-        if complaint:
-            unit = "" if f.par.unit == "-" else f" {f.par.unit}"
-            raise ParameterError(f"{self.name}: {label} = {value:g}{unit} {complaint}")
-        return float(value)
-
-    def elements_in(self, p: Any) -> int:
-        """The number of elements in `p` (0 for a law without)."""
-        return self.count_in(p, "element")
-
-    def count_in(self, p: Any, per: str) -> int:
-        """How many values the parameters with that ``per`` have in `p`."""
-        return next((len(getattr(p, f.name)) for f in self.fields if f.per_element and f.par.per == per), 0)
-
-    def pack(self, p: Any) -> list[float]:
-        """Return `p` as the flat list that compiled functions read (`packed`)."""
-        return packed(self.fields, p)
-
-
 @dataclass(frozen=True, eq=False)
 class ReferenceKind(Described):
     """A kind of reference motion.
@@ -186,114 +114,6 @@ class ReferenceKind(Described):
     def __post_init__(self) -> None:
         object.__setattr__(self, "fields", fields_of(self.Params))
         object.__setattr__(self, "Parameters", self.Params)
-
-
-class Configurable(Described):
-    """Something described that has choices and a state: a friction law, a control law."""
-
-    kind: ClassVar[str] = ""
-    """What it is called in messages."""
-    choices: tuple[Choice, ...]
-    chosen: Mapping[str, str]
-    variants: dict[tuple[tuple[str, str], ...], Any]
-    written: Mapping[str, Any]
-    state_fields: tuple[Field, ...]
-    example: Mapping[str, Any]
-
-    def __repr__(self) -> str:
-        chosen = "".join(f", {k}={v!r}" for k, v in self.chosen.items())
-        return f"{type(self).__name__}({self.name!r}{chosen})"
-
-    def option_fields(self, own: type) -> dict[str, Field]:
-        """The fields of a ``Params`` class and of the chosen options, by name; the first of a name holds."""
-        fields: dict[str, Field] = {}
-        for part in (own, *(self.option(choice).params for choice in self.choices)):
-            for f in fields_of(part):
-                fields.setdefault(f.name, f)
-        return fields
-
-    def option_scope(self) -> dict[str, Any]:
-        """What the names that choices replace stand for under the chosen options."""
-        scope: dict[str, Any] = {}
-        for choice in self.choices:
-            option = self.option(choice)
-            if option.function:
-                scope |= {choice.replaces: option.function, f"{choice.replaces}_scale": option.velocity_scale}
-        return scope
-
-    def option_examples(self, own: Mapping[str, Any], fields: Mapping[str, Field]) -> dict[str, Any]:
-        """The example of the file with those of the chosen options, as far as they have such a field."""
-        examples: dict[str, Any] = {}
-        for choice in self.choices:
-            examples |= self.option(choice).example
-        return {k: v for k, v in {**examples, **own}.items() if k in fields}
-
-    # ---- choices -------------------------------------------------------------------------------------
-
-    def option(self, choice: Choice) -> Option:
-        """The option in force for `choice`."""
-        return choice.options[self.chosen.get(choice.name, choice.default)]
-
-    def option_of(self, choice: str) -> str:
-        """The name of the option in force for a choice; "" where the law has no choice of that name."""
-        defaults = {c.name: c.default for c in self.choices}
-        return self.chosen.get(choice, defaults.get(choice, ""))
-
-    def having(self, **names: str) -> Self:
-        """Return this with other options, ``law.having(slip_rule="literal")``.
-
-        Parameters
-        ----------
-        **names : str
-            Options by the names of the choices.
-
-        Raises
-        ------
-        UnknownName
-            If it has no such choice, or the choice no such option.
-        """
-        known = {choice.name: choice for choice in self.choices}
-        for name, option in names.items():
-            if name not in known:
-                raise UnknownName(f"choice of {self.kind} {self.name!r}", name, known)
-            if option not in known[name].options:
-                raise UnknownName(name.replace("_", " "), option, known[name].options)
-        key = tuple(sorted({**self.chosen, **names}.items()))
-        if key not in self.variants:
-            self.variants[key] = self._rewritten(chosen=dict(key))
-        return self.variants[key]
-
-    def offering(self, choices: Sequence[Choice]) -> Self:
-        """Return this with further choices; those that it has by name stay as they are."""
-        own = {choice.name for choice in self.choices}
-        more = tuple(choice for choice in choices if choice.name not in own)
-        return self._rewritten(choices=self.choices + more, variants={}) if more else self
-
-    def _rewritten(self, **changes: Any) -> Self:
-        """This as its file has it, but for `changes`."""
-        written: dict[str, Any] = {**self.written, **changes}
-        return type(self)(**written)
-
-    # ---- state ---------------------------------------------------------------------------------------
-
-    def state(self, p: Any) -> types.SimpleNamespace:
-        """Return the state at rest, everything zero and sticking, for the plain Python functions."""
-        sizes = {f.name: self.count_in(p, f.par.per) for f in self.state_fields if f.per_element}
-        return types.SimpleNamespace(
-            **{f.name: [0.0] * sizes[f.name] if f.per_element else 0.0 for f in self.state_fields}
-        )
-
-    def state_size(self, p: Any) -> int:
-        """The length of the flat state."""
-        return sum(self.count_in(p, f.par.per) if f.per_element else 1 for f in self.state_fields)
-
-    def pack_state(self, z: types.SimpleNamespace) -> list[float]:
-        """Return a state `z` as the flat list that compiled functions read."""
-        flat = [getattr(z, f.name) for f in self.state_fields if not f.per_element]
-        for f in self.state_fields:
-            if f.per_element:
-                flat.extend(getattr(z, f.name))
-        return flat
 
 
 @dataclass(frozen=True, eq=False, repr=False)
