@@ -1,7 +1,7 @@
 """Metrics, accumulated inside the integrators while a run goes on.
 
 An integrator hands every stretch of time (at most 2 ms long, inside one half of the run and not across 80 % of
-it) to `meter`, with five equally spaced nodes of each signal. Integrals are taken by Boole's rule (order 6),
+it) to `meter`, with five equally spaced nodes of each signal (`_nodes`). Integrals are taken by Boole's rule (order 6),
 extremes of the error from its slope, the 50 Hz high-pass by its convolution with the velocity.
 """
 
@@ -13,12 +13,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.jit import kernel, pointer, record_at, spliced
+from stickslip.simulation._nodes import (
+    AT,
+    COMPENSATING,
+    ERROR,
+    ERROR_RATE,
+    FRICTION,
+    MOTOR,
+    REFERENCE_SPEED,
+    SPEED,
+    TRIGGER,
+    crest,
+    extremes,
+    peak,
+)
 
 # Thresholds, all stated by the study (issue and reference README).
 HIGH_PASS = 2.0 * math.pi * 50.0  # rad/s
-TRIGGER = 1e-3  # rad/s, Schmitt trigger of the reversals, and standstill
 MOVING = 2e-3  # rad/s, the reference moves
-NEARLY = 0.9  # of it; between nodes that are lower no crest passes it
 STANDSTILL = 10e-3  # s, shortest standstill that counts
 MAX_WINDOW = 2e-3  # s
 LONG_WINDOW = 16e-3  # s, where only the metrics of COARSE are wanted
@@ -101,12 +113,6 @@ class Sums(NamedTuple):
     compensation: float
 
 
-# ---- where the rows of the nodes begin: position error, velocity error, position, velocity, reference velocity, and
-# the torques of motor, friction and compensator
-SIGNALS = 8
-ERROR, ERROR_RATE, AT, SPEED, REFERENCE_SPEED, MOTOR, FRICTION, COMPENSATING = range(0, 5 * SIGNALS, 5)
-
-
 class Turns(NamedTuple):
     """Where reversals are kept: the address of (n, 2) numbers, time and position, and room for how many."""
 
@@ -124,7 +130,7 @@ def turns_of(turns: Any) -> Turns:
 def meter(acc: Any, turns: Any, t: float, h: float, nodes: Any) -> None:
     """Add the stretch [t, t + h] to the accumulator.
 
-    ``nodes`` has a row for each signal (see the names above) and five columns in time; ``turns`` (n, 2) receives
+    ``nodes`` has a row for each signal (`_nodes`) and five columns in time; ``turns`` (n, 2) receives
     time and position of every reversal, as long as it has room.
     """
     add_stretch(meter_of(acc), turns_of(turns), t, h, pointer(nodes, 0))
@@ -213,100 +219,6 @@ def reached(acc: Any, second: bool, low: float, high: float, speed: float, motor
 def in_second_half(acc: Any, t: float) -> bool:
     """Whether a stretch that begins at t lies in the second half of the run."""
     return t >= 0.5 * acc.duration * (1.0 - 1e-12)
-
-
-@kernel(exact=False)
-def extremes(nodes: Any, d: float) -> tuple[float, float]:
-    """Smallest and largest error over the nodes, spaced d apart, and between them where its slope changes sign."""
-    low = nodes[ERROR]
-    high = nodes[ERROR]
-    for i in range(1, 5):
-        low = min(low, nodes[ERROR + i])
-        high = max(high, nodes[ERROR + i])
-        if nodes[ERROR_RATE + i - 1] * nodes[ERROR_RATE + i] < 0.0:
-            between = summit(
-                nodes[ERROR + i - 1], nodes[ERROR_RATE + i - 1], nodes[ERROR + i], nodes[ERROR_RATE + i], d
-            )  # fmt: skip
-            low = min(low, between)
-            high = max(high, between)
-    return low, high
-
-
-@kernel(exact=False, inline=True)
-def summit(y0: float, d0: float, y1: float, d1: float, d: float) -> float:
-    """The cubic through two values and slopes of opposite sign, d apart, where a straight slope vanishes."""
-    x = d0 / (d0 - d1)
-    y = 1.0 - x
-    return y * y * (1.0 + 2.0 * x) * y0 + x * x * (3.0 - 2.0 * x) * y1 + x * y * d * (y * d0 - x * d1)
-
-
-@kernel(exact=False)
-def speed_at(nodes: Any, x: float) -> float:
-    """The quartic through the velocities at the five nodes, at x = 0 to 4."""
-    d1 = nodes[SPEED + 1] - nodes[SPEED]
-    d2 = nodes[SPEED + 2] - 2.0 * nodes[SPEED + 1] + nodes[SPEED]
-    d3 = nodes[SPEED + 3] - 3.0 * nodes[SPEED + 2] + 3.0 * nodes[SPEED + 1] - nodes[SPEED]
-    d4 = (
-        nodes[SPEED + 4]
-        - 4.0 * nodes[SPEED + 3]
-        + 6.0 * nodes[SPEED + 2]
-        - 4.0 * nodes[SPEED + 1]
-        + nodes[SPEED]
-    )
-    rise = d3 + 0.25 * (x - 3.0) * d4
-    return nodes[SPEED] + x * (d1 + 0.5 * (x - 1.0) * (d2 + (x - 2.0) / 3.0 * rise))
-
-
-@kernel(exact=False)
-def crest(nodes: Any, i: int) -> float:
-    """The velocity at node i, or, where only a crest between the node before and it passes TRIGGER, that crest.
-
-    Else the place of the nodes, which is the step's and not the motion's, would decide whether it counts.
-    """
-    v = nodes[SPEED + i]
-    near = max(abs(v), abs(nodes[SPEED + i - 1]))
-    if near > TRIGGER or near < NEARLY * TRIGGER:
-        return v
-    top = v
-    before = nodes[SPEED + i - 1]
-    now = speed_at(nodes, i - 0.875)
-    for j in range(2, 9):
-        after = speed_at(nodes, i - 1.0 + 0.125 * j)
-        bend = before - 2.0 * now + after
-        if abs(now) > abs(top) and (now - before) * (after - now) <= 0.0 and bend * now < 0.0:
-            top = now - (after - before) * (after - before) / (8.0 * bend)
-        before, now = now, after
-    return top
-
-
-@kernel(exact=False)
-def peak(nodes: Any, so_far: float) -> float:
-    """Largest |v| of the quartic through the five nodes, where it may exceed the one so far; else 0.
-
-    Sampled finely and refined by a parabola.
-    """
-    if (
-        1.3
-        * max(
-            abs(nodes[SPEED]),
-            abs(nodes[SPEED + 1]),
-            abs(nodes[SPEED + 2]),
-            abs(nodes[SPEED + 3]),
-            abs(nodes[SPEED + 4]),
-        )
-        < so_far
-    ):
-        return 0.0
-    top = 0.0
-    before, middle = 0.0, 0.0
-    for i in range(33):
-        now = abs(speed_at(nodes, i / 8.0))
-        bend = before - 2.0 * middle + now
-        if i > 1 and middle >= before and middle >= now and bend < 0.0:
-            top = max(top, middle - (now - before) * (now - before) / (8.0 * bend))
-        top = max(top, now)
-        before, middle = middle, now
-    return top
 
 
 @kernel(exact=False)

@@ -13,14 +13,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel, pointer
-from stickslip.simulation._meter import (
-    MAX_WINDOW,
-    SIGNALS,
-    close_standstill,
-    meter,
-    new_meter,
-    turning_points,
-)
+from stickslip.simulation._meter import MAX_WINDOW, close_standstill, meter, new_meter, turning_points
+from stickslip.simulation._nodes import SIGNALS
 from stickslip.simulation.adaptive.hybrid import rates
 from stickslip.simulation.adaptive.layout import Laid, Loop, laid_out, loop_of, named
 from stickslip.simulation.adaptive.step import LOCAL, attempt, dense, note

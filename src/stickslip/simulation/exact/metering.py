@@ -11,18 +11,17 @@ import math
 from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
-from stickslip.simulation._meter import (
+from stickslip.simulation._meter import LONG_WINDOW, Turns
+from stickslip.simulation._nodes import (
     AT,
     COMPENSATING,
     ERROR,
     ERROR_RATE,
     FRICTION,
-    LONG_WINDOW,
     MOTOR,
     REFERENCE_SPEED,
     SIGNALS,
     SPEED,
-    Turns,
 )
 from stickslip.simulation.case_arrays import KD, KP, KR
 from stickslip.simulation.exact.flow import (

@@ -7,22 +7,15 @@ from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
 from stickslip.simulation._meter import (
-    AT,
-    ERROR,
-    ERROR_RATE,
-    MOTOR,
     MOVING,
-    REFERENCE_SPEED,
-    SPEED,
-    TRIGGER,
     Turns,
     confirm,
     follow_reference,
     in_second_half,
     reached,
     rest_seen,
-    summit,
 )
+from stickslip.simulation._nodes import AT, ERROR, ERROR_RATE, MOTOR, REFERENCE_SPEED, SPEED, TRIGGER, summit
 from stickslip.simulation.exact.flow import UNMOVED, Matrix, free_motion
 from stickslip.simulation.exact.ringing import Five, quartic, value
 

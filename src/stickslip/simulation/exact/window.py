@@ -7,23 +7,8 @@ import math
 from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
-from stickslip.simulation._meter import (
-    COMPENSATING,
-    ERROR,
-    ERROR_RATE,
-    FRICTION,
-    MAX_WINDOW,
-    MOTOR,
-    SPEED,
-    Sums,
-    Turns,
-    add,
-    add_high_pass,
-    extremes,
-    high_pass,
-    reached,
-    sums,
-)
+from stickslip.simulation._meter import MAX_WINDOW, Sums, Turns, add, add_high_pass, high_pass, reached, sums
+from stickslip.simulation._nodes import COMPENSATING, ERROR, ERROR_RATE, FRICTION, MOTOR, SPEED, extremes
 from stickslip.simulation.exact.flow import UNMOVED, Linear, Matrix, flow, free_motion
 from stickslip.simulation.exact.ringing import Ringing, at_nodes, high_passed, overlap, quartic
 from stickslip.simulation.exact.scan import (

@@ -8,21 +8,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.jit import call_profile, call_sample, kernel, pointer, record_at, spliced
-from stickslip.simulation._meter import (
+from stickslip.simulation._meter import MAX_WINDOW, Turns, add_stretch, close_standstill, meter_of, turns_of
+from stickslip.simulation._nodes import (
     AT,
     COMPENSATING,
     ERROR,
     ERROR_RATE,
     FRICTION,
-    MAX_WINDOW,
     MOTOR,
     REFERENCE_SPEED,
     SPEED,
-    Turns,
-    add_stretch,
-    close_standstill,
-    meter_of,
-    turns_of,
 )
 from stickslip.simulation.case_arrays import AROUND, MOTION
 from stickslip.simulation.case_arrays import COLUMNS as OF_AXES

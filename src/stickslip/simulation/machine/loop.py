@@ -21,7 +21,8 @@ from stickslip.jit import compiled_profile, flat
 from stickslip.machines.machine import Machine
 from stickslip.model import Reference
 from stickslip.record import Record
-from stickslip.simulation._meter import SIGNALS, new_meter, turning_points
+from stickslip.simulation._meter import new_meter, turning_points
+from stickslip.simulation._nodes import SIGNALS
 from stickslip.simulation.case_arrays import ruled, ruled_in, slip_rules
 from stickslip.simulation.compiled_controller import Sampled, compiled
 from stickslip.simulation.machine.drive import COLUMNS, NO_NUMBER, TRIPPED, UNITS, Loop, Output, drive
