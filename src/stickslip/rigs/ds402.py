@@ -19,23 +19,20 @@ import contextlib
 import math
 import struct
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from stickslip.config import Table
 from stickslip.errors import DriveFault, InputError, MessageLost, RigError
 from stickslip.rigs import cia402 as cia
+from stickslip.rigs.canopen_node import CanopenNode
 from stickslip.rigs.files import limits_in
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
-
-if TYPE_CHECKING:
-    import canopen
 
 __all__ = ["RIG", "Ds402", "Settings"]
 
 COMMAND, ANSWER = struct.Struct("<Hh"), struct.Struct("<Hih")
-FORMATS = {1: "<B", 2: "<H", 4: "<I"}
 WATCHDOGS = ("rpdo", "heartbeat", "none")
 OWN_NODE = 127
 """Node number of this process, for its heartbeat"""
@@ -100,8 +97,7 @@ class Ds402:
         how = {"rpdo": "the drive misses the cyclic torque", "heartbeat": "the drive misses the heartbeat"}
         watchdog = None if s.watchdog == "none" else Watchdog(s.watchdog_time, how[s.watchdog])
         self.capabilities = Capabilities(watchdog)
-        self._network: canopen.Network | None = None
-        self._error = 0
+        self._node = CanopenNode(self.name, s.node)
         self._beats = 0
         self._begin = 0
         self._lost = False
@@ -118,10 +114,11 @@ class Ds402:
             Without `canopen`, where the bus cannot be opened, or the drive cannot do what is asked.
         DriveFault, MessageLost
         """
-        self._connect()
+        self._lost = False
+        self._node.connect(self.settings.bus)
         self._check()
         self._configure()
-        network = self._bus()
+        network = self._node.network
         network.send_message(0, bytes([0x80, self.settings.node]))  # pre-operational
         assert network.notifier is not None
         network.notifier.stop(1.0)  # from now on this thread reads the bus
@@ -142,7 +139,7 @@ class Ds402:
         status, measured = self._cycle(cia.ENABLE, torque)
         state = cia.state_of(status)
         if state in ("fault", "fault reaction active"):
-            return measured._replace(status=float(self._error or cia.UNKNOWN_FAULT))
+            return measured._replace(status=float(self._node.error or cia.UNKNOWN_FAULT))
         if state != "operation enabled":
             raise DriveFault(
                 f"{self.name}: the drive is in state {state!r} (statusword 0x{status:04X})", measured.time
@@ -164,7 +161,7 @@ class Ds402:
 
     def close(self) -> None:
         """Zero torque, disable the drive, disconnect. A drive that does not answer is told to stop all the same."""
-        network, self._network = self._network, None
+        network = self._node.leave()
         if network is None:
             return
         try:
@@ -181,72 +178,19 @@ class Ds402:
         finally:
             network.disconnect()
 
-    # ---- connecting --------------------------------------------------------------------------------------------
-
-    def _connect(self) -> None:
-        try:
-            import can
-            import canopen
-        except ModuleNotFoundError:
-            raise InputError("ds402 needs canopen; run `pip install 'stickslip[canopen]'`") from None
-        network = canopen.Network()
-        network.NOTIFIER_CYCLE = 0.02
-        try:
-            arguments: dict[str, Any] = dict(self.settings.bus)
-            network.bus = can.Bus(**arguments)
-            network.connect()  # pyright: ignore[reportUnknownMemberType]
-        except (can.CanError, OSError, ValueError, TypeError) as error:
-            raise InputError(
-                f"{self.name}: the bus {dict(self.settings.bus)} cannot be opened: {error}"
-            ) from None
-        self._network = network
-        self._error, self._lost = 0, False
-        node = network.add_node(self.settings.node, canopen.ObjectDictionary())
-        node.sdo.RESPONSE_TIMEOUT = 0.5
-        network.subscribe(0x80 + self.settings.node, self._on_emergency)
-
-    def _bus(self) -> canopen.Network:
-        if self._network is None:
-            raise RigError(f"{self.name} is not open; use it in a Loop")
-        return self._network
-
-    def _on_emergency(self, _: int, data: bytearray, __: float) -> None:
-        self._error = struct.unpack_from("<H", data)[0]
-
-    def _read(self, index: int, sub: int = 0) -> int:
-        """An object of the drive, unsigned."""
-        data = self._sdo("upload", index, sub)
-        return int.from_bytes(data, "little")
-
-    def _write(self, index: int, sub: int, value: int, size: int) -> None:
-        self._sdo("download", index, sub, struct.pack(FORMATS[size], value))
-
-    def _sdo(self, verb: str, index: int, sub: int, *data: bytes) -> bytes:
-        import canopen
-
-        sdo: Any = self._bus()[self.settings.node].sdo
-        try:
-            return getattr(sdo, verb)(index, sub, *data) or b""
-        except canopen.SdoAbortedError as error:
-            raise InputError(
-                f"{self.name}: the drive refuses {verb} of {index:04X}h:{sub}: {error}"
-            ) from None
-        except canopen.SdoCommunicationError as error:
-            raise MessageLost(f"{self.name}: no answer to {verb} of {index:04X}h:{sub} ({error})") from None
-
     # ---- checking and configuring --------------------------------------------------------------------------------
 
     def _check(self) -> None:
         """The drive is one, can do cyclic torque, is without fault, and homed where a position is limited."""
-        self._bus().send_message(0, bytes([0x80, self.settings.node]))
-        if (kind := self._read(cia.DEVICE_TYPE) & 0xFFFF) != cia.PROFILE:
+        self._node.network.send_message(0, bytes([0x80, self.settings.node]))
+        if (kind := self._node.read(cia.DEVICE_TYPE) & 0xFFFF) != cia.PROFILE:
             raise InputError(
                 f"{self.name}: its device type says profile {kind}, not CiA {cia.PROFILE}; check the node"
             )
-        if not self._read(cia.MODES) >> (cia.CYCLIC_TORQUE - 1) & 1:
+        if not self._node.read(cia.MODES) >> (cia.CYCLIC_TORQUE - 1) & 1:
             raise InputError(f"{self.name}: the drive has no cyclic synchronous torque mode (6502h)")
-        self._rated = 1e-3 * self._read(cia.RATED_TORQUE)  # mN·m
-        increments, turns = self._read(cia.ENCODER, 1), self._read(cia.ENCODER, 2)
+        self._rated = 1e-3 * self._node.read(cia.RATED_TORQUE)  # mN·m
+        increments, turns = self._node.read(cia.ENCODER, 1), self._node.read(cia.ENCODER, 2)
         if not self._rated > 0.0 or increments == 0:
             raise InputError(
                 f"{self.name}: rated torque (6076h) or encoder resolution (608Fh) is 0; set them"
@@ -262,74 +206,58 @@ class Ds402:
 
     def _reset(self) -> None:
         """Reset a fault, where that is asked for; else refuse the drive."""
-        if cia.state_of(self._read(cia.STATUSWORD)) != "fault":
+        if cia.state_of(self._node.read(cia.STATUSWORD)) != "fault":
             return
-        code = self._read(cia.ERROR_CODE)
+        code = self._node.read(cia.ERROR_CODE)
         if not self.settings.reset_fault:
             raise DriveFault(
                 f"{self.name}: the drive shows fault 0x{code:04X}; remove its cause, or set reset_fault"
             )
-        self._write(cia.CONTROLWORD, 0, 0, 2)
-        self._write(cia.CONTROLWORD, 0, cia.RESET, 2)
-        self._await(
+        self._node.write(cia.CONTROLWORD, 0, 0, 2)
+        self._node.write(cia.CONTROLWORD, 0, cia.RESET, 2)
+        self._node.wait_for(
             cia.STATUSWORD, lambda word: cia.state_of(word) != "fault", f"fault 0x{code:04X} does not reset"
         )
-        self._write(cia.CONTROLWORD, 0, 0, 2)
-        self._error = 0
+        self._node.write(cia.CONTROLWORD, 0, 0, 2)
+        self._node.error = 0
 
     def _demand_homed(self) -> None:
         """In homing mode the statusword tells whether the position is known."""
-        self._write(cia.MODE, 0, cia.HOMING, 1)
-        self._await(cia.MODE_SHOWN, lambda mode: mode == cia.HOMING, "it does not enter homing mode")
-        status = self._read(cia.STATUSWORD)
+        self._node.write(cia.MODE, 0, cia.HOMING, 1)
+        self._node.wait_for(cia.MODE_SHOWN, lambda mode: mode == cia.HOMING, "it does not enter homing mode")
+        status = self._node.read(cia.STATUSWORD)
         if not status & cia.HOMED or status & cia.HOMING_ERROR:
             raise InputError(
                 f"{self.name}: the position is limited, but the drive is not homed; home it first"
             )
 
-    def _await(self, index: int, good: Callable[[int], bool], complaint: str, seconds: float = 0.5) -> None:
-        end = time.monotonic() + seconds
-        while not good(self._read(index)):
-            if time.monotonic() > end:
-                raise DriveFault(f"{self.name}: {complaint}")
-
     def _configure(self) -> None:
         """PDOs, the watchdog, and the mode."""
         node = self.settings.node
-        self._pdo(cia.RPDO, cia.RPDO_MAP, 0x200 + node, {cia.CONTROLWORD: 16, cia.TARGET_TORQUE: 16})
-        self._pdo(
+        self._node.map_pdo(cia.RPDO, cia.RPDO_MAP, 0x200 + node, {cia.CONTROLWORD: 16, cia.TARGET_TORQUE: 16})
+        self._node.map_pdo(
             cia.TPDO, cia.TPDO_MAP, 0x180 + node, {cia.STATUSWORD: 16, cia.POSITION: 32, cia.TORQUE: 16}
         )
         milliseconds = math.ceil(1e3 * self.settings.watchdog_time - 1e-6)
         watched = self.settings.watchdog
-        self._write(cia.ABORT_OPTION, 0, cia.DISABLE_VOLTAGE_COMMAND if watched != "none" else 0, 2)
+        self._node.write(cia.ABORT_OPTION, 0, cia.DISABLE_VOLTAGE_COMMAND if watched != "none" else 0, 2)
         self._watch(cia.RPDO, 5, milliseconds, 2, watched == "rpdo")
         self._watch(cia.CONSUMER_HEARTBEAT, 1, OWN_NODE << 16 | milliseconds, 4, watched == "heartbeat")
         self._beat_every = max(1, int(0.3 * self.settings.watchdog_time / self.sample_time))
-        self._write(cia.MODE, 0, cia.CYCLIC_TORQUE, 1)
-        self._await(
+        self._node.write(cia.MODE, 0, cia.CYCLIC_TORQUE, 1)
+        self._node.wait_for(
             cia.MODE_SHOWN, lambda mode: mode == cia.CYCLIC_TORQUE, "it does not enter cyclic torque mode"
         )
-        self._last = cia.signed(self._read(cia.POSITION))
+        self._last = cia.signed(self._node.read(cia.POSITION))
         self._turned = self._last
 
     def _watch(self, index: int, sub: int, value: int, size: int, wanted: bool) -> None:
         """Set a watchdog of the drive, or switch off what an earlier session left of it."""
         if wanted:
-            self._write(index, sub, value, size)
+            self._node.write(index, sub, value, size)
             return
         with contextlib.suppress(InputError):  # a drive need not have the other one
-            self._write(index, sub, 0, size)
-
-    def _pdo(self, parameters: int, mapping: int, cob: int, objects: Mapping[int, int]) -> None:
-        """Map objects (index to bits) into the first PDO of a kind; CiA 301, 7.5.2.36."""
-        self._write(parameters, 1, cob | cia.OFF, 4)
-        self._write(parameters, 2, cia.SYNCHRONOUS, 1)
-        self._write(mapping, 0, 0, 1)
-        for place, (index, bits) in enumerate(objects.items(), 1):
-            self._write(mapping, place, index << 16 | bits, 4)
-        self._write(mapping, 0, len(objects), 1)
-        self._write(parameters, 1, cob, 4)
+            self._node.write(index, sub, 0, size)
 
     # ---- cycles --------------------------------------------------------------------------------------------------
 
@@ -351,7 +279,9 @@ class Ds402:
                 self._armed, self._lost = True, False
                 return measured
             if state in ("fault", "fault reaction active"):
-                raise DriveFault(f"{self.name}: fault 0x{self._error:04X} while it is enabled", measured.time)
+                raise DriveFault(
+                    f"{self.name}: fault 0x{self._node.error:04X} while it is enabled", measured.time
+                )
             if time.monotonic() > end:
                 raise DriveFault(f"{self.name}: the drive stays in state {state!r} while it is enabled")
             word = cia.NEXT.get(state, cia.DISABLE)
@@ -359,7 +289,7 @@ class Ds402:
             time.sleep(self.sample_time)
 
     def _send(self, word: int, torque: float) -> None:
-        network = self._bus()
+        network = self._node.network
         per_mille = max(-32768, min(32767, round(1e3 * torque / self._rated)))
         network.send_message(0x200 + self.settings.node, COMMAND.pack(word, per_mille))
         network.send_message(0x80, b"")
@@ -370,7 +300,7 @@ class Ds402:
 
     def _cycle(self, word: int, torque: float) -> tuple[int, Measurement]:
         """One sample: statusword and measurement."""
-        network = self._bus()
+        network = self._node.network
         bus: Any = network.bus
         try:
             # Answers that came too late for their own sample are not taken for this one's.
@@ -411,7 +341,7 @@ class Ds402:
         if message.arbitration_id == 0x180 + self.settings.node:
             return bytes(message.data) if len(message.data) == ANSWER.size else None
         if message.arbitration_id == 0x80 + self.settings.node and len(message.data) >= 2:
-            self._on_emergency(0, message.data, 0.0)
+            self._node.on_emergency(0, message.data, 0.0)
         return None
 
 
