@@ -19,9 +19,10 @@ from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
-from stickslip.report.answers import answers_of, counts_of, lacking, meaning_of, one_number_each
+from stickslip.report.answers import answers_of, meaning_of, one_number_each
 from stickslip.report.axis_pictures import pictures_of
 from stickslip.report.identified import Source, rendered, symbol, tally
+from stickslip.report.next_steps import counts_of, lacking
 from stickslip.report.result_text import result_lines
 from stickslip.report.sliding_torque import over_all_rows, sliding_of
 from stickslip.report.torque_pictures import friction_points, with_gaps

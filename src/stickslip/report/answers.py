@@ -6,7 +6,6 @@ The head of the report and what `stickslip identify` prints are made of these se
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
 from stickslip.identify.axis.agreed import on_timing
 from stickslip.identify.axis.problem import mechanics_parameters
 from stickslip.identify.estimate import Estimate, Identification
@@ -22,17 +20,13 @@ from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.identify.motion import speeds_of
 from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
-from stickslip.record import Record, encoder_step
-from stickslip.report.after_a_map import after_a_map
+from stickslip.record import Record
+from stickslip.report.next_steps import Step, next_steps
 from stickslip.report.plots import quantity
-from stickslip.report.sliding_torque import Sliding, sliding_of
+from stickslip.report.sliding_torque import WORSE, Sliding, beaten, sliding_of
 
 __all__ = ["Answers", "Step", "answers_of", "meaning_of", "next_steps", "one_number_each", "speeds_in"]
 
-WORSE = 1.05
-"""Times plain least squares' force error, from which on a model's counts as larger."""
-SMALL = 0.01
-"""Of the torque where the axis slides: a model that misses less is not beaten by another."""
 ELSEWHERE = 1.5
 """Times the force error of the fitted records, from which on that of held-out ones is one of another machine."""
 ROUGH = 0.1
@@ -43,21 +37,6 @@ OWN_WORDS = {
     "rate_effect": "change per tenfold ramp rate",
 }  # fmt: skip
 """Of numbers that no law and no axis describes."""
-OPTIONS = "  # with the options of this run"
-EXPERIMENTS = {
-    "inertia": "inertia", "fs": "breakaway", "sigma0": "presliding", "k": "presliding", "alpha": "presliding",
-    "fc": "sliding", "vs": "sliding", "sigma2": "sliding", "delta_s": "sliding",
-    "sigma1": "stickslip", "c": "stickslip",
-}  # fmt: skip
-"""The procedure that a rig runs for a number."""
-
-
-@dataclass(frozen=True)
-class Step:
-    """A command, or an advice where there is none: what it is for, and the line to copy (empty for none)."""
-
-    what: str
-    command: str = ""
 
 
 @dataclass(frozen=True)
@@ -277,11 +256,6 @@ def plain_there(sliding: Sliding) -> str:
     return f"; plain least squares: {percent(sliding.plain * sliding.relative / max(sliding.rms, 1e-300))}"
 
 
-def beaten(sliding: Sliding) -> bool:
-    """Whether plain least squares explains the torque better even where the axis slides for certain."""
-    return sliding.relative > SMALL and sliding.rms > WORSE * sliding.plain
-
-
 def force_errors(misfit: Mapping[str, float], excused: bool = False) -> list[str]:
     """Force error of training and held-out records beside plain least squares', in sentences.
 
@@ -305,124 +279,3 @@ def force_errors(misfit: Mapping[str, float], excused: bool = False) -> list[str
         elif math.isfinite(plain):
             out.append(f"{where}: {percent(plain)} force error (plain least squares).")
     return out
-
-
-# ---- what now -------------------------------------------------------------------------------------------------------
-
-
-def next_steps(
-    found: Identification, records: Sequence[Record], model_file: str | Path, files: Sequence[str]
-) -> list[Step]:  # fmt: skip
-    """The next commands: towards a setting where what matters is identified, towards another record where not."""
-    wanted = [Step(s) for s in found.measure_next]
-    if found.method == "cogging":
-        return [*wanted, Step(*after_a_map(found, model_file))]
-    if found.model is None:
-        # A procedure for one thing: the law is told by sliding.
-        command = f"stickslip identify sliding.npz --method sliding --out {shlex.quote(str(model_file))}"
-        return [*wanted, *rig_runs(["sliding"], "For the whole law"), Step("And identify it:", command)]
-    sliding = sliding_of(found)
-    if sliding is not None and beaten(sliding) and files:
-        plain = shlex.quote(str(Path(model_file).with_name("plain.toml")))
-        command = f"stickslip identify {quoted(files)} --inverse --out {plain}{OPTIONS}"
-        wanted = [
-            Step("Look at plain least squares, which explains the torque better here:", command),
-            *wanted,
-        ]
-    missing = lacking(found)
-    if not missing:
-        ahead = forward(found, records, str(model_file))
-        return [*wanted, *ahead] if wanted and wanted[0].command else [*ahead, *wanted]
-    return [*wanted, *another_record(found, missing, files, str(model_file))]
-
-
-def lacking(found: Identification) -> list[str]:
-    """Names of the numbers without which nothing can be built: inertia, a pendulum's gravity, and friction's level."""
-    names = {e.name.rpartition(".")[2]: e for e in found.estimates}
-    levels = [n for n in names if n in ("fc", "fc_negative")]
-    if not levels:
-        law = {f.name for f in found.model.law.fields} if found.model else set[str]()
-        levels = [n for n in names if n.partition("[")[0] in law]
-    needed = [*(n for n in ("inertia", "gravity") if n in names), *levels]
-    return [names[n].name for n in needed if not names[n].identified] if needed else list(names)
-
-
-def forward(found: Identification, records: Sequence[Record], model_file: str) -> list[Step]:
-    """From a model that holds what matters to a drive."""
-    model = shlex.quote(model_file)
-    if found.details.get("mechanics") is None and not any(e.name == "inertia" for e in found.estimates):
-        return [
-            Step("Identify the axis with this friction, or export the law:", f"stickslip export {model} --to c99")
-        ]  # fmt: skip
-    setting = shlex.quote(str(Path(model_file).with_name("recommended.toml")))
-    return [
-        Step(
-            "Find the compensator that is safe to switch on, with your drive's loop and sample time in place of these:",
-            f"stickslip recommend {model} {drive_in(records)} --out {setting}",
-        ),
-        Step(
-            "Write it for the drive:", f"stickslip export {setting} --to c99 --compensator recommended"
-        ),
-    ]  # fmt: skip
-
-
-def drive_in(records: Sequence[Record]) -> str:
-    """Options of `stickslip recommend` as far as the records tell them."""
-    loops = {str(r.meta.get("loop", "")) for r in records}
-    loop = loops.pop() if len(loops) == 1 else ""
-    kept = [p for p in loop.split(",") if p.partition("=")[0] in ("kp", "ki", "kd", "kr", "limit")]
-    out = [f"--loop {','.join(kept)}" if kept else "--bandwidth 10"]
-    periods = [float(np.median(np.diff(r.time))) for r in records if r.time.size > 1]
-    if periods:
-        out.append(f"--sample-time {min(periods):.3g}")
-    counts = [counts_of(r) for r in records]
-    if counts and min(counts) > 0:
-        out.append(f"--counts-per-rev {min(counts)}")
-    return " ".join(out)
-
-
-def counts_of(record: Record) -> int:
-    """Counts of the encoder a revolution, where its step shows and is a power of 2 or some thousands; else 0."""
-    if record.units.get("position") != "rad" or "position" not in record.channels:
-        return 0
-    try:
-        step = encoder_step(record["position"])
-    except InputError:
-        return 0
-    if not step > 0.0:
-        return 0
-    counts = 2.0 * math.pi / step
-    for near in (2 ** round(math.log2(counts)), 1000 * round(counts / 1000.0)):
-        if near and counts < 1e6 and abs(counts - near) < 2e-3 * near:
-            return int(near)
-    return 0
-
-
-def another_record(
-    found: Identification, missing: Sequence[str], files: Sequence[str], model_file: str
-) -> list[Step]:  # fmt: skip
-    """How to record and identify what is missing."""
-    kinds = [EXPERIMENTS.get(n.partition("[")[0].rpartition(".")[2], "sliding") for n in missing]
-    runs = list(dict.fromkeys(kinds))[:2]
-    steps = rig_runs(runs, f"To settle {', '.join(missing)}")
-    if not files or found.method not in ("axis", "inverse dynamics"):
-        return steps
-    logs = quoted([*files, *(f"{name}.npz" for name in runs)])
-    again = f"stickslip identify {logs} --out {shlex.quote(model_file)}{OPTIONS}"
-    return [*steps, Step("Identify all of it together:", again)]
-
-
-def quoted(files: Iterable[str]) -> str:
-    """Files as a shell takes them."""
-    return " ".join(shlex.quote(f) for f in files)
-
-
-def rig_runs(names: Sequence[str], why: str) -> list[Step]:
-    """Records to make."""
-    return [
-        Step(
-            f"{why}, record such a motion with your drive, or let a rig do it:" if number == 0 else "And:",
-            f"stickslip rig run {name} --rig machine.toml --out {name}.npz",
-        )
-        for number, name in enumerate(names)
-    ]

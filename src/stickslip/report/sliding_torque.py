@@ -19,9 +19,13 @@ from stickslip.identify.regression.regression import Regression
 from stickslip.identify.regression.sliding_rows import SlidingRows
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
-__all__ = ["Sliding", "over_all_rows", "sliding_of"]
+__all__ = ["WORSE", "Sliding", "beaten", "over_all_rows", "sliding_of"]
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+WORSE = 1.05
+"""Times plain least squares' force error, from which on a model's counts as larger."""
+SMALL = 0.01
+"""Of the torque where the axis slides: a model that misses less is not beaten by another."""
 
 ACCELERATION, SPEED, DIRECTION = range(3)
 POINTS = 4000
@@ -167,3 +171,8 @@ def over_all_rows(found: Identification) -> Sliding | None:
     return Sliding(
         inverse.time, inverse.velocity, inverse.position, inverse.torque, told, inertial, record, False, 1.0, whole
     )  # fmt: skip
+
+
+def beaten(sliding: Sliding) -> bool:
+    """Whether plain least squares explains the torque better even where the axis slides for certain."""
+    return sliding.relative > SMALL and sliding.rms > WORSE * sliding.plain
