@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers._choose import Choice
+from stickslip.readers._clock import on_clock, time_of, times_of
 from stickslip.readers._names import KINDS
 from stickslip.readers._units import SI, Unit, parse_unit
-from stickslip.readers.table_columns import Array, Column, Table
+from stickslip.readers.table_columns import Array, Table
 from stickslip.record import Record
 
 __all__ = ["Drive", "convert", "times_of"]
@@ -36,29 +35,6 @@ MOTION = (
 EFFORT = ("motor_torque", "friction_torque", "sensor_torque", "compensation_torque")
 NUMBERS = ("counts_per_rev", "rated_torque", "rated_current", "torque_constant", "gear_ratio", "lead")
 """What a drive's data sheet says, each a positive number."""
-PERIODS = (
-    "dt",
-    "ts",
-    "sampletime",
-    "sample_time",
-    "sampling_time",
-    "deltat",
-    "delta_t",
-    "period",
-    "abtastzeit",
-    "tsample",
-    "sampling_period",
-)
-RATES = (
-    "fs",
-    "samplerate",
-    "sample_rate",
-    "sampling_rate",
-    "rate_hz",
-    "abtastrate",
-    "sampling_frequency",
-    "f_s",
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +99,7 @@ def convert(
     by_role = {choice.role: choice for choice in choices}
     linear = _is_linear(by_role)
     columns = {c.name: c for c in table.columns}
-    time, origin, more = _time(table, by_role, columns, sample_time)
+    time, origin, more = time_of(table, by_role, columns, sample_time)
     said += more
     if time.size == 0:
         raise InputError("the file has no rows; give a record with samples")
@@ -143,7 +119,7 @@ def convert(
             continue
         unit = _unit(choice, linear)
         scale, target, steps = _scale(choice, unit, drive, linear)
-        values, resampled = _on_clock(columns[choice.column], time, origin, role)
+        values, resampled = on_clock(columns[choice.column], time, origin, role)
         said += resampled
         channels[role] = scale * values + (unit.offset if unit.offset else 0.0)
         units[role] = target
@@ -291,124 +267,3 @@ def _torque_from_current(
 
 def _ratio_or_one(drive: Drive) -> float:
     return 1.0 if math.isnan(drive.gear_ratio) else drive.gear_ratio
-
-
-# ---- time ---------------------------------------------------------------------------------------------------
-
-
-def _time(
-    table: Table, by_role: dict[str, Choice], columns: dict[str, Column], sample_time: float | None
-) -> tuple[Array, float, list[Finding]]:
-    """The record's time in s, what was taken off it, and what is to be said."""
-    found: list[Finding] = []
-    first = next(
-        (
-            columns[by_role[r].column]
-            for r in ("position", "velocity", "motor_torque", *by_role)
-            if r in by_role and r != "time"
-        ),
-        None,
-    )
-    if sample_time is not None:
-        if not (math.isfinite(sample_time) and sample_time > 0.0):
-            raise InputError(f"sample_time = {sample_time:g} must be greater than 0 s")
-        if first is None:
-            raise InputError("no column is known to be a channel; say which with --map position=COLUMN:UNIT")
-        by_role.pop("time", None)
-        return np.arange(first.values.size, dtype=np.float64) * sample_time, 0.0, found
-    if "time" in by_role:
-        choice = by_role["time"]
-        time = columns[choice.column].values
-        unit = parse_unit(choice.unit)
-        factor = unit.factor if unit is not None else _epoch(time)
-        if unit is None and factor != 1.0:
-            found.append(
-                Finding(
-                    "note",
-                    "time-unit",
-                    f"time {choice.column!r} counts from 1970 in steps of {factor:g} s, by its size",
-                )
-            )
-        return _from_start(time, factor, found)
-    if first is not None and first.clock is not None:
-        return _from_start(first.clock, 1.0, found)
-    for name, value in table.constants.items():
-        key = name.rsplit(".", 1)[-1].lower()
-        if (
-            isinstance(value, float)
-            and math.isfinite(value)
-            and value > 0.0
-            and key in (*PERIODS, *RATES)
-            and first is not None
-        ):
-            period = value if key in PERIODS else 1.0 / value
-            made = f"there is no column of times; they were made from {name} = {value:g}, as {period:g} s a sample"
-            found.append(Finding("warning", "time-made", made, remedy="if wrong, give --sample-time SECONDS"))
-            return np.arange(first.values.size, dtype=np.float64) * period, 0.0, found
-    if first is None:
-        raise InputError(
-            f"no column is known to be a channel among {_some(table)}; say which is which, "
-            "such as --map time=COLUMN:s --map position=COLUMN:deg"
-        )
-    raise InputError(
-        f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give --sample-time SECONDS"
-    )
-
-
-def times_of(table: Table, choices: Sequence[Choice], sample_time: float | None) -> tuple[Array, float]:
-    """A table's times in s from their origin, and that origin in s.
-
-    Raises
-    ------
-    InputError
-        If it has none.
-    """
-    columns = {c.name: c for c in table.columns}
-    # Any column tells how many samples there are, whatever it holds.
-    by_role = {c.role: c for c in choices} or {
-        "position": Choice("position", table.columns[0].name, "", "assumed")
-    }
-    time, origin, _ = _time(table, by_role, columns, sample_time)
-    return time, origin
-
-
-def _some(table: Table) -> str:
-    names = [c.name for c in table.columns]
-    return ", ".join(names[:12]) + (", ..." if len(names) > 12 else "") if names else "none at all"
-
-
-def _epoch(time: Array) -> float:
-    """1, or what times since 1970 count: their size tells, since records are of 2001 to 2286."""
-    finite = time[np.isfinite(time)]
-    size = float(np.median(finite)) if finite.size else 0.0
-    return next((f for f, low in ((1e-9, 1e18), (1e-6, 1e15), (1e-3, 1e12)) if low <= size < 10.0 * low), 1.0)
-
-
-def _from_start(time: Array, factor: float, found: list[Finding]) -> tuple[Array, float, list[Finding]]:
-    """Times in s; large ones, such as dates, count from the first sample."""
-    finite = time[np.isfinite(time)]
-    origin = float(finite[0]) if finite.size else 0.0
-    if abs(origin * factor) < 1e6:
-        origin = 0.0
-    return (time - origin) * factor, origin * factor, found
-
-
-def _on_clock(column: Column, time: Array, origin: float, role: str) -> tuple[Array, list[Finding]]:
-    """The column at the record's times."""
-    if column.clock is None:
-        if column.values.size != time.size:
-            raise InputError(f"{role}: column {column.name!r} has {column.values.size} values, time has {time.size}; "
-                             f"map columns of one table, or leave it out with --map {role}=none")  # fmt: skip
-        return column.values, []
-    own = column.clock - origin
-    if own.shape == time.shape and np.allclose(own, time, rtol=0.0, atol=1e-9, equal_nan=True):
-        return column.values, []
-    good = np.isfinite(own) & np.isfinite(column.values)
-    if np.count_nonzero(good) < 2:
-        return np.full(time.shape, np.nan), []
-    order = np.argsort(own[good], kind="stable")
-    values = np.interp(time, own[good][order], column.values[good][order], left=math.nan, right=math.nan)
-    text = (
-        f"{role} ({column.name!r}) has times of its own and was interpolated linearly at those of the record"
-    )
-    return values, [Finding("note", "resampled", text)]
