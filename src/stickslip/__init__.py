@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from stickslip.verbs.identify import identify
     from stickslip.verbs.learn import LearningResult, learn
     from stickslip.verbs.reading import read
-    from stickslip.verbs.recommend import RecommendationResult, recommend
+    from stickslip.verbs.recommend import recommend
+    from stickslip.verbs.recommendation import RecommendationResult
     from stickslip.verbs.sweep import SweepResult, sweep
     from stickslip.verbs.tune import tune
 
@@ -67,7 +68,8 @@ _HOME = {
         "verbs.identification": "IdentificationResult",
         "verbs.learn": "LearningResult learn",
         "verbs.reading": "read",
-        "verbs.recommend": "RecommendationResult recommend",
+        "verbs.recommend": "recommend",
+        "verbs.recommendation": "RecommendationResult",
         "verbs.sweep": "SweepResult",
         "verbs.tune": "tune",
     }.items()

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 from stickslip.cli import _files
 
 if TYPE_CHECKING:
-    from stickslip.verbs.recommend import RecommendationResult
+    from stickslip.verbs.recommendation import RecommendationResult
 
 SUMMARY = "recommend a compensator for an identified model"
 

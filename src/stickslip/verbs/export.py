@@ -31,7 +31,7 @@ from stickslip.verbs.export_maps import map_in, only_map
 from stickslip.verbs.export_notes import around_of, axis_of, constant_torque, notes_on, notes_on_controller
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import require
-from stickslip.verbs.recommend import RecommendationResult
+from stickslip.verbs.recommendation import RecommendationResult
 
 __all__ = ["CompensatorOptions", "ExportResult", "export"]
 

@@ -1,0 +1,109 @@
+"""What is recommended for an identified model: the setting, what to expect of it, and what was tried besides."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from stickslip.identify.setting.beside import Beside
+from stickslip.identify.setting.candidate_run import Drive
+from stickslip.identify.setting.candidates import NEAR, Candidate
+from stickslip.identify.setting.notes import ALLOWANCE, BETTER
+from stickslip.model import Model
+
+__all__ = ["Recommendation"]
+
+
+@dataclass(frozen=True, eq=False)
+class Recommendation:
+    """What to switch on.
+
+    Attributes
+    ----------
+    chosen : Candidate or None
+        None: switch no compensator on. Its errors are those on the axes that it was not picked on.
+    model : Model or None
+        The law to run, with its parameters.
+    gains : mapping
+        Of the linear controller; of a loop made of control laws the parameters of all of them.
+    linear_error : float
+        RMS error of the linear controller alone on the best estimate, rad.
+    margin : float
+        Highest gain tried, over the chosen one, up to which it is safe on all axes.
+    unsafe_gain : float
+        Lowest gain tried above the chosen one at which it is not safe on some axis; infinite where there is none.
+    candidates : tuple of Candidate
+    axes : int
+        On how many the candidates were simulated, the best estimate among them.
+    notes : tuple of str
+    rings : str
+        Where the linear controller rings alone, why, and what to change; empty where it does not.
+    inertia : float
+        kg·m², that the PD is placed with.
+    beside : tuple of Beside
+        Compensators of the catalogue that were tried besides, best first.
+    hunts : str
+        What the chosen setting does at rest for long, where compensators were tried besides and it goes to and fro.
+    """
+
+    chosen: Candidate | None
+    model: Model | None
+    gains: dict[str, float]
+    linear_error: float
+    margin: float
+    unsafe_gain: float
+    candidates: tuple[Candidate, ...]
+    axes: int
+    notes: tuple[str, ...] = ()
+    drive: Drive = field(default_factory=Drive)
+    rings: str = ""
+    inertia: float = math.nan
+    beside: tuple[Beside, ...] = ()
+    hunts: str = ""
+
+    @property
+    def instead(self) -> Beside | None:
+        """The compensator of the catalogue to be switched on instead of the chosen setting; None: none is better."""
+        best = next((b for b in self.beside if not b.why_not), None)
+        if best is None or best.name == "none" or ALLOWANCE * best.at_most > 1.0:
+            return None
+        return best if self.chosen is None or self.hunts or NEAR * best.at_most < self.chosen.worst else None
+
+    @property
+    def reduction(self) -> tuple[float, float]:
+        """Least and greatest part of the error that is taken away, over the axes that the setting was not picked on
+        and the best estimate.
+
+        Of n drawn axes they hold the reduction on another one with a probability of (n - 1)/(n + 1), 95 % for 39, or a
+        little more: the best estimate may widen them. They are moved apart by `ALLOWANCE` and `BETTER`,
+        for what machines have and the simulation has not.
+        """
+        if self.chosen is None:
+            return 0.0, 0.0
+        return 1.0 - ALLOWANCE * max(self.chosen.errors), 1.0 - min(self.chosen.errors) / BETTER
+
+    @property
+    def confirmed_on(self) -> int:
+        """How many drawn axes the chosen setting was confirmed on."""
+        return len(self.chosen.errors) - 1 if self.chosen else 0
+
+    @property
+    def confidence(self) -> float:
+        """Probability that `reduction` holds another axis from the model's intervals."""
+        n = self.confirmed_on
+        return max(0.0, (n - 1) / (n + 1))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "chosen": self.chosen.as_dict() if self.chosen else None,
+            "model": self.model.as_dict() if self.model else None, "gains": self.gains,
+            "linear_error_rms": self.linear_error, "margin": self.margin, "unsafe_gain": self.unsafe_gain,
+            "reduction": list(self.reduction) if self.chosen else None, "reduction_confidence": self.confidence,
+            "axes": self.axes, "axes_confirmed": self.confirmed_on, "notes": list(self.notes),
+            "linear_alone_rings": self.rings, "drive": self.drive.as_dict(),
+            "candidates": [c.as_dict() for c in self.candidates],
+            "compensators": [b.as_dict() for b in self.beside],
+            "instead": self.instead.label if self.instead else None,
+        }  # fmt: skip

@@ -1,0 +1,152 @@
+"""What the verb `recommend` gives: the recommendation with what it was made for, to print, save and run."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from stickslip.config import Table
+from stickslip.control.controller import Controller
+from stickslip.errors import InputError
+from stickslip.identify.identified_file import Identified
+from stickslip.identify.setting.file import setting_table, write_setting
+from stickslip.identify.setting.recommend import Candidate, Recommendation
+from stickslip.model import Model
+from stickslip.report.recommendation_text import recommendation_lines, reduction, safety
+from stickslip.study.files import prepared_folder
+
+__all__ = ["RecommendationResult"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RecommendationResult:
+    """What to switch on, and what to expect; printed, it is what `stickslip recommend` prints.
+
+    Attributes
+    ----------
+    recommendation : stickslip.identify.setting.recommendation.Recommendation
+    identified : stickslip.identify.identified_file.Identified
+        What it was made for.
+    """
+
+    recommendation: Recommendation
+    identified: Identified
+
+    @property
+    def chosen(self) -> Candidate | None:
+        """The setting and its errors; None: switch no compensator on."""
+        return self.recommendation.chosen
+
+    @property
+    def model(self) -> Model:
+        """The law to run.
+
+        Raises
+        ------
+        InputError
+            Where no compensator is recommended.
+        """
+        if self.recommendation.model is None:
+            raise InputError(f"no compensator is recommended: {'; '.join(self.notes)}")
+        return self.recommendation.model
+
+    @property
+    def controller(self) -> Controller:
+        """The loop that it was tried in with the compensator, for `simulate` and `export`.
+
+        Raises
+        ------
+        InputError
+            Where no compensator is recommended.
+        """
+        if self.recommendation.instead is not None:
+            assert self.recommendation.instead.controller is not None
+            return self.recommendation.instead.controller
+        model = self.model
+        assert self.chosen is not None
+        return self.chosen.setting.on(self.loop, model)
+
+    @property
+    def loop(self) -> Controller:
+        """The loop alone."""
+        return self.recommendation.drive.loop(self.recommendation.inertia)
+
+    @property
+    def reduction(self) -> tuple[float, float]:
+        """Least and greatest part of the error that is taken away, with the probability `confidence`."""
+        return self.recommendation.reduction
+
+    @property
+    def confidence(self) -> float:
+        """Probability that `reduction` holds the axis, if the model's intervals do."""
+        return self.recommendation.confidence
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All that was tried."""
+        return self.recommendation.candidates
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user must know, one sentence each."""
+        return self.recommendation.notes
+
+    def save(self, path: str | os.PathLike[str] = "recommended.toml") -> Path:
+        """Write the law and the setting, as `export` and `stickslip rig run track` take them.
+
+        Parameters
+        ----------
+        path : path
+            Of the TOML file.
+
+        Raises
+        ------
+        InputError
+            If nothing is recommended, or the file cannot be written.
+        """
+        prepared_folder(Path(path).parent)
+        return write_setting(path, self.identified, self.recommendation)
+
+    def table(self) -> Table:
+        """The content of the file that `save` writes."""
+        return setting_table(self.identified, self.recommendation)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, all candidates too."""
+        return self.recommendation.as_dict()
+
+    def __str__(self) -> str:
+        return "\n".join(recommendation_lines(self.recommendation, self.identified.unit))
+
+    def __repr__(self) -> str:
+        if self.recommendation.instead is not None:
+            return f"<RecommendationResult: {self.recommendation.instead.label}>"
+        if self.chosen is None:
+            return "<RecommendationResult: no compensator>"
+        x = self.chosen.setting
+        return f"<RecommendationResult: {x.kind} of law {x.law!r}, gain {x.gain:g}>"
+
+    def _repr_html_(self) -> str:
+        """A table of the candidates in a notebook, and what is recommended."""
+        names = ("law", "structure", "gain", "error left", "worst", "safe")
+        head = "".join(f"<th>{h}</th>" for h in names)
+        rows = "".join(_row(c) for c in self.candidates)
+        said = (
+            f"Error reduction: {reduction(self.recommendation)}"
+            if self.chosen
+            else "No compensator is recommended."
+        )
+        notes = "".join(f"<li>{escape(n)}</li>" for n in self.notes)
+        return (
+            f"<div><b>{escape(repr(self).strip('<>'))}</b><p>{escape(said)}</p>"
+            f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table><ul>{notes}</ul></div>"
+        )
+
+
+def _row(c: Candidate) -> str:
+    x = c.setting
+    cells = (x.law, x.kind, f"{x.gain:g}", f"{100 * c.errors[0]:.1f} %", f"{100 * c.worst:.1f} %", safety(c))
+    return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
