@@ -48,29 +48,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--hold-out", "--validation", dest="validation", action="append", default=[], type=Path, metavar="LOG",
         help="log for validation only, not fitted (axis)",
     )  # fmt: skip
-    parser.add_argument(
-        "--law",
-        action="append",
-        default=[],
-        metavar="LAW",
-        help="friction law: name, file or all; repeatable",
-    )
-    parser.add_argument(
-        "--noise", type=float, metavar="X", help="standard deviation of the fitted signal, N·m (lugre: rad)"
-    )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="initial value of a parameter"
-    )
-    parser.add_argument(
-        "--freeze", action="append", default=[], metavar="NAME[=VALUE]", help="keep a parameter fixed"
-    )
-    parser.add_argument(
-        "--free",
-        action="append",
-        default=[],
-        metavar="NAME[=VALUE]",
-        help="fit a parameter that is normally fixed",
-    )
+    _law_arguments(parser)
     parser.add_argument("--model", type=Path, metavar="MODEL.toml", help="model of an earlier identification")
     parser.add_argument(
         "--torque", metavar="CHANNEL", help="torque channel: motor_torque, sensor_torque, ... (not axis)"
@@ -100,6 +78,33 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
     _files.force_argument(parser)
     _reading.add_arguments(parser, part=True)
+
+
+def _law_arguments(parser: argparse.ArgumentParser) -> None:
+    """Laws, and what is known of their parameters and of the signal."""
+    parser.add_argument(
+        "--law",
+        action="append",
+        default=[],
+        metavar="LAW",
+        help="friction law: name, file or all; repeatable",
+    )
+    parser.add_argument(
+        "--noise", type=float, metavar="X", help="standard deviation of the fitted signal, N·m (lugre: rad)"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="initial value of a parameter"
+    )
+    parser.add_argument(
+        "--freeze", action="append", default=[], metavar="NAME[=VALUE]", help="keep a parameter fixed"
+    )
+    parser.add_argument(
+        "--free",
+        action="append",
+        default=[],
+        metavar="NAME[=VALUE]",
+        help="fit a parameter that is normally fixed",
+    )
 
 
 def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[reportPrivateUsage]
