@@ -36,7 +36,7 @@ REFERENCE = Path(os.environ.get("STICKSLIP_REFERENCE", ROOT.parent / "shared" / 
 # comes last. The rest may stand in any order.
 LONGEST = (
     "export/test_targets", "contract/test_declarations", "contract/test_control_laws", "export/test_c99",
-    "control/test_special_results", "test_readme", "identify/test_doctor", "commission/test_commission",
+    "control/test_special_results", "test_readme", "identify/test_doctor_spoiled", "commission/test_commission",
     "rigs/test_faults", "control/test_control_loops", "cli/test_results", "contract/test_laws", "sweep/test_sweep",
     "study/test_effort", "identify/test_doctor_change", "cli/test_bad_logs", "analyse/test_stability",
     "cli/test_bad_input", "study/test_study",

@@ -1,0 +1,145 @@
+"""Spoiled records: what was done to them must be found; and what looks alike, but is none."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from stickslip import Record
+from stickslip.cli import main
+from stickslip.identify.doctor import examine
+from stickslip.readers import read
+from support.doctor_logs import (
+    DEG,
+    HEADER,
+    UNITS,
+    delayed,
+    made,
+    rng,
+    run,
+    steps,
+    with_,
+    write,
+)
+from support.spoiled_logs import SPOILED
+
+
+@pytest.mark.parametrize(("what", "spoil", "names", "code", "level"), SPOILED, ids=[s[0] for s in SPOILED])
+@pytest.mark.parametrize("base", ["turned", "lugre"])
+def test_spoiled(base, tmp_path, capsys, monkeypatch, what, spoil, names, code, level):
+    monkeypatch.setenv("STICKSLIP_CONFIG", str(tmp_path / "config"))
+    path = write(tmp_path / "log.csv", spoil(made(base)), names)
+    exit_code = main(["doctor", str(path), "--json"])
+    streams = capsys.readouterr()
+    assert "Traceback" not in streams.err
+    if code == "refused":
+        assert exit_code == 2
+        assert level in streams.err
+        assert streams.err.count("\n") == 1
+        return
+    findings = json.loads(streams.out)["findings"]
+    assert (code, level) in {(f["code"], f["level"]) for f in findings}, findings
+    assert exit_code == (2 if any(f["level"] == "error" for f in findings) else 0)
+    found = next(f for f in findings if f["code"] == code)
+    assert found["remedy"] or level == "note"
+    assert "\n" not in found["message"]
+
+
+@pytest.mark.parametrize("counts", [1024, 4096, 65536])
+def test_a_coarse_encoder_is_no_delay_of_the_torque(counts):
+    """A turning point is known to the time in which the axis moves by a count, no better."""
+    slow = run("lugre", 0.5, 0.5, 4.0, sigma0=3.5e4, sigma1=0.1, sigma2=0.018, fs=0.335, fc=0.285, vs=0.01)
+    for lag in (0, 2):
+        channels = {
+            "position": steps(slow["position"], 2 * np.pi / counts),
+            "motor_torque": delayed(slow["torque"], lag or 1),
+        }
+        record = Record(slow["time"], channels, UNITS)
+        assert "time-skew" not in {f.code for f in examine(record).findings}
+
+
+def test_a_delay_is_told_with_a_coarse_encoder_too():
+    fast = run("coulomb", 0.3, 2.0, 3.0, fc=0.2, sigma2=0.01)
+    channels = {
+        "position": steps(fast["position"], 2 * np.pi / 4096),
+        "motor_torque": delayed(fast["torque"], 10),
+    }
+    found = {f.code: f.message for f in examine(Record(fast["time"], channels, UNITS)).findings}
+    assert re.search(r"shifted by (9|10|11) ms: torque comes after", found["time-skew"])
+
+
+@pytest.mark.parametrize("counts", [2**16, 4000])
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_degrees_under_a_header_that_says_rad_are_doubted(tmp_path, counts, unit):
+    table = made("turned")
+    table = with_(table, position=steps(table["position"], 2 * np.pi / counts))
+    if unit == "deg":
+        table = {k: v * DEG if k in ("position", "velocity") else v for k, v in table.items()}
+    found = examine(read(write(tmp_path / "a.csv", table, HEADER)))
+    doubted = [f for f in found.warnings if f.code == "position-unit"]
+    assert len(doubted) == (unit == "deg")
+    assert found.errors == ()
+    assert all("position=position [rad]:deg" in f.remedy.replace("'", "") for f in doubted)
+
+
+@pytest.mark.parametrize(
+    ("way", "doubted"), [(90.0, True), (2.0 * np.pi, False), (40.0, False), (45.01, False)]
+)
+def test_a_reference_over_eighths_of_a_turn_in_degrees_is_no_reference_in_rad(way, doubted):
+    table = made("lugre")
+    shape = table["position"] / np.ptp(table["position"])
+    channels = {"position": way * shape, "position_reference": way * shape, "motor_torque": table["torque"]}
+    units = {**UNITS, "position_reference": "rad"}
+    codes = {f.code for f in examine(Record(table["time"], channels, units)).warnings}
+    assert ("position-unit" in codes) == doubted
+
+
+@pytest.mark.parametrize(
+    ("position", "reference", "unit", "found"),
+    [
+        (DEG, 1.0, "rad", ("position-unit", "position in deg")),
+        (1.0, DEG, "rad", ("position-reference-unit", "position_reference in deg")),
+        (1e3, 1.0, "m", ("position-unit", "position in mm")),
+        (1.0, 1e3, "m", ("position-reference-unit", "position_reference in mm")),
+        (10.0, 1.0, "rad", ("reference-scale", "10 times as far")),
+        (60.0, 1.0, "rad", ("reference-scale", "60 times as far")),
+        (6.0, 1.0, "rad", ("reference-scale", "6 times as far")),
+        (1.0, 60.0, "rad", ("reference-scale", "60 times as little")),
+        (1.0, 1.0, "rad", None),
+        (1.4, 1.0, "rad", None),
+        (0.0, 1.0, "rad", None),
+    ],
+)
+def test_a_reference_of_another_size_than_the_position_is_told(position, reference, unit, found):
+    table = made("turned")
+    late = np.roll(table["position"], 20)
+    channels = {"position": position * late + 0.1, "position_reference": reference * table["position"]}
+    record = Record(
+        table["time"], {**channels, "motor_torque": table["torque"]},
+        {"position": unit, "position_reference": unit, "motor_torque": "N·m" if unit == "rad" else "N"},
+    )  # fmt: skip
+    told = [f for f in examine(record).findings if "follows its reference" in f.message]
+    assert len(told) == (found is not None)
+    for finding in told:
+        assert (finding.level, finding.code) == ("warning", found[0])
+        assert found[1] in finding.message
+
+
+@pytest.mark.parametrize(
+    ("unit", "twist"), [("deg", "gravity"), ("rad", "gravity"), ("deg", "spring"), ("rad", "warm")]
+)
+def test_a_pendulum_in_degrees_under_rad_is_known_by_its_gravity(unit, twist):
+    """Without an encoder's step; a spring, or friction that falls while the axis warms up, is none."""
+    t = np.arange(0.0, 8.0, 1e-3)
+    q = (1.4 if unit == "deg" else 80.0) * np.sin(2.0 * np.pi * 0.5 * t)
+    v, a = np.gradient(q, t), np.gradient(np.gradient(q, t), t)
+    torque = 1e-3 * a + 0.1 * np.sign(v) * (1.0 - 0.05 * t * (twist == "warm"))
+    torque += {"gravity": 0.4 * np.sin(q), "spring": 0.1 * q, "warm": 0.0}[twist]
+    size = DEG if unit == "deg" else 1.0
+    noise = 1e-3 * rng().standard_normal((2, t.size))
+    record = Record(t, {"position": size * (q + 1e-3 * noise[0]), "motor_torque": torque + noise[1]}, UNITS)
+    codes = {f.code for f in examine(record).warnings}
+    assert ("position-unit" in codes) == (unit == "deg" and twist == "gravity")
