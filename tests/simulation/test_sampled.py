@@ -11,12 +11,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
 
 import stickslip as ss
 from stickslip import plugins
 from stickslip.errors import Divergence, InputError
-from stickslip.machines.drivetrain import exponential
 from stickslip.simulation.case_arrays import DONE
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.sampled import engine as sampled
@@ -94,16 +92,6 @@ def on_grid(outcome):
 
 def apart(one, other):
     return np.abs(on_grid(one)[:, 3] - on_grid(other)[:, 3]).max()
-
-
-@pytest.mark.parametrize("time", [1e-5, 1e-3, 0.05])
-def test_the_exponential_of_a_small_matrix_is_scipys(time):
-    """Of a slipping axis, whose rates differ by decades."""
-    rates = np.zeros((5, 5))
-    rates[0, 1] = 1.0
-    rates[1, 1:4] = -0.018 / J, -1.0 / J, 1.0 / J
-    rates[2, 2], rates[2, 4] = -24.0 / 0.285, 24.0
-    np.testing.assert_allclose(exponential(rates * time), expm(rates * time), rtol=1e-13, atol=1e-15)
 
 
 # ---- equal to the general step, which knows a law by its ``step`` alone ----------------------------------------------

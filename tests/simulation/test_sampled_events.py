@@ -6,15 +6,19 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import stickslip as ss
+from stickslip.simulation.case_arrays import DONE
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact.flow import linear
+from stickslip.simulation.sampled import engine as sampled
 from stickslip.simulation.sampled.axis import axis_of
 from stickslip.simulation.sampled.modes import gather
-from stickslip.simulation.sampled.rates import SLIPS, STUCK
-from stickslip.simulation.sampled.slip import slip
-from stickslip.simulation.sampled.stick import Swing, first_break, stick
+from stickslip.simulation.sampled.order_eight import attempt
+from stickslip.simulation.sampled.rates import BENDS, RELAXES, SLIPS, STUCK, slip_of, start_of
+from stickslip.simulation.sampled.slip import at_velocity, slip
+from stickslip.simulation.sampled.stick import Swing, after, first_break, stick, turning_time
 
 J, TIME = 3.8623e-4, 1e-3
 K, SHARE, C = [1e4, 7e3, 5e3, 3e3], 0.25, 24.0
@@ -27,12 +31,13 @@ def s(v):
     return FC + (FS - FC) * math.exp(-((v / VS) ** 2))
 
 
-CASE = prepare(ss.RigidAxis(J, GMS), PD, ss.Reference("step", amplitude=0.1), 0.1, metered=False)
+FAST = ss.Reference("step", amplitude=0.1)
+CASE = prepare(ss.RigidAxis(J, GMS), PD, FAST, 0.1, metered=False)
 
 
-def laid_out():
+def laid_out(case=CASE):
     """The axis, its state and its elements as records."""
-    axis, state, springs = axis_of(CASE)
+    axis, state, springs = axis_of(case)
     return axis[0], state[0], springs
 
 
@@ -74,6 +79,54 @@ def test_a_load_above_the_curve_for_a_moment_before_the_axis_turns_breaks_away()
         assert way == 0.0 or found == pytest.approx(seen, abs=3e-8)
         short += 0.0 < most < 0.01
     assert short >= 5
+
+
+def speed_after(t, swing):
+    return after(swing, t).velocity
+
+
+def test_a_free_motion_turns_where_its_velocity_vanishes():
+    """Every turn of a swing of a few periods, by its closed form, against the velocity's own zeros."""
+    lin, rng = linear(J, SIGMA2, sum(K)), np.random.default_rng(5)
+    for _ in range(100):
+        swing = Swing(lin, 0.0, rng.normal(0.0, 1e-5), rng.normal(0.0, 0.1))
+        times = np.linspace(1e-7, 3e-3, 40)
+        velocities = [after(swing, t).velocity for t in times]
+        turns = 0
+        for low, high, v0, v1 in zip(times, times[1:], velocities, velocities[1:]):
+            if v0 * v1 < 0.0:
+                exact = brentq(speed_after, low, high, (swing,), xtol=1e-18)
+                found = turning_time(swing, low, high, math.copysign(1.0, v0))
+                assert found == pytest.approx(exact, rel=1e-9)
+                turns += 1
+        assert turns >= 6
+
+
+# ---- a step that ends near a turn ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [RELAXES, BENDS])
+def test_an_end_nearby_is_led_to_a_velocity_with_order_four(kind):
+    """Against the step of order 8 from the same start to the time that was found, from ends ever nearer."""
+    law = (
+        GMS
+        if kind == RELAXES
+        else ss.Model("lugre", sigma0=3.5e4, sigma1=0.1, fs=FS, fc=FC, vs=VS, sigma2=SIGMA2)
+    )
+    axis, z, _ = laid_out(prepare(ss.RigidAxis(J, law), PD, FAST, 0.1, metered=False))
+    z["mode"], z["direction"], z["velocity"], z["torque"] = SLIPS, 1.0, 0.02, 0.0
+    z["slipping"], z["share"], z["spring"] = (0.9 * FC, 1.0, 0.0) if kind == RELAXES else (0.5 * FC, 0.0, 0.0)
+    m = slip_of(axis, z)
+    start = start_of(m, z)
+    end = attempt(m, start, 2e-6)
+    off = []
+    for part in (0.2, 0.1, 0.05):
+        found = at_velocity(m, end, end.velocity * (1.0 - part), TIME)
+        exact = attempt(m, start, found.time)
+        assert found.velocity == end.velocity * (1.0 - part)
+        assert abs(found.velocity - exact.velocity) * TIME <= max(found.error, 1e-18)
+        off.append(abs(found.velocity - exact.velocity) + 1e-18)
+    assert off[2] < off[0] / 100.0 or off[0] < 1e-14
 
 
 # ---- a sample, in which anything may happen ------------------------------------------------------------------------
@@ -131,10 +184,11 @@ def by_the_engine(forces, slips, v, u):
     z["velocity"], z["torque"], z["direction"] = v, u, math.copysign(1.0, v)
     z["mode"] = SLIPS if any(slips) else STUCK
     gather(axis, z)
-    left = TIME
+    left, pieces = TIME, 0
     while left > 0.0:
         taken = (stick if z["mode"] == STUCK else slip)(axis, z, left)
-        left = left - taken if left - taken > 1e-12 * TIME else 0.0
+        left, pieces = left - taken if left - taken > 1e-12 * TIME else 0.0, pieces + 1
+        assert pieces < 1000, "it gets nowhere"
     return z["position"] + z["moved"], z["velocity"]
 
 
@@ -151,3 +205,27 @@ def test_a_sample_with_turns_and_break_away_is_that_of_small_steps():
         found, speed = by_the_engine(forces, slips, v, u)
         assert found == pytest.approx(position, rel=0.0, abs=1e-12)
         assert speed == pytest.approx(velocity, rel=0.0, abs=1e-9)
+
+
+def test_loads_that_reach_the_curve_together_while_the_axis_hardly_moves_let_time_pass():
+    """Three elements at their shares and an axis that creeps: after 1.249 s, a loop once never got on."""
+    w = 2.0 * math.pi * 20.0
+    helper = ss.ControlBlock(
+        "friction_feedforward",
+        ss.Model("lugre", sigma0=3.5e4, sigma1=0.0, fs=FS, fc=FC, vs=VS, sigma2=SIGMA2),
+        {"velocity": "held"},
+        gain=0.9,
+    )
+    controller = ss.Controller(
+        loop=ss.ControlBlock("pd", kp=J * w**2, kd=2.0 * J * w),
+        sample_time=TIME,
+        feedforward=helper,
+        torque_limit=1.0,
+    )
+    axis, slow = (
+        ss.RigidAxis(J, GMS.having(fs=1.3 * FS, fc=1.3 * FC)),
+        ss.Reference("sine", amplitude=0.01, frequency=0.4),
+    )
+    outcome = sampled.run(prepare(axis, controller, slow, 1.3, metered=False))
+    assert outcome.code == DONE
+    assert outcome.counts["steps"] < 5000
