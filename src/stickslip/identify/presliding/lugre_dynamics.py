@@ -23,6 +23,7 @@ from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.fit.broyden import descend_by_secants
 from stickslip.identify.fit.levenberg_marquardt import Residuals, Squares
 from stickslip.identify.fit.noise import Noise, as_noise
+from stickslip.identify.fit.parallel import mapped
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.fit.uncertainty import Fit, fit
 from stickslip.identify.presliding.hysteresis import correlation_lags
@@ -176,9 +177,10 @@ class Simulation:
     def position(self, u: Array) -> Array:
         """rad, at the times of the record."""
         parameters = self.vector.law_parameters(u)
-        coarse = self.coarse.run(self.mechanics, parameters)[self.rows, 0]
-        fine = self.fine.run(self.mechanics, parameters)[2 * self.rows, 0]
-        return fine + (fine - coarse) / 3.0
+        # Side by side, the long one by the caller.
+        coarse, fine = mapped(lambda c: c.run(self.mechanics, parameters)[:, 0], (self.coarse, self.fine))
+        ends = fine[2 * self.rows]
+        return ends + (ends - coarse[self.rows]) / 3.0
 
     def graded(self, u: Array, vs: float) -> Simulation:
         """The same with steps as short as the motion at u asks for."""
