@@ -1,4 +1,4 @@
-"""The exact flow of a drivetrain's linear part."""
+"""The exponential of a small matrix, by which a drivetrain's linear part moves."""
 
 from __future__ import annotations
 
