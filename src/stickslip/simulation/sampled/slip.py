@@ -1,7 +1,8 @@
 """A step in which something slips, cut where the axis turns or the next element breaks away.
 
-The step is of order 8 under error control (`stickslip.simulation.sampled.order_eight`). What ends it is found on the
-quintic through both of its ends and then located on real steps from the same start.
+The step is of order 8 under error control (`stickslip.simulation.sampled.order_eight`). It is no longer than until a
+turn is expected, and an end that lies near the turn is led to it (`at_velocity`); any other end is found on the quintic
+through both ends of the step and then located on real steps from the same start.
 """
 
 from __future__ import annotations
@@ -31,8 +32,6 @@ SHORTEST = 1e-13
 """Of the sample time: a step that must be shorter does not exist."""
 UNSEEN = 0.1
 """Of the tolerance of a step: what a bristle may move on beyond its turn without the turn being located."""
-LOOKS = 1
-"""Pieces of a step in which loads of sticking elements are first compared with the curve."""
 FINEST = 1e-6
 """Of the sample time: what a load may be above the curve for without being seen."""
 ROOT_STEPS = 60
@@ -40,6 +39,18 @@ SOON = 1e-3
 """Of a step: a turn expected sooner is looked for inside it."""
 NEARBY = 0.1
 """Of a step: what its end may lie beside where it is to end without a step of its own."""
+
+
+class End(NamedTuple):
+    """How a step ends."""
+
+    trial: Trial
+    acceleration: float
+    """rad/s²; before what ends it"""
+    turns: bool
+    """whether the axis turns there"""
+    breaks: bool
+    """whether an element breaks away"""
 
 
 @kernel(exact=False)
@@ -80,18 +91,6 @@ def slip(axis: Any, z: Any, left: float) -> float:
     elif axis.kind == BENDS and way * trial.velocity < edge:
         z.direction = sign(trial.velocity)
     return trial.time
-
-
-class End(NamedTuple):
-    """How a step ends."""
-
-    trial: Trial
-    acceleration: float
-    """rad/s²; before what ends it"""
-    turns: bool
-    """whether the axis turns there"""
-    breaks: bool
-    """whether an element breaks away"""
 
 
 @kernel(exact=False, inline=True)
@@ -254,7 +253,7 @@ def met(whole: Stretch, way: float, edge: float) -> float:
 
 @kernel(exact=False)
 def at_velocity(m: Slip, trial: Trial, goal: float, span: float) -> Trial:
-    """Lead the end of a step to a velocity nearby, which becomes the independent variable (Henon 1982).
+    """Lead the end of a step to a velocity nearby, which becomes the independent variable (``henon1982``).
 
     Runge and Kutta's step of order 4. Its error is taken for that of a step of order 2, over the `span` (s) in which an
     error of velocity is one of position.
@@ -292,7 +291,7 @@ def next_break(
     if way * v0 > 0.0 and load0 >= curve_at(axis, v0):
         return Trial(0.0, 0.0, v0, z.slipping, 0.0, 0.0), True
     h = whole.time
-    t, d = 0.0, h / LOOKS
+    t, d = 0.0, h
     w0, b0, before = v0, start.acceleration, 0.0
     while t < h:
         d = min(d, h - t)
