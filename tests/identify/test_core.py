@@ -1,6 +1,7 @@
 """The vector of parameters, least squares, and what they say about uncertainty."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.identify.estimate import Identification
 from stickslip.identify.fit.broyden import descend_by_secants
 from stickslip.identify.fit.levenberg_marquardt import Squares, central_differences, descend
-from stickslip.identify.fit.noise import noise_of_repeats
+from stickslip.identify.fit.noise import Noise, noise_of_repeats
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
+from stickslip.identify.fit.profile import profiles_of
 from stickslip.identify.fit.selection import criteria, cross_validate
 from stickslip.identify.fit.uncertainty import fit
 
@@ -154,6 +156,25 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
                   vector_of(a=(POSITIVE, 1.0), k=(POSITIVE, 1.0)), starts=2)  # fmt: skip
         inside += out.estimates[1].lower <= 0.7 <= out.estimates[1].upper
     assert 89 <= inside <= 100
+
+
+def test_what_lies_below_a_minimum_by_less_than_its_tolerance_is_no_other_minimum() -> None:
+    """Fits of simulations end early: the profile of a coordinate with hardly an effect began anew four times."""
+    t = np.linspace(0.0, 1.0, 50)
+    wrong = 0.1 * np.sin(37.0 * t)
+    limits = np.full(2, 10.0)
+    squares = Squares(lambda u: u[0] * t + 1e-6 * u[1] * t**2 - 2.0 * t + wrong, -limits, limits)
+    exact = descend(squares, np.array([1.0, 2.0]))
+    early = descend(squares, exact.u + np.array([2e-3, 0.0]), iterations=0)
+    early = replace(early, jacobian=exact.jacobian)
+    noise = Noise(0.1, "given")
+    assert 1.0 < early.cost / exact.cost < 1.01
+    assert profiles_of(squares, early, noise, 0).better is not None
+    found = profiles_of(squares, early, noise, 0, tolerance=0.01)
+    assert found.better is None
+    low, high = profiles_of(squares, exact, noise, 0).bounds[0]
+    assert found.bounds[0] == pytest.approx((low, high), abs=0.02 * (high - low))
+    assert found.bounds[1] == (-math.inf, math.inf)
 
 
 def test_a_parameter_without_effect_is_not_identified() -> None:

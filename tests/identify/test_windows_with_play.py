@@ -8,6 +8,7 @@ import pytest
 
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.regression import (
+    MISSING,
     STILL_ROUGH,
     UNSURE_THERE,
     Regression,
@@ -67,3 +68,28 @@ def test_in_a_rough_record_friction_falls_as_gaussian(logs: Any) -> None:
     assert not rough.both_forms
     _, calm = drawn(logs, (4, "held", 1000, "p-pi", "production", "clean"))
     assert calm.both_forms
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        (1040222, "commanded", 1000, "feedforward", "production", "backlash"),
+        (700102, "held", 500, "feedforward", "production", "backlash"),
+    ],
+)
+def test_a_motor_that_creeps_on_within_the_play_makes_the_level_doubtful(logs: Any, cell: Any) -> None:
+    """The motor's own share of friction passed for the level, 24 and 6 % too low, "identified"."""
+    truth, found = drawn(logs, cell)
+    assert abs(found.numbers["fc"].value / truth["fc"] - 1.0) > 0.05
+    assert found.missing > 0.15
+    assert found.level_doubt == MISSING.format(share=found.missing)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0])
+def test_friction_that_falls_with_velocity_is_not_missing_where_the_axis_creeps(
+    logs: Any, exponent: float
+) -> None:
+    """A staircase without play creeps at length, and friction is greater there."""
+    log = logs.draw(1040080, "held", 500, "pid", "staircase", "clean", exponent=exponent)
+    found = regress_axis([Experiment("log", log.time, log.position, log.torque)], AXIS)
+    assert found.missing == 0.0

@@ -73,8 +73,13 @@ class Profiles:
     better: Array | None
 
 
-def profiles_of(squares: Squares, best: Optimum, noise: Noise, lags: int) -> Profiles:
-    """Follow the profile of every coordinate to both sides."""
+def profiles_of(
+    squares: Squares, best: Optimum, noise: Noise, lags: int, tolerance: float = 1e-15
+) -> Profiles:
+    """Follow the profile of every coordinate to both sides.
+
+    `best` is the minimum to a part `tolerance` of its sum of squares: what is lower by less is no other minimum.
+    """
     inverse, seen = inverse_information(best.jacobian)
     target = np.full(best.u.size, quantile(noise) * noise.std**2)
     if lags > 0:
@@ -97,7 +102,7 @@ def profiles_of(squares: Squares, best: Optimum, noise: Noise, lags: int) -> Pro
                 near = side * float(begin[i] - best.u[i])
                 if again and near <= 1.01 * reach[i, side]:
                     continue
-                profile = Profile(squares, best, i, side, float(target[i]), valley)
+                profile = Profile(squares, best, i, side, float(target[i]), valley, tolerance)
                 reach[i, side] = profile.end(min(max(first, 1e-9), 1.0, farthest), farthest, near, begin)
                 family += profile.family
                 if profile.better is not None:
@@ -112,10 +117,13 @@ class Profile:
     """One side of the profile of coordinate i: the least sum of squares where it is held at a distance."""
 
     def __init__(
-        self, squares: Squares, best: Optimum, i: int, side: float, target: float, valley: Array
-    ) -> None:
+        self, squares: Squares, best: Optimum, i: int, side: float, target: float, valley: Array,
+        tolerance: float,
+    ) -> None:  # fmt: skip
         self.squares, self.best, self.i, self.side = squares, best, i, side
         self.target, self.valley = target, valley
+        self.accuracy = max(1e-9, 0.1 * tolerance)
+        self.slack = max(1e-6 * target, tolerance * best.cost)
         self.family: list[Array] = []
         self.better: Array | None = None
 
@@ -165,14 +173,15 @@ class Profile:
         for begin in (along, straight):
             try:
                 found = descend(
-                    self.squares, begin, held=(self.i,), iterations=100, tolerance=1e-9, jacobian_there=False
-                )
+                    self.squares, begin, held=(self.i,), iterations=100, tolerance=self.accuracy,
+                    jacobian_there=False,
+                )  # fmt: skip
             except InputError:  # not finite there
                 continue
             gain = min(gain, found.cost - self.best.cost)
             if gain < self.target:
                 self.family.append(found.u)
-                if gain < -1e-6 * self.target:
+                if gain < -self.slack:
                     self.better = found.u
                 break
         return gain

@@ -165,7 +165,7 @@ def follow_profiles(
     for _ in range(8 if profiles else 0):
         if not level.known:
             break
-        followed = profiles_of(squares, optima[0], level, lags)
+        followed = profiles_of(squares, optima[0], level, lags, tolerance)
         if followed.better is None:
             return optima, level, followed
         found = descend(squares, followed.better, tolerance=tolerance)
