@@ -13,8 +13,6 @@ import numpy as np
 
 from stickslip.errors import InputError, RecordFault
 
-__all__ = ["HEAD", "MAGIC", "Contents", "StreamFile", "contents", "load", "rows_since"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Contents = tuple[Array, Mapping[str, Array], Mapping[str, str], Mapping[str, Any]]
 """Times, channels, their units, meta"""

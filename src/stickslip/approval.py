@@ -19,9 +19,6 @@ from pathlib import Path
 
 from stickslip.errors import CodeRefused
 
-__all__ = ["allow_code", "approved_file", "asked_for", "demand"]
-
-
 _allowed: ContextVar[bool | frozenset[str]] = ContextVar("stickslip_code_allowed", default=False)
 _remember: ContextVar[bool] = ContextVar("stickslip_code_remember", default=False)
 _ran: set[str] = set()

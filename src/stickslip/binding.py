@@ -10,8 +10,6 @@ import types
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-__all__ = ["NEGATIVE", "bound", "distinct", "first_complaint", "least", "negative", "rescoped", "wrapped"]
-
 NEGATIVE = "_negative"
 """Ending of the names of parameters that hold for v < 0 alone."""
 

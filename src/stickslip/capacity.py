@@ -9,8 +9,6 @@ from pathlib import Path
 
 from stickslip.errors import InputError
 
-__all__ = ["free_memory", "insist_on_jobs", "insist_on_memory", "number_of", "size_text"]
-
 MOST_JOBS = 32
 """Workers per processor"""
 LITTLE = 1e6

@@ -6,8 +6,6 @@ import threading
 from collections.abc import Callable
 from typing import TextIO
 
-__all__ = ["Notice", "ended", "listen", "silence", "started"]
-
 SOON = 1.0
 """s of compiling before a word is said of it: a law of one's own takes less."""
 WORDS = "compiling for this machine, some 20 s, once after an installation; `stickslip warm-up` does it beforehand"

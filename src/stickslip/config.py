@@ -18,8 +18,6 @@ from typing import Any, Self, cast
 
 from stickslip.errors import ConfigError, InputError, ModelRemark, suggestion
 
-__all__ = ["Document", "Table", "named_numbers", "read_toml", "refuse_endless"]
-
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 RUN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,63}")
 

@@ -9,8 +9,6 @@ from typing import Any, ClassVar, Self, cast
 from stickslip.description import Choice, Field, Option, fields_of, packed
 from stickslip.errors import ParameterError, UnknownName, suggestion
 
-__all__ = ["Configurable", "Described"]
-
 
 class Described:
     """Something with a name and described parameters: a law, a reference."""

@@ -40,8 +40,6 @@ from stickslip.binding import bound, first_complaint
 from stickslip.errors import LawError
 from stickslip.spec import Choice, Configurable, Field, Law, Par, fields_of
 
-__all__ = ["PLACES", "REST", "ControlLaw", "Signals", "friction", "friction_steady"]
-
 PLACES = ("estimator", "feedforward", "observer", "loop")
 """Where a law stands in a controller, in the order in which a sample runs them."""
 

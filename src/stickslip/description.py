@@ -10,22 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
-__all__ = [
-    "Bristle",
-    "Choice",
-    "Elements",
-    "Field",
-    "Kept",
-    "Learned",
-    "Memory",
-    "Mode",
-    "Option",
-    "Par",
-    "Surroundings",
-    "fields_of",
-    "packed",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Par:

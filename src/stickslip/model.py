@@ -16,8 +16,6 @@ from stickslip.config import Table, read_toml
 from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
 from stickslip.spec import Law, ReferenceKind
 
-__all__ = ["MODEL_FORMAT", "Model", "Reference"]
-
 MODEL_FORMAT = "stickslip-model-1"
 """What a file that `stickslip identify` wrote says it is."""
 

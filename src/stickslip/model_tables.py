@@ -12,8 +12,6 @@ from stickslip.errors import ConfigError, suggestion
 from stickslip.model import Model
 from stickslip.spec import Described, Law
 
-__all__ = ["friction_laws", "model", "models", "refuse_unknown"]
-
 
 def models(tables: Mapping[str, Table], laws: Mapping[str, Law | ControlLaw]) -> dict[str, Model]:
     """Read named models; one may be ``like`` another of them, with other values or scaled ones.

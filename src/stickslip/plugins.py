@@ -24,18 +24,6 @@ from stickslip.errors import InputError, LawError, UnknownName
 from stickslip.spec import Law, ReferenceKind
 from stickslip.subset import law_layouts, lower
 
-__all__ = [
-    "code_at",
-    "defined_in",
-    "installed",
-    "law",
-    "law_in",
-    "law_names",
-    "module_of",
-    "reference_kind",
-    "reference_names",
-]
-
 
 def law_names() -> tuple[str, ...]:
     """Every law's name: built in, installed, and from files named in STICKSLIP_LAWS."""

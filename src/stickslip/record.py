@@ -16,8 +16,6 @@ from stickslip.errors import InputError, suggestion
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["Record", "encoder_step"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

@@ -9,8 +9,6 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 
-__all__ = ["MUST", "gives", "missing_return"]
-
 MUST = frozenset({"step", "sampled", "rate", "steady", "holding", "stored", "sliding", "sample", "guarded"})
 """Functions whose number is the answer; what others write, they write into their arguments."""
 

@@ -16,8 +16,6 @@ from typing import Any, NamedTuple
 
 from stickslip.spec import Law, Surroundings
 
-__all__ = ["Moment", "complaint", "moments"]
-
 STEPS = 150
 NOW = 1e-6
 """What the torque of a step of no length, and that of `rate`, may differ by from the torque now, over the largest."""

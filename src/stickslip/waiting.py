@@ -9,8 +9,6 @@ from collections.abc import Callable
 from queue import SimpleQueue
 from typing import NamedTuple, TypeVar
 
-__all__ = ["Reached", "Watch", "listen", "watched"]
-
 Result = TypeVar("Result")
 FIRST = 2.0
 """s until the first word; each later one comes after twice the time of the one before."""

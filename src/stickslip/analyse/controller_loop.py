@@ -25,8 +25,6 @@ from stickslip.machines.drivetrain import FREE
 from stickslip.model import Model
 from stickslip.spec import Law, Par, Surroundings
 
-__all__ = ["LinearController", "linearised"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 CARRIED = (
     "position",

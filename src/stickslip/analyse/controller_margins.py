@@ -17,8 +17,6 @@ from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
 
-__all__ = ["ControllerStability", "LoopMargins", "controller_stability"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 MOST, LEAST = 100.0, 0.01
 """Factors on the torque between which the loop is looked at."""

@@ -17,8 +17,6 @@ from stickslip.analyse.spectrum import channel_of
 from stickslip.errors import InputError, ParameterError
 from stickslip.record import Record
 
-__all__ = ["Dependence", "Pass", "dependence"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BINS = 72

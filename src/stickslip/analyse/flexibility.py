@@ -26,14 +26,6 @@ from typing import Any
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import Chain, Modes, all_positive
 
-__all__ = [
-    "Flexibility",
-    "far_inertia",
-    "flexibility",
-    "lowest_first_mode",
-    "twist",
-]
-
 
 def twist(torque: float, stiffness: float) -> float:
     """Static twist of a spring under a torque (N·m), rad; thesis 4.5."""

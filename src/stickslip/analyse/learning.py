@@ -24,8 +24,6 @@ from stickslip.control.learning import bin_response, low_pass, low_pass_response
 from stickslip.errors import InputError
 from stickslip.machines.drivetrain import Drivetrain
 
-__all__ = ["Convergence", "over_angle", "over_time", "response", "widest"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 DRAWN = 600
 """Frequencies at which the condition is looked at."""

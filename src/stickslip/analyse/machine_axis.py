@@ -7,8 +7,6 @@ import math
 from stickslip.analyse.presliding_loop import Axis
 from stickslip.machines.machine import Machine
 
-__all__ = ["axis_of"]
-
 
 def axis_of(machine: Machine, amplitude: float = 0.0) -> Axis:
     """Drivetrain and contact of a machine with the imperfections that it has; noise, ripple and drift do not enter.

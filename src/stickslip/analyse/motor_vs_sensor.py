@@ -17,8 +17,6 @@ from stickslip.analyse.spectrum import channel_of
 from stickslip.errors import InputError
 from stickslip.record import Record
 
-__all__ = ["Point", "Sides", "sides"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WINDOW = 0.1

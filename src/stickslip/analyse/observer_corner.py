@@ -19,8 +19,6 @@ from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import Drivetrain
 
-__all__ = ["DAMPING", "HIGHEST", "default_corner", "largest_corner", "poles"]
-
 Array = np.ndarray[Any, np.dtype[np.complex128]]
 HIGHEST = 6000.0
 """1/s, up to which corners are tried."""

@@ -20,8 +20,6 @@ from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
 
-__all__ = ["Ratios", "largest_stiffness", "objection", "positive_real_ratios", "stuck_radius"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 CLOSE = 1e-3
 """Part to which the largest stiffness is found."""

@@ -22,8 +22,6 @@ from stickslip.machines.drivetrain import FREE, INPUTS, Drivetrain, LinearContac
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
-__all__ = ["Axis", "Drive", "Loop", "Poles", "Sampled", "describing"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 STEPS = 64

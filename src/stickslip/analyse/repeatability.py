@@ -14,8 +14,6 @@ from stickslip.analyse.spectrum import channel_of
 from stickslip.errors import InputError
 from stickslip.record import Record
 
-__all__ = ["Repeated", "repeatability"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

@@ -17,8 +17,6 @@ import numpy as np
 from stickslip.errors import InputError, ParameterError
 from stickslip.record import Record
 
-__all__ = ["Peak", "Spectrum", "channel_of", "evenly", "spectrum"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SEGMENTS = 8

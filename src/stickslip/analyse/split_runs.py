@@ -8,8 +8,6 @@ import numpy as np
 
 from stickslip.record import Record
 
-__all__ = ["pieces"]
-
 SAME = 1e-6
 """Relative change of the reference velocity from which another run begins."""
 GAP = 50.0

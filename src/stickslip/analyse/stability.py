@@ -41,8 +41,6 @@ from stickslip.control.short_form import highest_corner
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
 from stickslip.model import Model
 
-__all__ = ["AMPLITUDES", "COUNTED", "SLOW", "edge", "gain_margin", "stability", "stable", "with_law"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 COUNTED = 4.0 / math.pi

@@ -12,8 +12,6 @@ import numpy as np
 from stickslip.analyse.presliding_loop import Axis, Drive, Poles
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
 
-__all__ = ["FILTERS", "GAINS", "MOST_GAIN", "TIMES", "Cycle", "Map", "Margins", "Recommended", "Stability"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 MOST_GAIN = 3.0

@@ -10,8 +10,6 @@ import numpy as np
 
 from stickslip.record import Record
 
-__all__ = ["METRICS", "tracking_metrics"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SHAKING = 5.0

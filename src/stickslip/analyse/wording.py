@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["quantity"]
-
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"))
 
 

@@ -21,8 +21,6 @@ from stickslip.approval import allow_code
 from stickslip.errors import InputError, Interrupted, ModelRemark, StickslipError
 from stickslip.verbs.kinds import require
 
-__all__ = ["VERBS", "allow_code_argument", "main", "parser_of"]
-
 VERBS = (
     "study", "sweep", "tune", "simulate", "learn", "identify", "doctor", "analyse", "compare", "recommend", "demo",
     "rig", "laws", "law", "cite", "rerun", "export", "web", "warm-up", "version"

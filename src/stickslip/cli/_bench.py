@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-__all__ = ["run"]
-
 
 def run(args: argparse.Namespace) -> int:
     """Run the bench, print which compensator is for what, write the report."""

@@ -12,8 +12,6 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
-__all__ = ["LEDGER", "force_argument", "ours", "refuse_foreign", "written"]
-
 LEDGER = ".stickslip-written"
 
 

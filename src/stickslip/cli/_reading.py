@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from stickslip.record import Record
     from stickslip.verbs.reading import Opened, Reading
 
-__all__ = ["add_arguments", "print_columns", "read_record", "reading_of"]
-
 
 def add_arguments(parser: argparse.ArgumentParser, *, part: bool = False) -> None:
     """--map, --profile and the numbers that units need; with `part` what takes a part of the record."""

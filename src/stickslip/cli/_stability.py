@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from stickslip.model import Model
     from stickslip.study.stability_map import Confirmed
 
-__all__ = ["arguments", "work"]
-
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Machine, linear controller, drive."""

@@ -10,8 +10,6 @@ from stickslip.study.experiments import ExperimentView
 from stickslip.study.result import StudyResult
 from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share
 
-__all__ = ["judged_in", "print_statements", "statements_as_data"]
-
 
 def judged_in(result: StudyResult) -> list[Judged]:
     """Every statement on the variants that were run; empty for experiments on which none can be judged."""

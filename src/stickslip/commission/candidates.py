@@ -38,11 +38,6 @@ from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
 from stickslip.rigs.virtual import VirtualRig
 
-__all__ = [
-    "DAMPING", "LEVELS", "MARGIN", "Candidate", "Following", "Known", "candidates_of", "chosen_of", "controller_of",
-    "laws_to_try", "resolution_of", "simulated", "with_lead",
-]  # fmt: skip
-
 MARGIN = 2.0
 """The bandwidth from which on a PD rings, over the one recommended: 6 dB at the mode that rings."""
 DAMPING = 1.0

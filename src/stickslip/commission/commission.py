@@ -55,8 +55,6 @@ from stickslip.rigs.procedures.stickslip import Stickslip
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
 
-__all__ = ["VELOCITIES", "Commissioned", "Stage", "commission", "planned"]
-
 VELOCITIES = (25.0, 18.0, 10.0, 5.0, 3.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.06, 0.04, 0.02)
 """rad/s; those that the rig can run at are taken."""
 FEWEST = 5

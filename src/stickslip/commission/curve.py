@@ -21,8 +21,6 @@ from stickslip.record import Record
 from stickslip.rigs.procedures.resting import RESTING, resting
 from stickslip.simulation.prescribed.steady import Steady
 
-__all__ = ["Slid", "fitted_curve", "moving"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 STANDING = 0.7

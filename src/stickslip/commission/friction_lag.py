@@ -21,8 +21,6 @@ from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.simulation.prescribed.motion import Along
 
-__all__ = ["LAGS", "lag_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LAGS = np.geomspace(0.5, 1e-4, 81)

@@ -13,8 +13,6 @@ from stickslip.identify.monte_carlo import sliding_torque
 if TYPE_CHECKING:
     from stickslip.commission.commission import Commissioned
 
-__all__ = ["headline"]
-
 NAMED = 5
 """Parameters that are not identified, listed by name."""
 

@@ -42,8 +42,6 @@ from stickslip.rigs.procedures.base import Performed
 from stickslip.rigs.rig import Rig
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
-__all__ = ["SLOWER", "Recommended", "Tracked", "picture_of_candidates", "recommend_on", "write_recommended"]
-
 SLOWER = (0.75, 0.5)
 """Of the bandwidth: where the gain over the linear controller alone is measured too."""
 

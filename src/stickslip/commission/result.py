@@ -17,8 +17,6 @@ from stickslip.model import Model
 from stickslip.rigs.procedures.base import Performed
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
-__all__ = ["Stage", "result_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

@@ -14,8 +14,6 @@ from stickslip.record import Record
 from stickslip.rigs.procedures.base import Check, Performed, Procedure
 from stickslip.rigs.rig import Rig
 
-__all__ = ["RESULTS", "claimed", "kept", "stamped"]
-
 RESULTS = ("model.toml", "recommended.toml", "report.html")
 """What a commissioning writes at its end."""
 

@@ -16,8 +16,6 @@ from stickslip.identify.presliding.attraction import largest_without_overshoot
 from stickslip.model import Model
 from stickslip.record import Record
 
-__all__ = ["joined_model", "listed", "resolved", "with_lag", "with_stiffness"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 

@@ -20,8 +20,6 @@ from stickslip.contract.units import units
 from stickslip.contract.verdict import Verdict, failed
 from stickslip.spec import Law
 
-__all__ = ["CHECKS", "Verdict", "examine"]
-
 CHECKS: tuple[Callable[[Law], Verdict], ...] = (
     description, subset, bounds, units, no_length, compiled, bounded, dissipation, step_against_rate,
     steady_is_reached, modes_against_rate, derivatives, single_precision,

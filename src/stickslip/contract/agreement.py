@@ -18,8 +18,6 @@ from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.prescribed.open_loop import respond
 from stickslip.spec import Law
 
-__all__ = ["modes_against_rate", "steady_is_reached", "step_against_rate", "step_errors"]
-
 LONG, POINTS = 0.6, 60
 """Length of the motion, s, and the moments at which its torques are compared."""
 COARSE, FINE = 2400, 9600

@@ -11,8 +11,6 @@ from stickslip.contract.verdict import Verdict, failed, held
 from stickslip.errors import ParameterError
 from stickslip.spec import Law
 
-__all__ = ["derivatives"]
-
 WIDTHS = 1e-3, 1e-4
 """Changes of a parameter over its value; both tell the same derivative where the torque is smooth."""
 TYPICAL = 0.9

@@ -12,8 +12,6 @@ from stickslip.errors import LawError, ParameterError
 from stickslip.spec import Configurable, Law, Mode
 from stickslip.subset import law_layouts, lower
 
-__all__ = ["bounds", "description", "subset"]
-
 FUNCTIONS = ("step", "sampled", "rate", "guards", "switch", "steady", "holding", "stored")
 
 

@@ -10,8 +10,6 @@ from stickslip.contract.motions import Array, batch, example, name_of, nearby, s
 from stickslip.contract.verdict import Verdict, failed, held, not_tried
 from stickslip.spec import Law
 
-__all__ = ["claims_passivity", "dissipation", "gives_back", "within_condition"]
-
 CASES = 8
 TRAPEZOID = 0.02
 """Share of the work that its trapezoids leave open."""

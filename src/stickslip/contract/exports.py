@@ -8,8 +8,6 @@ from stickslip.export.job import CannotCarry, Job
 from stickslip.model import Model
 from stickslip.spec import Law
 
-__all__ = ["exported", "single_precision"]
-
 
 def exported(law: Law, name: str) -> Verdict:
     """The law by one target."""

@@ -14,11 +14,6 @@ from stickslip.jit import call_step, compiled_step, flat, kernel, pointer
 from stickslip.laws import COMMON_CHOICES
 from stickslip.spec import Law, Surroundings
 
-__all__ = [
-    "STEPS", "U", "batch", "example", "level_of", "motions", "name_of", "nearby", "seeded", "swings", "tried",
-    "variants",
-]  # fmt: skip
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 U = Surroundings()

@@ -15,8 +15,6 @@ from stickslip.control_spec import ControlLaw
 from stickslip.simulation.compiled_controller import Sampled, compiled
 from stickslip.subset import named
 
-__all__ = ["at_rest"]
-
 HOUR, MINUTE = 60, 60_000
 """Minutes, and samples of one."""
 REST = [f.name for f in MEMORY].index("rest")

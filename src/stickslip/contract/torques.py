@@ -23,8 +23,6 @@ from stickslip.contract.verdict import Verdict, failed, held
 from stickslip.spec import Law
 from stickslip.trial import complaint
 
-__all__ = ["bounded", "compiled", "no_length"]
-
 CASES, MOTIONS = 10, 30
 """Parameter sets of a law and option, and motions of each."""
 FINER = 64

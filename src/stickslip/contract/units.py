@@ -13,8 +13,6 @@ from stickslip.errors import ParameterError
 from stickslip.spec import Field, Law, Surroundings
 from stickslip.trial import moments
 
-__all__ = ["Unit", "parsed", "units"]
-
 POWERS = {"²": "2", "³": "3", "⁴": "4", "⁻¹": "-1", "⁻²": "-2"}
 WORD = re.compile(r"(N|m|rad|s|kg|J|W|Hz|K|°C|-|1)(?:\^(-?\d+))?")
 ROUNDING = 1e-9

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["Verdict", "failed", "held", "not_tried"]
-
 
 class Verdict(NamedTuple):
     """What a check says of a law.

@@ -11,8 +11,6 @@ from typing import Any
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
-__all__ = ["Belief", "believed"]
-
 
 @dataclass(frozen=True)
 class Belief:

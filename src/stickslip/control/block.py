@@ -15,8 +15,6 @@ from stickslip.errors import ParameterError
 from stickslip.model import Model
 from stickslip.spec import Field, Law
 
-__all__ = ["ControlBlock", "within"]
-
 HELD = "friction"
 """The part of a block's state and parameters that is the friction law's."""
 

@@ -8,8 +8,6 @@ from typing import Any
 
 from stickslip.control.block import ControlBlock
 
-__all__ = ["calls_of", "deviations_of"]
-
 SUMS = {
     "estimate": ("estimator", "sample", "Velocity by the estimator, rad/s."),
     "feedforwards": ("feedforward", "sample", "Torque of the feedforwards, N·m."),

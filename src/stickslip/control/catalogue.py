@@ -19,8 +19,6 @@ from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError, UnknownName
 from stickslip.model import Model
 
-__all__ = ["CATALOGUE", "LOOPS", "Belief", "Compensator", "compensated"]
-
 LOOPS = ("PD", "PID")
 DAMPING = 1.0
 

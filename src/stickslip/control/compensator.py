@@ -12,8 +12,6 @@ from typing import Any, ClassVar
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
-__all__ = ["COMPENSATORS", "MOST_SUBSTEPS", "Compensator", "Feedback", "Feedforward"]
-
 MOST_SUBSTEPS = 1000
 
 

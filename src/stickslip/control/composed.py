@@ -15,8 +15,6 @@ from stickslip.errors import ParameterError, suggestion
 from stickslip.spec import Field, Kept, Learned, Surroundings, fields_of, packed
 from stickslip.subset import Layout
 
-__all__ = ["FADE", "Composed"]
-
 FADE = 0.1
 """s, over which a torque that was taken over fades."""
 SLOW = 2.0 * math.pi * 20.0

@@ -22,17 +22,6 @@ from stickslip.binding import rescoped
 from stickslip.control_spec import Signals
 from stickslip.spec import Field, Par, fields_of
 
-__all__ = [
-    "MEMORY",
-    "Memory",
-    "Settings",
-    "follow",
-    "follow_turns",
-    "functions_with",
-    "sample",
-    "sample_turns",
-]
-
 TURN = 2.0 * math.pi  # rad
 LARGEST = 1e9  # rad, rad/s, N·m: an input beyond it is no measurement
 STILL = 1e-6  # rad/s: a reference that moves slower stands still

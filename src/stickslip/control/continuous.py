@@ -14,8 +14,6 @@ from stickslip.control.linear import Compensation, Gains
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
-__all__ = ["Continuous", "continuous_form", "refuse_windup"]
-
 
 class Continuous(NamedTuple):
     """A controller in continuous time: its gains, and the friction law that compensates with how it does."""

@@ -18,8 +18,6 @@ from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
-__all__ = ["Controller"]
-
 Blocks = ControlBlock | Sequence[ControlBlock] | None
 MANY = ("feedforward", "observer", "loop")
 """Places in which several laws may stand; their torques are summed."""

@@ -39,8 +39,6 @@ from stickslip.errors import ConfigError, suggestion
 from stickslip.model import Model
 from stickslip.model_tables import models
 
-__all__ = ["Placement", "composed", "is_composed", "placement", "read_controller"]
-
 NUMERICS = ("integrator", "tolerance", "time_step", "output")
 """Keys of a controller's table that are not the controller's: how a simulation integrates it."""
 

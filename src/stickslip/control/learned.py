@@ -18,19 +18,6 @@ from stickslip.config import read_toml
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 
-__all__ = [
-    "WIDTH",
-    "LearnedValue",
-    "after",
-    "learned_values",
-    "plain",
-    "read_learned",
-    "refuse_others",
-    "told",
-    "write_learned",
-    "write_table",
-]
-
 WIDTH = 1.96
 """Standard deviations of half an interval that holds 95 of 100 times."""
 SILENT = "no uncertainty told"

@@ -10,16 +10,6 @@ import numpy as np
 
 from stickslip.control.block import ControlBlock
 
-__all__ = [
-    "AngleTable",
-    "TimeTable",
-    "bin_response",
-    "low_pass",
-    "low_pass_response",
-    "relearned",
-    "smoothed",
-]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 REACH = 5.0
 """Standard deviations after which the weights of a low-pass end."""

@@ -15,8 +15,6 @@ from typing import Annotated, NamedTuple
 from stickslip.errors import ParameterError
 from stickslip.spec import Par
 
-__all__ = ["LINEAR", "Cascade", "Compensation", "Gains", "pd", "pid", "place", "pr"]
-
 
 class Gains(NamedTuple):
     """Gains of the linear controller."""

@@ -11,8 +11,6 @@ from stickslip.control.block import ControlBlock
 from stickslip.errors import ParameterError
 from stickslip.machines.position_map import PositionMap
 
-__all__ = ["position_feedforward"]
-
 NEVER = 1e-9
 """Turns by which an order may miss a whole number."""
 

@@ -18,8 +18,6 @@ from stickslip.errors import InputError
 from stickslip.model import Model
 from stickslip.spec import fields_of
 
-__all__ = ["Recommended", "read_recommended", "recommended_in"]
-
 
 @dataclass(frozen=True)
 class Recommended:

@@ -18,8 +18,6 @@ from stickslip.control_spec import ControlLaw
 from stickslip.errors import ConfigError, LawError, UnknownName
 from stickslip.spec import Law
 
-__all__ = ["control_law", "control_law_names", "law_files", "law_or_control_law"]
-
 BUILT_IN = {"stickslip.control.laws": CONTROL_LAWS, "stickslip.control.estimators": ESTIMATORS}
 """Folders of one file a law, and the names there"""
 

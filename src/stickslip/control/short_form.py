@@ -12,8 +12,6 @@ from stickslip.control.compensator import Compensator
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import ParameterError
 
-__all__ = ["highest_corner", "laws_meant", "refuse_short"]
-
 FILTER_ROOM = 0.495  # of the sample rate: just below half of it, where a sampled low-pass ends
 
 

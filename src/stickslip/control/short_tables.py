@@ -11,8 +11,6 @@ from stickslip.control.linear import LINEAR, Cascade, Gains, place
 from stickslip.errors import ConfigError
 from stickslip.model import Model
 
-__all__ = ["OF_GAINS", "Placement", "compensator_in", "gains_in", "placement"]
-
 OF_GAINS = ("linear", "gains", "cascade")
 """Keys of which one says the linear part."""
 OF_COMPENSATOR = ("law", "gain", "filter_hz", "lead", "deadband", "offset", "inertia_feedforward", "substeps")

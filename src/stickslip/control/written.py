@@ -13,8 +13,6 @@ from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.model import Model
 from stickslip.spec import Law
 
-__all__ = ["tables_of"]
-
 
 def tables_of(controller: Controller) -> dict[str, Any]:
     """The tables ``controller`` and ``laws`` (where friction laws are held), with every number.

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from stickslip.export.controllers import ControllerTarget
     from stickslip.export.target import Target
 
-__all__ = ["CONTROLLER_TARGETS", "TARGETS", "controller_target", "target_named"]
-
 TARGETS = (
     "c99",
     "arduino",

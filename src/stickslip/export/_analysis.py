@@ -11,8 +11,6 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Facts", "Kind", "analyse", "fields_read", "kind_of", "merged"]
-
 Kind = Literal["real", "int", "bool"]
 
 INT_CALLS = {"int"}

@@ -16,8 +16,6 @@ from typing import ClassVar
 from stickslip.export._analysis import Facts
 from stickslip.export._language import ATOM, UNARY, Language
 
-__all__ = ["Dialect", "function", "functions", "head", "safe"]
-
 KEYWORDS = {
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern",
     "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed",

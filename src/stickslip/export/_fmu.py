@@ -28,19 +28,6 @@ from stickslip.export._text import ascii_only, render
 from stickslip.export.job import Job
 from stickslip.spec import Field, Surroundings
 
-__all__ = [
-    "VERSIONS",
-    "Contents",
-    "Variable",
-    "archive",
-    "contents_of",
-    "field_variables",
-    "law_variables",
-    "numbered",
-    "surroundings_read",
-    "units_of",
-]
-
 VERSIONS = {"2.0": "fmi2", "3.0": "fmi3"}
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-builtin", "-fPIC", "-shared", "-fvisibility=hidden")
 PLATFORMS = {"2.0": "linux64", "3.0": "x86_64-linux"}

@@ -12,8 +12,6 @@ import numpy as np
 
 from stickslip.export.job import Check, Export
 
-__all__ = ["checked", "played"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

@@ -12,8 +12,6 @@ from collections.abc import Mapping, Sequence
 from stickslip.errors import LawError
 from stickslip.export._analysis import Facts, analyse
 
-__all__ = ["hoisted"]
-
 
 def hoisted(functions: Mapping[str, ast.FunctionDef]) -> dict[str, ast.FunctionDef]:
     """Functions whose calls that change a structure stand alone, callees first.

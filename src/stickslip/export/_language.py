@@ -15,8 +15,6 @@ from typing import ClassVar
 from stickslip.errors import LawError
 from stickslip.export._analysis import Facts, Kind, kind_of
 
-__all__ = ["Language"]
-
 ADDITIVE, MULTIPLICATIVE, UNARY, POWER, ATOM = 6, 7, 8, 9, 10
 OR, AND, NOT, COMPARISON, CONDITION = 1, 2, 3, 4, 0
 

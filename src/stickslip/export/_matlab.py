@@ -14,8 +14,6 @@ from stickslip.export._analysis import analyse
 from stickslip.export._hoist import hoisted
 from stickslip.export._language import ATOM, Language
 
-__all__ = ["functions", "local", "safe", "with_helpers"]
-
 MATH = {"fabs": "abs", "pow": "power"} | {
     n: n for n in ("exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
                    "floor", "ceil", "hypot")

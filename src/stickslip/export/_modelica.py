@@ -15,8 +15,6 @@ from stickslip.export._analysis import Facts, analyse
 from stickslip.export._hoist import hoisted
 from stickslip.export._language import ATOM, CONDITION, Language
 
-__all__ = ["RECORDS", "functions", "safe"]
-
 RECORDS = {"z": "State", "p": "Parameters", "u": "Surroundings"}
 KEYWORDS = {
     "algorithm", "and", "annotation", "assert", "block", "break", "class", "connect", "connector", "constant",

@@ -12,8 +12,6 @@ from xml.etree.ElementTree import Element
 
 from stickslip.errors import InputError
 
-__all__ = ["Part", "joint_named", "parts"]
-
 MAIN = "main"
 ELSEWHERE = (
     "default",

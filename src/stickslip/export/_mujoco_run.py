@@ -14,8 +14,6 @@ from stickslip.model import Model, Reference
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-__all__ = ["Run", "drift", "pulled", "spring"]
-
 DURATION, FREQUENCY = 1.0, 0.5  # s, Hz
 SPRING = 20.0  # Hz, of the axis on the spring
 PULL = 3.0  # torques of friction to which the spring is stretched

@@ -11,8 +11,6 @@ import numpy as np
 from stickslip.export.nearest import Curve, Form
 from stickslip.spec import Law, Par, Surroundings
 
-__all__ = ["TABLE", "between_points", "stiffness", "table_form"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Finish = Callable[[dict[str, list[float]]], dict[str, list[float]]]
 

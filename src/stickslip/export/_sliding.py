@@ -12,8 +12,6 @@ import numpy as np
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
-__all__ = ["Curve"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SCALES = 100.0

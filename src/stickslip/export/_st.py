@@ -18,8 +18,6 @@ from stickslip.export._analysis import Facts, analyse
 from stickslip.export._language import ADDITIVE, AND, ATOM, CONDITION, MULTIPLICATIVE, NOT, OR, Language
 from stickslip.export._st_names import RESERVED, named_in_st
 
-__all__ = ["HELPERS", "Names", "functions", "number"]
-
 TYPES = ("parameters", "state", "surroundings", "settings", "memory")
 IGNORED = {"BOOL": "done", "LREAL": "left_out"}
 """What takes a result that nobody wants."""

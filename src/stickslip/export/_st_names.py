@@ -9,8 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
-__all__ = ["RESERVED", "named_in_st"]
-
 WORDS = """
 abs abstract acos action add add_dt_time add_time add_tod_time adr and andn any any_bit any_chars any_date any_derived
 any_duration any_elementary any_int any_magnitude any_num any_real any_signed any_string any_unsigned array asin assert

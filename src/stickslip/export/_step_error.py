@@ -14,8 +14,6 @@ from typing import Any, NamedTuple
 from stickslip.model import Model
 from stickslip.spec import Law, Surroundings
 
-__all__ = ["PARTS", "StepError", "about_steps", "step_errors"]
-
 SPEED, FREQUENCY = 2.0, 1.0  # rad/s, Hz: of the sine whose reversal is looked at
 PARTS = 4
 """Into which a step is divided for the last column, where nothing else divides it."""

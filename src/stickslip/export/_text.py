@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import jinja2
 
-__all__ = ["ascii_only", "first_line", "render"]
-
 LETTERS = {
     "·": "*", "²": "^2", "³": "^3", "°": "deg", "µ": "u", "μ": "u", "−": "-", "–": "-", "×": "x", "≤": "<=",
     "≥": ">=",

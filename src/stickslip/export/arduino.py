@@ -14,8 +14,6 @@ from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target
 from stickslip.spec import Surroundings
 
-__all__ = ["TARGET", "tried"]
-
 STUB = """/* What the example needs of Arduino.h. */
 #include <stdint.h>
 inline uint32_t micros() { return 0; }

@@ -12,8 +12,6 @@ from stickslip.export.controllers import STILL, ControllerTarget, head_of
 from stickslip.export.job import Export
 from stickslip.spec import Surroundings
 
-__all__ = ["CONTROLLER"]
-
 
 def write(controller: Controller, name: str, single: bool = True, around: Surroundings = STILL) -> Export:
     """Sources, an example, the library's properties, and the check of the C export."""

@@ -24,8 +24,6 @@ from stickslip.export.nearest import COULOMB, STRIBECK, Curve, Nearest, carried
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 
-__all__ = ["TARGET", "Bam", "read", "write"]
-
 KEYS = {
     "friction_base": "N·m, Coulomb torque",
     "friction_stribeck": "N·m, above it at rest",

@@ -21,8 +21,6 @@ from stickslip.export.nearest import Curve, Form, Nearest, carried
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 
-__all__ = ["TARGET", "read", "write"]
-
 ENTRIES = 20
 UNITS = {"rotary": 180.0 / math.pi * 1000.0, "linear": 1e6}
 """0.001 °/s per rad/s, µm/s per m/s."""

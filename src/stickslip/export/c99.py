@@ -38,8 +38,6 @@ from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
-__all__ = ["SINGLE_BOUND", "TARGET", "checked", "dialect_of", "translated", "write"]
-
 SINGLE_BOUND = 1e-2
 """Largest error of single precision, as a share of the largest torque: where a contact breaks away a step sooner or
 later by rounding, it is the fall of the torque in that step."""

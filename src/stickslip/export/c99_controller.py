@@ -45,8 +45,6 @@ from stickslip.export.golden import Samples, as_csv
 from stickslip.export.job import Check, Export
 from stickslip.spec import Surroundings, fields_of
 
-__all__ = ["CONTROLLER", "check", "step_error_of", "write"]
-
 PUBLIC = ("_sample", "_sample_turns", "_follow", "_follow_turns")
 NARROW = "float turns, float position, float reference_turns, float reference, "
 WIDE = {

@@ -19,25 +19,6 @@ from stickslip.export.nearest import read_by
 from stickslip.spec import Surroundings
 from stickslip.subset import named
 
-__all__ = [
-    "STILL",
-    "ControllerTarget",
-    "checked_name",
-    "compensates_alone",
-    "counts_of",
-    "depends_on",
-    "deviation_functions",
-    "given_by",
-    "golden_samples",
-    "head_of",
-    "laws_of",
-    "learned_of",
-    "settings_of",
-    "table_of",
-    "trees_of",
-]
-
-
 STILL = Surroundings()
 """Where nothing is said."""
 

@@ -20,8 +20,6 @@ from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target
 from stickslip.spec import Surroundings
 
-__all__ = ["TARGET", "Moved", "moved"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 HEAD = "time_s,dt_s,velocity_rad_s,acceleration_rad_s2,position_rad,torque_Nm"
 SUBSTEPS = (

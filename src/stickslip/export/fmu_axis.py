@@ -26,8 +26,6 @@ from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.subset import named
 
-__all__ = ["BOUND", "MAX_STEP", "TARGET", "Driven", "driven", "inertia_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 BOUND = 1e-9
 """Largest error against the package's own motion: rad, rad/s, N·m."""

@@ -38,8 +38,6 @@ from stickslip.export.golden import Samples, as_csv, sampled_torques
 from stickslip.export.job import Check, Export
 from stickslip.spec import Surroundings
 
-__all__ = ["CONTROLLER"]
-
 GIVEN: tuple[str, ...] = ("position", "reference", "reference_velocity", "reference_acceleration")
 MEANING = ("Measured position", "Reference position", "Reference velocity", "Reference acceleration")
 UNITS = ("rad", "rad", "rad/s", "rad/s2")

@@ -12,22 +12,6 @@ from stickslip.export.nearest import surroundings_of
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
-__all__ = [
-    "Golden",
-    "Samples",
-    "Surrounded",
-    "answered",
-    "as_csv",
-    "changing",
-    "csv_of",
-    "golden",
-    "golden_around",
-    "random_motion",
-    "random_steps",
-    "room_beside_jumps",
-    "sampled_torques",
-]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TRIED, ROUNDED, NEAR = 24, 1e-6, 0.1
 """Motions that are tried beside a jump, what they differ by, and the share of the bound from which a torque counts."""

@@ -15,8 +15,6 @@ from stickslip.export.job import Export, Job
 from stickslip.export.nearest import COULOMB, STATIC, carried
 from stickslip.export.target import Setting, Target, settings_of
 
-__all__ = ["TARGET", "write"]
-
 NOTE = "the keys are those of Isaac Lab 3.0, read in its source; not tried in the simulator"
 
 

@@ -10,8 +10,6 @@ from dataclasses import dataclass, field
 from stickslip.errors import InputError
 from stickslip.model import Model
 
-__all__ = ["CannotCarry", "Check", "Export", "Job", "counts_in"]
-
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")
 
 

@@ -19,8 +19,6 @@ from stickslip.export._text import ascii_only, render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target
 
-__all__ = ["TARGET", "law_job", "write"]
-
 NOTE = "run in our tests against the golden vectors; not tried on a machine"
 
 

@@ -11,8 +11,6 @@ from stickslip.export.position_tables import c_table, moteus, odrive, vesc
 from stickslip.export.position_waves import linuxcnc_waves, st_function, twincat_pou
 from stickslip.machines.position_map import PositionMap
 
-__all__ = ["MAP_TARGETS", "MapTarget", "map_target", "written"]
-
 CONSTANT = "torque_constant"
 
 

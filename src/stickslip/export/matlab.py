@@ -17,8 +17,6 @@ from stickslip.export.target import Target
 from stickslip.spec import Surroundings
 from stickslip.subset import law_layouts, named
 
-__all__ = ["BOUND", "TARGET", "in_octave"]
-
 BOUND = 1e-12
 """Largest relative error in Octave, whose exp and power are not the C library's."""
 

@@ -24,8 +24,6 @@ from stickslip.export.job import Export
 from stickslip.export.matlab import BOUND, in_octave
 from stickslip.spec import Field, Surroundings, fields_of
 
-__all__ = ["CONTROLLER"]
-
 PUBLIC = ("sample", "follow")
 
 

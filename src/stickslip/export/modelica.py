@@ -28,8 +28,6 @@ from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
-__all__ = ["TARGET", "write"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 NOTE = (
     "grammar, functions and the number of equations are checked in our tests (pymoca), Axis is run in rumoca, and "

@@ -23,8 +23,6 @@ from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
-__all__ = ["TARGET", "holding_step", "read", "write", "xml"]
-
 MOTOR = ("sigma0", "sigma1", "fc", "fs", "vs")
 """Of LuGre, in the order of the attribute ``lugre``."""
 SHAPE = 2.0

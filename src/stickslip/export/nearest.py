@@ -26,8 +26,6 @@ from stickslip.model import Model
 from stickslip.spec import Bristle, Law, Mode
 from stickslip.subset import law_layouts, named
 
-__all__ = ["COULOMB", "STATIC", "STRIBECK", "Curve", "Form", "Nearest", "carried", "losses", "nearest"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 EXACT = 1e-9

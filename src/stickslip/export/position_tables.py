@@ -16,8 +16,6 @@ from stickslip.errors import InputError
 from stickslip.export.job import Export
 from stickslip.machines.position_map import PositionMap
 
-__all__ = ["Left", "c_table", "left_of", "moteus", "odrive", "vesc", "whole_turn"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 MOTEUS, BYTE = 1024, 127

@@ -14,8 +14,6 @@ from stickslip.export.job import Export
 from stickslip.export.position_tables import left_of, whole_turn
 from stickslip.machines.position_map import PositionMap
 
-__all__ = ["linuxcnc_waves", "st_function", "twincat_pou"]
-
 
 def st_function(found: PositionMap, name: str = "cogging") -> Export:
     """A function of IEC 61131-3: the torque or current at an angle in rad.

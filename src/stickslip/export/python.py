@@ -19,8 +19,6 @@ from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
-__all__ = ["TARGET", "alone", "assigned", "cleared", "constant", "count_by_constant", "indent_docstring"]
-
 SUBSTEPS = "`contact.step(v0, v1, dt, substeps=4)` divides a step, the velocity linear in between."
 
 

@@ -21,8 +21,6 @@ from stickslip.export.job import Check, Export
 from stickslip.export.python import alone, assigned, cleared, constant, count_by_constant, indent_docstring
 from stickslip.spec import Surroundings, fields_of
 
-__all__ = ["CONTROLLER"]
-
 PUBLIC = ("sample", "sample_turns", "follow", "follow_turns")
 
 

@@ -16,8 +16,6 @@ from stickslip.export.job import Export, Job
 from stickslip.export.nearest import COULOMB, carried
 from stickslip.export.target import Setting, Target, settings_of
 
-__all__ = ["TARGET", "write"]
-
 NOTE = "the keys are those of ros2_controllers 6, read in its source; not tried on a robot"
 
 

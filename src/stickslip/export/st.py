@@ -17,8 +17,6 @@ from stickslip.export.target import Target
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
-__all__ = ["NOTE", "STRUCTURES", "TARGET", "about", "cleared", "declared"]
-
 BLOCK = (
     "velocity",
     "sample_time",

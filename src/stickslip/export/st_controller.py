@@ -27,8 +27,6 @@ from stickslip.export.st import NOTE, about, cleared, declared
 from stickslip.export.st import STRUCTURES as OF_LAWS
 from stickslip.spec import Field, Surroundings, fields_of
 
-__all__ = ["CONTROLLER"]
-
 GIVEN = ("position", "reference_position", "reference_velocity", "reference_acceleration")
 BLOCK = (
     *GIVEN,

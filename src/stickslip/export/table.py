@@ -17,8 +17,6 @@ from stickslip.model import Model
 if TYPE_CHECKING:
     from stickslip.identify.sliding.points import SlidingPoints
 
-__all__ = ["TARGET", "model_of", "read", "write"]
-
 HEADER = "velocity_rad_s,torque_forward_Nm,torque_backward_Nm"
 POINTS = 50
 

@@ -10,8 +10,6 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.nearest import Form
 
-__all__ = ["Setting", "Target", "settings_of"]
-
 ANY_LAW = "any law, as it is"
 
 

@@ -19,8 +19,6 @@ from stickslip.export.nearest import COULOMB, carried
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 
-__all__ = ["TARGET", "read", "write"]
-
 NAMES = {"fc": "friction", "sigma2": "damping"}
 
 

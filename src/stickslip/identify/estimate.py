@@ -12,8 +12,6 @@ import numpy as np
 from stickslip.errors import UnknownName
 from stickslip.model import Model
 
-__all__ = ["Estimate", "Identification", "Picture", "Trace", "silent"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

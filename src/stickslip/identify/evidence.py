@@ -12,15 +12,6 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.simulation.prescribed.steady import Steady
 
-__all__ = [
-    "EXTRAPOLATED",
-    "bend_limits",
-    "bounded_verdicts",
-    "extrapolated",
-    "torque_limits",
-    "within_speeds",
-]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 EXTRAPOLATED = "extrapolated"

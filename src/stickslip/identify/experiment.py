@@ -12,8 +12,6 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 
-__all__ = ["Experiment", "experiment_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 

@@ -17,8 +17,6 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.motion import Motion, motion_in
 from stickslip.model import Model
 
-__all__ = ["Identified", "identified_in", "read_identified"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

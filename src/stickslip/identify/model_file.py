@@ -25,8 +25,6 @@ from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import MODEL_FORMAT, Model
 
-__all__ = ["in_memory", "model_content", "model_data", "versions", "write_model"]
-
 
 def write_model(
     path: str | os.PathLike[str],

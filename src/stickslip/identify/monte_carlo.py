@@ -13,8 +13,6 @@ from stickslip.identify.estimate import Estimate
 from stickslip.model import Model
 from stickslip.simulation.prescribed.steady import Steady
 
-__all__ = ["curve_band", "draw_models", "draw_values", "sliding_torque", "spread_values"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WIDEST = math.log(3.0)

@@ -18,8 +18,6 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.record import Record
 
-__all__ = ["LONGEST", "Motion", "motion_in", "motion_of", "sinusoid", "speeds_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LONGEST = 8.0

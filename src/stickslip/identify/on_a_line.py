@@ -10,8 +10,6 @@ from typing import Any
 from stickslip.identify.estimate import Identification, Picture
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["along_a_line"]
-
 LINEAR = ServoAxis(motion="linear")
 UNITS = re.compile(r"(?<![^\W\d_])([mµk]?)(N·m|kg·m²|rad)(?![^\W\d_])")
 """A unit in a sentence or a label, perhaps with a prefix, between other signs than letters."""

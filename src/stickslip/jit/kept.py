@@ -25,9 +25,6 @@ from numba.core.runtime.nrt import rtsys
 
 from stickslip import compiling
 
-__all__ = ["cache_folder", "cached", "decorating", "loaded"]
-
-
 ROOMS = ("jit", "simulation", "machines", "rigs")
 """Rooms of the package that have kernels: what these are made of, with the constants that they hold."""
 PACKAGE = Path(__file__).parent.parent

@@ -6,8 +6,6 @@ integrates across the kink.
 
 from __future__ import annotations
 
-__all__ = ["direction_ends", "direction_of"]
-
 
 def direction_ends(mode: float, v: float) -> float:
     """The value that rises to zero where the direction ends."""

@@ -12,8 +12,6 @@ from typing import Any
 from stickslip.binding import NEGATIVE, negative
 from stickslip.spec import Choice, Option
 
-__all__ = ["SYMMETRY"]
-
 # What the wrapped law has under these names, bound when the option is chosen.
 inner_step: Any = None
 inner_rate: Any = None

@@ -9,8 +9,6 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.spec import Choice, Option, Par
 
-__all__ = ["VISCOUS", "linear"]
-
 
 class Linear(NamedTuple):
     """Parameter of linear viscous friction, thesis eq. 2.3."""

@@ -20,8 +20,6 @@ from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Law, Memory, Mode, Par
 
-__all__ = ["LAW"]
-
 
 class Params(NamedTuple):
     """Parameters besides the viscous one."""

@@ -16,8 +16,6 @@ from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Law, Mode, Par
 
-__all__ = ["LAW"]
-
 
 class Params(NamedTuple):
     """Parameters of thesis eq. 2.7."""

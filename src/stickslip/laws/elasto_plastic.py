@@ -18,8 +18,6 @@ from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
 from stickslip.spec import Law, Par
 
-__all__ = ["LAW"]
-
 SUBSTEP = 0.05
 """Length of a substep between z_ba and z_ss over the length on which the bristle's rate changes."""
 SETTLED = 1e-5

@@ -19,8 +19,6 @@ from stickslip.laws.slip_rule import SLIP_RULE, switch
 from stickslip.laws.slip_rule import signed as load_of
 from stickslip.spec import Elements, Law, Mode, Par
 
-__all__ = ["LAW"]
-
 
 class Params(NamedTuple):
     """Parameters besides the sliding curve's, thesis Table 1."""

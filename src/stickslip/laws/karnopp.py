@@ -16,8 +16,6 @@ from stickslip.laws.sliding_curve import CURVE
 from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.spec import Law, Par
 
-__all__ = ["LAW"]
-
 
 class Params(NamedTuple):
     """Parameters besides those of the sliding curve and of the viscous part."""

@@ -23,8 +23,6 @@ from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
 from stickslip.spec import Law, Mode, Par
 
-__all__ = ["LAW"]
-
 GAMMA = 1.0 - math.sqrt(0.5)
 """Alexander's coefficient (1977): two stages of backward Euler, of second order and stable for any step."""
 ROUNDING = 4.5e-16

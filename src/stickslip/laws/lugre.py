@@ -18,8 +18,6 @@ from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
 from stickslip.spec import Bristle, Choice, Law, Option, Par
 
-__all__ = ["LAW"]
-
 
 class Params(NamedTuple):
     """Parameters besides the sliding curve's, thesis Table 4."""

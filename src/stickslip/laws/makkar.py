@@ -14,8 +14,6 @@ from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Law, Par
 
-__all__ = ["LAW"]
-
 
 class Params(NamedTuple):
     """Its parameters but the viscous; g1 (tanh g2 v - tanh g3 v) is the Stribeck effect."""

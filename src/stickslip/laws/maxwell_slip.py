@@ -15,8 +15,6 @@ from stickslip.laws._viscous import linear as viscous
 from stickslip.laws.slip_rule import switch
 from stickslip.spec import Elements, Law, Mode, Par
 
-__all__ = ["LAW"]
-
 
 class Params(NamedTuple):
     """Parameters of the elements, thesis eq. 2.14."""

@@ -12,8 +12,6 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.spec import Choice, Option, Par
 
-__all__ = ["LOAD", "POSITION", "TEMPERATURE", "TIME"]
-
 
 class Spectrum(NamedTuple):
     """Torque ripple over one revolution, thesis 2.1.6."""

@@ -14,8 +14,6 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.spec import Choice, Option, Par
 
-__all__ = ["CURVE", "GRID", "Stribeck", "extremes", "stribeck", "stribeck_scale"]
-
 GRID = (0.0, *(10.0 ** (0.02 * i) for i in range(-200, 251)))
 """Multiples of the velocity scale at which a curve is looked at as a whole."""
 

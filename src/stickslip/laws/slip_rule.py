@@ -11,8 +11,6 @@ from typing import Any
 
 from stickslip.spec import Choice, Option
 
-__all__ = ["SLIP_RULE", "literal", "signed", "switch"]
-
 
 def signed(direction: float, force: float) -> float:
     """Load of an element: the part of its force that resists motion in `direction` (+1 or -1), N·m."""

@@ -12,8 +12,6 @@ from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Law, Par
 
-__all__ = ["LAW"]
-
 
 class Params(NamedTuple):
     """Parameters besides the viscous part's, thesis eqs. 2.1 and 2.5."""

@@ -15,8 +15,6 @@ from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
 from stickslip.spec import Elements, Law, Par
 
-__all__ = ["LAW"]
-
 
 class Params(NamedTuple):
     """Parameters besides the sliding curve's, thesis Table 3."""

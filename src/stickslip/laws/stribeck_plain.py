@@ -14,8 +14,6 @@ from stickslip.laws.sliding_curve import CURVE
 from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.spec import Law
 
-__all__ = ["LAW"]
-
 
 class Params(NamedTuple):
     """Nothing besides the parameters of the sliding curve and of the viscous part."""

@@ -11,8 +11,6 @@ from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Law
 
-__all__ = ["LAW"]
-
 
 class Params(NamedTuple):
     """Nothing besides the viscous part's parameters."""

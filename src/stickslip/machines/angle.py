@@ -12,8 +12,6 @@ from stickslip.errors import InputError
 from stickslip.machines.motor import Harmonics
 from stickslip.model import Model
 
-__all__ = ["AngleMap", "harmonic_sum"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 NONE = Harmonics()
 

@@ -15,8 +15,6 @@ from stickslip.errors import ParameterError
 from stickslip.machines.motor import Harmonics
 from stickslip.model import Model
 
-__all__ = ["Bearings", "Contact", "Drift", "Heat"]
-
 LEVELS = ("fs", "fc", "alpha0", "beta0", "curve_torque")
 """Parameters that lift a whole sliding curve: of the Stribeck curve, of thesis eqs. 4.4 and 4.5, of a table."""
 NONE = Harmonics()

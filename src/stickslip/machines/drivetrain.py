@@ -16,11 +16,6 @@ import numpy as np
 
 from stickslip.errors import ParameterError
 
-__all__ = [
-    "FREE", "INPUTS", "Chain", "Drivetrain", "Flow", "LinearContact", "Modes", "StateSpace", "all_positive",
-    "exponential",
-]  # fmt: skip
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from stickslip.errors import ParameterError
 
-__all__ = ["Encoder"]
-
 
 @dataclass(frozen=True)
 class Encoder:

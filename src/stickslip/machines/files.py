@@ -18,8 +18,6 @@ from stickslip.machines.machine import Machine, Sensor
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
 from stickslip.model import Model
 
-__all__ = ["LIBRARY", "library", "load_machine", "machine"]
-
 LIBRARY = Path(__file__).parent / "library"
 """Where the package's own machines lie."""
 LEVEL_SPEED = 0.3

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import Chain
 
-__all__ = ["FlexibleAxis"]
-
 
 @dataclass(frozen=True)
 class FlexibleAxis:

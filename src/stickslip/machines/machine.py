@@ -19,8 +19,6 @@ from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
 from stickslip.model import Model
 
-__all__ = ["IMPERFECTIONS", "Machine", "Sensor"]
-
 UNITY, NONE, EXACT, EXACTLY = Amplifier(1.0), Harmonics(), Encoder(), Converter()
 
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from stickslip.errors import ParameterError
 
-__all__ = ["Amplifier", "Converter", "Harmonics"]
-
 HIGHEST = 4096
 """Order, at most: 24 slots behind a gear of 1:50 have 1200 at the output."""
 

@@ -14,8 +14,6 @@ from stickslip.errors import UnknownName
 from stickslip.machines.machine import Machine
 from stickslip.model import Model
 
-__all__ = ["machine_numbers", "with_friction", "with_numbers"]
-
 FIXED = ("sample_time", "spring_factor")
 """Numbers that are not the machine's to vary: its controller is made for them."""
 PARTS = ("flexible", "contact.bearings", "contact.drift", "contact.heat", "amplifier", "encoder", "sensor")

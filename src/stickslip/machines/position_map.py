@@ -11,8 +11,6 @@ import numpy as np
 
 from stickslip.errors import InputError, ParameterError
 
-__all__ = ["PositionMap", "Waves"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

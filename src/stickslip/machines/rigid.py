@@ -9,8 +9,6 @@ from typing import Any
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
-__all__ = ["RigidAxis"]
-
 
 @dataclass(frozen=True)
 class RigidAxis:

@@ -12,8 +12,6 @@ from typing import Any
 
 from stickslip.errors import ParameterError
 
-__all__ = ["DRIVE_QUANTITIES", "Motor", "ServoAxis"]
-
 SIDES = ("motor", "load")
 GRAVITIES = ("constant", "pendulum")
 MOTIONS = ("rotary", "linear")

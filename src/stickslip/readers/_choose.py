@@ -12,8 +12,6 @@ from stickslip.readers._names import ALIASES, KINDS, ROLES, Name, role_of
 from stickslip.readers._units import parse_unit, spellings
 from stickslip.readers.table_columns import Column, Table
 
-__all__ = ["Choice", "choose", "parse_mapping"]
-
 MAIN = ("time", "position", "velocity", "motor_torque")
 """Channels that must not be guessed between equals: the wrong one spoils every result."""
 

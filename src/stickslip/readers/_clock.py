@@ -13,8 +13,6 @@ from stickslip.readers._choose import Choice
 from stickslip.readers._units import parse_unit
 from stickslip.readers.table_columns import Array, Column, Table
 
-__all__ = ["on_clock", "time_of", "times_of"]
-
 PERIODS = (
     "dt",
     "ts",

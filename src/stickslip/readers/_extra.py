@@ -7,8 +7,6 @@ from typing import Any
 
 from stickslip.errors import InputError
 
-__all__ = ["needed"]
-
 
 def needed(module: str, extra: str, what: str) -> Any:
     """The module, imported now.

@@ -11,8 +11,6 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.readers.table_columns import Column, Table
 
-__all__ = ["as_numbers", "table_of"]
-
 MAX_DEPTH = 12
 MAX_WIDTH = 64
 """A matrix with more columns than this is a picture or a map, not signals."""

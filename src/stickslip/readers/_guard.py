@@ -13,8 +13,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-__all__ = ["Died", "call", "patience"]
-
 T = TypeVar("T")
 PATIENCE = 20.0
 """s until reading a file is given up, and as much again for every 200 MB."""

@@ -12,8 +12,6 @@ import zlib
 from dataclasses import dataclass
 from struct import unpack_from
 
-__all__ = ["Damaged", "check"]
-
 HEADER = 128
 INT8, UINT8, INT32, UINT32, MATRIX, COMPRESSED, UTF8 = 1, 2, 5, 6, 14, 15, 16
 BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}

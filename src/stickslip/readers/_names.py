@@ -11,8 +11,6 @@ from dataclasses import dataclass
 
 from stickslip.readers._units import Unit, parse_unit
 
-__all__ = ["ALIASES", "KINDS", "ROLES", "Name", "role_of", "words"]
-
 KINDS: dict[str, tuple[str, ...]] = {
     "time": ("time",),
     "position": ("angle", "length", "counts"),

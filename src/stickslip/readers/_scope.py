@@ -16,8 +16,6 @@ from stickslip.readers._names import role_of
 from stickslip.readers._units import parse_unit
 from stickslip.readers.table_columns import Array, Column
 
-__all__ = ["columns", "constants", "groups"]
-
 KEYS = (
     "name", "symbolname", "symbolcomment", "netid", "port", "indexgroup", "indexoffset", "data-type",
     "sampletime[ms]", "symbolbased", "variablesize", "offset", "scalefactor", "bitmask", "unit",

@@ -6,8 +6,6 @@ import math
 import re
 from dataclasses import dataclass, replace
 
-__all__ = ["SI", "Unit", "parse_unit", "spellings"]
-
 SI = {
     "time": "s", "angle": "rad", "length": "m", "angular velocity": "rad/s", "velocity": "m/s",
     "angular acceleration": "rad/s²", "acceleration": "m/s²", "torque": "N·m", "force": "N", "current": "A",

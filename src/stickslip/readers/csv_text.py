@@ -19,8 +19,6 @@ from stickslip.readers import _scope
 from stickslip.readers._units import parse_unit
 from stickslip.readers.table_columns import Array, Column, Format, Table
 
-__all__ = ["FORMAT", "cell"]
-
 DIALECTS = (("\t", "."), ("\t", ","), (";", "."), (";", ","), (",", "."), ("|", "."), (" ", "."), (" ", ","))
 """Delimiter and decimal sign, in the order in which ties are decided."""
 SAMPLE = 400

@@ -15,19 +15,6 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.record import Record, encoder_step
 
-__all__ = [
-    "BRIDGED",
-    "Cut",
-    "cut",
-    "file_rows",
-    "jumps",
-    "parse_rows",
-    "pieces",
-    "range_words",
-    "taken",
-    "unwrapped",
-]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BRIDGED = 4

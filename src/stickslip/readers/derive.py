@@ -10,8 +10,6 @@ import numpy as np
 from stickslip.errors import InputError, UnknownName
 from stickslip.record import Record
 
-__all__ = ["METHODS", "with_resampled_time", "with_velocity"]
-
 METHODS = ("butterworth", "savitzky-golay")
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -18,8 +18,6 @@ from stickslip.readers import _guard
 from stickslip.readers._flatten import table_of
 from stickslip.readers.table_columns import Column, Format, Table
 
-__all__ = ["FORMAT", "read_tree"]
-
 UNIT_KEYS = ("unit", "units", "Unit", "Units")
 MAX_ITEMS = 4000
 

@@ -15,8 +15,6 @@ from stickslip.readers._units import SI, parse_unit
 from stickslip.readers.convert import LINEAR
 from stickslip.readers.table_columns import Column, Table
 
-__all__ = ["digest_of", "table_in_memory", "table_of_signals"]
-
 FORMAT = "arrays"
 
 

@@ -11,8 +11,6 @@ from stickslip.errors import InputError
 from stickslip.readers._flatten import table_of
 from stickslip.readers.table_columns import Format, Table
 
-__all__ = ["FORMAT"]
-
 
 def recognise(head: bytes, path: Path) -> bool:
     """A bracket or brace comes first, and the name does not say otherwise."""

@@ -16,8 +16,6 @@ from stickslip.readers import _mat_check, hdf5
 from stickslip.readers._flatten import table_of
 from stickslip.readers.table_columns import Format, Table
 
-__all__ = ["FORMAT"]
-
 
 def recognise(head: bytes, path: Path) -> bool:
     """Both versions begin with a line of text; version 4 has only its file name."""

@@ -16,8 +16,6 @@ from stickslip.readers import _guard
 from stickslip.readers._extra import needed
 from stickslip.readers.table_columns import Column, Format, Table
 
-__all__ = ["FORMAT"]
-
 
 def recognise(head: bytes, path: Path) -> bool:
     """The identification block."""

@@ -11,8 +11,6 @@ from stickslip.errors import InputError
 from stickslip.readers._flatten import table_of
 from stickslip.readers.table_columns import Format, Table
 
-__all__ = ["FORMAT"]
-
 
 def recognise(head: bytes, path: Path) -> bool:
     """The signature of npy, or a zip archive that holds such files."""

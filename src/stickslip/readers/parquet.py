@@ -12,8 +12,6 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers.table_columns import Column, Format, Table
 
-__all__ = ["FORMAT"]
-
 
 def recognise(head: bytes, path: Path) -> bool:
     """Its signature."""

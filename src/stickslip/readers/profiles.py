@@ -25,19 +25,6 @@ from stickslip.readers.convert import Drive
 from stickslip.readers.table_columns import Table
 from stickslip.record import Record
 
-__all__ = [
-    "Profile",
-    "alike",
-    "fingerprint",
-    "folder",
-    "load",
-    "merged",
-    "misfits",
-    "remembered",
-    "save",
-    "sizes",
-]
-
 NUMBERS_BEHIND = {
     "speed": ("counts_per_rev", "gear_ratio", "lead"),
     "torque": ("torque_constant", "rated_torque", "rated_current", "gear_ratio", "lead"),

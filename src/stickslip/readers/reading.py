@@ -21,8 +21,6 @@ from stickslip.readers.convert import Drive, convert, times_of
 from stickslip.readers.table_columns import Column, Format, Table
 from stickslip.record import Record
 
-__all__ = ["FORMATS", "formats", "joined", "open_table", "read", "record_of"]
-
 FORMATS = (
     "record_file",
     "mat",

@@ -10,8 +10,6 @@ from stickslip._stream_file import MAGIC
 from stickslip.readers.table_columns import Column, Format, Table
 from stickslip.record import Record
 
-__all__ = ["FORMAT"]
-
 
 def recognise(head: bytes, path: Path) -> bool:
     """A zip archive with the header that `Record.save` writes, or a rig's stream."""

@@ -15,8 +15,6 @@ from stickslip.errors import InputError
 from stickslip.readers._extra import needed
 from stickslip.readers.table_columns import Column, Format, Table
 
-__all__ = ["FORMAT"]
-
 MAX_ELEMENTS = 64
 
 

@@ -11,8 +11,6 @@ import numpy as np
 
 from stickslip.finding import Finding
 
-__all__ = ["Array", "Column", "Format", "Table"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

@@ -11,8 +11,6 @@ from stickslip.errors import InputError
 from stickslip.readers._extra import needed
 from stickslip.readers.table_columns import Column, Format, Table
 
-__all__ = ["FORMAT"]
-
 
 def recognise(head: bytes, path: Path) -> bool:
     """The tag of a segment."""

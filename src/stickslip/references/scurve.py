@@ -8,8 +8,6 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.spec import Par, ReferenceKind
 
-__all__ = ["REFERENCE"]
-
 
 class Params(NamedTuple):
     """Limits of the move; Biagiotti and Melchiorri 2008, section 3.4."""

@@ -11,8 +11,6 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.spec import Par, ReferenceKind
 
-__all__ = ["REFERENCE"]
-
 
 class Params(NamedTuple):
     """Parameters of the sinusoid."""

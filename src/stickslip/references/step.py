@@ -12,8 +12,6 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.spec import Par, ReferenceKind
 
-__all__ = ["REFERENCE"]
-
 
 class Params(NamedTuple):
     """Parameters of the step."""

@@ -9,8 +9,6 @@ import numpy as np
 
 from stickslip.spec import Par, ReferenceKind
 
-__all__ = ["REFERENCE"]
-
 
 class Params(NamedTuple):
     """Points of the motion."""

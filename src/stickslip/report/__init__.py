@@ -10,8 +10,6 @@ from stickslip.study.result import StudyResult
 if TYPE_CHECKING:
     from stickslip.report.figures import Figure
 
-__all__ = ["draw", "write"]
-
 
 def draw(result: StudyResult) -> list[Figure]:
     """Draw a study's figures into ``figures/`` of its folder, as SVG and PNG.

@@ -22,8 +22,6 @@ from stickslip.simulation.prescribed.open_loop import respond
 from stickslip.study.plan import Drive, Response, Study, load
 from stickslip.study.result import StudyResult
 
-__all__ = ["comparison_figures", "drive_figures", "response_figures"]
-
 NEAR_ZERO = 0.04  # rad/s, what the thesis shows where it compares laws
 GRID = 20_000  # instants of a response
 PLANT = {

@@ -10,8 +10,6 @@ from stickslip.report._view import StudyView
 from stickslip.report.captions import HUNTS
 from stickslip.study.result import Run
 
-__all__ = ["Cell", "Column", "MetricsTable", "metrics_tables"]
-
 
 @dataclass(frozen=True)
 class Column:

@@ -9,8 +9,6 @@ from stickslip.record import Record
 from stickslip.study.result import Run, StudyResult
 from stickslip.thesis.edition import EDITIONS, PLAIN
 
-__all__ = ["StudyView"]
-
 
 class StudyView:
     """Runs by key, names in the study's order, what the configuration says of a controller."""

@@ -7,8 +7,6 @@ from pathlib import Path
 
 from stickslip.identify.estimate import Identification
 
-__all__ = ["after_a_map"]
-
 
 def after_a_map(found: Identification, model_file: str | Path) -> tuple[str, str]:
     """What to do, and the command."""

@@ -17,15 +17,6 @@ from stickslip.analyse.spectrum import Spectrum
 from stickslip.machines.drivetrain import Chain
 from stickslip.report.plots import SPARE, Curve, Panel, Style, envelope, save, scaled
 
-__all__ = [
-    "draw_analysis",
-    "picture_of_dependence",
-    "picture_of_flexibility",
-    "picture_of_repeatability",
-    "picture_of_sides",
-    "picture_of_spectra",
-]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Drawn = tuple[str, str, Sequence[Panel], float]
 """Title, message, panels, height of one in inches."""

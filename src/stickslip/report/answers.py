@@ -25,8 +25,6 @@ from stickslip.report.next_steps import Step, next_steps
 from stickslip.report.plots import quantity
 from stickslip.report.sliding_torque import WORSE, Sliding, beaten, sliding_of
 
-__all__ = ["Answers", "Step", "answers_of", "meaning_of", "next_steps", "one_number_each", "speeds_in"]
-
 ELSEWHERE = 1.5
 """Times the force error of the fitted records, from which on that of held-out ones is one of another machine."""
 ROUGH = 0.1

@@ -18,8 +18,6 @@ from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
-__all__ = ["judgements", "measured_friction", "slow_rows"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BINS, FEWEST = 24, 8

@@ -21,8 +21,6 @@ from stickslip.report.sliding_torque import Sliding, over_all_rows, sliding_of
 from stickslip.report.torque_pictures import friction_points, over_velocity, stretch, whole_record
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
-__all__ = ["data_pictures", "pictures_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BINS, FEWEST = 60, 5

@@ -16,8 +16,6 @@ from stickslip.report.page import filled, replaced
 from stickslip.study.bench import BenchResult, BenchRun
 from stickslip.study.bench_decision import CONDITIONS, LATE, USUAL, Choice, Standing, choices, standings
 
-__all__ = ["dots", "write_bench_report"]
-
 WIDTH, LEFT, ROW, TOP = 760.0, 190.0, 15.0, 46.0
 """Of a picture, px: width, room for names, height of a row, room for the title."""
 CALM, OTHER, BAR = "#1f5f99", "#999999", "#c9d8e6"

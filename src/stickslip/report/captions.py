@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from stickslip.analyse.wording import quantity
 from stickslip.study.result import Run
 
-__all__ = ["HUNTS", "case_caption", "case_message", "figure_of_merit", "oscillates", "ranking"]
-
 OSCILLATES = 20e-3  # rad/s RMS above 50 Hz; the statements' measure
 HUNTS = 2.0  # reversals/s while the reference is at rest
 

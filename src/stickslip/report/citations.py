@@ -17,8 +17,6 @@ from stickslip.spec import Law
 from stickslip.study.plan import Study, load, load_run
 from stickslip.study.planned_run import PlannedRun
 
-__all__ = ["bibliography", "cited_by", "citing"]
-
 INTEGRATORS = {"adaptive": ("dormand1980", "sommeijer1998"), "auto": ("dormand1980", "sommeijer1998")}
 """What an integrator's method is taken from."""
 THESIS = "thesis"

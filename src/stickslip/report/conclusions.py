@@ -10,8 +10,6 @@ from stickslip.report._view import StudyView
 from stickslip.report.captions import figure_of_merit, oscillates, ranking
 from stickslip.study.result import Run
 
-__all__ = ["helped", "rig_conclusion", "study_conclusion"]
-
 MOST = 1000.0
 """Times by which an error is said to be smaller."""
 

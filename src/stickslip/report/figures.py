@@ -17,8 +17,6 @@ from stickslip.report.captions import case_caption, case_message
 from stickslip.report.plots import REFERENCE, Array, Curve, Panel, draw, envelope, scaled, style_of
 from stickslip.study.result import Run
 
-__all__ = ["COMMON", "Figure", "reference_figures", "result_figures"]
-
 COMMON = "both"  # folder of the figures that no slip rule changes
 LINES = 7  # as many controllers as one figure still shows
 DENSE = 50  # turning points of a drawn line

@@ -17,8 +17,6 @@ from stickslip.report.plots import embedded
 from stickslip.thesis.claims import Claim, Verdict, judge
 from stickslip.thesis.edition import SLIP, Note
 
-__all__ = ["image", "notes", "render"]
-
 MARKS = {True: ("yes", "holds"), False: ("no", "does not hold"), None: ("open", "not run")}
 READING = Note(
     "Reading the metrics",

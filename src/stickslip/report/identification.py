@@ -11,8 +11,6 @@ import numpy as np
 from stickslip.identify.estimate import Picture, Trace
 from stickslip.report import plots
 
-__all__ = ["HEIGHT", "draw_picture_to", "panel_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 HEIGHT = 2.7

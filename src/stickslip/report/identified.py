@@ -22,8 +22,6 @@ from stickslip.report.page import filled, replaced
 from stickslip.report.sliding_torque import sliding_of
 from stickslip.report.svg import embedded_svg
 
-__all__ = ["Source", "comparison_of", "number", "write_identification"]
-
 TABLE = 15
 """Estimates beyond which a table of all correlations is too wide to read."""
 STRONG = 0.9

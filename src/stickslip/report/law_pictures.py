@@ -21,18 +21,6 @@ from stickslip.model import Model
 from stickslip.report.plots import DATES, DPI, FORMATS, RC, WIDTH, Array, Curve, Panel, Style, save, scaled
 from stickslip.spec import Law, Surroundings
 
-__all__ = [
-    "Response",
-    "Scales",
-    "draw_gallery",
-    "draw_law",
-    "follow",
-    "presliding",
-    "scales_of",
-    "slow_sine",
-    "velocity_steps",
-]
-
 USUAL_VELOCITY = 0.01  # rad/s, for a law that declares no scale: the thesis's Stribeck velocity
 USUAL_DISTANCE = 1e-4  # rad, for a law without pre-sliding
 RISING = Style("#D55E00", (0, (4, 1.2)), 1.4)

@@ -16,8 +16,6 @@ from stickslip.record import Record, encoder_step
 from stickslip.report.after_a_map import after_a_map
 from stickslip.report.sliding_torque import beaten, sliding_of
 
-__all__ = ["Step", "counts_of", "lacking", "next_steps"]
-
 OPTIONS = "  # with the options of this run"
 EXPERIMENTS = {
     "inertia": "inertia", "fs": "breakaway", "sigma0": "presliding", "k": "presliding", "alpha": "presliding",

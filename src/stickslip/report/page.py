@@ -9,8 +9,6 @@ from typing import Any
 from stickslip.errors import InputError
 from stickslip.report.plots import tied
 
-__all__ = ["filled", "replaced", "unwritable"]
-
 
 def filled(template: str, **values: Any) -> str:
     """The HTML of a template beside this file; a value that it lacks is an error."""

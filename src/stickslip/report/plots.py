@@ -20,20 +20,6 @@ import numpy as np
 
 from stickslip.errors import InputError
 
-__all__ = [
-    "Curve",
-    "Panel",
-    "Style",
-    "draw",
-    "embedded",
-    "envelope",
-    "quantity",
-    "save",
-    "scaled",
-    "style_of",
-    "tied",
-]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WIDTH = 4.4  # inches: printed at half a page's width, 8 points stay above 5

@@ -9,8 +9,6 @@ from stickslip.control.learned import told
 from stickslip.identify.setting.recommend import WORTH, Candidate, Recommendation
 from stickslip.model import Model
 
-__all__ = ["parameters", "percent", "recommendation_lines", "reduction", "safety"]
-
 
 def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str]:
     """The setting, what to expect, and what was tried; `unit` turns an angular unit into the axis's own."""

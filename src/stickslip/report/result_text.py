@@ -7,8 +7,6 @@ import math
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.report.answers import Answers, meaning_of, one_number_each
 
-__all__ = ["interval_text", "result_lines"]
-
 JUDGED = ("force_relative", "inverse_dynamics_relative", "position_", "sliding_rms", "rms_Nm", "rms_N")
 """Misfits that sentences say, or that say little (the position of an open loop drifts); all are in `as_dict`."""
 

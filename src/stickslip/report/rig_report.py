@@ -18,8 +18,6 @@ from stickslip.study.experiments import Experiment, ExperimentView, experiments_
 from stickslip.study.result import Run, StudyResult
 from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share
 
-__all__ = ["draw_experiments", "verdict_table", "write_rig_report"]
-
 MARKS = {True: ("yes", "holds"), False: ("no", "does not hold"), None: ("open", "not run")}
 WINDOWS = {"low": (2.5, 5.0), "high": (0.0, 20.0), "step": (0.0, 1.5)}
 """s, of each reference that is drawn."""

@@ -19,8 +19,6 @@ from stickslip.identify.regression.regression import Regression
 from stickslip.identify.regression.sliding_rows import SlidingRows
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
-__all__ = ["WORSE", "Sliding", "beaten", "over_all_rows", "sliding_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 WORSE = 1.05
 """Times plain least squares' force error, from which on a model's counts as larger."""

@@ -13,8 +13,6 @@ from stickslip.analyse.stability_result import FILTERS, GAINS, TIMES, Map, Stabi
 from stickslip.report.plots import Curve, Panel, Style
 from stickslip.study.stability_map import FINE, FINE_GAINS, OPEN, Confirmed
 
-__all__ = ["picture_of_confirmed", "picture_of_controller", "picture_of_stability"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 ONE = Style("#000000", (0, (1, 1.5)), 1.2)

@@ -18,8 +18,6 @@ import numpy as np
 
 from stickslip.report.plots import LEGEND, WIDTH, Curve, Panel, Style, tied
 
-__all__ = ["embedded_svg", "svg_of", "ticks_between"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Points = Callable[[Array], Array]
 

@@ -18,8 +18,6 @@ from stickslip.sweep.sample import LEVEL, widest
 from stickslip.sweep.summary import influences, within
 from stickslip.sweep.tune import Tuned, front
 
-__all__ = ["draw", "trade_off"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LEVELS = 13
 HIGH = 95.0

@@ -13,8 +13,6 @@ from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.report.plots import envelope, quantity
 from stickslip.report.sliding_torque import Sliding
 
-__all__ = ["friction_points", "over_velocity", "stretch", "whole_record"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 PART, BEGINS = 8, 40

@@ -15,8 +15,6 @@ from contextlib import contextmanager
 from stickslip.errors import Overrun
 from stickslip.rigs.rig import Measurement, Setpoint
 
-__all__ = ["BUDGET", "Budget"]
-
 BUDGET = 0.1
 """s, by which a controller may be behind if nothing else is said"""
 FIRST = 10.0

@@ -13,8 +13,6 @@ from stickslip.rigs import cia402 as cia
 if TYPE_CHECKING:
     import canopen
 
-__all__ = ["CanopenNode"]
-
 FORMATS = {1: "<B", 2: "<H", 4: "<I"}
 
 

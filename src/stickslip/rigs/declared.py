@@ -10,8 +10,6 @@ from typing import Any
 from stickslip.errors import InputError, RigError
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, Rig
 
-__all__ = ["FASTEST", "FIELDS", "answer", "blamed", "checked"]
-
 FASTEST = 1e-7
 """s, the shortest sample time"""
 FIELDS = len(Measurement._fields)

@@ -30,8 +30,6 @@ from stickslip.rigs.canopen_node import CanopenNode
 from stickslip.rigs.files import limits_in
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
 
-__all__ = ["RIG", "Ds402", "Settings"]
-
 COMMAND, ANSWER = struct.Struct("<Hh"), struct.Struct("<Hih")
 WATCHDOGS = ("rpdo", "heartbeat", "none")
 OWN_NODE = 127

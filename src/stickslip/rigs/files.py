@@ -25,8 +25,6 @@ from stickslip.rigs.declared import checked
 from stickslip.rigs.kinds import rig_kind, rig_kind_names
 from stickslip.rigs.rig import Limits, Rig, RigKind
 
-__all__ = ["limits_in", "read_rig"]
-
 
 def read_rig(path: str | os.PathLike[str]) -> Rig:
     """The rig that the TOML file at `path` describes, not yet open.

@@ -11,8 +11,6 @@ from stickslip.rigs.rig import LIMIT_UNITS, Limits
 from stickslip.rigs.safety import ASKED, REASONS, RUNNING, STATUS, STOPPED, STOPPING, UNBOUNDED, Safety
 from stickslip.stream import Stream
 
-__all__ = ["Guard"]
-
 STATE = Safety._fields.index("state")
 """Every sample asks for it, and a place takes a quarter of the time that a name does."""
 KNOWN = ("started", "turns", "position", "velocity", "slow_velocity", "error")

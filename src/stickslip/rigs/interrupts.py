@@ -21,8 +21,6 @@ import numpy as np
 from stickslip.errors import Interrupted
 from stickslip.jit import compiled_notice
 
-__all__ = ["ALWAYS", "UNLESS_USED", "Signals"]
-
 ALWAYS = ("SIGINT", "SIGTERM", "SIGBREAK")
 """Heard whatever the program does with them otherwise"""
 UNLESS_USED = (

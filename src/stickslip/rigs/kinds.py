@@ -10,8 +10,6 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.rigs import RIGS
 from stickslip.rigs.rig import RigKind
 
-__all__ = ["rig_kind", "rig_kind_names"]
-
 
 def rig_kind_names() -> tuple[str, ...]:
     """The name of every kind of rig."""

@@ -34,8 +34,6 @@ from stickslip.rigs.safety import STOPPED, STOPPING
 from stickslip.rigs.step import Step
 from stickslip.stream import Stream
 
-__all__ = ["Loop", "PythonController"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Result = TypeVar("Result")
 PythonController = Callable[[Measurement, Setpoint], float]

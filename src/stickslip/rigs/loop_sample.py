@@ -21,25 +21,6 @@ from stickslip.rigs.safety import Bounds as BoundNames
 from stickslip.spec import Surroundings, fields_of
 from stickslip.subset import Layout
 
-__all__ = [
-    "BOUNDS",
-    "COLUMNS",
-    "MEASURED",
-    "NAMES",
-    "REMEMBERED",
-    "SAFETY",
-    "UNITS",
-    "Control",
-    "addresses",
-    "begin_learned",
-    "control_of",
-    "decide",
-    "decide_at",
-    "end_learned",
-    "finished",
-    "nothing_at",
-]
-
 UNITS = {
     "time": "s", "position": "rad", "velocity": "rad/s", "motor_torque": "N·m", "torque_command": "N·m",
     "sensor_torque": "N·m", "temperature": "°C", "position_reference": "rad", "velocity_reference": "rad/s",

@@ -12,8 +12,6 @@ from stickslip.errors import InputError, suggestion
 from stickslip.rigs.loop_sample import Control
 from stickslip.rigs.rig import BlockRig, Capabilities, Limits, Measurement, Rig
 
-__all__ = ["LIMITS", "Limited", "limited"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LIMITS = (

@@ -20,8 +20,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["TIMES", "Account", "Pace", "soft_real_time"]
-
 TIMES = ("lateness", "own", "control", "empty")
 """What is timed of every sample, in ns."""
 

@@ -19,8 +19,6 @@ from stickslip.rigs.declared import FASTEST
 from stickslip.rigs.files import limits_in
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
 
-__all__ = ["RIG", "Replay"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 UNLIMITED = Limits(torque=1e9, speed=1e9)

@@ -26,18 +26,6 @@ if TYPE_CHECKING:
     from stickslip.config import Table
     from stickslip.rigs.loop_sample import Control
 
-__all__ = [
-    "BlockRig",
-    "Capabilities",
-    "Limits",
-    "Measurement",
-    "Rig",
-    "RigKind",
-    "Setpoint",
-    "Watchdog",
-    "setpoints",
-]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LIMIT_UNITS = {

@@ -23,8 +23,6 @@ from stickslip.control.composition import follow, sample
 from stickslip.rigs.rig import Limits
 from stickslip.spec import Par
 
-__all__ = ["REASONS", "Bounds", "Safety", "bounds", "guarded", "guarded_by"]
-
 # States; from STOPPED on no sample follows. ENDED: the segment's travel is reached, which is no fault; the next segment
 # goes on.
 RUNNING, STOPPING, STOPPED, ENDED = 0.0, 1.0, 2.0, 3.0

@@ -7,8 +7,6 @@ import numpy as np
 from stickslip.rigs.loop_sample import ADDRESSES, COLUMNS, MEASURED, Control, addresses, decide_at, nothing_at
 from stickslip.rigs.rig import Setpoint
 
-__all__ = ["Step"]
-
 SETPOINT, ROW = ((ADDRESSES.names or ()).index(name) for name in ("setpoint", "row"))
 """Places of the addresses that change from sample to sample; by name they would take twice as long."""
 

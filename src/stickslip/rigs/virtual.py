@@ -23,8 +23,6 @@ from stickslip.simulation.machine.layout import lay_out_machine, look, run, wait
 from stickslip.simulation.machine.plant import Laid, plant_of
 from stickslip.simulation.machine.step import sample
 
-__all__ = ["RIG", "VirtualRig", "virtual_rig"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TORQUE, SPEED = 1.0, 100.0

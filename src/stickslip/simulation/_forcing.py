@@ -18,8 +18,6 @@ from stickslip.errors import InputError
 from stickslip.jit import call_profile, call_step, kernel, pointer
 from stickslip.simulation.case_arrays import Array, Case, surroundings
 
-__all__ = ["CELL_SIZE", "NO_CELLS", "feedforward"]
-
 CELL_SIZE = 7
 """Start (s), 1/width (1/s), and five coefficients of powers of (t - start)/width (N·m)."""
 NO_CELLS: Array = np.zeros((0, CELL_SIZE))

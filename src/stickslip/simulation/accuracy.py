@@ -21,8 +21,6 @@ from stickslip.simulation.case_arrays import DONE, PERTURBATION, POSITION_0, TOL
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.sampled import engine as sampled
 
-__all__ = ["BESIDE", "Accuracy", "branches", "estimate", "start_apart"]
-
 PERTURBATIONS = (2.0, -2.0)
 """Over what a step may be wrong by."""
 WELL = 10.0

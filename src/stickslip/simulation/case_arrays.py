@@ -21,20 +21,6 @@ from stickslip.model import Model, Reference
 from stickslip.spec import Bristle, Elements, Surroundings
 from stickslip.subset import Layout
 
-__all__ = [
-    "COLUMNS",
-    "UNITS",
-    "Case",
-    "Outcome",
-    "Side",
-    "StepBudget",
-    "lay_out",
-    "ruled",
-    "ruled_in",
-    "slip_rules",
-    "surroundings",
-]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 # ---- rows: what a kernel writes at every output time and event ---------------------------------------------------

@@ -37,8 +37,6 @@ from stickslip.simulation.case_arrays import (
 )
 from stickslip.simulation.metrics import metrics
 
-__all__ = ["INTEGRATORS", "Choice", "check_machine_run", "integrator_for", "prepare", "run_case", "simulate"]
-
 INTEGRATORS = ("exact", "adaptive", "sampled", "fixed")
 """In the order in which `integrator="auto"` tries them."""
 

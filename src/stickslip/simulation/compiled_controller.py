@@ -11,16 +11,6 @@ from stickslip.control.composition import MEMORY as MEMORY_FIELDS
 from stickslip.control.controller import Controller
 from stickslip.jit import call_sample, compiled_sample, flat, kernel, pointer
 
-__all__ = [
-    "COMPENSATION",
-    "FAULT",
-    "FEEDFORWARD",
-    "Sampled",
-    "compiled",
-    "measured_position",
-    "replay",
-]
-
 COMPENSATION, FAULT, FEEDFORWARD = (
     [f.name for f in MEMORY_FIELDS].index(name) for name in ("others", "fault", "feedforward")
 )

@@ -26,8 +26,6 @@ import numpy as np
 from stickslip.jit import compiled_kernels
 from stickslip.subset import Layout
 
-__all__ = ["MOST", "ROOT", "SEARCH", "SOLVED", "begin", "begin_beyond", "compiled", "improve", "ready"]
-
 ROOT = Layout(
     (
         "x", "last", "f_last", "other", "phase", "inverse", "enough", "rounding", "least", "sharp", "rested", "rest",

@@ -29,8 +29,6 @@ from stickslip.study.bench_metrics import judged
 from stickslip.study.planned_run import described
 from stickslip.study.provenance import engine_hash, source_hash
 
-__all__ = ["BENCH", "COUNTS", "BenchResult", "BenchRun", "is_bench", "planned", "read_bench", "run_bench"]
-
 BENCH = "compensators"
 COUNTS = 2.0**20
 """Of every machine's encoder, unless a change says otherwise."""

@@ -16,18 +16,6 @@ from stickslip.control.catalogue import CATALOGUE, INERTIA, LEVELS, NOTHING
 from stickslip.identify.setting.swings import between_counts
 from stickslip.study.bench import BenchRun
 
-__all__ = [
-    "CONDITIONS",
-    "KNOWLEDGE",
-    "LATE",
-    "USUAL",
-    "Choice",
-    "Standing",
-    "choices",
-    "knowledge_of",
-    "standings",
-]
-
 KNOWLEDGE = ("nothing", "its inertia", "levels of friction", "a friction law")
 """What may be known of an axis, each with those before it."""
 CHATTER = 0.05

@@ -10,8 +10,6 @@ import numpy as np
 from stickslip.identify.setting.swings import back_and_forth
 from stickslip.record import Record
 
-__all__ = ["METRICS", "judged"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Places = np.ndarray[Any, np.dtype[np.bool_]]
 STILL = 1e-6

@@ -21,8 +21,6 @@ from stickslip.machines.machine import Machine
 from stickslip.rigs.virtual import VirtualRig
 from stickslip.study.stability_map import RESTLESS, Judged, moved
 
-__all__ = ["FACTORS", "ConfirmedController", "Scaled", "confirmed_controller", "scaled"]
-
 FACTORS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0)
 """By which the gains of the loop are multiplied."""
 

@@ -34,17 +34,6 @@ from stickslip.study.planned_run import OWN, Executed, PlannedRun
 from stickslip.study.provenance import source_hash
 from stickslip.study.result import Run, StudyResult
 
-__all__ = [
-    "NOMINAL",
-    "Experiment",
-    "ExperimentRun",
-    "ExperimentView",
-    "experiments_of",
-    "planned_experiments",
-    "variant",
-    "variants_of",
-]
-
 NOMINAL = "as it is"
 
 

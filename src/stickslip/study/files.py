@@ -25,21 +25,6 @@ if TYPE_CHECKING:
     from stickslip.study.plan import Study
     from stickslip.study.planned_run import PlannedRun
 
-__all__ = [
-    "KEYS",
-    "claim_folder",
-    "copy_inputs",
-    "find_run",
-    "keep_record",
-    "metric_names",
-    "prepared_folder",
-    "read_manifest",
-    "save_manifest",
-    "unwritable",
-    "write_manifest",
-    "write_metrics",
-]
-
 KEYS = ("slip_rule", "reference", "friction", "controller")
 KINDS = ("study", "sweep", "tune")
 MARK = ".stickslip-results"

@@ -18,16 +18,6 @@ from stickslip.study.build import Numerics, Placement
 from stickslip.study.planned_run import FAMILIES, OWN, PlannedRun
 from stickslip.study.result import Run
 
-__all__ = [
-    "SLIP_RULES",
-    "Drive",
-    "Response",
-    "Study",
-    "load",
-    "load_run",
-    "select",
-]
-
 SLIP_RULES = ("signed", "literal")
 BUILT_IN = ("thesis", "imperfections", "thesis-rig")
 

@@ -21,8 +21,6 @@ from stickslip.simulation.closed_loop import check_machine_run, integrator_for, 
 from stickslip.study.build import Numerics
 from stickslip.study.provenance import engine_hash, source_hash
 
-__all__ = ["OWN", "Executed", "PlannedRun", "described"]
-
 OWN = "own"
 """What stands for the slip rule in the name of a run whose laws keep rules of their own."""
 FAMILIES = ("slip_rule", "reference", "friction", "controller")

@@ -12,8 +12,6 @@ from pathlib import Path
 
 import stickslip
 
-__all__ = ["engine_hash", "file_hash", "other_versions", "source_hash", "versions"]
-
 WITHOUT_PHYSICS = ("analyse", "cli", "report", "study", "sweep")
 """Folders of the package that cannot change a run's numbers."""
 

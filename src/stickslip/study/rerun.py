@@ -15,8 +15,6 @@ from stickslip.study.plan import load
 from stickslip.study.provenance import other_versions
 from stickslip.study.study import Progress, execute
 
-__all__ = ["Comparison", "rerun"]
-
 
 @dataclass(frozen=True)
 class Comparison:

@@ -9,8 +9,6 @@ from typing import Any
 
 from stickslip.record import Record
 
-__all__ = ["Run", "StudyResult"]
-
 
 @dataclass(frozen=True)
 class Run:

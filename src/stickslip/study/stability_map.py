@@ -29,19 +29,6 @@ from stickslip.rigs.loop import Loop as RigLoop
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import VirtualRig
 
-__all__ = [
-    "FILTERS",
-    "FINE",
-    "FINE_GAINS",
-    "GAINS",
-    "OPEN",
-    "Confirmed",
-    "Judged",
-    "Point",
-    "confirmed",
-    "moved",
-]
-
 FILTERS = (4.0, 10.0, 25.0, 60.0, 150.0, 0.0)
 """Hz; 0 for none."""
 GAINS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)

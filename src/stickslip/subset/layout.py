@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from stickslip.spec import Field, Law, Surroundings
 
-__all__ = ["Layout", "law_layouts"]
-
 
 @dataclass(frozen=True, slots=True)
 class Layout:

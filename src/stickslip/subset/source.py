@@ -13,8 +13,6 @@ from typing import Any
 
 from stickslip.errors import LawError
 
-__all__ = ["Place", "arguments_of", "parsed"]
-
 VARIADIC = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
 
 

@@ -14,8 +14,6 @@ from stickslip.errors import LawError, suggestion
 from stickslip.subset.layout import Layout
 from stickslip.subset.source import Place, arguments_of
 
-__all__ = ["Names", "Target", "Translator", "View"]
-
 BUILTINS = {"abs", "min", "max", "range", "len", "float", "int"}
 MATH = {
     "exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",

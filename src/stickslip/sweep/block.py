@@ -23,8 +23,6 @@ from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.numbers import as_columns, varied
 from stickslip.sweep.plan import BLOCK, Sweep
 
-__all__ = ["FLOORS", "Block", "Measured", "compute", "compute_cases", "differ", "integrator_of", "measured"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TIGHTER, FINEST = (0.1, 0.01, 0.001), 1e-10
 """Times the tolerance, at which those that are not sure are run again; least tolerance, rad."""

@@ -22,8 +22,6 @@ from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.block import Block
 from stickslip.sweep.plan import BLOCK, Sweep
 
-__all__ = ["block_path", "has_block", "keep_block", "read", "read_block", "room_for", "rows_of"]
-
 OVERHEAD = 4000
 """Bytes that a file of a block takes besides its rows."""
 KEY = b"stickslip"

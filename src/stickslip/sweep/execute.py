@@ -29,8 +29,6 @@ from stickslip.sweep import dataset
 from stickslip.sweep.block import Block, compute, integrator_of
 from stickslip.sweep.plan import BLOCK, Sweep, load
 
-__all__ = ["computed", "run"]
-
 ADDRESS = re.compile(r"(?:[a-z]+://)?(?:[^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):\d{1,5}/?|inproc://\S+")
 """Of a Dask scheduler: its client looks for another kind of text in vain, and for long."""
 MOST_TRIES = 5

@@ -9,8 +9,6 @@ import numpy as np
 from stickslip.sweep.block import compute_cases, integrator_of
 from stickslip.sweep.plan import BLOCK, Sweep
 
-__all__ = ["seconds_of"]
-
 MOST_TIMED, SHARE = 16, 0.05
 """Cases timed of every run, at most, and as part of all that it has."""
 CHUNK = 4

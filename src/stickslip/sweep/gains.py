@@ -16,8 +16,6 @@ from stickslip.sweep.plan import Sweep
 from stickslip.sweep.sample import Drawn
 from stickslip.sweep.summary import LEAST_CASES
 
-__all__ = ["GAIN", "Recommended", "recommended", "too_few"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 GAIN = "controller.gain"
 LEAST_BINS, MOST_BINS = 5, 20

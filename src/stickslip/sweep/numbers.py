@@ -25,8 +25,6 @@ from stickslip.machines.numbers import machine_numbers, with_friction, with_numb
 from stickslip.model import Model, Reference
 from stickslip.study.planned_run import PlannedRun
 
-__all__ = ["as_columns", "belongs", "poles", "value_of", "varied"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 FAMILIES = ("axis", "machine", "friction", "law", "controller", "reference")
 POLES = ("bandwidth_hz", "damping")

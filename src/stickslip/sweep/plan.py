@@ -25,8 +25,6 @@ from stickslip.sweep.numbers import belongs, value_of, varied
 from stickslip.sweep.ranges import admitted, usual
 from stickslip.sweep.sample import LEVEL, METHODS, Drawn, Spread, count_of
 
-__all__ = ["BUILT_IN", "Sweep", "load"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 BUILT_IN = ("thesis-robustness", "thesis-gain")
 BLOCK = 256

@@ -11,8 +11,6 @@ from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.numbers import belongs, parts, value_of
 from stickslip.sweep.sample import Spread
 
-__all__ = ["admitted", "described", "usual"]
-
 WIDTH = 5.0
 """Factor up and down from the run's own number, where its bounds are open."""
 

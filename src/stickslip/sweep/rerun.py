@@ -19,8 +19,6 @@ from stickslip.sweep.block import Block
 from stickslip.sweep.execute import Progress, computed, ready
 from stickslip.sweep.plan import BLOCK, Sweep, load
 
-__all__ = ["is_sweep", "rerun"]
-
 MOST_LINES = 1000
 
 

@@ -17,8 +17,6 @@ import numpy as np
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.monte_carlo import spread_values
 
-__all__ = ["LEVEL", "METHODS", "Drawn", "Spread", "widest"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 METHODS = ("grid", "sobol", "latin")
 LEVEL = "level"

@@ -14,8 +14,6 @@ from stickslip.study.files import KEYS, unwritable
 from stickslip.sweep.dataset import read
 from stickslip.sweep.plan import Sweep
 
-__all__ = ["PERCENTILES", "influences", "summarise", "within", "write_summary"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 PERCENTILES = (5, 50, 95, 100)
 LEAST_CASES = 20

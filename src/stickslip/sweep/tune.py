@@ -22,8 +22,6 @@ from stickslip.sweep.numbers import belongs, value_of
 from stickslip.sweep.plan import Sweep
 from stickslip.sweep.ranges import admitted
 
-__all__ = ["Tuned", "front", "tune"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 POPULATION, GENERATIONS = 6, 12
 MOST_CASES = 4096

@@ -11,8 +11,6 @@ from stickslip.study.files import unwritable
 from stickslip.sweep.plan import Sweep
 from stickslip.sweep.tune import Tuned
 
-__all__ = ["write"]
-
 
 def write(folder: Path, sweep: Sweep, tuned: Tuned) -> list[Path]:
     """Write CONTROLLER-tuned.json and CONTROLLER-tried.csv; returns their paths."""

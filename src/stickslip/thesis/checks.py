@@ -9,22 +9,6 @@ from itertools import pairwise
 from stickslip.analyse.wording import quantity
 from stickslip.thesis.evidence import QUANTITIES, Evidence
 
-__all__ = [
-    "Check",
-    "Claim",
-    "above",
-    "all_of",
-    "at_least",
-    "beats",
-    "below",
-    "cases",
-    "claims_of",
-    "close",
-    "compared",
-    "rises",
-    "within_cycle",
-]
-
 Check = Callable[[Evidence], tuple[bool, str]]
 
 

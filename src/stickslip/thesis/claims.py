@@ -11,8 +11,6 @@ from stickslip.thesis import step as _thesis_step
 from stickslip.thesis.checks import Claim
 from stickslip.thesis.evidence import Evidence, View
 
-__all__ = ["CLAIMS", "Claim", "Verdict", "View", "judge"]
-
 CLAIMS: tuple[Claim, ...] = (*_thesis_sines.CLAIMS, *_thesis_step.CLAIMS, *_thesis_overall.CLAIMS)
 
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 
 from stickslip.thesis.claims import CLAIMS, Claim
 
-__all__ = ["EDITIONS", "PLAIN", "SLIP", "THESIS", "Edition", "Note"]
-
 
 @dataclass(frozen=True)
 class Note:

@@ -11,8 +11,6 @@ import numpy as np
 
 from stickslip.record import Record
 
-__all__ = ["QUANTITIES", "Evidence", "View"]
-
 STANDSTILL_SPEED, REFERENCE_MOVES, SHORTEST_STANDSTILL = 1e-3, 2e-3, 10e-3  # rad/s, rad/s, s; as the metrics'
 NEAR_ZERO, AWAY = 0.3, 0.5  # shares of the reference's peak velocity
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 from stickslip.thesis.checks import Check, Claim, cases
 from stickslip.thesis.evidence import Evidence
 
-__all__ = ["CLAIMS"]
-
 LAWS = ("coulomb", "stribeck", "lugre", "gms")
 GROUPS = [
     (f"{reference}/{friction}", kind)

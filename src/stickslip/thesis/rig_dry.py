@@ -22,8 +22,6 @@ from stickslip.thesis.checks import (
     rises,
 )
 
-__all__ = ["CLAIMS", "calmed", "oscillates", "unstable"]
-
 VISIBLE = {"low": 1e-4, "step": 1e-4, "high": 1e-3}  # rad
 CLOSE, UNSTABLE, CALM = 0.2, 5.0, 0.2
 STATIC, DYNAMIC, OTHERS = "coulomb stribeck", "lugre gms", "coulomb stribeck lugre"

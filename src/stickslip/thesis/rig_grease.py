@@ -31,8 +31,6 @@ from stickslip.thesis.rig_dry import (
     unstable,
 )
 
-__all__ = ["CLAIMS"]
-
 LOW, LOW36, LOW_PID = "grease-low-PD25", "grease-low-PD36", "grease-low-PID10"
 HIGH, HIGH_PID = "grease-high-PD10", "grease-high-PID10"
 STEP, STEP35, STEP_PID = "grease-step-PD25", "grease-step-PD35", "grease-step-PID10"

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from stickslip.thesis.rig_claims import CLAIMS, MAIN, WHY, Claim, View, judge
 
-__all__ = ["Judged", "judged_over", "main_share"]
-
 
 @dataclass(frozen=True)
 class Judged:

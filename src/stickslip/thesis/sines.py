@@ -21,8 +21,6 @@ from stickslip.thesis.checks import (
     rises,
 )
 
-__all__ = ["CLAIMS"]
-
 OSCILLATES = 20e-3  # rad/s RMS above 50 Hz
 TRAVEL = {"low": 0.02, "high": 1.0}  # rad, of the reference
 CHATTER = 20.0  # reversals/s

@@ -20,8 +20,6 @@ from stickslip.thesis.checks import (
     within_cycle,
 )
 
-__all__ = ["CLAIMS"]
-
 STEP = 0.01  # rad
 OSCILLATES = 2.0  # reversals/s at steady state
 AT_REST = 1e-6  # rad peak to peak

@@ -10,8 +10,6 @@ from stickslip.identify.identified_file import Identified, read_identified
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import require
 
-__all__ = ["IdentifiedModel", "compare", "identified_of"]
-
 IdentifiedModel = IdentificationResult | Identified | str | os.PathLike[str]
 """What `identify` handed back, or the path of the model that it saved."""
 

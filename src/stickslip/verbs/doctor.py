@@ -12,8 +12,6 @@ from stickslip.identify.doctor import Diagnosis, examine
 from stickslip.readers.cut import file_rows, pieces, range_words
 from stickslip.verbs.reading import Log, Reading, open_log
 
-__all__ = ["doctor"]
-
 
 def doctor(
     log: Log | None = None,

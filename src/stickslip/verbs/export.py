@@ -33,8 +33,6 @@ from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import require
 from stickslip.verbs.recommendation import RecommendationResult
 
-__all__ = ["CompensatorOptions", "ExportResult", "export"]
-
 Source = (
     IdentificationResult | RecommendationResult | Model | Controller | PositionMap | str
     | os.PathLike[str]

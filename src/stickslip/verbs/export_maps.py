@@ -11,8 +11,6 @@ from stickslip.machines.position_map import PositionMap
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import kind_of, require
 
-__all__ = ["map_in", "only_map"]
-
 
 def only_map(source: object) -> bool:
     """Whether a source holds a torque over the angle and no law."""

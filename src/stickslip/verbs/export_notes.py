@@ -15,8 +15,6 @@ from stickslip.export.nearest import read_by
 from stickslip.export.target import Target
 from stickslip.machines.angle import AngleMap
 
-__all__ = ["around_of", "axis_of", "constant_torque", "notes_on", "notes_on_controller"]
-
 SLOW = 0.02
 """s: sample times above it are told; a tenth of a period of 5 Hz."""
 

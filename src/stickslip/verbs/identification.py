@@ -31,8 +31,6 @@ from stickslip.study.files import prepared_folder
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["IdentificationResult"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class IdentificationResult:

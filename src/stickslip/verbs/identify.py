@@ -27,8 +27,6 @@ from stickslip.spec import Law
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, doctor_of, named, open_log
 
-__all__ = ["assumptions", "identify"]
-
 Loops = str | Mapping[str, float] | Sequence[str | Mapping[str, float]] | None
 
 

@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-__all__ = ["kind_of", "require"]
-
 WORDS = {
     "record": ("a record", "a record (CSV, MAT, HDF5, Parquet, ...)"),
     "model": ("a model", "a model (what `stickslip identify` wrote)"),

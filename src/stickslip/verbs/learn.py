@@ -29,8 +29,6 @@ from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, repl
 from stickslip.spec import Surroundings
 from stickslip.study.files import prepared_folder, unwritable
 
-__all__ = ["LearningResult", "learn"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 OVER = ("time", "angle")
 LARGEST = 1e6

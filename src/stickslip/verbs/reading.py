@@ -22,10 +22,6 @@ from stickslip.readers.table_columns import Table
 from stickslip.record import Record
 from stickslip.verbs.kinds import require
 
-__all__ = [
-    "ARRAYS", "Log", "Opened", "Reading", "beside_of", "columns_of", "doctor_of", "named", "open_log", "read",
-]  # fmt: skip
-
 Log = str | os.PathLike[str] | Record | Any
 """A path, a `Record`, a data frame, a mapping of arrays, or a structured array."""
 

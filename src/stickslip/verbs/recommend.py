@@ -26,8 +26,6 @@ from stickslip.verbs.compare import IdentifiedModel, identified_of
 from stickslip.verbs.reading import Log, open_log
 from stickslip.verbs.recommendation import RecommendationResult
 
-__all__ = ["RecommendationResult", "recommend"]
-
 
 def recommend(
     model: IdentifiedModel,

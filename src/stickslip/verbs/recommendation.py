@@ -18,8 +18,6 @@ from stickslip.model import Model
 from stickslip.report.recommendation_text import recommendation_lines, reduction, safety
 from stickslip.study.files import prepared_folder
 
-__all__ = ["RecommendationResult"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RecommendationResult:

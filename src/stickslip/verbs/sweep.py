@@ -22,8 +22,6 @@ from stickslip.sweep.summary import summarise, write_summary
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["SweepResult", "sweep", "sweep_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

@@ -13,8 +13,6 @@ from stickslip.sweep.tune import Tuned
 from stickslip.sweep.tune import tune as search
 from stickslip.sweep.tuned_files import write
 
-__all__ = ["tune", "tuning_of"]
-
 
 def tune(
     file: str | os.PathLike[str] | Sweep,

@@ -22,8 +22,6 @@ from stickslip.web.projects import Projects
 from stickslip.web.security import Gate
 from stickslip.web.site import Site
 
-__all__ = ["Options", "make_app"]
-
 STATIC = Path(__file__).with_name("static")
 
 

@@ -14,8 +14,6 @@ from starlette.responses import JSONResponse, Response
 from stickslip.errors import InputError, StickslipError
 from stickslip.web.projects import NotThere
 
-__all__ = ["Handler", "Refused", "Table", "answered", "body", "chosen_names", "number", "text"]
-
 Handler = Callable[[Request], Awaitable[Response]]
 Table = dict[tuple[str, str], Handler]
 """Handlers by method and path."""

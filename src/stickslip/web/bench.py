@@ -13,8 +13,6 @@ from starlette.responses import JSONResponse, Response
 from stickslip.web.asking import Refused, Table, body
 from stickslip.web.jobs import ended, last_of, started
 
-__all__ = ["Bench", "table"]
-
 PATIENCE = 400.0
 """s that a simulation may take, a first one that compiles too"""
 

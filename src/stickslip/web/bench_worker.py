@@ -14,8 +14,6 @@ from typing import Any
 from stickslip.errors import InputError, StickslipError
 from stickslip.web.worker import plain
 
-__all__ = ["main", "simulated"]
-
 CHANNELS = ("position_reference", "position", "error", "velocity", "motor_torque", "friction_torque")
 POINTS = 1200
 

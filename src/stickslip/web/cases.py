@@ -10,8 +10,6 @@ from stickslip import plugins
 from stickslip.errors import InputError
 from stickslip.spec import Described, Field
 
-__all__ = ["descriptions", "python_of", "toml_of"]
-
 PARTS = {
     "bandwidth_hz": "Hz", "damping": "-", "sample_time": "s", "encoder_counts": "counts a revolution",
     "torque_limit": "N·m", "gain": "-", "lead": "s", "deadband": "rad/s", "filter_hz": "Hz",

@@ -13,8 +13,6 @@ from stickslip.web.identifying import approved
 from stickslip.web.projects import Item, NotThere, Project
 from stickslip.web.site import Site
 
-__all__ = ["table"]
-
 
 def table(site: Site) -> Table:
     """Handlers by method and path."""

@@ -14,8 +14,6 @@ from stickslip.web.jobs import Job
 from stickslip.web.projects import Item, Project, words
 from stickslip.web.site import Site
 
-__all__ = ["approved", "table"]
-
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
 """A report is a page of its own: its styles stand in it, and nothing in it runs."""
 

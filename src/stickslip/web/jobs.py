@@ -17,8 +17,6 @@ from typing import Any
 from stickslip.errors import InputError
 from stickslip.web.projects import NotThere
 
-__all__ = ["Job", "Jobs", "ended", "last_of", "started", "worker_command"]
-
 LONGEST_LINE = 64 * 2**20
 KEPT = 200
 """Finished jobs that are remembered."""

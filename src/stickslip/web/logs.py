@@ -17,8 +17,6 @@ from stickslip.web.projects import Item, Project, words
 from stickslip.web.site import Site
 from stickslip.web.uploads import memory_for, received, suffix_of, time_for
 
-__all__ = ["read_again", "reading_of", "table"]
-
 NUMBERS = (
     "counts_per_rev",
     "rated_torque",

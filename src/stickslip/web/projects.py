@@ -24,8 +24,6 @@ from typing import Any, cast
 
 from stickslip.errors import InputError
 
-__all__ = ["KINDS", "Item", "NotThere", "Project", "Projects", "words"]
-
 KINDS = {"logs": "log", "models": "model", "settings": "setting", "studies": "study", "rigs": "rig"}
 """What a project holds, and how the identifiers of each begin."""
 PROJECT_ID = re.compile(r"\d{4}-\d{2}-\d{2}-[0-9a-f]{8}")

@@ -13,8 +13,6 @@ from stickslip.web.jobs import Job
 from stickslip.web.projects import KINDS
 from stickslip.web.site import Site
 
-__all__ = ["table"]
-
 
 def table(site: Site) -> Table:
     """Handlers by method and path."""

@@ -19,8 +19,6 @@ from stickslip.errors import InputError
 from stickslip.rigs.rig import LIMIT_UNITS, Limits, Rig
 from stickslip.web.worker import Said
 
-__all__ = ["MAIN", "RIG_TASKS", "described"]
-
 Request = Mapping[str, Any]
 MAIN = "rig.toml"
 

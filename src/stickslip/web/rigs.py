@@ -22,8 +22,6 @@ from stickslip.web.projects import Item, Project
 from stickslip.web.sent import MAIN
 from stickslip.web.site import Site
 
-__all__ = ["table"]
-
 PATIENCE = 4.0
 """s without a sign of life from the page, after which the rig is stopped"""
 FRAME = 0.04

@@ -16,8 +16,6 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-__all__ = ["SESSION", "Gate", "new_token", "same"]
-
 SESSION = "/api/session"
 """Where the token is turned into a cookie: the one address under /api that needs none."""
 CHANGING = ("POST", "PUT", "PATCH", "DELETE")

@@ -22,8 +22,6 @@ from stickslip.web.jobs import Job
 from stickslip.web.projects import Item, Project, words
 from stickslip.web.site import Site
 
-__all__ = ["MAIN", "table"]
-
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_. -]{0,79}\.(toml|py|csv)", re.IGNORECASE)
 """Names that are taken as they are, since the TOML file says them; none of them leaves a folder."""
 MAIN = {"models": "model.toml", "studies": "study.toml", "rigs": "rig.toml"}

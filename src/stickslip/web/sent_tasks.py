@@ -13,8 +13,6 @@ from stickslip.web import rig_tasks
 from stickslip.web.projects import Item, written_whole
 from stickslip.web.worker import Said, plain
 
-__all__ = ["SENT_TASKS"]
-
 Request = Mapping[str, Any]
 METRICS = ("position_rms_rad", "position_peak_rad", "velocity_rms_rad_s", "torque_rms_Nm", "standstills")
 """Of a study, in the page's table; all of them are in its metrics.csv."""

@@ -16,8 +16,6 @@ from stickslip.errors import InputError
 from stickslip.web.app import Options, make_app
 from stickslip.web.security import new_token
 
-__all__ = ["serve"]
-
 OWN = ("127.0.0.1", "::1")
 
 

@@ -10,8 +10,6 @@ from stickslip.web.bench import Bench
 from stickslip.web.jobs import Jobs
 from stickslip.web.projects import Item, Project, Projects
 
-__all__ = ["Site"]
-
 
 @dataclass(frozen=True)
 class Site:

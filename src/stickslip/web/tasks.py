@@ -20,8 +20,6 @@ from stickslip.web.sent_tasks import SENT_TASKS
 from stickslip.web.wording import in_the_page
 from stickslip.web.worker import Said, plain
 
-__all__ = ["TASKS"]
-
 Request = Mapping[str, Any]
 LONG = 300_000
 """Rows of a log that is shown before the doctor has looked at it, which takes ten seconds and more for a million"""

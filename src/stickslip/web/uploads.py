@@ -11,8 +11,6 @@ from starlette.requests import Request
 from stickslip.verbs.kinds import RECORDS
 from stickslip.web.asking import Refused
 
-__all__ = ["memory_for", "received", "suffix_of", "time_for"]
-
 KNOWN = RECORDS | {".json", ".jsonl", ".ndjson", ".toml"}
 SPARE = 256 * 2**20
 """Of the disk, that an upload leaves."""

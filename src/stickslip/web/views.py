@@ -14,8 +14,6 @@ import numpy as np
 
 from stickslip.record import Record
 
-__all__ = ["MOST_BINS", "lay_out", "plane", "samples"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 FIRST, FACTOR = 64, 8

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["in_the_page"]
-
 FORM = "under “Columns and units”"
 MAP = re.compile(r"--map (?:'(?P<quoted>[^']+)'|(?P<bare>[^\s,;)]+))(?P<again>(?: --map [^\s,;)]+)*)")
 PATH = re.compile(r"\S*[/\\](?=(?:model|study|recommended)\.toml)")

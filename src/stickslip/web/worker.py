@@ -18,8 +18,6 @@ from typing import Any, TextIO
 
 from stickslip.errors import StickslipError
 
-__all__ = ["Said", "main", "plain"]
-
 Said = Callable[[dict[str, Any]], None]
 """Sends one line to the server."""
 

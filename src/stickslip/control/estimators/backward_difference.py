@@ -7,8 +7,6 @@ from typing import Any, NamedTuple
 
 from stickslip.control_spec import ControlLaw
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """It has none."""

@@ -12,8 +12,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Par
 
-__all__ = ["CONTROL_LAW"]
-
 MOST = 0.99 * math.pi
 """Largest corner times sample time that the low-pass is designed with."""
 

@@ -13,8 +13,6 @@ from stickslip.control.linear import Compensation
 from stickslip.control_spec import friction
 from stickslip.spec import Choice, Option, Par
 
-__all__ = ["LOW_PASS", "OVER_SAMPLE", "Seen", "compensation", "linear", "open_pass"]
-
 MOST = 0.99 * math.pi
 """Largest corner times sample time that the low-pass is designed with."""
 

@@ -16,8 +16,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Choice, Learned, Option, Par
 
-__all__ = ["CONTROL_LAW"]
-
 TURN = 2.0 * math.pi  # rad
 
 

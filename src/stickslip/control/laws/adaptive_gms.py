@@ -18,8 +18,6 @@ from stickslip.control.laws.dual_observer import reference as velocity_of
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Kept, Learned, Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """Elements, the believed curve, pace, leak and bound of what is learned."""

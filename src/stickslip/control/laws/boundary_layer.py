@@ -7,8 +7,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """Surface and layer. Torque over layer is a gain on the velocity error, bounded by sample time and delay."""

@@ -12,8 +12,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Choice, Learned, Option, Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """Nominal machine, how fast it learns, and where."""

@@ -17,8 +17,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import REST, ControlLaw
 from stickslip.spec import Choice, Option, Par
 
-__all__ = ["CONTROL_LAW"]
-
 MOST_DELAY = 2.0
 
 

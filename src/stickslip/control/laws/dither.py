@@ -10,8 +10,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Choice, Option, Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """The wave."""

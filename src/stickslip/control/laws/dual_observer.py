@@ -21,8 +21,6 @@ from stickslip.laws.sliding_curve import CURVE
 from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.spec import Choice, Kept, Learned, Option, Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """Parameters besides the sliding curve's: nominal law, pace of observers and factors, bounds."""

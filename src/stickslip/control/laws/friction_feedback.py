@@ -9,8 +9,6 @@ from stickslip.control.linear import Compensation
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Choice, Option, Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """How much of the friction is compensated."""

@@ -10,8 +10,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw, friction
 from stickslip.spec import Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """How much of the friction is compensated, and how the error corrects it."""

@@ -12,8 +12,6 @@ from stickslip.control.linear import Gains
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """The gains."""

@@ -11,8 +11,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw, friction
 from stickslip.spec import Kept, Learned, Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """Start, pace and bound."""

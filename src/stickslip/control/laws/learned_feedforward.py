@@ -14,8 +14,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import REST, ControlLaw
 from stickslip.spec import Kept, Learned, Par
 
-__all__ = ["CONTROL_LAW"]
-
 TURN = 2.0 * math.pi  # rad
 
 

@@ -14,8 +14,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw, friction
 from stickslip.spec import Kept, Learned, Par
 
-__all__ = ["CONTROL_LAW"]
-
 FULL = 0.999
 """Of the largest trace: a covariance that has been cut back tells nothing."""
 

@@ -16,8 +16,6 @@ from stickslip.laws.sliding_curve import CURVE
 from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.spec import Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """Parameters besides the sliding curve's."""

@@ -14,8 +14,6 @@ from stickslip.control.linear import pid as gains_of
 from stickslip.control_spec import REST, ControlLaw
 from stickslip.spec import Choice, Option, Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """Gains, thesis eq. 3.15."""

@@ -9,8 +9,6 @@ from stickslip.control.linear import pr as gains_of
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """Gains, thesis eq. 3.10."""

@@ -13,8 +13,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Kept, Learned, Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """Surface, layer, how fast the levels grow and up to where."""

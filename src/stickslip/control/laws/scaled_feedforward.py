@@ -14,8 +14,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw, friction, friction_steady
 from stickslip.spec import Kept, Learned, Par
 
-__all__ = ["CONTROL_LAW"]
-
 
 class Params(NamedTuple):
     """Nominal machine, how fast it learns, and within what."""

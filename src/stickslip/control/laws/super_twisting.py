@@ -12,8 +12,6 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.control_spec import ControlLaw
 from stickslip.spec import Choice, Option, Par
 
-__all__ = ["CONTROL_LAW"]
-
 ROOT, INTEGRAL = 1.5, 1.1
 """Levant's gains: 1.5 sqrt(L) on the root, 1.1 L in the integral."""
 

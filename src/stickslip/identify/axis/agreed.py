@@ -29,20 +29,6 @@ from stickslip.identify.regression.regressions import Regress
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
-__all__ = [
-    "SAME",
-    "TOLD_BY_SLIDING",
-    "agreed",
-    "aligned",
-    "as_good",
-    "held_against",
-    "on_timing",
-    "on_width",
-    "regressed",
-    "sliding_values",
-    "told_apart",
-]
-
 ALIGNED = 0.1
 """Rows by which a torque that acts from row to row must be off its row to be moved."""
 KNOWN = 0.5

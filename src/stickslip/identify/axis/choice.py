@@ -29,8 +29,6 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
 
-__all__ = ["Candidate", "asked_of", "chosen_of", "compared", "foreseen", "sentence_on"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BLOCKS = 20

@@ -26,8 +26,6 @@ from stickslip.identify.regression.sliding_rows import Fall
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
 
-__all__ = ["is_open", "predicted_with", "shown", "with_other"]
-
 EXPONENT = "delta_s"
 FORMS = {1.0: 2.0, 2.0: 1.0}
 """Every exponent that is tried, and the other."""

@@ -11,8 +11,6 @@ import numpy as np
 
 from stickslip.identify.estimate import Estimate
 
-__all__ = ["hanging", "nearest", "within_a_turn"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TURN = 2.0 * math.pi

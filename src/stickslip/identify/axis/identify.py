@@ -36,8 +36,6 @@ from stickslip.identify.regression.regressions import Regress
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
 
-__all__ = ["AUTOMATIC", "Candidate", "identify_axis"]
-
 AUTOMATIC = ("coulomb", "stribeck", "lugre")
 """Laws among which the held-out error chooses where none is named."""
 NO_PREDICTION = "The prediction error cannot be had from these records:"

@@ -38,8 +38,6 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
 
-__all__ = ["Evidence", "estimated", "predicted"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 HELD = 0.1

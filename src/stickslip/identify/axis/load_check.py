@@ -18,8 +18,6 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
-__all__ = ["ADVICE", "judged_load", "own_part", "tells_external"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LEAST = 0.1

@@ -33,8 +33,6 @@ from stickslip.identify.fit.student import student_quantile
 from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 
-__all__ = ["GAINS", "ShownGains", "doubted_loops", "shown_gains"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Means = tuple[Array, Array, Array]
 """Columns beside a constant, signal, time."""

@@ -25,8 +25,6 @@ from stickslip.identify.regression.inverse import InverseDynamics, correlation_l
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
 
-__all__ = ["Extras", "OutputError", "judged", "output_error"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TOLERANCE, DIFFERENCE = 1e-5, 1e-4

@@ -30,8 +30,6 @@ from stickslip.identify.regression.strokes import stacked, strokes_of
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["OverAngle", "over_angle"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SECTORS = 12

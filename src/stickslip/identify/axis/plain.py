@@ -20,8 +20,6 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
-__all__ = ["inverse_identification"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 POSITIVE = ("inertia", "fc", "sigma2", "gravity")

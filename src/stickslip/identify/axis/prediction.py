@@ -29,8 +29,6 @@ from stickslip.model import Model
 from stickslip.record import encoder_step
 from stickslip.spec import Law
 
-__all__ = ["Watched", "axis_prediction", "motion_of", "searched", "watched"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SLOWER = (0.02, 0.1, 0.5)

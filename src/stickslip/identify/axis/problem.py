@@ -23,8 +23,6 @@ from stickslip.model import Model
 from stickslip.simulation.recorded_input.simulation import Course, Drive, Harmonics, Mechanics
 from stickslip.spec import Law, Par
 
-__all__ = ["Problem", "mechanics_parameters"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 OBSERVER_HZ = 1.0

@@ -29,8 +29,6 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
 
-__all__ = ["assembled", "evident", "narrow_note", "noted", "rising", "untold_by_reversals"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WINDOW, CREEP = 0.02, 1e-3

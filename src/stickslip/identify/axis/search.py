@@ -29,8 +29,6 @@ from stickslip.model import Model
 from stickslip.simulation.recorded_input.simulation import Mechanics
 from stickslip.spec import Law
 
-__all__ = ["Asked", "Extras", "FittedAxis", "fitted_axis", "laid_out", "require_start", "starting_models"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 ROUGH, ENOUGH = 0.1, 3e-3

@@ -24,8 +24,6 @@ from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.model import Model
 from stickslip.simulation.prescribed.steady import Steady
 
-__all__ = ["ALIKE", "ALONE", "APART", "TWO_METHODS", "settled"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 PLAIN = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}

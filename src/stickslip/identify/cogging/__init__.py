@@ -44,8 +44,6 @@ from stickslip.machines.position_map import PositionMap, Waves
 from stickslip.model import Model
 from stickslip.record import Record
 
-__all__ = ["angle_of", "chosen_terms", "identify_cogging", "map_of"]
-
 LEVELS = "fc", "sigma2"
 """Parameters of the model that stand among the estimates under another name."""
 LEAST = 60

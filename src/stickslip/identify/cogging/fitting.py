@@ -12,8 +12,6 @@ from stickslip.identify.cogging.noise import Noise, long_strokes, memory, widene
 from stickslip.identify.cogging.orders import Term, columns
 from stickslip.identify.cogging.rows import Places, least_squares
 
-__all__ = ["Fit", "fit"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Column = tuple[Array, float]
 """And how large its value may be."""

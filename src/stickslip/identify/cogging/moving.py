@@ -13,8 +13,6 @@ from stickslip.identify.cogging.rows import FASTEST, velocity_of
 from stickslip.machines.position_map import PositionMap
 from stickslip.record import Record
 
-__all__ = ["Motion", "in_motion", "speed_control"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 

@@ -17,8 +17,6 @@ import numpy as np
 from stickslip.identify.cogging.rows import Places
 from stickslip.identify.fit.student import student_quantile
 
-__all__ = ["Noise", "excess", "long_strokes", "memory", "widened"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Integers = np.ndarray[Any, np.dtype[np.intp]]
 

@@ -16,20 +16,6 @@ import numpy as np
 from stickslip.identify.cogging.noise import memory
 from stickslip.identify.cogging.rows import Places
 
-__all__ = [
-    "MOST",
-    "Orders",
-    "Term",
-    "chosen",
-    "columns",
-    "grid_of",
-    "interleaved",
-    "left_out",
-    "moving_columns",
-    "path",
-    "sectors",
-]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Integers = np.ndarray[Any, np.dtype[np.intp]]
 Part = Literal["even", "odd"]

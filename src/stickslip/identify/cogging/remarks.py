@@ -10,8 +10,6 @@ import numpy as np
 
 from stickslip.identify.cogging.fitting import Fit
 
-__all__ = ["Eccentricity", "Lag", "eccentricities", "lag_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SAME = 0.7

@@ -17,8 +17,6 @@ from stickslip.identify.cogging.rows import Places
 from stickslip.identify.estimate import Estimate, Picture, Trace
 from stickslip.machines.position_map import PositionMap
 
-__all__ = ["Choice", "estimates_of", "notes_of", "pictures_of", "remarks_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 ROUND = 0.999 * 2.0 * math.pi

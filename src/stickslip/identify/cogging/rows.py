@@ -17,8 +17,6 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.record import Record
 
-__all__ = ["FASTEST", "Places", "joined", "least_squares", "places_of", "velocity_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Integers = np.ndarray[Any, np.dtype[np.intp]]
 

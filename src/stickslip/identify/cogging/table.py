@@ -10,8 +10,6 @@ import numpy as np
 from stickslip.identify.cogging.orders import Fold
 from stickslip.identify.cogging.rows import Places
 
-__all__ = ["table_left_out", "table_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 FINEST = 2048

@@ -17,8 +17,6 @@ from stickslip.identify.estimate import Estimate, Picture, Trace
 from stickslip.identify.identified_file import Identified, covariance
 from stickslip.identify.monte_carlo import curve_band, sliding_torque
 
-__all__ = ["Change", "Comparison", "compare_models"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 DRAWS = 400

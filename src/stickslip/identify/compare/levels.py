@@ -15,8 +15,6 @@ import numpy as np
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.monte_carlo import curve_band, sliding_torque
 
-__all__ = ["Change", "common_speeds", "levels_of", "said_of", "unseen"]
-
 DRAWS = 400
 
 

@@ -12,8 +12,6 @@ from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.model import Model
 
-__all__ = ["on_one_side"]
-
 
 def on_one_side(first: Identified, second: Identified) -> tuple[Identified, str]:
     """The second on the first one's side of the gear, and a note where that made a difference.

@@ -22,8 +22,6 @@ from stickslip.identify.regression.regressions import Regress
 from stickslip.readers.cut import range_words, taken
 from stickslip.record import Record
 
-__all__ = ["CHECKS", "Diagnosis", "examine"]
-
 FINAL = ("too-short", "no-clock")
 """Errors after which nothing can be computed."""
 ERRORS = (

@@ -20,8 +20,6 @@ from stickslip.finding import Finding
 from stickslip.identify.doctor.view import Array, Smooth, View, row
 from stickslip.identify.fit.profile import long_run
 
-__all__ = ["changes", "temperature"]
-
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 
 MOST_ROWS = 30_000

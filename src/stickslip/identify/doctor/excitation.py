@@ -11,8 +11,6 @@ from stickslip.finding import Finding
 from stickslip.identify.doctor.view import View
 from stickslip.record import encoder_step
 
-__all__ = ["channels", "moved", "reversed_and_slow"]
-
 
 def channels(view: View) -> Iterator[Finding]:
     """What no identification can do without."""

@@ -17,8 +17,6 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import Array, Smooth, View
 
-__all__ = ["gravity", "line_of", "sign", "skew", "usable"]
-
 ROWS = 20_000
 """Rows of a regression: more tell no more."""
 QUARTER = 90.0

@@ -19,8 +19,6 @@ from stickslip.finding import Finding
 from stickslip.identify.doctor.physics import line_of, usable
 from stickslip.identify.doctor.view import Array, Smooth, View
 
-__all__ = ["DeadTravel", "backlash", "dead_travel"]
-
 REVERSALS = 3
 ROWS = 15
 """Rows, at least, of the travel that is looked at."""

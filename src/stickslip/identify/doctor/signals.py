@@ -14,8 +14,6 @@ from stickslip.identify.doctor.spikes import sticking_out
 from stickslip.identify.doctor.view import Array, View, is_number, row
 from stickslip.readers.cut import RANGE, jumps
 
-__all__ = ["missing", "quantised", "saturated", "supply", "wrapped"]
-
 WINDOW = 0.1
 """s: the window over which a slow speed is told from the counts it gives."""
 SLOW_ERROR = 0.05

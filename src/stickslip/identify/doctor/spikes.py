@@ -15,8 +15,6 @@ from stickslip.identify.doctor.view import Array, View, row
 from stickslip.readers.cut import range_words
 from stickslip.record import Record
 
-__all__ = ["spike_rows", "spikes", "sticking_out"]
-
 DRIVING = ("motor_torque", "sensor_torque", "current", "voltage")
 """Channels that the axis follows with its acceleration."""
 CHANNELS = ("position", "velocity", "motor_torque", "friction_torque", "sensor_torque", "current", "voltage")

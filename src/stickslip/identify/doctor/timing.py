@@ -9,8 +9,6 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import View, row
 
-__all__ = ["ascending", "sampling", "scale"]
-
 GAP = 5.0
 """A gap is this many times the usual distance of samples."""
 FEWEST = 20

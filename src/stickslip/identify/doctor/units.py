@@ -11,8 +11,6 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import Array, View
 
-__all__ = ["assumed", "counted", "degrees", "reference_scale", "too_fast", "torque_scale", "velocity_scale"]
-
 DEG, REV, RPM = math.pi / 180.0, 2.0 * math.pi, 2.0 * math.pi / 60.0
 POSITION = {"deg": DEG, "rev": REV, "mm": 1e-3, "um": 1e-6}
 VELOCITY = {"deg/s": DEG, "rpm": RPM, "rev/s": REV, "mm/s": 1e-3, "mm/min": 1e-3 / 60}

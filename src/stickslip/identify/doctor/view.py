@@ -19,8 +19,6 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.readers.cut import file_rows
 from stickslip.record import Record, encoder_step
 
-__all__ = ["Array", "Column", "Smooth", "View", "is_number", "row"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 

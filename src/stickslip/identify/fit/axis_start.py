@@ -22,8 +22,6 @@ from stickslip.model import Model
 from stickslip.simulation.prescribed.steady import Steady
 from stickslip.spec import Field, Law
 
-__all__ = ["dimensions", "feasible", "frozen_by_default", "starts"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LENGTHS = (1e-5, 1e-4, 1e-3)  # of the travel: pre-sliding lengths that are tried

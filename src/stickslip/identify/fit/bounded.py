@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["within_bounds"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 

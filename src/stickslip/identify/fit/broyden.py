@@ -16,8 +16,6 @@ import numpy as np
 from stickslip.identify.fit.levenberg_marquardt import MOST_TRIES, Quadratic, Squares, downhill
 from stickslip.identify.fit.parallel import mapped
 
-__all__ = ["Secants", "descend_by_secants", "forward_differences"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TRIES = 2

@@ -14,8 +14,6 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.simulation.biquads import zero_phase
 
-__all__ = ["ZeroPhase", "cross_spectrum", "decimated", "low_pass", "spectrum"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 

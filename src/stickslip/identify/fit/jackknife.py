@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["BlockCovariance", "leave_blocks_out"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

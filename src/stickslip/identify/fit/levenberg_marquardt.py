@@ -15,18 +15,6 @@ import numpy as np
 
 from stickslip.errors import InputError
 
-__all__ = [
-    "STEP",
-    "Optimum",
-    "Residuals",
-    "Squares",
-    "central_differences",
-    "descend",
-    "distinct",
-    "search",
-    "spread_starts",
-]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Residuals = Callable[[Array], Array]
 """Model minus data at the coordinates, shape (n,); what is not finite counts as infinitely bad."""

@@ -16,8 +16,6 @@ import numpy as np
 
 from stickslip.identify.fit.parameter_vector import Vector
 
-__all__ = ["bounded_solution", "linear_parameters", "separable_starts"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Values = Callable[[Array], Array]
 

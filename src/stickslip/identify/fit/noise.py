@@ -16,8 +16,6 @@ import numpy as np
 
 from stickslip.errors import InputError
 
-__all__ = ["Noise", "as_noise", "noise_of_fit", "noise_of_repeats", "quantile", "white_std"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 PERFECT = 1e-9

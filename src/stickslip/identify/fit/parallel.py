@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
-__all__ = ["mapped"]
-
 T = TypeVar("T")
 R = TypeVar("R")
 

@@ -18,8 +18,6 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.model import Model
 from stickslip.spec import Par
 
-__all__ = ["Parameter", "Vector"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LARGEST = 230.0

@@ -15,8 +15,6 @@ from stickslip.errors import InputError
 from stickslip.identify.fit.levenberg_marquardt import Optimum, Squares, descend
 from stickslip.identify.fit.noise import Noise, quantile
 
-__all__ = ["inverse_information", "long_run", "profiles_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 FARTHEST = 12.0

@@ -18,8 +18,6 @@ import numpy as np
 from stickslip.identify.estimate import Estimate
 from stickslip.spec import Law, Surroundings
 
-__all__ = ["contact_frequency", "of_slow_motion", "stiffness_at_rest", "unseen_refused"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SAMPLES = 3.0

@@ -11,8 +11,6 @@ import numpy as np
 
 from stickslip.identify.fit.noise import Noise
 
-__all__ = ["Criteria", "criteria", "cross_validate"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["student_quantile"]
-
 SETTLED = 1e-15
 """Relative change at which a fraction or a root is taken as found."""
 TERMS = 300

@@ -28,8 +28,6 @@ from stickslip.identify.fit.noise import Noise, as_noise, noise_of_fit, quantile
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.profile import Profiles, inverse_root, long_run, profiles_of
 
-__all__ = ["Fit", "fit", "verdict_on"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 RATIO = 2.0

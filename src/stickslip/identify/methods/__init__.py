@@ -14,8 +14,6 @@ from stickslip.errors import UnknownName
 if TYPE_CHECKING:
     from stickslip.identify.methods.method import Method
 
-__all__ = ["METHODS", "method_named"]
-
 METHODS = (
     "axis",
     "inertia",

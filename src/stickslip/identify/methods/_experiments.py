@@ -14,8 +14,6 @@ from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Loop
 
-__all__ = ["driven", "experiments_of", "loop_of"]
-
 LOOP_NAMES = ("kp", "ki", "kd", "kr", "limit", "period", "count", "span")
 NOT_NEGATIVE = ("kp", "ki", "kd", "kr", "period", "count")
 RANGES = {"limit": "greater than 0", **dict.fromkeys(NOT_NEGATIVE, "a finite number of 0 or more")}

@@ -15,8 +15,6 @@ from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 
-__all__ = ["with_dead_travel"]
-
 HOLDS_ZERO = "its interval holds 0"
 
 

@@ -8,8 +8,6 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.identify.methods.method import Options
 from stickslip.record import Record
 
-__all__ = ["curve_values", "has_torque", "single", "torque_channel"]
-
 TORQUES = ("motor_torque", "torque", "sensor_torque", "friction_torque")
 CURVE = ("fs", "fc", "vs", "delta_s", "sigma2")
 

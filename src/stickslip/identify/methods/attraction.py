@@ -12,8 +12,6 @@ from stickslip.identify.presliding.attraction import identify_attraction
 from stickslip.identify.presliding.hysteresis import Loop
 from stickslip.record import Record
 
-__all__ = ["METHOD"]
-
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """The attraction parameter of the model given."""

@@ -20,8 +20,6 @@ from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 
-__all__ = ["METHOD"]
-
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """The whole axis; the last records judge where some are held out."""

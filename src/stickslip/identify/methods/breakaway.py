@@ -10,8 +10,6 @@ from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.presliding.breakaway import identify_breakaway
 from stickslip.record import Record
 
-__all__ = ["METHOD"]
-
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """Torque at the break, per direction."""

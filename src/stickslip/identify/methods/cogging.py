@@ -11,8 +11,6 @@ from stickslip.identify.methods._records import TORQUES
 from stickslip.identify.methods.method import Method, Options
 from stickslip.record import Record
 
-__all__ = ["METHOD"]
-
 GEAR = "gear_ratio"
 
 

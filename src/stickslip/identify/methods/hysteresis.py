@@ -14,8 +14,6 @@ from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.presliding.hysteresis import Loop, choose_hysteresis, templates_for
 from stickslip.record import Record
 
-__all__ = ["METHOD"]
-
 ROWS = 8000
 """Rows that a loop is fitted to: of 25,000 the same values come in a tenth of the time."""
 

@@ -10,8 +10,6 @@ from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.response.inertia import inertia
 from stickslip.record import Record
 
-__all__ = ["METHOD"]
-
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """The inertia."""

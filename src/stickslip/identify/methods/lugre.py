@@ -11,8 +11,6 @@ from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.presliding.lugre_dynamics import Response, identify_lugre_dynamics
 from stickslip.record import Record
 
-__all__ = ["METHOD"]
-
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """sigma0 and sigma1 of one response; the inertia is among the values."""

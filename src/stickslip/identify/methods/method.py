@@ -16,8 +16,6 @@ from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.spec import Law
 
-__all__ = ["Method", "Options", "law_of"]
-
 LONGEST_DELAY = 1.0
 """s"""
 TorqueIs = Literal["commanded", "actual", "mean"]

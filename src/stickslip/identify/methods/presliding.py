@@ -11,8 +11,6 @@ from stickslip.identify.presliding.hysteresis import Loop
 from stickslip.identify.presliding.presliding import identify_presliding
 from stickslip.record import Record
 
-__all__ = ["METHOD"]
-
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """Elements from the loops of one record; the inertia is among the values where it is known."""

@@ -19,8 +19,6 @@ from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.spec import Law
 
-__all__ = ["METHOD"]
-
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """A curve of the laws asked for; where none is named, of those of the thesis."""

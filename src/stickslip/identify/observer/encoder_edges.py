@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["SeenVelocity", "seen_velocity"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LEAST = 1.5

@@ -21,14 +21,6 @@ from stickslip.identify.observer.observer import Prepared
 from stickslip.simulation.recorded_input.simulation import Mechanics
 from stickslip.spec import Law
 
-__all__ = [
-    "BAND",
-    "DIFFERENCE",
-    "Criterion",
-    "MakeMechanics",
-    "student_weight",
-]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 MakeMechanics = Callable[[Mapping[str, float]], Mechanics]
 

@@ -22,8 +22,6 @@ from stickslip.simulation.recorded_input.segments import Segments, cut
 from stickslip.simulation.recorded_input.simulation import Course, Drive, Mechanics
 from stickslip.spec import Law
 
-__all__ = ["EXACT", "GRASP", "REMEMBERED", "ROUGH", "Motion", "Prepared", "prepare"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LAG = 4.0

@@ -46,8 +46,6 @@ from stickslip.model import Model
 from stickslip.simulation.recorded_input.simulation import Mechanics
 from stickslip.spec import Law
 
-__all__ = ["PredictionError", "prediction_error"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SLOWER, STRICTER = 0.5, 3.0

@@ -18,8 +18,6 @@ from stickslip.identify.presliding.hysteresis import Loop, correlation_lags, cur
 from stickslip.model import Model
 from stickslip.simulation.prescribed.motion import Along
 
-__all__ = ["identify_attraction", "largest_without_overshoot"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 FASTER = (

@@ -20,8 +20,6 @@ from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.sliding.levels import slope_of
 from stickslip.record import Record, encoder_step
 
-__all__ = ["Break", "find_breaks", "identify_breakaway"]
-
 WINDOW = 0.02
 """s, over which a velocity is taken where the record has none."""
 RAMP = 0.7

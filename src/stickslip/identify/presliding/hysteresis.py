@@ -24,8 +24,6 @@ from stickslip.record import Record
 from stickslip.simulation.prescribed.motion import Along
 from stickslip.spec import Par
 
-__all__ = ["Loop", "choose_hysteresis", "correlation_lags", "identify_hysteresis", "templates_for"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 

@@ -22,8 +22,6 @@ from stickslip.identify.fit.uncertainty import RATIO, SHARE, Fit
 from stickslip.identify.presliding.hysteresis import Loop, Rows, correlation_lags, fit_loop
 from stickslip.record import encoder_step
 
-__all__ = ["doubted"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LINEARITY = 1e-4

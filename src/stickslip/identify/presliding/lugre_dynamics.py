@@ -32,8 +32,6 @@ from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Course, Drive, Mechanics
 
-__all__ = ["Response", "fit_position", "identify_lugre_dynamics", "small_signal_stiffness"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 

@@ -15,8 +15,6 @@ import numpy as np
 from stickslip.identify.estimate import Picture, Trace
 from stickslip.identify.fit.uncertainty import Fit
 
-__all__ = ["plain_scan", "plain_verdict", "response_picture", "scan_picture"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SCAN = np.geomspace(0.02, 50.0, 18)

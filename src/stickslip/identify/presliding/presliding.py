@@ -36,8 +36,6 @@ from stickslip.identify.presliding.loop_doubt import doubted
 from stickslip.model import Model
 from stickslip.simulation.prescribed.motion import Along
 
-__all__ = ["cycles", "identify_presliding", "maxwell_start"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 

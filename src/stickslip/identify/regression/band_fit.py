@@ -29,8 +29,6 @@ from stickslip.identify.regression.band_system import (
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import memory_of
 
-__all__ = ["QUANTILE", "BandFit", "Number", "fit_band"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 CORE = 5

@@ -20,8 +20,6 @@ from stickslip.errors import InputError
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
 
-__all__ = ["COULOMB", "INERTIA", "JERK", "OFFSET", "USUAL_EXPONENTS", "VISCOUS", "Candidate", "System"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Places = np.ndarray[Any, np.dtype[np.int64]]
 

@@ -23,19 +23,6 @@ from stickslip.identify.regression.sliding_rows import FEWEST, Fall, Signals, Sl
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
-__all__ = [
-    "GAUSSIAN",
-    "ROTATED",
-    "USUALLY",
-    "Bands",
-    "calmed",
-    "decided",
-    "in_bands",
-    "rough",
-    "that_tell",
-    "together",
-]
-
 BANDS = (1.0, 1.6, 2.6)
 """Widths of the windows, in that of the narrowest which noise allows."""
 ROUGH, WIDER = 0.05, (1.6, 2.6, 4.1, 6.6, 10.0)

@@ -12,8 +12,6 @@ from stickslip.identify.regression.band_system import least_squares
 from stickslip.identify.regression.sliding_rows import SlidingRows
 from stickslip.identify.regression.strokes import stacked
 
-__all__ = ["missing_where_it_creeps"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 CREEPING, MOVING = (0.01, 0.03), 0.1

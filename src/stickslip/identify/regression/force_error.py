@@ -15,8 +15,6 @@ from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynam
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 
-__all__ = ["force_error", "force_error_on", "model_torque", "plain_error_on"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

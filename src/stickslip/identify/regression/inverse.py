@@ -23,8 +23,6 @@ from stickslip.identify.fit.filters import decimated, low_pass, spectrum
 from stickslip.identify.fit.profile import inverse_information, long_run
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["InverseDynamics", "inverse_dynamics", "refuse_harmonics"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 HIGHEST_CUTOFF = 100.0  # Hz, of the position's low-pass, as published for EMPS

@@ -16,8 +16,6 @@ import numpy as np
 from stickslip.identify.regression.sliding_rows import SlidingRows
 from stickslip.identify.regression.strokes import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
 
-__all__ = ["candidate_orders", "goes_round", "shown_orders"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 MOST = 8

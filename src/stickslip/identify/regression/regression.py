@@ -39,8 +39,6 @@ from stickslip.identify.regression.sliding_rows import Fall, SlidingRows, narrow
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["FALLS", "QUANTILE", "Regression", "regress_axis"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Falling = Mapping[float, tuple[float, Number]]
 """By exponent of a fall of friction: how probable it is if there is one, and its velocity, rad/s (m/s)."""

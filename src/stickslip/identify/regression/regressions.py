@@ -10,8 +10,6 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.regression import Regression, regress_axis
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["Regress", "Regressions"]
-
 Regress = Callable[..., Regression]
 """`stickslip.identify.regression.regression.regress_axis`, or what stands in for it."""
 

@@ -20,8 +20,6 @@ from stickslip.identify.fit.smooth import CORNER, NARROWEST, Window, seen, seen_
 from stickslip.identify.regression.inverse import uniform, white_noise
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["Fall", "Signals", "SlidingRows", "narrowest_width", "signals_of", "sliding_rows"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 HIGHEST_CORNER = 60.0  # Hz, of the narrowest window

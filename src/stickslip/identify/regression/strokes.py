@@ -9,8 +9,6 @@ import numpy as np
 
 from stickslip.identify.regression.sliding_rows import SlidingRows
 
-__all__ = ["PIECE", "memory_of", "pieces_of", "rows_in", "stacked", "strokes_of"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Places = np.ndarray[Any, np.dtype[np.int64]]
 

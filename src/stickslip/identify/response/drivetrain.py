@@ -22,8 +22,6 @@ from stickslip.machines.drivetrain import Drivetrain, LinearContact
 from stickslip.machines.flexible import FlexibleAxis
 from stickslip.record import Record
 
-__all__ = ["FittedDrivetrain", "LoopResponse", "fit_drivetrain", "identified_drivetrain", "loop_response"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]

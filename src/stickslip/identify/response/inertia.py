@@ -24,8 +24,6 @@ from stickslip.identify.fit.filters import cross_spectrum, spectrum
 from stickslip.identify.regression.inverse import uniform
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["Response", "frequency_response", "inertia"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 

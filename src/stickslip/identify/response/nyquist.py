@@ -20,8 +20,6 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.response.drivetrain import LoopResponse
 
-__all__ = ["Count", "Fastest", "encirclements", "fastest_pd", "pd_response"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 

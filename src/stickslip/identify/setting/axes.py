@@ -23,8 +23,6 @@ from stickslip.identify.setting.plant import Plant
 from stickslip.machines.machine import Machine
 from stickslip.model import Model
 
-__all__ = ["plants_of"]
-
 CURRENT_LOOP = (200.0, 2000.0)
 """Hz, bandwidths drawn."""
 PROMPT = 0.3

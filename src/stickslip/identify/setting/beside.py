@@ -25,8 +25,6 @@ from stickslip.identify.setting.candidates import NEAR, Bench
 from stickslip.identify.setting.swings import back_and_forth, between_counts
 from stickslip.model import Model
 
-__all__ = ["Beside", "belief_of", "limit_cycle", "tried_beside"]
-
 RESTS = 20.0
 """s at rest, of which the second half is judged: an integral that is reset on a soft contact cycles in 6 to 12 s."""
 

@@ -27,8 +27,6 @@ from stickslip.simulation.machine.layout import look, stand_at
 from stickslip.simulation.machine.plant import Laid, plant_of
 from stickslip.simulation.machine.step import sample
 
-__all__ = ["AT_REST", "Drive", "Plant", "Trial", "dangers", "rings", "run"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 AT_REST = "limit cycle at rest"

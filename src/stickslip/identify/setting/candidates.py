@@ -18,18 +18,6 @@ from stickslip.identify.setting.candidate_run import Drive, Trial, dangers, ring
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 
-__all__ = [
-    "NEAR",
-    "TRIES",
-    "Account",
-    "Bench",
-    "Candidate",
-    "Setting",
-    "on_both",
-    "resistance",
-    "rings_alone",
-]
-
 FOLLOWS, LIVELY = 3.0, 5.0
 """An axis that the drive's own loop does not hold is not the user's: times the best estimate's error, and swings per
 second beyond the best estimate's, from which on it does not."""

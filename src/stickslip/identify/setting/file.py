@@ -20,8 +20,6 @@ from stickslip.identify.setting.candidates import Setting
 from stickslip.identify.setting.recommend import Recommendation
 from stickslip.machines.servo import ServoAxis
 
-__all__ = ["setting_table", "write_setting"]
-
 
 def write_setting(path: str | os.PathLike[str], found: Identified, advice: Recommendation) -> Path:
     """Write what is recommended: the same form as that of `stickslip rig commission`, without a machine's name.

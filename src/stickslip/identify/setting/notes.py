@@ -11,8 +11,6 @@ from stickslip.identify.setting.candidates import Bench, Candidate, resistance
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 
-__all__ = ["ALLOWANCE", "BETTER", "axes_left_out", "lag_of", "notes_on", "weak_on"]
-
 MOSTLY = 0.8
 """Part of the error from which on a lag is most of it."""
 ALLOWANCE, BETTER = 1.4, 2.0

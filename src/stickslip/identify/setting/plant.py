@@ -19,8 +19,6 @@ from stickslip.machines.motor import Amplifier
 from stickslip.machines.rigid import RigidAxis
 from stickslip.simulation.machine.layout import Laid, lay_out_machine
 
-__all__ = ["Plant", "laid_out"]
-
 
 @dataclass(frozen=True)
 class Plant(RigidAxis):

@@ -36,8 +36,6 @@ from stickslip.identify.setting.recommendation import Recommendation
 from stickslip.identify.setting.refusals import held, refuse_endless, refuse_unknown, refuse_weak
 from stickslip.model import Model
 
-__all__ = ["Candidate", "Drive", "Recommendation", "Setting", "recommend"]
-
 GAINS = (0.5, 0.7, 0.8, 0.9, 1.0)
 BEYOND = (1.1, 1.25, 1.5)
 """Gains above 1, for the margin only."""

@@ -12,8 +12,6 @@ from stickslip.identify.setting.candidates import NEAR, Candidate
 from stickslip.identify.setting.notes import ALLOWANCE, BETTER
 from stickslip.model import Model
 
-__all__ = ["Recommendation"]
-
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:

@@ -10,8 +10,6 @@ from stickslip.identify.identified_file import Identified
 from stickslip.identify.setting.candidate_run import Drive, Trial
 from stickslip.identify.setting.candidates import breakaway, resistance
 
-__all__ = ["held", "refuse_endless", "refuse_unknown", "refuse_weak"]
-
 MOST_STEPS = 1e10
 """Of all simulations together; more would take half a day."""
 STEPS_PER_HOUR = 1e9

@@ -9,8 +9,6 @@ import numpy as np
 
 from stickslip.jit import kernel
 
-__all__ = ["above", "back_and_forth", "between_counts", "repeats", "reversals", "turning_points", "turns"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SHRINKS = 0.7

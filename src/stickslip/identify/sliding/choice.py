@@ -24,8 +24,6 @@ from stickslip.identify.sliding.curve import (
 from stickslip.model import Model
 from stickslip.simulation.prescribed.steady import Steady
 
-__all__ = ["candidates", "choose_sliding"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 FOLD_REACH = 10.0

@@ -27,8 +27,6 @@ from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.model import Model
 from stickslip.simulation.prescribed.steady import Steady
 
-__all__ = ["SlidingPoints", "default_noise", "fit_sliding", "identify_sliding", "model_of", "steady_vector"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BELOW, ABOVE = 0.5, 2.0

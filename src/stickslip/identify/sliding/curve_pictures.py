@@ -13,8 +13,6 @@ from stickslip.identify.fit.uncertainty import Fit
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.simulation.prescribed.steady import Steady
 
-__all__ = ["curve_picture", "law_of", "listed", "residual_picture"]
-
 FAMILY = 40
 """How many of the equally good curves are drawn."""
 

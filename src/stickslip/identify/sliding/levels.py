@@ -16,8 +16,6 @@ import numpy as np
 from stickslip.identify.fit.noise import white_std
 from stickslip.record import encoder_step
 
-__all__ = ["Stretch", "level_runs", "slope_of", "stretches"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WINDOW, WIDER, WIDEST = 0.05, 3.0, 0.1

@@ -11,8 +11,6 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.fit.selection import Indices
 
-__all__ = ["SlidingPoints"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SAME_VELOCITY = 0.005

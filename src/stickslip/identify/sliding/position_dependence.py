@@ -20,8 +20,6 @@ from stickslip.machines.angle import AngleMap, harmonic_sum
 from stickslip.machines.motor import Harmonics
 from stickslip.record import Record
 
-__all__ = ["identify_angle"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 HIGHEST = 30

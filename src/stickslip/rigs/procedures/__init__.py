@@ -14,8 +14,6 @@ from stickslip.errors import UnknownName
 if TYPE_CHECKING:
     from stickslip.rigs.procedures.base import Procedure
 
-__all__ = ["PROCEDURES", "procedure"]
-
 PROCEDURES = (
     "inertia", "resonance", "breakaway", "sliding", "presliding", "stickslip", "attraction", "cogging",
     "standstill", "track", "repeat", "learn",

@@ -17,8 +17,6 @@ from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Ste
 from stickslip.rigs.procedures.moves import ROOM, brake, holder, now, samples, speed_up
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["PROCEDURE", "Attraction"]
-
 
 @dataclass(frozen=True)
 class Attraction(Procedure):

@@ -26,8 +26,6 @@ from stickslip.rigs.loop_sample import COLUMNS, UNITS, begin_learned, end_learne
 from stickslip.rigs.realtime import Account
 from stickslip.rigs.rig import Rig
 
-__all__ = ["Check", "CheckFailed", "Performed", "Plan", "Procedure", "Step", "Steps", "perform", "planned"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 KEPT = (
     "position", "motor_torque", "torque_command", "sensor_torque", "temperature", "position_reference",

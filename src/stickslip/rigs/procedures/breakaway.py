@@ -13,8 +13,6 @@ from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Ste
 from stickslip.rigs.procedures.moves import ROOM, holder, move, now, samples
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["PROCEDURE", "Breakaway"]
-
 
 @dataclass(frozen=True)
 class Breakaway(Procedure):

@@ -14,8 +14,6 @@ from typing import ClassVar
 
 from stickslip.rigs.procedures.sliding import Sliding
 
-__all__ = ["PROCEDURE", "Cogging"]
-
 SLOW = (0.6, 0.4, 0.25)
 """rad/s"""
 BELOW = 5.0

@@ -33,8 +33,6 @@ from stickslip.rigs.procedures.moves import (
 )
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["PROCEDURE", "Inertia"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TORQUE = COLUMNS.index("motor_torque")
 SLOW = 0.02

@@ -26,8 +26,6 @@ from stickslip.rigs.rig import Rig, setpoints
 from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, replay
 from stickslip.spec import Surroundings
 
-__all__ = ["PROCEDURE", "Learn"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TORQUE = COLUMNS.index("torque_command")
 OVER = ("time", "angle")

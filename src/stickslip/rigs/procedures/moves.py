@@ -15,8 +15,6 @@ from stickslip.errors import RigError
 from stickslip.rigs.procedures.base import BYTES, POSITION, Step
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["brake", "holder", "move", "now", "rough_inertia", "samples", "smooth", "speed_up", "uniform"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 ROOM = 0.95

@@ -13,8 +13,6 @@ from stickslip.rigs.procedures.base import Check, Plan, Steps
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
 
-__all__ = ["PROCEDURE", "Repeat"]
-
 
 @dataclass(frozen=True)
 class Repeat(Track):

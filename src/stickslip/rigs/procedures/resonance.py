@@ -19,8 +19,6 @@ from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Ste
 from stickslip.rigs.procedures.moves import ROOM, brake, holder, now, samples, speed_up
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["PROCEDURE", "Resonance"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 REFERENCE = COLUMNS.index("position_reference")
 HOLD = 4.0

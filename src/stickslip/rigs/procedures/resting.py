@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["RESTING", "resting"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SLOW, RESTING = 0.2, 0.02

@@ -18,8 +18,6 @@ from stickslip.rigs.procedures.moves import ROOM, brake, holder, now, uniform
 from stickslip.rigs.procedures.resting import RESTING, resting
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["DRY", "PROCEDURE", "Sliding"]
-
 DRY = (1.4, 1.2, 1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.08, 0.06, 0.04, 0.02)
 """rad/s, thesis eq. 4.1"""
 ROWS, LONGEST = 2000, 0.02

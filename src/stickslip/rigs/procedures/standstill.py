@@ -19,8 +19,6 @@ from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Ste
 from stickslip.rigs.procedures.moves import ROOM, holder, now, samples, smooth
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["PROCEDURE", "Standstill"]
-
 ROWS = 4
 """Of each place; the first one is dropped: the loop settles in it."""
 HELD = 0.95

@@ -13,8 +13,6 @@ from stickslip.rigs.procedures.base import Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.procedures.moves import now, samples
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["PROCEDURE", "Stickslip"]
-
 
 @dataclass(frozen=True)
 class Stickslip(Procedure):

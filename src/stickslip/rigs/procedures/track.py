@@ -28,8 +28,6 @@ from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Ste
 from stickslip.rigs.procedures.moves import ROOM, samples
 from stickslip.rigs.rig import Rig, setpoints
 
-__all__ = ["PROCEDURE", "REFERENCES", "Track"]
-
 REFERENCES = {
     "low": (Reference("sine", amplitude=0.01, frequency=0.4), 5.0),
     "high": (Reference("sine", amplitude=0.5, frequency=0.1), 20.0),

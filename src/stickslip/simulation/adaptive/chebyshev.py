@@ -14,8 +14,6 @@ from stickslip.jit import kernel, pointer
 from stickslip.simulation.adaptive.hybrid import rates
 from stickslip.simulation.adaptive.layout import Loop
 
-__all__ = ["chebyshev", "chebyshev_error", "stages_for"]
-
 DAMPING = 2.0 / 13.0
 MARGIN = 1.3
 """Over the decay rate last seen: it changes while the step is used."""

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["ERROR", "NODES", "TABLEAU"]
-
 TABLEAU = np.array(
     [
         [0, 0, 0, 0, 0, 0],

@@ -48,8 +48,6 @@ from stickslip.simulation.case_arrays import (
 from stickslip.simulation.metrics import settle_band_of
 from stickslip.waiting import Reached, watched
 
-__all__ = ["can_run", "run"]
-
 EVENT_ROWS = 20_000
 CREEP, STEEPEST = 1e-9, 1e6
 """Velocity (rad/s) at which a law's slope is taken, and the relaxation rate (1/s) that explicit steps can follow."""

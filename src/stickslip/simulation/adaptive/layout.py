@@ -10,8 +10,6 @@ import numpy as np
 from stickslip.jit import LAW, pointer, record_at, spliced
 from stickslip.simulation.case_arrays import AROUND, MOTION, Case, surroundings
 
-__all__ = ["EVENTS", "HEAD", "SCRATCH", "STAGES", "Laid", "Loop", "due_in", "laid_out", "loop_of", "named"]
-
 STATE = np.dtype(
     [(name, np.float64) for name in ("position", "velocity", "integral", "filtered", "filter_rate")]
 )

@@ -52,8 +52,6 @@ from stickslip.simulation.metrics import settle_band_of
 from stickslip.spec import Bristle, Elements, Law, Option
 from stickslip.waiting import Reached, watched
 
-__all__ = ["Prepared", "can_run", "is_literal", "prepare", "run"]
-
 EVENT_ROWS = 20_000
 STEPS = StepBudget(1_000_000, 300_000, 1_000, 50_000_000)
 """The thesis's runs take 90,000 a second at most."""

@@ -60,8 +60,6 @@ from stickslip.simulation.root import compiled as root
 from stickslip.spec import Surroundings
 from stickslip.waiting import Reached, watched
 
-__all__ = ["can_run", "run"]
-
 RESOLVED = 2.0
 """dt * slope / J up to which the trapezoid runs; omega dt = 2 after `contact_slope` of a spring."""
 ROUNDING = 1e-14

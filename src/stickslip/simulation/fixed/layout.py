@@ -10,8 +10,6 @@ from stickslip.jit import LAW, pointer, record_at, spliced
 from stickslip.simulation.case_arrays import AROUND, MOTION
 from stickslip.simulation.root import SEARCH
 
-__all__ = ["CASE", "HEAD", "NOW", "PROGRESS", "STATE", "STATES", "Laid", "Loop", "loop_of"]
-
 STATE = np.dtype(
     [
         (name, np.float64) for name in (

@@ -16,8 +16,6 @@ from stickslip.simulation.machine.plant import FINEST, FIRST, LAST, SLOTS, SPRIN
 from stickslip.simulation.root import MOST, ROOT
 from stickslip.simulation.root import compiled as root
 
-__all__ = ["CUT", "ENOUGH", "PARTS", "Tried", "sliding", "with_rest"]
-
 PARTS = 1 << FINEST
 """Shortest sub-steps in a sample."""
 FLATTEST, STEEPEST = 0.1, 1e6

@@ -27,8 +27,6 @@ from stickslip.simulation.fixed.loop import NUDGE
 from stickslip.simulation.machine.plant import CHANNELS, SHOWN, Laid, Plant, plant_of
 from stickslip.simulation.machine.step import ITSELF, axis_itself, measure, sample
 
-__all__ = ["COLUMNS", "NO_NUMBER", "TRIPPED", "UNITS", "Loop", "Output", "drive"]
-
 UNITS = {
     **OF_AXES_UNITS, "position_measured": "rad", "torque_command": "N·m", "sensor_torque": "N·m", "temperature": "°C",
 }  # fmt: skip

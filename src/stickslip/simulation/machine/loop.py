@@ -31,8 +31,6 @@ from stickslip.simulation.metrics import metrics, settle_band_of
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout
 
-__all__ = ["COLUMNS", "UNITS", "sampled_on", "simulate_machine"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 REASONS = {

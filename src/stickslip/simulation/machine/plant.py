@@ -8,11 +8,6 @@ import numpy as np
 
 from stickslip.jit import WIDTH, pointer, record_at, spliced
 
-__all__ = [
-    "BLOCK", "CHANNELS", "COLUMNS", "FINEST", "FIRST", "GIVEN", "IN_ANGLE", "IN_BEARING", "IN_COG", "IN_MOTOR", "LAST",
-    "LEVELS", "MACHINE", "NOW", "SHOWN", "SLOTS", "SPRINGS", "Laid", "Plant", "plant_of",
-]  # fmt: skip
-
 FINEST = 8
 """Halvings of a sample down to its shortest sub-step."""
 LEVELS = FINEST + 2

@@ -35,8 +35,6 @@ from stickslip.simulation.machine.plant import (
     Plant,
 )
 
-__all__ = ["cross", "harmonics"]
-
 UNBALANCE = 1e-6
 """Of a velocity, over a whole sample, by which a solved sub-step may be out of balance; the torque takes it up."""
 GROWS = 0.125

@@ -36,8 +36,6 @@ from stickslip.simulation.many.batch_kernel import Found, solve_all
 from stickslip.simulation.many.batch_layout import Member, member, share_curves
 from stickslip.simulation.metrics import COARSE, METRICS, columns, settle_band_of
 
-__all__ = ["METRICS", "NUMBERS", "Batch", "Results", "prepare", "refusal"]
-
 NUMBERS = {
     "inertia": INERTIA, "kp": case_arrays.KP, "ki": case_arrays.KI, "kd": KD, "kr": case_arrays.KR, "gain": GAIN,
 }  # fmt: skip

@@ -23,8 +23,6 @@ from stickslip.simulation.exact.engine import CURVE_SPEEDS, curve_of
 from stickslip.simulation.many.batch_kernel import curve_at, layers, least_of
 from stickslip.spec import Bristle, Elements, Field, Law
 
-__all__ = ["Member", "member", "share_curves"]
-
 
 @dataclass(frozen=True)
 class Member:

@@ -42,8 +42,6 @@ from stickslip.simulation.many.batch import Results, laid_out, refusal
 from stickslip.simulation.many.batch_layout import Member
 from stickslip.simulation.many.simd_source import Curve, Numbers, Refused, source
 
-__all__ = ["DEVICES", "LANES", "METRICS", "STEP", "Lanes", "check_gpu", "prepare"]
-
 LANES = 32
 STEP = 1e-4
 """Step in s, unless another is given."""

@@ -21,8 +21,6 @@ from stickslip.laws.sliding_curve import decay
 from stickslip.spec import Law
 from stickslip.subset import law_layouts, lower
 
-__all__ = ["Numbers", "Refused", "body", "source"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 DECAY = f"_{decay.__name__}"
 """Name that `lower` gives the exponential of the sliding curves."""

@@ -11,8 +11,6 @@ from stickslip.jit import call_step, compiled_law, flat, kernel, pointer
 from stickslip.model import Model
 from stickslip.spec import Law, Surroundings
 
-__all__ = ["Along"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

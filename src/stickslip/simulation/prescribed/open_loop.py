@@ -16,8 +16,6 @@ from stickslip.simulation.prescribed.kernels import Motion, march
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout
 
-__all__ = ["METHODS", "respond"]
-
 METHODS = ("auto", "step", "rate")
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

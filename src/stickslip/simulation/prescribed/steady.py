@@ -9,8 +9,6 @@ import numpy as np
 from stickslip.jit import LawPointers, call_value, compiled_law, flat, kernel, pointer
 from stickslip.spec import Law
 
-__all__ = ["Steady"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BARELY = 1e-150

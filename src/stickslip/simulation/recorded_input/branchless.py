@@ -14,8 +14,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["Assumption", "NotStraight", "Trace", "traced"]
-
 LONGEST = 2000
 """Operations beyond which a function is refused."""
 BINARY: dict[type[ast.operator], tuple[str, Callable[[Any, Any], Any]]] = {

@@ -10,8 +10,6 @@ import numpy as np
 from stickslip.jit import call_holding, call_step, kernel, record_at, spliced
 from stickslip.subset import Layout
 
-__all__ = ["AXIS", "GIVEN", "NUMBERS", "Plant", "axis_of", "load_of", "outer", "share"]
-
 NUMBERS = Layout(("inertia", "loss", "holds"))
 """What the text of a step reads of the axis. loss is all damping: the back-EMF's and an observer's; holds is 1 where
 the contact's torque jumps at rest."""

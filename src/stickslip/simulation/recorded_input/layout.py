@@ -13,11 +13,6 @@ from stickslip.simulation.recorded_input.step import MOVING
 from stickslip.simulation.root import SEARCH
 from stickslip.spec import Surroundings
 
-__all__ = [
-    "DRIVE", "MEMORY", "MEMORY_SIZE", "MOVED", "SAMPLE", "Laid", "Run", "laid_out", "moved_at", "run_of",
-    "sample_at",
-]  # fmt: skip
-
 DRIVE = np.dtype(
     [
         (name, np.float64) for name in (

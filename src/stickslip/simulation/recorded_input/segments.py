@@ -29,8 +29,6 @@ from stickslip.simulation.root import ROOT
 from stickslip.spec import Law, Surroundings
 from stickslip.subset import law_layouts, lower
 
-__all__ = ["LANES", "Segments", "cut"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 

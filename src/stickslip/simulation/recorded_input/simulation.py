@@ -26,8 +26,6 @@ from stickslip.simulation.recorded_input.layout import DRIVE, MOVED, SAMPLE, lai
 from stickslip.spec import Law, Surroundings
 from stickslip.subset import law_layouts, lower
 
-__all__ = ["COLUMNS", "Course", "Drive", "Harmonics", "Loop", "Mechanics", "control_signal", "drive_axis"]
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 COLUMNS = MOVED.names or ()

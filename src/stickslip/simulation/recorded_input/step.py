@@ -23,8 +23,6 @@ from stickslip.simulation.recorded_input.contact import NUMBERS, go_on, keep, ou
 from stickslip.simulation.root import MOST, ROOT, begin, begin_beyond, improve
 from stickslip.subset import Layout
 
-__all__ = ["GAMMA", "LAYOUTS", "LEAST", "MOTION", "MOVING", "ROUNDING", "step_on", "two_stages"]
-
 GAMMA = 1.0 - math.sqrt(0.5)  # Alexander's coefficient
 REST = 1.0 - GAMMA
 ROUNDING = 1e-11

@@ -45,8 +45,6 @@ from stickslip.simulation.sampled.rates import (
 )
 from stickslip.spec import Bristle, Elements
 
-__all__ = ["Laid", "axis_of", "general_axis"]
-
 LOCAL = 1e-3
 """Of the tolerance, which one step may be wrong by."""
 GENERAL = 1e-2

@@ -51,8 +51,6 @@ from stickslip.simulation.sampled.stick import stick
 from stickslip.spec import Elements
 from stickslip.waiting import Reached, watched
 
-__all__ = ["can_run", "run"]
-
 NUDGE = 1e-11
 """s after a sample, at which the reference is read, so that a kink there is seen from behind."""
 MOST_STEPS = 5e7

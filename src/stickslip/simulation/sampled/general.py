@@ -19,8 +19,6 @@ from stickslip.simulation.recorded_input.step import GAMMA, LEAST, MOTION, ROUND
 from stickslip.simulation.root import ROOT, compiled
 from stickslip.simulation.sampled.rates import HOLDS, STEPS
 
-__all__ = ["Contact", "act_on", "contact_of", "hold", "plant_of", "step_on"]
-
 THIRD = 3.0 * GAMMA**2 - 2.0 * GAMMA**3 - 1.0 / 6.0
 """What the step makes wrong of the third derivative, over h^3."""
 SHORTEST = 1e-6

@@ -20,20 +20,6 @@ from stickslip.simulation.sampled.rates import (
 )
 from stickslip.simulation.sampled.stretch import Stretch
 
-__all__ = [
-    "break_away",
-    "creep",
-    "floor_below",
-    "fold",
-    "friction",
-    "gather",
-    "heaviest",
-    "rest",
-    "sign",
-    "stays_below",
-    "turn",
-]
-
 AT_ONCE = 1e-12
 """Of the curve: elements whose load lies this near to it break away with the first one."""
 OUT = 1.0 + 1e-12

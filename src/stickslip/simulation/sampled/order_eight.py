@@ -12,8 +12,6 @@ from typing import Any
 
 from stickslip.jit import loaded
 
-__all__ = ["attempt"]
-
 # fmt: off
 STAGES = (
     (0.05260015195876773,),

@@ -14,8 +14,6 @@ from stickslip.simulation.sampled.modes import friction
 from stickslip.simulation.sampled.rates import CREEPS, STUCK
 from stickslip.simulation.sampled.stretch import Stretch, velocity_in, within
 
-__all__ = ["PROGRESS", "Output", "measure", "put_out", "with_room", "write"]
-
 BESIDE = 1e-11
 """s, by which one-sided values of the reference lie inside a stretch."""
 

@@ -13,22 +13,6 @@ import numpy as np
 
 from stickslip.jit import call_value, kernel, pointer, pointer_at, record_at, spliced
 
-__all__ = [
-    "AXIS",
-    "LEVELS",
-    "SPRING",
-    "STATE",
-    "Slip",
-    "Start",
-    "Trial",
-    "combined",
-    "curve_at",
-    "rates",
-    "slip_of",
-    "spring_of",
-    "start_of",
-]
-
 RELAXES, FOLLOWS, BENDS = range(3)
 """What a slipping force does: relax towards the curve (GMS), lie on it (Coulomb, Maxwell-slip), bend as a bristle."""
 STUCK, SLIPS, RESTS, CREEPS, STEPS, HOLDS = range(6)

@@ -26,8 +26,6 @@ from stickslip.simulation.sampled.rates import (
 )
 from stickslip.simulation.sampled.stretch import Stretch, lowest, velocity_in, within
 
-__all__ = ["slip"]
-
 SHORTEST = 1e-13
 """Of the sample time: a step that must be shorter does not exist."""
 UNSEEN = 0.1

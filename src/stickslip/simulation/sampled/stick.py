@@ -14,8 +14,6 @@ from stickslip.simulation.sampled.modes import break_away, floor_below, heaviest
 from stickslip.simulation.sampled.rates import curve_at, spring_of
 from stickslip.simulation.sampled.stretch import Stretch
 
-__all__ = ["Swing", "first_break", "stick"]
-
 PHASE = 0.5
 """rad of the oscillation between two looks at the loads."""
 ROOT_STEPS = 60

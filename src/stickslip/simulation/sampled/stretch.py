@@ -7,8 +7,6 @@ from typing import NamedTuple
 from stickslip.jit import kernel
 from stickslip.simulation.exact.flow import hermite
 
-__all__ = ["Stretch", "lowest", "velocity_in", "within"]
-
 
 class Stretch(NamedTuple):
     """A stretch of time by its ends: rad, rad/s, rad/s²."""
