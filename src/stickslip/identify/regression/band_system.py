@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.regression.rounding import rounded_sums
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
 
@@ -174,6 +175,7 @@ class System:
         self.columns = columns / self.scale
         self.products = self.columns.T @ self.columns
         self.small: Places = np.arange(columns.shape[1] - small.shape[1], columns.shape[1])
+        self.rounded = rounded_sums(records, self.columns)
         residual = first - plain[:, :JERK] @ start
         self.noise = float(residual @ residual) / first.size
         self.memory = memory_of(residual, self.stroke)
@@ -255,7 +257,8 @@ class System:
         return weight / weight.sum()
 
     def covariance(self, torque: Array, c: Candidate) -> Array:
-        """Of a candidate's values: noise that pieces share, what no law holds, and misfit that does not average out."""
+        """Of a candidate's values: noise that pieces share, what no law holds, the rounding of the torque, and misfit
+        that does not average out."""
         residual = self.residual(torque, c)
         begins = np.flatnonzero(np.concatenate([[True], np.diff(self.piece) != 0]))
         bounds = pairwise([*begins.tolist(), residual.size])
@@ -267,6 +270,7 @@ class System:
         shrunk = self.products[np.ix_(c.columns, self.small)]
         shrunk = shrunk - c.mixing.T @ self.products[np.ix_(self.small, self.small)]
         moved = c.inverse @ shrunk * (self.std * self.scale[self.small])
+        rounded = c.inverse @ (self.rounded[:, c.columns] - self.rounded[:, self.small] @ c.mixing).T
         least, plain = self.noise * self.memory * np.diag(c.inverse), np.diag(noise)
         # Whole pieces tell level and slope of friction: where many of them refute the misfit's say, they decide.
         # Of acceleration, jerk and offset a piece holds too little.
@@ -279,4 +283,4 @@ class System:
         share[[INERTIA, JERK]] = STIFF, LATE
         coherent = np.diag(share**2 * float(residual @ residual) * np.diag(c.inverse))
         scale = self.scale[c.columns]
-        return (noise + moved @ moved.T + coherent) / np.outer(scale, scale)
+        return (noise + moved @ moved.T + rounded @ rounded.T + coherent) / np.outer(scale, scale)

@@ -19,6 +19,7 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.smooth import CORNER, NARROWEST, Window, seen, seen_at
 from stickslip.identify.regression.inverse import uniform, white_noise
 from stickslip.machines.servo import ServoAxis
+from stickslip.record import encoder_step
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -68,6 +69,8 @@ class Signals:
         Standard deviation of the position's white part, rad (m).
     origin : float
         What was taken off the position, rad (m).
+    count : float
+        What the column of the torque is rounded to, N·m (N); 0 where it is to nothing that shows.
     """
 
     time: Array
@@ -77,6 +80,7 @@ class Signals:
     rows: np.ndarray[Any, np.dtype[np.bool_]]
     noise: float
     origin: float
+    count: float = 0.0
 
     @property
     def period(self) -> float:
@@ -91,7 +95,9 @@ def signals_of(experiment: Experiment, axis: ServoAxis) -> Signals:
     supply = 1.0 if experiment.supply is None else np.interp(t, experiment.time, experiment.supply)
     rows = np.interp(t, experiment.time, experiment.rows.astype(np.float64)) > 0.5
     noise = math.sqrt(white_noise(q, rate) * rate / 2.0)
-    return Signals(t, q - q[0], gain * supply * u, loss, np.asarray(rows, dtype=np.bool_), noise, float(q[0]))
+    count = gain * float(np.median(supply)) * encoder_step(experiment.signal())
+    sliding = np.asarray(rows, dtype=np.bool_)
+    return Signals(t, q - q[0], gain * supply * u, loss, sliding, noise, float(q[0]), count)
 
 
 def narrowest_width(signals: Signals) -> float:
@@ -170,7 +176,14 @@ class SlidingRows:
 
     def farther(self, distance: float) -> SlidingRows:
         """Only the rows that lie farther behind a reversal or stop, rad (m)."""
-        kept = self.gone > distance
+        return self.only(self.gone > distance)
+
+    def faster(self, speed: float) -> SlidingRows:
+        """Only the rows at which the axis is faster, rad/s (m/s)."""
+        return self.only(np.abs(self.speed) > speed)
+
+    def only(self, kept: np.ndarray[Any, np.dtype[np.bool_]]) -> SlidingRows:
+        """Only some of the rows."""
         return SlidingRows(
             self.time[kept], self.position[kept], self.speed[kept], self.fixed[kept], self.jerk[kept],
             self.falling[kept], np.unique(self.stroke[kept], return_inverse=True)[1].astype(np.int64),
