@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from stickslip.identify.axis.agreed import AT_REST, BAND_ALONE, told_apart, widened, with_rest
+from stickslip.identify.axis.agreed import BAND_ALONE, told_apart
+from stickslip.identify.axis.falling import AT_REST, widened, with_rest
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment

@@ -16,15 +16,15 @@ import numpy as np
 
 from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
+from stickslip.identify.axis.falling import FALL, SAME, fall_together, told, with_rest
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.axis.settled import ALONE, APART, TWO_METHODS
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
-from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
-from stickslip.identify.fit.uncertainty import RATIO, verdict_on
+from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.regression.regression import FALLS, QUANTILE, Regression, regress_axis
+from stickslip.identify.regression.regression import QUANTILE, Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
@@ -33,17 +33,10 @@ ALIGNED = 0.1
 """Rows by which a torque that acts from row to row must be off its row to be moved."""
 KNOWN = 0.5
 """Rows: the skew's half-width up to which it says anything about the hold of the torque."""
-SAME = 0.05
-"""Relative difference of two numbers that is none."""
 AS_GOOD = 1.5
 """Times as much as the regression leaves of the torque in certain sliding, that other values may leave and still
 stand."""
 TOLD_BY_SLIDING = ("inertia", "offset", "gravity", "gravity_angle", "fc", "sigma2")
-FALL = ("fs", "vs")
-"""What friction's fall with velocity is told by."""
-MOVED, UNLIKE = 1.3, 0.01
-"""Factor on the interval of these (in logarithms) where the torque had to be moved to where it acted, since reversals
-are then blurred by a part of a row; and the half-width, in parts of the value, that no law's form is true to."""
 DOUBT = "the prediction error, the only evidence for it, contradicts certain sliding on {name}: {other} against {own}"
 
 ONE_BAND = (
@@ -59,7 +52,6 @@ UNSEEN = (
     "the record slides too little in one direction to tell a level of friction, or when the torque acted; record "
     "longer motion in one direction"
 )
-AT_REST = "extrapolated to rest: at which velocity friction falls to its level is not told"
 UNDECIDED = (
     "the prediction error says {name} {own}, the plain inverse dynamics {other}, and the record slides too little in "
     "one direction to decide"
@@ -127,6 +119,17 @@ def on_width(found: Regression | None) -> list[str]:
     ]
 
 
+def on_creep(found: Regression | None, axis: ServoAxis) -> list[str]:
+    """That friction is missing where the axis creeps, in a sentence; nothing where it is not."""
+    if found is None or found.creep.speed == 0.0:
+        return []
+    speed, missing = f"{found.creep.speed:.3g} {axis.unit('rad/s')}", f"{found.creep.missing:.0%}"
+    return [
+        f"Slower than {speed} {missing} of friction's level is missing (a motor that goes on alone within the play, or "
+        f"friction that builds up with velocity): inertia and friction are those of faster motion."
+    ]
+
+
 # ---- numbers --------------------------------------------------------------------------------------------------
 
 
@@ -177,7 +180,7 @@ def agreed(
         notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
     for e in estimates if fine else ():
         if e.name in FALL and e.name in parameters:
-            taken[e.name], said = fall_together(e, found, parameters[e.name], held=held)
+            taken[e.name], said = fall_together(e, found, parameters[e.name], exponent_of(vector), held=held)
             notes += said
     out = tuple(taken.get(e.name, e) for e in estimates)
     # Reversals show what a contact withstands, where the torque is known to act from row to row.
@@ -191,6 +194,12 @@ def agreed(
         out = tuple(replace(e, identified=False, verdict=found.doubt) if e.identified else e for e in out)
         notes.append(f"Nothing is identified: {found.doubt}.")
     return out, notes
+
+
+def exponent_of(vector: Vector) -> float | None:
+    """With which friction falls in the law; none where it has none."""
+    exponent = None if vector.base is None else getattr(vector.base.parameters, "delta_s", None)
+    return None if exponent is None else float(exponent)
 
 
 def known_to_act(found: Regression) -> bool:
@@ -230,15 +239,6 @@ def of_sliding(
     return taken, notes, doubts
 
 
-def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale: float) -> Estimate:
-    """An estimate with another value and interval, judged by the same rules, within the parameter's bounds."""
-    std = (high - low) / (2.0 * QUANTILE)
-    least = p.par.lower if not p.par.positive else max(p.par.lower, 1e-12 * abs(high))
-    value, low, high = (min(max(x, least), p.par.upper) for x in (value, low, high))
-    why = verdict_on(p, value, low, high, Noise(1.0, "residual", math.inf), scale)
-    return replace(e, value=value, std=std, lower=low, upper=high, identified=not why, verdict=why)
-
-
 def told_apart(estimates: Iterable[Estimate], found: Regression) -> tuple[Estimate, ...]:
     """The estimates, inertia, level and slope of friction not identified where certain sliding does not tell them
     apart; values stay.
@@ -266,15 +266,6 @@ def told_apart(estimates: Iterable[Estimate], found: Regression) -> tuple[Estima
     return tuple(replace(e, identified=False, verdict=doubt) if doubt else e for e, doubt in doubts)
 
 
-def with_rest(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
-    """The estimates, friction at rest not identified where the velocity of its fall is not."""
-    untold = any(e.name == "vs" and not e.identified for e in estimates)
-    return tuple(
-        replace(e, identified=False, verdict=AT_REST) if untold and e.name == "fs" and e.identified else e
-        for e in estimates
-    )
-
-
 PLAIN = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}
 """Names of the plain inverse dynamics."""
 
@@ -285,34 +276,6 @@ def plain_value(name: str, inverse: InverseDynamics | None) -> tuple[float, floa
     if inverse is None or not inverse.has(own):
         return None
     return inverse[own], QUANTILE * float(inverse.robust_std[inverse.names.index(own)])
-
-
-def fall_together(e: Estimate, found: Regression, p: Parameter, *, held: bool) -> tuple[Estimate, list[str]]:
-    """Fs or vs of the prediction error, with what certain sliding says of the fall of friction where both contradict
-    each other, and with what a moved torque and the law's own form leave unsure."""
-    own = found.vs if e.name == "vs" else found.numbers["fs"]
-    notes: list[str] = []
-    if not e.identified:
-        return e, notes
-    apart = abs(own.value - e.value) > math.hypot(half_width(e), QUANTILE * own.std)
-    if found.falls >= FALLS and apart and abs(own.value - e.value) > SAME * abs(e.value):
-        e = told(e, p, e.value, min(e.lower, own.value), max(e.upper, own.value), math.nan)
-        notes.append(
-            f"{e.name}: certain sliding says {own.value:.4g}, the prediction error {e.value:.4g} {e.unit}; the "
-            "interval holds both."
-        )
-    return (widened(e, p, 1.0 if held else MOVED) if e.identified else e), notes
-
-
-def widened(e: Estimate, p: Parameter, factor: float) -> Estimate:
-    """An estimate whose interval is so many times as wide, in logarithms, and not narrower than `UNLIKE`."""
-    below, above = (math.hypot(factor * math.log(end / e.value), UNLIKE) for end in (e.lower, e.upper))
-    return told(e, p, e.value, e.value * math.exp(-below), e.value * math.exp(above), math.nan)
-
-
-def half_width(e: Estimate) -> float:
-    """Of its interval."""
-    return 0.5 * (e.upper - e.lower)
 
 
 def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tuple[Estimate, ...]:

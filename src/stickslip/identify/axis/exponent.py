@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from stickslip.errors import InputError
-from stickslip.identify.axis.agreed import told
+from stickslip.identify.axis.falling import told
 from stickslip.identify.axis.prediction import axis_prediction, rival
 from stickslip.identify.axis.search import Asked
 from stickslip.identify.estimate import Estimate

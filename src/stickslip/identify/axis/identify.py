@@ -18,6 +18,7 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis.agreed import (
     TOLD_BY_SLIDING,
     aligned,
+    on_creep,
     on_timing,
     on_width,
     regressed,
@@ -184,7 +185,13 @@ def looked_at(
     experiments, validation = aligned(experiments, sliding), aligned(validation, sliding)
     inverse, more = first_look(experiments, axis, extras, per_direction)
     unchecked = sliding is None and all(t.drive is not None for t in experiments)
-    said = [*(on_timing(sliding) if skew is None else []), *on_width(sliding), *notes, *more]
+    said = [
+        *(on_timing(sliding) if skew is None else []),
+        *on_width(sliding),
+        *on_creep(sliding, axis),
+        *notes,
+        *more,
+    ]
     return Evidence(experiments, validation, axis, inverse, sliding, unchecked), said
 
 

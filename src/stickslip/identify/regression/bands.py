@@ -18,6 +18,7 @@ from stickslip.errors import InputError
 from stickslip.identify.fit.smooth import Window, seen
 from stickslip.identify.regression.band_fit import QUANTILE, BandFit, Number, fit_band
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
+from stickslip.identify.regression.creeping import NOWHERE, Creep, creep_of
 from stickslip.identify.regression.orders import candidate_orders, goes_round, shown_orders
 from stickslip.identify.regression.sliding_rows import FEWEST, Fall, Signals, SlidingRows, sliding_rows
 from stickslip.identify.regression.strokes import stacked
@@ -72,12 +73,15 @@ class Bands:
         Cycles a radian (m) of the torque over the position that were found there.
     widened : float
         Times that the windows are wider than noise asks.
+    creep : Creep
+        Up to which speed friction is missing in the widest, so that slower rows are left out.
     """
 
     fits: tuple[BandFit, ...]
     rows: tuple[SlidingRows, ...]
     orders: tuple[float, ...]
     widened: float = 1.0
+    creep: Creep = NOWHERE
 
     @property
     def exponents(self) -> Sequence[float]:
@@ -177,13 +181,14 @@ def in_bands(
     bands: list[BandFit] = []
     widest: list[SlidingRows] = []
     chosen: dict[str, Any] = {}
+    creep = NOWHERE
     lacking = InputError("no band of the record slides long enough in one direction")
     for factor in BANDS:
         try:
             if not bands:
                 known = options["skew"]
                 start = clear_skew(signals, factor * width) if known is None else known
-                widest, falls = rows_of(signals, factor * width, start, exponents)
+                widest, falls, creep = rows_of(signals, factor * width, start, exponents)
                 own = {**options, "start": start}
                 chosen = {
                     "start": start,
@@ -191,13 +196,14 @@ def in_bands(
                 }
                 rows = widest
             else:
-                rows, falls = rows_of(signals, factor * width, bands[0].numbers["skew"].value, exponents)
+                skew = bands[0].numbers["skew"].value
+                rows, falls, _ = rows_of(signals, factor * width, skew, exponents)
             bands.append(fit_band(rows, falls, **{**options, **chosen}))
         except InputError as error:
             lacking = error
     if not bands:
         raise lacking
-    return Bands(tuple(bands), tuple(widest), tuple(chosen.get("orders", [])))
+    return Bands(tuple(bands), tuple(widest), tuple(chosen.get("orders", [])), creep=creep)
 
 
 def decided(found: Bands, none: Bands) -> Bands:
@@ -253,8 +259,9 @@ def clear_skew(signals: Sequence[Signals], width: float) -> float:
 
 def rows_of(
     signals: Sequence[Signals], width: float, skew: float, exponents: Sequence[float]
-) -> tuple[list[SlidingRows], list[Fall]]:
-    """Rows seen through one window, without those where friction is still being rebuilt; and the falls tried."""
+) -> tuple[list[SlidingRows], list[Fall], Creep]:
+    """Rows seen through one window, without those where friction is still being rebuilt or the axis creeps with too
+    little of it; the falls tried; and that creeping."""
     windows = [Window(width, s.period) for s in signals]
     first = [sliding_rows(s, w) for s, w in zip(signals, windows, strict=True)]
     speed = np.abs(stacked(first, "speed"))
@@ -266,7 +273,9 @@ def rows_of(
     rows = [r for r in rows if r.time.size >= FEWEST]
     if not rows:
         raise InputError("friction is rebuilt over the whole of every stroke; record longer strokes")
-    return rows, falls
+    creep = creep_of(rows, skew)
+    faster = [r for r in (r.faster(creep.speed) for r in rows) if r.time.size >= FEWEST]
+    return (faster, falls, creep) if faster and creep is not NOWHERE else (rows, falls, NOWHERE)
 
 
 def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:

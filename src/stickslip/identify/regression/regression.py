@@ -34,7 +34,7 @@ from stickslip.identify.regression.bands import (
     that_tell,
     together,
 )
-from stickslip.identify.regression.creeping import missing_where_it_creeps
+from stickslip.identify.regression.creeping import NOWHERE, Creep
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows, narrowest_width, signals_of
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
@@ -67,10 +67,6 @@ LEVEL_UNTOLD = (
 )
 STILL_ROUGH = "motor and load do not move as one even in the windows in which they do so best, and "
 UNSURE_THERE, ROUGHLY = "it is unsure to {share:.0%} there; identified means at most {most:.0%}", 0.1
-MISSING = (
-    "{share:.0%} of it is missing where the axis creeps: play, in which the motor goes on alone, or friction that "
-    "grows less than in proportion to velocity"
-)
 APART = (
     "the axis does not follow its torque as one inertia does: what its acceleration needs is unsure to {share:.2g} of "
     "Fc; record gentler motion"
@@ -116,8 +112,8 @@ class Regression:
         Of the widest band.
     widened : float
         Times that the windows are wider than noise asks, so that motor and load move as one in them.
-    missing : float
-        Part of the level of friction that is missing where the axis creeps.
+    creep : Creep
+        Up to which speed friction is missing, so that slower rows are left out.
     """
 
     numbers: dict[str, Number]
@@ -130,7 +126,7 @@ class Regression:
     period: float
     rows: tuple[SlidingRows, ...]
     widened: float = 1.0
-    missing: float = 0.0
+    creep: Creep = NOWHERE
 
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval of a number."""
@@ -229,8 +225,6 @@ class Regression:
         share = QUANTILE * level.std / max(abs(level.value), 1e-300)
         if share > ROUGHLY and self.widened > 1.0 and self.rough:
             return STILL_ROUGH + UNSURE_THERE.format(share=share, most=ROUGHLY)
-        if self.missing:
-            return MISSING.format(share=self.missing)
         if self.slope_told:
             return ""
         sloped = QUANTILE * self.numbers["sigma2"].std * self.fastest > SLOPED * abs(level.value)
@@ -319,10 +313,9 @@ def regress_axis(
     numbers["skew"] = (
         Number(found.value, math.hypot(found.std, FINEST * period)) if skew is None else Number(skew, size)
     )
-    missing = missing_where_it_creeps(seen.rows, found.value, seen.orders, axis.gravity == "pendulum")
     return Regression(
         numbers, bands, seen.orders, falls, falling, float(np.quantile(speed, 0.01)), float(np.max(speed)), period,
-        seen.rows, seen.widened, missing,
+        seen.rows, seen.widened, seen.creep,
     )  # fmt: skip
 
 

@@ -1,0 +1,95 @@
+"""What is said of friction's fall with velocity, Fs and vs, by the prediction error and by certain sliding together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.fit.noise import Noise
+from stickslip.identify.fit.parameter_vector import Parameter
+from stickslip.identify.fit.uncertainty import verdict_on
+from stickslip.identify.regression.band_fit import QUANTILE, Number
+from stickslip.identify.regression.regression import FALLS, Regression
+
+FALL = ("fs", "vs")
+"""What friction's fall with velocity is told by."""
+SAME = 0.05
+"""Relative difference of two numbers that is none."""
+MOVED, UNLIKE = 1.3, 0.01
+"""Factor on the interval of these (in logarithms) where the torque had to be moved to where it acted, since reversals
+are then blurred by a part of a row; and the half-width, in parts of the value, that no law's form is true to."""
+NARROW, FORM = 1.6, 0.02
+"""Factor on certain sliding's standard deviation of these, and the part of the value that its form is true to."""
+AT_REST = "extrapolated to rest: at which velocity friction falls to its level is not told"
+
+
+def fall_together(
+    e: Estimate, found: Regression, p: Parameter, exponent: float | None, *, held: bool
+) -> tuple[Estimate, list[str]]:
+    """Fs or vs of the prediction error, with what certain sliding says of the fall of friction where both contradict
+    each other, and with what a moved torque and the law's own form leave unsure.
+
+    Where certain sliding shows the fall and the prediction error does not tell it, or says another, its value; never
+    identified by that alone, since its own interval is too narrow: of 251 logs 78 to 85 % held
+    (`benchmarks/ordinary_logs.py`).
+    """
+    own, notes = number_of(e.name, found, exponent), list[str]()
+    if own is None:
+        return e, notes
+    if not e.identified:
+        return (shown_by_sliding(e, own) if found.shows_a_fall else e), notes
+    apart = abs(own.value - e.value) > math.hypot(half_width(e), QUANTILE * own.std)
+    if found.falls >= FALLS and apart and abs(own.value - e.value) > SAME * abs(e.value):
+        notes.append(
+            f"{e.name}: certain sliding says {own.value:.4g}, the prediction error {e.value:.4g} {e.unit}; the "
+            "interval holds both."
+        )
+        value = own.value if found.shows_a_fall else e.value
+        e = told(e, p, value, min(e.lower, own.value), max(e.upper, own.value), math.nan)
+    return (widened(e, p, 1.0 if held else MOVED) if e.identified else e), notes
+
+
+def number_of(name: str, found: Regression, exponent: float | None) -> Number | None:
+    """Fs, or vs with that exponent, of certain sliding; none where it did not look for a fall of that form."""
+    if name != "vs":
+        return found.numbers["fs"]
+    return found.vs if exponent is None else found.falling.get(exponent, (0.0, None))[1]
+
+
+def shown_by_sliding(e: Estimate, own: Number) -> Estimate:
+    """The estimate, not identified, with the value of certain sliding and an interval that holds what both say."""
+    half = QUANTILE * math.hypot(NARROW * own.std, FORM * own.value)
+    return replace(
+        e, value=own.value, lower=min(e.lower, own.value - half), upper=max(e.upper, own.value + half)
+    )
+
+
+def widened(e: Estimate, p: Parameter, factor: float) -> Estimate:
+    """An estimate whose interval is so many times as wide, in logarithms, and not narrower than `UNLIKE`."""
+    below, above = (math.hypot(factor * math.log(end / e.value), UNLIKE) for end in (e.lower, e.upper))
+    return told(e, p, e.value, e.value * math.exp(-below), e.value * math.exp(above), math.nan)
+
+
+def with_rest(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """The estimates, friction at rest not identified where the velocity of its fall is not."""
+    untold = any(e.name == "vs" and not e.identified for e in estimates)
+    return tuple(
+        replace(e, identified=False, verdict=AT_REST) if untold and e.name == "fs" and e.identified else e
+        for e in estimates
+    )
+
+
+def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale: float) -> Estimate:
+    """An estimate with another value and interval, judged by the same rules, within the parameter's bounds."""
+    std = (high - low) / (2.0 * QUANTILE)
+    least = p.par.lower if not p.par.positive else max(p.par.lower, 1e-12 * abs(high))
+    value, low, high = (min(max(x, least), p.par.upper) for x in (value, low, high))
+    why = verdict_on(p, value, low, high, Noise(1.0, "residual", math.inf), scale)
+    return replace(e, value=value, std=std, lower=low, upper=high, identified=not why, verdict=why)
+
+
+def half_width(e: Estimate) -> float:
+    """Of its interval."""
+    return 0.5 * (e.upper - e.lower)
