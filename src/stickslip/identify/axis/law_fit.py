@@ -153,7 +153,7 @@ def beside_plain(
     own = {n: (low, high) for n, (_, low, high) in sliding_values(sliding).items()}
     # Refuted by less than half, it is still in the intervals of the estimates.
     both = {e.name: (e.lower, e.upper) for e in estimates} if as_good(inverse, sliding) else None
-    return settled(estimates, model, inverse, own, both)
+    return settled(estimates, model, inverse, own, both, falls=sliding.shows_a_fall)
 
 
 def with_values(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -99,17 +100,19 @@ def evident(
         why = f"a level of friction above the largest torque recorded, {largest:.4g}, cannot be"
         out.append(replace(e, identified=False, verdict=why) if above else e)
     by_name = {e.name: e for e in out}
-    if {"fs", "fc"} <= by_name.keys() and by_name["fs"].value <= by_name["fc"].value:
+    rest, level = (by_name[n].value if n in by_name else math.nan for n in ("fs", "fc"))
+    if rest <= level:
         why = "no fall of friction with velocity shows: fs is not above fc"
         out = [replace(e, identified=False, verdict=why) if e.name in STRIBECK else e for e in out]
-        level = by_name["fc"].value
-        out = [
-            replace(e, value=level, lower=min(e.lower, level), upper=max(e.upper, level))
-            if e.name == "fs"
-            else e
-            for e in out
-        ]
+    if rest <= level or (rest > largest and level <= largest):
+        # No model is to hold a friction at rest that nothing moved against.
+        out = [at_level(e, level) if e.name == "fs" else e for e in out]
     return tuple(out)
+
+
+def at_level(e: Estimate, level: float) -> Estimate:
+    """Fs with the value of Fc: no fall of friction."""
+    return replace(e, value=level, lower=min(e.lower, level), upper=max(e.upper, level))
 
 
 def speed_of(experiment: Experiment) -> Array:

@@ -205,6 +205,7 @@ def settled(
     inverse: InverseDynamics | None,
     refuted_by: Mapping[str, tuple[float, float]] | None = None,
     at_most: Mapping[str, tuple[float, float]] | None = None,
+    falls: bool = False,
 ) -> tuple[tuple[Estimate, ...], list[str]]:
     """The estimates, what is not identified chosen so that the record's torque is explained best; and what to say.
 
@@ -222,6 +223,8 @@ def settled(
     at_most : mapping, optional
         Wider intervals, where it is refuted by little: as far as a value may go where within the others nothing comes
         near the force error of the inverse dynamics.
+    falls : bool
+        Whether certain sliding shows that friction falls with velocity, which the inverse dynamics knows nothing of.
     """
     by_name = {e.name: e for e in estimates}
     if inverse is None or model.law.steady is None or not set(PLAIN) <= by_name.keys():
@@ -233,7 +236,7 @@ def settled(
     free = {n: b for n, b in physical(inverse).items() if not by_name[n].identified}
     free |= turned(by_name, values, inverse)
     chosen, error = own.solved(values, free, False)
-    if "fs" in by_name and not by_name["fs"].identified:
+    if "fs" in by_name and not by_name["fs"].identified and not falls:
         plain, flat = own.solved(values, free, True)
         if not error <= PREFERRED * flat:
             chosen, error = plain, flat
