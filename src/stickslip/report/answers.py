@@ -222,15 +222,17 @@ def percent(share: float) -> str:
 def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
     """How far the model's torque is from the measured one, in sentences."""
     out: list[str] = []
-    unit = unit_in(found, "N·m")
+    unit, regression = unit_in(found, "N·m"), found.details.get("regression")
     if sliding is not None:
+        speeds = (
+            within_speeds(regression, unit_in(found, "rad/s")) if isinstance(regression, Regression) else ""
+        )
         out.append(
-            f"Where the axis slides for certain ({100.0 * sliding.share:.0f} % of the record) the model's torque is "
-            f"{percent(sliding.relative)} off the measured one, {quantity(sliding.rms, unit)} root mean square"
-            f"{plain_there(sliding)}."
+            f"Where the axis slides for certain ({100.0 * sliding.share:.0f} % of the record{speeds}) the model's "
+            f"torque is {percent(sliding.relative)} off the measured one, {quantity(sliding.rms, unit)} root mean "
+            f"square{plain_there(sliding)}."
         )
     out += force_errors(found.misfit, sliding is not None and not beaten(sliding))
-    regression = found.details.get("regression")
     if isinstance(regression, Regression) and regression.orders:
         turn = 1.0 if linear(found) else 2.0 * math.pi
         per = "a metre" if linear(found) else "a revolution"
@@ -245,6 +247,11 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
         what = f"{'force' if linear(found) else 'torque'}: {quantity(float(rms), unit_in(found, 'N·m'))}"
         out.append(f"What the curve leaves of the {what} root mean square.")
     return out
+
+
+def within_speeds(regression: Regression, unit: str) -> str:
+    """The speeds of certain sliding: of others the record says nothing."""
+    return f", {regression.slowest:.3g} to {regression.fastest:.3g} {unit}"
 
 
 def plain_there(sliding: Sliding) -> str:

@@ -309,14 +309,17 @@ def regress_axis(
     falls, falling = fall_of(bands)
     numbers = {name: together(name, bands) for name in bands[0].numbers}
     numbers["fc"] = with_form(numbers["fc"], numbers["sigma2"])
-    found = numbers["skew"]
-    numbers["skew"] = (
-        Number(found.value, math.hypot(found.std, FINEST * period)) if skew is None else Number(skew, size)
-    )
+    numbers["skew"] = Number(skew, size) if skew is not None else as_told(numbers, size, period)
     return Regression(
         numbers, bands, seen.orders, falls, falling, float(np.quantile(speed, 0.01)), float(np.max(speed)), period,
         seen.rows, seen.widened, seen.creep,
     )  # fmt: skip
+
+
+def as_told(numbers: Mapping[str, Number], size: float, period: float) -> Number:
+    """The skew, s: no surer than its usual size where the inertia, by which acceleration shows it, is not told."""
+    found, untold = numbers["skew"], not told_to_two(numbers["inertia"])
+    return Number(found.value, math.hypot(found.std, FINEST * period, size if untold else 0.0))
 
 
 def told_to_two(number: Number) -> bool:
