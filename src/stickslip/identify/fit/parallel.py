@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
@@ -12,10 +13,15 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
+def _cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 @functools.cache
 def _helpers() -> ThreadPoolExecutor | None:
     """A thread for every core but the caller's that this process may use."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = _cores()
     return ThreadPoolExecutor(cores - 1, "stickslip") if cores > 1 else None
 
 
@@ -45,3 +51,15 @@ def mapped(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
     finally:
         for f in asked:
             f.cancel()
+
+
+def in_turn(function: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
+    """The function of every item, in their order: the first alone, of the others as many ahead as there are cores.
+
+    For work that may end early, whose rest is then lost.
+    """
+    coming = iter(items)
+    for first in itertools.islice(coming, 1):
+        yield function(first)
+    while some := list(itertools.islice(coming, _cores())):
+        yield from mapped(function, some)

@@ -13,6 +13,7 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import COMPENSATORS
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
+from stickslip.identify.fit.parallel import in_turn
 from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.identify.setting.candidate_run import Drive, Trial, dangers, rings, run
 from stickslip.machines.rigid import RigidAxis
@@ -166,16 +167,15 @@ class Bench:
         """The best estimate, which is drawn first, and the first `count` others that the linear controller holds."""
         bench = Bench([next(drawn)], linear, drive, laws, ran)
         best, kept, alone = bench.before(0), list(bench.plants), list(bench.alone)
-        for plant in drawn:
-            if len(kept) > count:
-                break
-            trial = run(plant, linear, drive)
+        for plant, trial in in_turn(lambda plant: (plant, run(plant, linear, drive)), drawn) if count else ():
             ran()
             if lost(trial, best, drive):
                 bench.left_out += 1
                 continue
             kept.append(plant)
             alone.append(trial)
+            if len(kept) > count:
+                break
         bench.plants, bench.alone = kept, alone
         return bench
 
@@ -196,8 +196,18 @@ class Bench:
         """The setting on every axis, up to the first on which it is not safe."""
         controller = setting.on(self.linear, self.laws[setting.law])
         errors: list[float] = []
-        for i, plant in enumerate(self.plants):
-            before, after = self.before(i), run(plant, controller, self.drive)
+
+        def both(i: int) -> tuple[Trial | str, Trial | str]:
+            plant, known = self.plants[i], i < len(self.alone)
+            return (
+                self.alone[i] if known else run(plant, self.linear, self.drive),
+                run(plant, controller, self.drive),
+            )
+
+        for i, (before, after) in enumerate(in_turn(both, range(len(self.plants)))):
+            if i >= len(self.alone):
+                self.alone.append(before)
+                self.ran()
             self.ran()
             if isinstance(after, str) or isinstance(before, str):
                 why = after if isinstance(after, str) else "the linear controller alone fails"
