@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.description import packed
 from stickslip.errors import InputError, UnknownName
 from stickslip.model import Model
 from stickslip.spec import Par
@@ -110,8 +111,12 @@ class Vector:
         self._plain = [p for p in self.free if not p.shares]
         groups = dict.fromkeys(p.shares for p in self.free if p.shares)
         self._groups = [[p for p in self.free if p.shares == g] for g in groups]
+        self._wholes = [
+            1.0 - sum(p.value for p in self.parameters if p.shares == g and not p.free) for g in groups
+        ]
         self._fixed = {p.name: p.value for p in self.parameters if not p.free}
         self._scales = [(p.name, p.logarithmic, p.scale) for p in self._plain]
+        self._flat = _flat_names(model) if model else []
 
     # ---- sizes and bounds ------------------------------------------------------------------------------------
 
@@ -160,12 +165,11 @@ class Vector:
         for x, (name, logarithmic, scale) in zip(u.tolist(), self._scales, strict=False):
             values[name] = math.exp(x) if logarithmic else x * scale
         place = len(self._plain)
-        for group in self._groups:
+        for group, whole in zip(self._groups, self._wholes, strict=True):
             ratios = [*u[place : place + len(group) - 1].tolist(), 0.0]
             place += len(group) - 1
             top = max(ratios)
             parts = [math.exp(x - top) for x in ratios]
-            whole = 1.0 - sum(p.value for p in self.parameters if p.shares == group[0].shares and not p.free)
             factor = whole / math.fsum(parts)
             values.update({p.name: factor * x for p, x in zip(group, parts, strict=True)})
         return values
@@ -198,15 +202,15 @@ class Vector:
 
     def packed(self, u: Array) -> Array:
         """The law's parameters as the flat array that compiled functions read."""
-        return self._packed(self.named(u))
+        return self.packed_named(self.named(u))
 
     def packed_values(self, values: Array) -> Array:
         """The same for values of the free parameters."""
-        return self._packed({**self._fixed, **dict(zip(self.names, values.tolist(), strict=True))})
+        return self.packed_named({**self._fixed, **dict(zip(self.names, values.tolist(), strict=True))})
 
-    def _packed(self, named: Mapping[str, float]) -> Array:
-        assert self.base is not None
-        return np.array(self.base.law.pack(self._parameters(named)), dtype=np.float64)
+    def packed_named(self, named: Mapping[str, float]) -> Array:
+        """The same for every parameter by name, as `named` gives them."""
+        return np.array([named[x] if isinstance(x, str) else x for x in self._flat], dtype=np.float64)
 
     def model(self, u: Array) -> Model:
         """The law with these parameters.
@@ -254,6 +258,20 @@ def _parameters_of(model: Model | None) -> list[Parameter]:
             name = f"{f.name}[{i}]" if f.per_element else f.name
             out.append(Parameter(name, f.par, float(number), True, shares, abs(float(number)) or 1.0))
     return out
+
+
+def _flat_names(model: Model) -> list[Any]:
+    """What stands at every place of the flat array that compiled functions read: a parameter, or how many there are.
+
+    The numbers of elements are the model's, whatever the parameters.
+    """
+    fields, p = model.law.fields, model.parameters
+    counts = {f.name: len(getattr(p, f.name)) for f in fields if f.per_element}
+    places = {
+        f.name: tuple(f"{f.name}[{i}]" for i in range(counts[f.name])) if f.per_element else f.name
+        for f in fields
+    }
+    return packed(fields, model.law.Parameters(**places))
 
 
 def _limited(parameter: Parameter, limits: Mapping[str, tuple[float, float]]) -> Parameter:

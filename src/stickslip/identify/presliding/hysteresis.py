@@ -139,7 +139,9 @@ def fit_loop(
 def curve_of(along: Along, vector: Vector, u: Array) -> Array:
     """The law's torque, the offset, and what is in step with the velocity, at every sample."""
     named = vector.named(u)
-    torque = along.torque(vector.packed(u), vector.law_parameters(u)) + named.get("offset", 0.0)
+    assert vector.base is not None
+    # It has as many elements as the law with these parameters.
+    torque = along.torque(vector.packed_named(named), vector.base.parameters) + named.get("offset", 0.0)
     damping = named.get("damping", 0.0)
     return torque + damping * along.velocity if damping else torque
 

@@ -11,8 +11,9 @@ import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -64,11 +65,24 @@ class Candidate:
     cost: float
 
 
+class Products(NamedTuple):
+    """Of the columns with one fall of friction (or none), with each other and with the small ones: no torque changes
+    them."""
+
+    level: int
+    own: Places
+    every: Places
+    own_own: Array
+    own_small: Array
+    small_own: Array
+    every_every: Array
+
+
 def inverse_of(matrix: Array) -> Array:
     """Of a symmetric positive matrix; what rounding made negative of it counts as hardly there."""
     with contextlib.suppress(np.linalg.LinAlgError):
         inverse: Array = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
-        if np.min(np.diag(inverse)) > 0.0:
+        if inverse.diagonal().min() > 0.0:
             return inverse
     sizes, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
     return np.asarray((vectors / np.maximum(sizes, LEAST * sizes[-1])) @ vectors.T, dtype=np.float64)
@@ -189,30 +203,40 @@ class System:
         """The torque that acted, N·m (N)."""
         return np.concatenate([r.torque(skew) for r in self.records])
 
-    def candidates(self, torque: Array, skew: float) -> list[Candidate]:
-        """The fit without a fall of friction, and with every one."""
-        products, small = self.products, self.small
-        seen = self.columns.T @ torque
-        held = np.diag(self.noise * self.memory / (self.std * self.scale[small]) ** 2)
-        inner = inverse_of(products[np.ix_(small, small)] + held)
-        power = float(torque @ torque)
-        out: list[Candidate] = []
+    @cached_property
+    def by_level(self) -> list[Products]:
+        """Without a fall of friction, and with every one."""
+        out: list[Products] = []
         for level in range(-1, len(self.levels)):
             own = np.array([*range(self.core), *([self.core + level] if level >= 0 else [])])
-            mixing = inner @ products[np.ix_(small, own)]
-            matrix = products[np.ix_(own, own)] - products[np.ix_(own, small)] @ mixing
-            right = seen[own] - mixing.T @ seen[small]
-            # The skew is known to its usual size before the record is looked at.
-            known = self.noise * self.memory / (self.inertia * self.skew_size * self.scale[JERK]) ** 2
+            every = np.concatenate([own, self.small])
+            pairs = ((own, own), (own, self.small), (self.small, own), (every, every))
+            out.append(Products(level, own, every, *(self.products[np.ix_(*pair)] for pair in pairs)))
+        return out
+
+    def candidates(self, torque: Array, skew: float) -> list[Candidate]:
+        """The fit without a fall of friction, and with every one."""
+        small = self.small
+        seen = self.columns.T @ torque
+        held = np.diag(self.noise * self.memory / (self.std * self.scale[small]) ** 2)
+        inner = inverse_of(self.products[np.ix_(small, small)] + held)
+        power, seen_small = float(torque @ torque), seen[small]
+        alone = inner @ seen_small
+        # The skew is known to its usual size before the record is looked at.
+        known = self.noise * self.memory / (self.inertia * self.skew_size * self.scale[JERK]) ** 2
+        moved = known * self.inertia * (skew - self.expected) * self.scale[JERK]
+        out: list[Candidate] = []
+        for level, own, every, own_own, own_small, small_own, every_every in self.by_level:
+            mixing = inner @ small_own
+            matrix = own_own - own_small @ mixing
+            right = seen[own] - mixing.T @ seen_small
             matrix[JERK, JERK] += known
-            right[JERK] += known * self.inertia * (skew - self.expected) * self.scale[JERK]
+            right[JERK] += moved
             inverse = inverse_of(matrix + 1e-11 * np.trace(matrix) / own.size * np.eye(own.size))
             values = inverse @ right
-            coefficients = inner @ seen[small] - mixing @ values
-            every, both = np.concatenate([own, small]), np.concatenate([values, coefficients])
-            cost = (
-                power - 2.0 * float(seen[every] @ both) + float(both @ products[np.ix_(every, every)] @ both)
-            )
+            coefficients = alone - mixing @ values
+            both = np.concatenate([values, coefficients])
+            cost = power - 2.0 * float(seen[every] @ both) + float(both @ every_every @ both)
             cost += float(coefficients @ held @ coefficients)
             out.append(Candidate(level, own, mixing, inverse, values, coefficients, cost))
         return out

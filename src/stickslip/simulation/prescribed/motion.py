@@ -79,7 +79,7 @@ class Along:
         parameters : NamedTuple
             The same for the law's plain functions; only the number of elements is read.
         """
-        state = flat(self._law.pack_state(self._law.state(parameters)))
+        state = np.zeros(max(1, self._law.state_size(parameters)))
         out = np.empty(self._samples.time.size)
         follow(self._step, flat(packed), np.array(Surroundings()), self._samples, state, out)
         return out
