@@ -32,14 +32,19 @@ ROOT = TESTS.parent
 REFERENCE = Path(os.environ.get("STICKSLIP_REFERENCE", ROOT.parent / "shared" / "reference"))
 
 
-# Dearest first, by the processor's time: a file goes to one process as a whole, and the others wait for a long one that
-# comes last. The rest may stand in any order.
+# Dearest first, by time and the processor's time (the page's files keep a browser and servers busy, or wait for them):
+# a file goes to one process as a whole, and the others wait for a long one that comes last. The rest, of less than ten
+# seconds each, may stand in any order.
 LONGEST = (
-    "export/test_targets", "contract/test_declarations", "contract/test_control_laws", "export/test_c99",
-    "control/test_special_results", "test_readme", "identify/test_doctor_spoiled", "commission/test_commission",
-    "rigs/test_faults", "control/test_control_loops", "cli/test_results", "contract/test_laws", "sweep/test_sweep",
-    "study/test_effort", "identify/test_doctor_change", "cli/test_bad_logs", "analyse/test_stability",
-    "cli/test_bad_input", "study/test_study",
+    "test_readme", "commission/test_commission", "web/test_accessible", "web/test_way", "web/test_hostile",
+    "web/test_rig_files", "export/test_targets", "identify/test_axis", "web/test_log_view", "web/test_rig_view",
+    "control/test_special_results", "contract/test_declarations", "identify/test_presliding",
+    "identify/test_sliding", "export/test_c99", "rigs/test_ds402", "export/test_modelica",
+    "identify/test_doctor_spoiled", "study/test_stability_map", "web/test_workbench",
+    "identify/test_recommend_beside", "rigs/test_faults", "contract/test_control_laws", "sweep/test_sweep",
+    "identify/test_doctor_change", "web/test_sent", "contract/test_laws", "cli/test_results",
+    "export/test_composed", "report/test_thesis_report", "cli/test_identify", "control/test_control_loops",
+    "identify/test_exponent", "identify/test_prediction_error", "test_compiled_code", "simulation/test_lanes",
 )  # fmt: skip
 
 
