@@ -20,7 +20,7 @@ from stickslip.control.catalogue import CATALOGUE, LOOPS, compensated
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade
 from stickslip.errors import ParameterError
-from stickslip.identify.setting.candidate_run import AT_REST, Drive, Trial, dangers, run, simulated
+from stickslip.identify.setting.candidate_run import AT_REST, Drive, Trial, dangers, simulated
 from stickslip.identify.setting.candidates import NEAR, Bench
 from stickslip.identify.setting.swings import back_and_forth, between_counts
 from stickslip.model import Model
@@ -213,9 +213,7 @@ def on_axes(beside: Beside, bench: Bench, where: str) -> Beside:
     controller = beside.controller
     assert controller is not None
     errors: list[float] = []
-    for i, plant in enumerate(bench.plants):
-        before, after = bench.before(i), run(plant, controller, bench.drive)
-        bench.ran()
+    for i, (before, after) in enumerate(bench.trials(controller)):
         if isinstance(after, str) or isinstance(before, str):
             why = after if isinstance(after, str) else "the linear controller alone fails"
             return replace(beside, errors=tuple(errors), why_not=why + where.rstrip())

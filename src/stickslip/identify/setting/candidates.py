@@ -186,6 +186,21 @@ class Bench:
             self.ran()
         return self.alone[i]
 
+    def trials(self, controller: Controller) -> Iterator[tuple[Trial | str, Trial | str]]:
+        """The linear controller alone and this one, on one axis after the other; some ahead, side by side."""
+
+        def both(i: int) -> tuple[Trial | str, Trial | str]:
+            plant, known = self.plants[i], i < len(self.alone)
+            before = self.alone[i] if known else run(plant, self.linear, self.drive)
+            return before, run(plant, controller, self.drive)
+
+        for i, (before, after) in enumerate(in_turn(both, range(len(self.plants)))):
+            if i >= len(self.alone):
+                self.alone.append(before)
+                self.ran()
+            self.ran()
+            yield before, after
+
     def ringing(self) -> Iterator[tuple[RigidAxis, str]]:
         """The axes, of the first `LOOKED_AT`, on which the linear controller alone oscillates, and where."""
         for i, plant in enumerate(self.plants[:LOOKED_AT]):
@@ -196,19 +211,7 @@ class Bench:
         """The setting on every axis, up to the first on which it is not safe."""
         controller = setting.on(self.linear, self.laws[setting.law])
         errors: list[float] = []
-
-        def both(i: int) -> tuple[Trial | str, Trial | str]:
-            plant, known = self.plants[i], i < len(self.alone)
-            return (
-                self.alone[i] if known else run(plant, self.linear, self.drive),
-                run(plant, controller, self.drive),
-            )
-
-        for i, (before, after) in enumerate(in_turn(both, range(len(self.plants)))):
-            if i >= len(self.alone):
-                self.alone.append(before)
-                self.ran()
-            self.ran()
+        for before, after in self.trials(controller):
             if isinstance(after, str) or isinstance(before, str):
                 why = after if isinstance(after, str) else "the linear controller alone fails"
                 return Candidate(setting, (*errors, math.inf), (why,))
