@@ -138,3 +138,42 @@ def test_clipped_torques_are_found(kind):
     clipped = np.clip(torque, -level, level)
     assert "saturation" not in codes(record(torque))
     assert f"{level:g}" in codes(record(clipped))["saturation"]
+
+
+def coarse(limit: float) -> Record:
+    """Moves with rests whose torque a drive writes down in 60 steps, as a controller's that a coarse encoder holds
+    still from row to row; cut off at a limit."""
+    t, _, _ = motion()
+    v = np.interp(
+        t % 4.0, [0.0, 0.2, 1.2, 1.4, 2.0, 2.2, 3.2, 3.4], [0.0, 4.0, 4.0, 0.0, 0.0, -4.0, -4.0, 0.0]
+    )
+    ripple = 0.3 * np.repeat(np.random.default_rng(6).standard_normal(t.size // 10), 10) * (v != 0.0)
+    torque = 0.1 * np.gradient(v, t) + 1.2 * np.tanh(v / 0.05) + ripple
+    torque = np.clip(0.05 * np.round(torque / 0.05), -limit, limit)
+    return Record(t, {"position": np.cumsum(v) * 1e-3, "motor_torque": torque}, UNITS)
+
+
+@pytest.mark.parametrize("limit", [1.5, 2.0, 2.5])
+def test_a_limit_is_found_in_a_coarse_torque_that_stands_still_elsewhere_too(limit: float):
+    assert "saturation" not in codes(coarse(9.0))
+    assert f"-{limit:g} and {limit:g} N·m" in codes(coarse(limit))["saturation"]
+
+
+def test_the_rounded_top_of_a_sine_is_no_limit():
+    t, q, _ = motion()
+    torque = 0.0052 * np.round(1.645 * np.sin(2.0 * np.pi * 0.3 * t) / 0.0052)
+    assert "saturation" not in codes(record(torque, q))
+
+
+def test_a_plateau_of_the_velocity_is_no_limit_unless_the_position_outruns_it():
+    t, _, torque = motion()
+    sine = 8.0 * np.sin(2.0 * np.pi * 0.3 * t)
+    v: np.ndarray = np.clip(sine, -4.0, 4.0)
+    units = {**UNITS, "velocity": "rad/s"}
+    for top, said in ((9.0, False), (3.5, True)):
+        channels = {
+            "position": np.cumsum(v) * 1e-3,
+            "velocity": np.clip(v, -top, top),
+            "motor_torque": torque,
+        }
+        assert ("saturation" in codes(Record(t, channels, units))) is said

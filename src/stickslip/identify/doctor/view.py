@@ -93,13 +93,18 @@ class View:
     def mapped(self, channel: str, unit: str) -> str:
         """The option that reads the channel in another unit; "-" turns the sign of the present one."""
         # A torque that was computed from the current has no column of its own.
-        if channel == "motor_torque" and channel not in self.columns and "current" in self.columns:
+        if channel == "motor_torque" and self.from_current:
             channel = "current"
         if unit == "-":
             unit = "-" + (
                 self.columns[channel].unit if channel in self.columns else self.record.units[channel]
             )
         return "--map " + shlex.quote(f"{channel}={self.name(channel)}:{unit}")
+
+    @property
+    def from_current(self) -> bool:
+        """Whether the motor's torque was computed from the current: what one shows the other does, too."""
+        return self.has("motor_torque") and "motor_torque" not in self.columns and "current" in self.columns
 
     @cached_property
     def file_rows(self) -> Any:
