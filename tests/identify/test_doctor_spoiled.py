@@ -68,7 +68,26 @@ def test_a_delay_is_told_with_a_coarse_encoder_too():
         "motor_torque": delayed(fast["torque"], 10),
     }
     found = {f.code: f.message for f in examine(Record(fast["time"], channels, UNITS)).findings}
-    assert re.search(r"shifted by (9|10|11) ms: torque comes after", found["time-skew"])
+    assert re.search(r"shifted by (9|10|11) ms \(±1\): torque comes after", found["time-skew"])
+
+
+@pytest.mark.parametrize("base", ["lugre", "coulomb", "stribeck"])
+@pytest.mark.parametrize("rows", [20, -15])
+def test_a_torque_of_another_clock_is_told_with_its_interval(base, rows):
+    table = made(base)
+    channels = {"position": table["position"], "motor_torque": delayed(table["torque"], rows)}
+    found = {f.code: f.message for f in examine(Record(table["time"], channels, UNITS)).findings}
+    said = re.search(r"shifted by ([\d.]+) ms \(±([\d.]+)\): (torque|motion) comes", found["time-skew"])
+    assert said is not None
+    assert abs(float(said[1]) - abs(rows)) <= float(said[2])
+    assert said[3] == ("torque" if rows > 0 else "motion")
+
+
+def test_reversals_that_friction_rounds_tell_no_delay():
+    """Most of the torque is friction without a sharp edge: logs of that kind whose torque is in time look alike."""
+    table = made("turned")
+    channels = {"position": table["position"], "motor_torque": delayed(table["torque"], 20)}
+    assert "time-skew" not in {f.code for f in examine(Record(table["time"], channels, UNITS)).findings}
 
 
 @pytest.mark.parametrize("counts", [2**16, 4000])

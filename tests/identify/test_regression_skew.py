@@ -11,6 +11,7 @@ import pytest
 from stickslip.identify.axis.agreed import aligned, on_timing
 from stickslip.identify.doctor import examine
 from stickslip.identify.experiment import Experiment
+from stickslip.identify.regression.band_fit import Number
 from stickslip.identify.regression.regression import regress_axis
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
@@ -117,3 +118,18 @@ def test_one_band_fitted_with_two_skews_confirms_nothing(logs: Any) -> None:
     found = regress_axis([experiment(logs.draw(4242, "held", 1000, "p-pi", "production", "clean"))], AXIS)
     assert found.confirmed("inertia")
     assert not replace(found, bands=(found.bands[0], found.bands[0])).confirmed("inertia")
+
+
+def test_a_skew_beside_an_inertia_that_is_not_told_is_not_stated() -> None:
+    """A slow sine: J has the interval [-158 %, +158 %], its skew had one of 0.06 ms that was 0.85 ms off."""
+    t = np.arange(0.0, 12.0, 1e-3)
+    v = 2.0 * np.cos(2.0 * np.pi * 0.25 * t)
+    rng = np.random.default_rng(3)
+    torque = (
+        1e-6 * np.gradient(v, t) + 0.2 * np.tanh(v / 0.01) + 0.02 * v + 2e-3 * rng.standard_normal(t.size)
+    )
+    found = regress_axis(
+        [Experiment("slow", t, 2.0 / (2.0 * np.pi * 0.25) * np.sin(2.0 * np.pi * 0.25 * t), torque)], AXIS
+    )
+    assert not found.shows_inertia
+    assert on_timing(replace(found, numbers=found.numbers | {"skew": Number(0.0, 1e-5)})) == []

@@ -12,7 +12,6 @@ from support.doctor_logs import (
     HEADER,
     Table,
     clip,
-    delayed,
     moving_up,
     n,
     rng,
@@ -149,20 +148,6 @@ SPOILED: list[tuple[str, Callable[[Table], Table], dict[str, str], str, str]] = 
         "error",
     ),
     ("velocity turned", lambda t: with_(t, velocity=-t["velocity"]), HEADER, "velocity-sign", "error"),
-    (
-        "torque late by 20 ms",
-        lambda t: with_(t, torque=delayed(t["torque"], 20)),
-        HEADER,
-        "time-skew",
-        "warning",
-    ),
-    (
-        "torque early by 15 ms",
-        lambda t: with_(t, torque=delayed(t["torque"], -15)),
-        HEADER,
-        "time-skew",
-        "warning",
-    ),
     (
         "gravity",
         lambda t: with_(t, torque=t["torque"] + 0.4 * np.sin(t["position"])),

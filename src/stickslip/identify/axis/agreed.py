@@ -92,7 +92,7 @@ def on_timing(found: Regression | None) -> list[str]:
         return []
     low, high = found.interval("skew")
     half, row = 0.5 * (high - low), found.period
-    if half > KNOWN * row:
+    if half > KNOWN * row or not found.shows_inertia:
         return []
     value = found.numbers["skew"].value
     where = "after" if value < 0.0 else "before"

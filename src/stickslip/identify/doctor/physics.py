@@ -16,6 +16,7 @@ import numpy as np
 
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import Array, Smooth, View
+from stickslip.identify.regression.regression import told_to_two
 
 ROWS = 20_000
 """Rows of a regression: more tell no more."""
@@ -25,17 +26,20 @@ BOTH = 0.05
 """Share of the moving rows in either direction below which friction is not told from a constant torque."""
 STRETCHES, SURE = 12, 3.0
 """Stretches of the jackknife of friction's work, and its standard deviations below zero that make an error."""
-HARM = 5e-6
-"""Of the torque's variance, that a delay must leave unexplained to be told: less spoils nothing."""
+UNEXPLAINED = 0.5
+"""Of the torque, that may be left in certain sliding for a time to be believed."""
+MANY, CLEARLY, HARM = 9, 10.0, 1e-3
+"""Rows from which on a delay that reversals alone show is told, how many times as much none must leave, and part of the
+torque's variance that this must be. Play, wind-up, tuning steps and flexible trains left 3 times as much at most where
+that was worth a word; at 1.25 times they made 9 false delays of 187 logs."""
 WEIGHT, TOLD = 0.3, 0.25
 """Of Coulomb friction, from which on a constant torque is worth a word; and half the interval within which it is told,
 of its value."""
-TENTH, STRANGE, STRANGE_TIME = 0.1, 1.5, 1.5e-3
-"""Rows by which a torque acts beside its row that are worth a word; rows and s from which on no hold explains it."""
+TENTH, HELD, STRANGE, STRANGE_TIME = 0.1, 0.5, 1.5, 1.5e-3
+"""Rows by which a torque acts beside its row that are worth a word; that any hold makes, and to which it must be known
+if it may be one; rows and s from which on no hold explains it."""
 RANK = 1e-10
 """Part of the largest singular value below which a direction is not told."""
-MANY = 10.0
-"""Rows from which on a delay that reversals alone show is told: play, wind-up and stick-slip shift them by fewer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,55 +115,49 @@ def _braking(smooth: Smooth, *, measured: bool) -> tuple[float, float]:
 
 
 def skew(view: View) -> Iterator[Finding]:
-    """When the torque acted: a note from a tenth of a row on, a warning from where no drive does so."""
+    """When the torque acted, as certain sliding tells it: a note, and a warning from where no drive does so."""
     smooth = usable(view)
     if smooth is None or (found := view.sliding) is None:
         return
     low, high = found.interval("skew")
     late, half, row = 0.5 * (low + high), 0.5 * (high - low), found.period
-    stiff = found.numbers["inertia"].value > 0.0 and max(b.relative for b in found.bands) <= 0.5
-    if not (stiff and half <= 0.5 * row):
-        # Sliding alone does not tell it: only a delay of many rows at reversals, which sliding does not contradict.
-        at_reversals = _skew_at_reversals(view, smooth)
-        if at_reversals is None or abs(at_reversals) < MANY * row:
-            return
-        if stiff and half <= row and abs(at_reversals - late) > half:
-            return
-        late, half = at_reversals, 0.0
-    if abs(late) - half > max(STRANGE * row, STRANGE_TIME):
+    # Only what accelerates the axis tells a time; ringing and torque over the position pass for a skew of many rows,
+    # and for an inertia that is known badly.
+    shows = found.shows_inertia and max(b.relative for b in found.bands) <= UNEXPLAINED
+    sure = shows and told_to_two(found.numbers["inertia"]) and found.confirmed("skew")
+    untold = not sure or half > MANY * row
+    if untold and (at_reversals := _skew_at_reversals(smooth)) is not None:
+        late, half, sure = at_reversals, smooth.period, True
+    if not (shows or sure):
+        return
+    told, beyond = f"{abs(late) * 1e3:.3g} ms (±{half * 1e3:.2g})", abs(late) - half
+    if sure and beyond > max(STRANGE * row, STRANGE_TIME):
         words = (
             "torque comes after the motion it causes" if late > 0.0
             else "motion comes later than the torque that causes it"
         )  # fmt: skip
-        known = f" (±{half * 1e3:.2g})" if half > 0.0 else ""
-        message = f"torque and motion fit best when shifted by {abs(late) * 1e3:.3g} ms{known}: {words}"
-        remedy = "identify allows for it where sliding shows it; better log both from one clock, or say --delay SECONDS"
+        message = f"torque and motion fit best when shifted by {told}: {words}"
+        remedy = "log both from one clock; identify allows for it where sliding shows it to half a row"
         yield Finding("warning", "time-skew", message, remedy=remedy)
-    elif half > 0.0 and abs(late) > half and abs(late) >= TENTH * row:
+    elif (half <= HELD * row and beyond > 0.0 and abs(late) >= TENTH * row) or (sure and beyond > HELD * row):
         where = "after" if late < 0.0 else "before"
-        message = (
-            f"the torque acted {abs(late) * 1e3:.3g} ms (±{half * 1e3:.2g}) {where} its row on average, "
-            f"{abs(late) / row:.2g} of a row"
-        )
-        yield Finding("note", "torque-timing", message, remedy="identify allows for it")
+        message = f"the torque acted {told} {where} its row on average, {abs(late) / row:.2g} of a row"
+        remedy = "identify allows for it" if half <= HELD * row else "log both from one clock"
+        yield Finding("note", "torque-timing", message, remedy=remedy)
 
 
-def _skew_at_reversals(view: View, smooth: Smooth) -> float | None:
-    """The delay at which reversals of torque and motion fit best, s, where that leaves clearly less; None otherwise.
+def _skew_at_reversals(smooth: Smooth) -> float | None:
+    """The delay of many rows at which reversals of torque and motion fit, s, where nothing else fits by far; else None.
 
-    Play, wind-up and a feedforward shift reversals too: it is asked only where sliding does not tell.
+    Play, wind-up, ringing and a feedforward shift reversals too: it is asked only where sliding does not tell.
     """
     reach = int(min(max(0.03 / smooth.period, 10), 60, smooth.velocity.size // 8))
     rests = _rests(smooth, range(-reach, reach + 1))
     best = int(np.argmin(rests))
-    shift = best - reach
-    known = abs(shift) >= 2 and abs(shift) * smooth.period >= _edge(smooth, view.step)
-    spoils = rests[reach] >= 1.25 * rests[best] and rests[reach] - rests[best] >= HARM * float(
-        np.var(smooth.torque)
-    )
-    if not (known and spoils) or best in (0, 2 * reach) or _fit(smooth, shift).explained < 0.8:
+    least = max(CLEARLY * float(rests[best]), HARM * float(np.var(smooth.torque)))
+    if abs(best - reach) < MANY or best in (0, 2 * reach) or rests[reach] < least:
         return None
-    return shift * smooth.period
+    return (best - reach) * smooth.period
 
 
 def gravity(view: View) -> Iterator[Finding]:
@@ -279,10 +277,3 @@ def _matrix(smooth: Smooth, rows: Any, *, measured: bool) -> Array:
     v = smooth.velocity[rows]
     inertia = np.zeros_like(v) if measured else smooth.acceleration[rows]
     return np.stack([inertia, np.sign(v), v, np.ones_like(v)], axis=1)
-
-
-def _edge(smooth: Smooth, step: float) -> float:
-    """The time within which the axis turns round inside one step of its encoder, s: no edge is known better."""
-    slow = smooth.moving & (np.abs(smooth.velocity) < 0.5 * smooth.fast)
-    turning = float(np.sqrt(np.mean(smooth.acceleration[slow] ** 2))) if np.any(slow) else 0.0
-    return math.sqrt(step / turning) if turning > 0.0 else 0.0

@@ -214,6 +214,11 @@ class Regression:
         return low > 0.0 or high < 0.0
 
     @property
+    def shows_inertia(self) -> bool:
+        """Whether the torque shows that something accelerates: nothing else tells when it acted."""
+        return self.interval("inertia")[0] > 0.0
+
+    @property
     def level_doubt(self) -> str:
         """Why the level that friction falls to with velocity is not told; empty where it is.
 
