@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -109,3 +111,11 @@ def test_a_temperature_that_rises():
     found = [f.line() for f in examine(hot).findings if f.code == "temperature-change"]
     assert "from 25.75 to 39.25 °C" in found[0]
     assert not [f for f in examine(r).findings if f.code == "temperature-change"]
+
+
+@pytest.mark.parametrize(("seed", "column"), [(11206, "mean"), (11086, "commanded"), (11146, "actual")])
+def test_creeping_after_fast_steps_is_no_other_inertia(logs: Any, seed: int, column: str) -> None:
+    """Where hardly anything accelerates, the cogging that is left passes for an inertia 2 to 6 times as large."""
+    log = logs.draw(seed, column, 500, "feedforward", "staircase", "cogging")
+    channels = {"position": log.position, "motor_torque": log.torque}
+    assert said(Record(log.time, channels, {"position": "rad", "motor_torque": "N·m"})) == ""
