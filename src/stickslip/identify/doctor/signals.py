@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor.spikes import sticking_out
+from stickslip.identify.doctor.spikes import LATE, sticking_out
 from stickslip.identify.doctor.view import Array, Mask, View, is_number, row
 from stickslip.readers.cut import RANGE, jumps
 from stickslip.record import encoder_step
@@ -26,6 +26,8 @@ NEAR, AT_ONCE, ELSEWHERE = 0.05, 3.0, 0.2
 """Of the range: values beside an extreme; steps of a rounded column, from more than which a limit is reached at once;
 share of the rows that stand still elsewhere, from which on an extreme must stand out from all of its size. Of 187 + 240
 logs those at their limit in 0.35 % of the rows are found, but two of which six rows show it, and no other."""
+LEAPS = 99.0
+"""Percentile of the changes of torque that a leap exceeds."""
 WORTH_A_WORD = 1e-4
 """Part of the fast speed below which that speed is of no interest: the step is the file's rounding, no encoder's."""
 
@@ -189,11 +191,16 @@ def wrapped(view: View) -> Iterator[Finding]:
     at, sizes = jumps(values)
     if not at.size:
         return
-    index = int(rows[at[0] + 1])
     size = float(np.median(sizes))
     unit = view.record.units["position"]
     turn = next((t for t in (2.0 * math.pi, 360.0, 1.0, math.pi) if abs(size / t - 1.0) < 0.05), None)
-    if turn is not None or size > RANGE * float(np.ptp(values)):
+    wraps = turn is not None or size > RANGE * float(np.ptp(values))
+    if not wraps:
+        at = at[~_driven(view, values, at, spiky)]
+        if not at.size:
+            return
+    index = int(rows[at[0] + 1])
+    if wraps:
         yield Finding(
             "error",
             "position-wrap",
@@ -209,3 +216,15 @@ def wrapped(view: View) -> Iterator[Finding]:
             row(index, view),
             f"leave these rows out, such as --leave-out {view.file_rows[index]}, or check the encoder",
         )
+
+
+def _driven(view: View, position: Array, at: Any, spiky: Any) -> Any:
+    """Of jumps of a position without spikes, whether a torque that leaps to the same side drives them: a step of the
+    reference; a controller answers an encoder's jump to the other side."""
+    if view.torque_channel != "motor_torque":
+        return np.zeros(at.size, dtype=bool)
+    leaps: Array = np.diff(np.delete(view.values("motor_torque"), spiky))
+    leaps[np.abs(leaps) <= np.percentile(np.abs(leaps), LEAPS)] = 0.0
+    near = leaps[np.clip(at[:, None] + np.arange(-LATE, LATE + 1), 0, leaps.size - 1)]
+    first = near[np.arange(at.size), np.argmax(near != 0.0, axis=1)]
+    return first * (position[at + 1] - position[at]) > 0.0

@@ -31,19 +31,25 @@ FEW = 0.05
 """Share of the rows up to which they are spikes; more are noise."""
 BACK = 0.25
 """Of what a spike sticks out, by which the signal may have changed across it."""
-ROWS = 3
-"""Over which a velocity is taken, before and after a spike."""
+ABRUPT = 0.3
+"""Of what a spike sticks out, by which it leaps from row to row at least; over how far its neighbours lie apart."""
+ROWS, LATE = 3, 3
+"""Over which a velocity is taken, before and after a spike; by which a torque's column may lie off."""
 SEEN, SHARE = 90.0, 0.3
 """Percentile of the changes of velocity that one must exceed to be seen, and the share of the torque that it explains,
 at least. Of 251 simulated logs of servo axes 50 had false spikes without these and `BACK`, and 2 with them;
 of five spikes put into each of them, five times as high as the signal, 99.6 and 99.0 % were found."""
+SEVERAL, MOST = 8, 0.67
+"""Of that which sticks out, and the part of them that is seen, from which on those drive the axis that move it alike,
+to `SHARE`: answers to steps of a reference, where play or a delay hides the inertia. With these and `ABRUPT` 17 of 419
+logs have 87 false spikes in the torque (30 had 650), and 98.9 % of 2140 put in are found (99.2)."""
 NAMED = 4
 
 
 def spikes(view: View) -> Iterator[Finding]:
     """Rows that stick out of a signal."""
     for channel in CHANNELS:
-        if not view.has(channel):
+        if not view.has(channel) or (channel == "current" and view.from_current):
             continue
         index = np.flatnonzero(view.usable)[_spikes_of(view, channel)]
         if not index.size:
@@ -73,18 +79,40 @@ def _spikes_of(view: View, channel: str) -> Any:
     """Usable rows of a channel's spikes: what sticks out, comes back to where it was and does not move the axis."""
     values = view.values(channel)
     rows = sticking_out(values, position=channel == "position")
-    if not rows.size or channel == "position":
+    if not rows.size:
         return rows
     runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
     first, last = np.array([r[0] for r in runs]), np.array([r[-1] for r in runs])
-    before, after = values[np.maximum(first - 1, 0)], values[np.minimum(last + 1, values.size - 1)]
-    level = 0.5 * (before + after)
+    before, after = np.maximum(first - 1, 0), np.minimum(last + 1, values.size - 1)
+    level = 0.5 * (values[before] + values[after])
     out = np.array([values[r][np.argmax(np.abs(values[r] - at))] for r, at in zip(runs, level, strict=True)])
-    spike = np.abs(after - before) <= BACK * np.abs(out - level)
+    size = np.abs(out - level)
+    spike = np.abs(values[after] - values[before]) <= BACK * size
+    # What has mass comes and goes over several rows, and a peak of what rings is among others.
+    leaps = np.abs(np.stack([values[first] - values[before], values[last] - values[after]]))
+    spike &= np.min(leaps, axis=0) >= ABRUPT * size
+    spike &= _beside(values, first, last) <= size / ABRUPT
+    if channel == "velocity" and view.has("position"):
+        spike &= ~_travelled(view, first, last, out - level)
     if channel in DRIVING:
         spike &= ~_moving(view, values, first, last, np.sign(out - level))
     kept = [run for run, keep in zip(runs, spike, strict=True) if keep]
     return np.concatenate(kept) if kept else rows[:0]
+
+
+def _beside(values: Array, first: Any, last: Any) -> Array:
+    """How far apart the rows beside each run are, `ROWS` on either side."""
+    away = np.arange(1, ROWS + 1)
+    rows = np.concatenate((first[:, None] - away, last[:, None] + away), axis=1)
+    return np.asarray(np.ptp(values[np.clip(rows, 0, values.size - 1)], axis=1))
+
+
+def _travelled(view: View, first: Any, last: Any, size: Array) -> Any:
+    """Of runs of rows of the velocity, whether the position moves as much faster there; mask."""
+    rate = np.diff(view.values("position")) / np.diff(view.time)
+    there = np.stack([rate[np.clip(k, 0, rate.size - 1)] for k in (first - 1, first, last - 1, last)])
+    ends = np.stack([rate[np.clip(k, 0, rate.size - 1)] for k in (first - 2, last + 1)])
+    return np.max((there - np.mean(ends, axis=0)) * np.sign(size), axis=0) >= SHARE * np.abs(size)
 
 
 def _moving(view: View, torque: Array, first: Any, last: Any, sign: Array) -> Any:
@@ -102,13 +130,21 @@ def _moving(view: View, torque: Array, first: Any, last: Any, sign: Array) -> An
     strong = np.abs(usual) >= max(float(np.percentile(np.abs(usual), 95)), 1e-300)
     # The inertia in units of rows, from the rows that accelerate most.
     inertia = float(np.median(_kick(driven, every, every)[strong] / usual[strong])) if np.any(strong) else 0.0
-    kick = _kick(position, first, last)
-    seen = (kick * sign > 0.0) & (np.abs(kick) > float(np.percentile(np.abs(usual), SEEN)))
-    return seen & (inertia * np.abs(kick) >= SHARE * np.abs(_kick(driven, first, last)))
+    usually = float(np.percentile(np.abs(usual), SEEN))
+    given = np.abs(_kick(driven, first, last))
+    # A column may lie rows beside the torque that acted.
+    shifts = range(-LATE, LATE + 1)
+    late: Array = np.stack([_kick(position, first + k, last + k, sign) for k in shifts]).max(axis=0)
+    kick, seen = _kick(position, first, last) * sign, late > usually
+    if seen.size >= SEVERAL and float(np.mean(seen)) >= MOST:
+        # They tell the inertia that they move themselves.
+        return seen & (late / given >= SHARE * float(np.median(late[seen] / given[seen])))
+    return (kick > usually) & (inertia * kick >= SHARE * given)
 
 
-def _kick(position: Array, first: Any, last: Any) -> Array:
-    """By how much the velocity changes across runs of rows, beyond what it changes beside them; per row."""
+def _kick(position: Array, first: Any, last: Any, sign: Any = 0.0) -> Array:
+    """By how much the velocity changes across runs of rows, beyond what it changes beside them, per row; with a sign
+    to that side, and no more than it changes at all: beside a kick there is none to the other side."""
 
     def way(begin: Any) -> Array:
         ends: Array = np.clip(np.stack([begin, begin + ROWS]), 0, position.size - 1)
@@ -116,7 +152,8 @@ def _kick(position: Array, first: Any, last: Any) -> Array:
 
     before, after = way(first - 1 - ROWS), way(last + 1)
     earlier, later = way(first - 1 - 2 * ROWS), way(last + 1 + ROWS)
-    return after - before - 0.5 * (later - after + before - earlier)
+    kick = after - before - 0.5 * (later - after + before - earlier)
+    return kick if np.ndim(sign) == 0 else np.minimum(kick * sign, (after - before) * sign)
 
 
 def sticking_out(values: Array, *, position: bool) -> Any:
