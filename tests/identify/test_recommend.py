@@ -260,6 +260,14 @@ def test_friction_of_its_own_for_each_direction_is_compensated_by_every_law_trie
     )
 
 
+def test_a_limit_below_the_friction_of_a_linear_axis_names_the_conversion() -> None:
+    found = replace(identified(0.03), motion="linear")
+    with pytest.raises(
+        InputError, match=r"in kg and N: 1 N·m of a motor at a lead of P metres is 2 pi / P N"
+    ):
+        recommend(found, Drive(20.0, amplitude=0.1, torque_limit=0.01))
+
+
 @pytest.mark.parametrize("greater", ["fc", "fc_negative"])
 def test_a_torque_limit_that_moves_the_axis_in_one_direction_only_is_refused(greater: str) -> None:
     each = {"fc": 0.2, "fc_negative": 0.2, greater: 0.4}

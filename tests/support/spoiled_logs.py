@@ -249,6 +249,6 @@ SPOILED: list[tuple[str, Callable[[Table], Table], dict[str, str], str, str]] = 
         lambda t: with_(t, position=t["position"] / 20, velocity=t["velocity"] / 20),
         HEADER,
         "less-than-a-revolution",
-        "warning",
+        "note",
     ),
 ]

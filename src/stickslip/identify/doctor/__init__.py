@@ -42,6 +42,19 @@ CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
 )  # fmt: skip
 
 
+CONSEQUENCES = {
+    "position-wrap": (
+        "torque-sign", "velocity-sign", "velocity-mismatch", "time-skew", "torque-timing", "gravity", "offset",
+        "change", "backlash", "less-than-a-revolution", "no-reversal",
+    ),
+    "duplicate-time": (
+        "torque-sign", "velocity-mismatch", "velocity-unit", "time-skew", "torque-timing", "change", "backlash",
+        "irregular-sampling", "gap", "spikes", "position-jump",
+    ),
+}  # fmt: skip
+"""By an error, what comes of it: nobody knows of these before it is repaired, and their own remedies are wrong."""
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What the doctor says of a record.
@@ -143,9 +156,9 @@ def examine(
                 "change",
             )
             findings = [f for f in findings if f.code not in vain]
-    if any(f.code == "position-wrap" for f in findings):
-        # How far an axis turns is not known before its position is counted on.
-        findings = [f for f in findings if f.code != "less-than-a-revolution"]
+    causes = {f.code for f in findings if f.level == "error" and f.code not in accept}
+    follow = {code for cause in causes for code in CONSEQUENCES.get(cause, ())}
+    findings = [f for f in findings if f.code not in follow]
     findings = [
         replace(f, level="warning") if f.level == "error" and f.code in accept and f.code not in FINAL else f
         for f in findings

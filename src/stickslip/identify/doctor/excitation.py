@@ -105,11 +105,11 @@ def reversed_and_slow(view: View, stribeck_velocity: float | None = None) -> Ite
     travel = float(np.ptp(smooth.position))
     if view.has("position") and view.record.units["position"] == "rad" and travel < 2.0 * math.pi:
         message = (
-            f"the axis turns by {travel:.3g} rad, less than a revolution: what depends on the angle does not"
-            " average out"
+            f"the axis turns by {travel:.3g} rad, less than a revolution: what depends on the angle (cogging, gravity) "
+            "does not average out"
         )
         yield Finding(
-            "warning", "less-than-a-revolution", message, remedy="turn at least once where the machine can"
+            "note", "less-than-a-revolution", message, remedy="turn at least once where the machine can"
         )
     speed = np.abs(smooth.velocity)
     low, high = (0.005 * smooth.fast, 0.1 * smooth.fast)

@@ -14,6 +14,10 @@ MOST_STEPS = 1e10
 """Of all simulations together; more would take half a day."""
 STEPS_PER_HOUR = 1e9
 """Of a law with memory on one core, about."""
+AT_THE_LOAD = (
+    "; this model, --loop and the limit are in kg and N: 1 N·m of a motor at a lead of P metres is 2 pi / P N"
+)
+"""Of a torque limit that is too low for a linear axis: it may be the motor's own, in N·m."""
 LOST = 2.0
 """RMS error of the linear controller alone, in parts of the motion's RMS, from which on it does not hold the axis: one
 that friction keeps from moving at all has 1."""
@@ -27,16 +31,17 @@ def refuse_weak(found: Identified, drive: Drive) -> None:
     InputError
     """
     limit, torque = drive.torque_limit, found.unit("N·m")
+    converted = AT_THE_LOAD if torque == "N" else ""
     if limit <= (held := breakaway(found.model)):
         raise InputError(
             f"torque limit {limit:g} {torque}: the drive cannot move the axis, whose friction is {held:.3g} {torque}; "
-            "give a --torque-limit above it"
+            f"give a --torque-limit above it{converted}"
         )
     if limit <= (friction := resistance(found.model, drive)):
         raise InputError(
             f"torque limit {limit:g} {torque}: the drive cannot follow this motion, along which friction reaches "
             f"{friction:.3g} {torque}; give a --torque-limit above it, or a slower motion: another --motion, or a "
-            "smaller --amplitude or --frequency"
+            f"smaller --amplitude or --frequency{converted}"
         )
 
 
