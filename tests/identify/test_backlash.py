@@ -59,6 +59,21 @@ def test_a_gap_is_found_on_a_sine_and_measured(logs):
     assert all(0.9 < ratio < 1.3 for ratio in found.values()), found
 
 
+@pytest.mark.parametrize("rate", [2500, 5000])
+def test_a_gap_is_found_in_a_fast_log_as_in_one_of_1_khz(logs, rate):
+    """Teeth meet in a millisecond, which is no two rows there: 1 and 0 of 8 were found."""
+    held = 0
+    for seed in range(100, 108):
+        log = logs.draw(seed, "held", rate, "p-pi", "sine", "backlash")
+        channels = {"position": log.position, "motor_torque": log.torque}
+        if (found := dead_travel(View(Record(log.time, channels, UNITS)))) is not None:
+            assert found.lower <= log.machine.axis[4] <= found.upper
+            held += 1
+        for imperfection in ("clean", "flexible"):
+            assert of(logs.draw(seed, "held", rate, "p-pi", "sine", imperfection)) == []
+    assert held >= 5
+
+
 @pytest.mark.parametrize("imperfection", ["clean", "flexible", "cogging", "asymmetry"])
 def test_without_a_gap_none_is_found(logs, imperfection):
     for seed in range(100, 108):
