@@ -247,10 +247,18 @@ def _blocks(parts: Array, torque: Array, count: int) -> Blocks:
         scores = x * (y - x @ values[k])[:, None]
         covariance = inverse @ long_run(scores, max(10, piece.size // 10)) @ inverse
         variances[k] = np.maximum(np.diag(covariance), 1e-10)
-        rest = y - x @ values[k]
-        left[k] = np.sqrt(float(rest @ rest) * np.diag(inverse))
+        left[k] = np.linalg.norm(y - x @ values[k]) / np.maximum(_by_itself(x), 1e-300)
     told = (left <= UNTOLD) & (left <= WORSE * np.percentile(left, 25.0, axis=0))
     return Blocks(values, variances, told, np.array([p[0] for p in pieces]))
+
+
+def _by_itself(x: Array) -> Array:
+    """Size of what of each column the others do not make: nothing of friction and load where a block moves one way."""
+    each = [
+        x[:, k] - x[:, others] @ _least(x[:, others], x[:, k])
+        for k, others in enumerate(([1, 2], [0, 2], [0, 1]))
+    ]
+    return np.array([float(np.linalg.norm(own)) for own in each])
 
 
 def _change(blocks: Blocks, part: int, weight: float) -> Change | None:
