@@ -56,7 +56,10 @@ def response(b, a, f):
 @settings(max_examples=150)
 def test_the_count_is_half_the_unstable_poles(load, mode, damping, delay, held, bandwidth):
     b, a = plant(load, mode, damping, delay, held)
-    sizes = np.abs(unstable_poles(b, a, bandwidth))
+    poles = unstable_poles(b, a, bandwidth)
+    sizes = np.abs(poles)
+    if np.any((poles.real < -1.0) & (poles.imag == 0.0)):
+        return  # one alone: it oscillates at half the sample rate, where a response has ended
     if np.any(np.abs(sizes - 1.0) < 2e-4) or np.any(np.abs(sizes[sizes > 1.0] - 1.0) < 2e-4):
         return  # on the edge the grid of frequencies decides
     count = encirclements(response(b, a, np.arange(0.25, 499.9, 0.25)), 1e-3, bandwidth)

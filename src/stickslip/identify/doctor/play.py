@@ -131,7 +131,7 @@ def dead_travel(view: View) -> DeadTravel | None:
 
 def _at_rate(view: View) -> View:
     """The record with every so many of its rows that one lasts `ROW` at least."""
-    every = round(ROW / view.period) if view.period > 0.0 else 1
+    every = round(min(ROW / view.period, view.time.size)) if view.period > 0.0 else 1
     if every < 2:
         return view
     channels = {name: view.values(name)[::every] for name in ("position", "motor_torque")}

@@ -37,7 +37,8 @@ class Count:
     Attributes
     ----------
     turns : int
-        Clockwise, over positive frequencies; half the unstable poles of the closed loop.
+        Clockwise, over positive frequencies; half the unstable poles of the closed loop. One alone on the negative real
+        axis is not among them: it oscillates at half the sample rate, above every frequency of a response.
     frequency : float
         Of the crossing that encircles, Hz; not a number where none does.
     unseen : tuple of float
