@@ -13,19 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.identify.regression.band_system import least_squares
-from stickslip.identify.regression.sliding_rows import SlidingRows
+from stickslip.identify.regression.sliding_rows import DIRECTION, FEWEST, SlidingRows
 from stickslip.identify.regression.strokes import stacked
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 CREEPING = (0.0, 0.01, 0.03, 0.1)
 """Of the highest speed: between these friction is looked at; the axis moves above the last."""
-FEWEST, SHARE = 30, 0.01
-"""Rows that must move, and the share of all that must creep with too little friction."""
+SHARE = 0.01
+"""Of all rows, that must creep with too little friction."""
 MISSING = 0.15
 """Part of the level that must be missing in more than half of such rows. Of 1,900 ordinary logs it was in no log
 without play (`benchmarks/ordinary_logs.py`)."""
-DIRECTION = 2  # its column
 
 
 class Creep(NamedTuple):
