@@ -23,9 +23,9 @@ CREEPING = (0.0, 0.01, 0.03, 0.1)
 SHARE = 0.01
 """Of all rows, that must creep with too little friction."""
 MISSING = 0.15
-"""Part of the level that must be missing in more than half of such rows. Of ordinary logs it was in 18 of 411 with play,
-in 53 of about 430 tuning steps without it, whose faster rows accelerate and tell the level badly, and in 5 of 1,260 others
-(1070000, 1120000, and 1080000 with exponent 1)."""
+"""Part of the level that must be missing in more than half of such rows. Of ordinary logs it was in 18 of 411 with
+play, in 53 of about 430 tuning steps without it, whose faster rows accelerate and tell the level badly, and in 5 of
+1,260 others (1070000, 1120000, and 1080000 with exponent 1)."""
 
 
 class Creep(NamedTuple):
