@@ -61,6 +61,12 @@ def test_a_level_that_windows_which_stay_rough_hardly_tell_is_not_identified(log
     assert UNSURE_THERE[:15] in unsure.level_doubt
 
 
+def test_the_few_fast_rows_of_tuning_steps_do_not_say_that_the_slow_ones_creep(logs: Any) -> None:
+    """They accelerate, and say 26 % too much; friction seemed to be missing where the axis was slow."""
+    _, found = drawn(logs, (1070035, "held", 1000, "pid", "steps", "clean"))
+    assert found.creep is NOWHERE
+
+
 def test_rough_windows_of_which_one_width_alone_tells_the_level_are_not_taken(logs: Any) -> None:
     """Its level was 5 % too low, known to 4, and a motor's with cogging was lost on a quarter of its record."""
     _, found = drawn(logs, (415462, "actual", 500, "feedforward", "production", "backlash"))

@@ -53,9 +53,9 @@ GIVEN = 0.05
 """Rows to which a skew that is given is known."""
 LEVEL, EXCLUDED = 0.05, 0.05
 """Half-width, in parts of Fc, up to which it is told in any case; probability of a fall up to which none is there."""
-SLOPED, WIDELY = 0.1, 0.2
-"""Part of Fc to which viscous friction must be known at the highest speed, where no fall shows; and of that speed below
-which the slowest rows lie where one may hide."""
+SLOPED, WIDELY, FEW = 0.1, 0.2, 0.2
+"""Part of Fc to which viscous friction must be known at the highest speed, where no fall shows; of that speed below
+which the slowest rows lie where one may hide; and of the rows that must be faster for the level to be theirs."""
 FORM = 0.012
 """Part of Fc, one standard deviation, that its level is unsure by where the slope beside it is not told: of 103 levels
 on tuning steps 89 % held without it."""
@@ -234,7 +234,8 @@ class Regression:
             return ""
         sloped = QUANTILE * self.numbers["sigma2"].std * self.fastest > SLOPED * abs(level.value)
         hidden = self.falls < FALLS and self.fall_may_hide
-        untold = (hidden and (sloped or share > LEVEL)) or (share > LEVEL and self.falls > EXCLUDED)
+        slow = float(np.mean(np.abs(stacked(self.rows, "speed")) > WIDELY * self.fastest)) < FEW
+        untold = (hidden and (sloped or slow or share > LEVEL)) or (share > LEVEL and self.falls > EXCLUDED)
         return LEVEL_UNTOLD if untold else ""
 
     @property
