@@ -41,7 +41,7 @@ LONGEST = (
     "control/test_special_results", "contract/test_declarations", "identify/test_presliding",
     "identify/test_sliding", "export/test_c99", "rigs/test_ds402", "export/test_modelica",
     "identify/test_doctor_spoiled", "study/test_stability_map", "web/test_workbench",
-    "identify/test_recommend_beside", "rigs/test_faults", "contract/test_control_laws", "sweep/test_sweep",
+    "recommend/test_recommend_beside", "rigs/test_faults", "contract/test_control_laws", "sweep/test_sweep",
     "identify/test_doctor_change", "web/test_sent", "contract/test_laws", "cli/test_results",
     "export/test_composed", "report/test_thesis_report", "cli/test_identify", "control/test_control_loops",
     "identify/test_exponent", "identify/test_prediction_error", "test_compiled_code", "simulation/test_lanes",

@@ -68,7 +68,6 @@ _HOME = {
         "verbs.identification": "IdentificationResult",
         "verbs.learn": "LearningResult learn",
         "verbs.reading": "read",
-        "verbs.recommend": "recommend",
         "verbs.recommendation": "RecommendationResult",
         "verbs.sweep": "SweepResult",
         "verbs.tune": "tune",
@@ -125,7 +124,7 @@ __all__ = [
 ]
 
 
-_ROOMS = {"export": "verbs.export", "identify": "verbs.identify", "sweep": "verbs.sweep"}
+_ROOMS = {name: f"verbs.{name}" for name in ("export", "identify", "recommend", "sweep")}
 """Functions with the name of a package that holds more (docs/decisions/0023)."""
 
 

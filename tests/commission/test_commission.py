@@ -24,8 +24,6 @@ from stickslip.identify.compare.change import compare_models
 from stickslip.identify.estimate import Identification
 from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
-from stickslip.identify.setting.axes import plants_of
-from stickslip.identify.setting.notes import notes_on
 from stickslip.identify.sliding.segments import constant_velocity_segments
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.contact import Contact
@@ -34,6 +32,8 @@ from stickslip.machines.files import machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
+from stickslip.recommend.axes import plants_of
+from stickslip.recommend.notes import notes_on
 from stickslip.report.identified import Source, write_identification
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.narrower_limits import limited

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.identify.setting.candidate_run import UNLIMITED, follow
-from stickslip.identify.setting.plant import laid_out
 from stickslip.machines.contact import Bearings, Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
+from stickslip.recommend.candidate_run import UNLIMITED, follow
+from stickslip.recommend.plant import laid_out
 from stickslip.rigs.loop_sample import COLUMNS, control_of
 from stickslip.rigs.rig import setpoints
 from stickslip.simulation.machine.layout import look

@@ -220,7 +220,7 @@ def test_a_recommendation_is_that_of_the_command_line_and_runs_in_a_simulation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     for name, few in (("GAINS", (0.9,)), ("LEADS", (0.5,)), ("BEYOND", (1.5,))):
-        monkeypatch.setattr(f"stickslip.identify.setting.recommend.{name}", few)
+        monkeypatch.setattr(f"stickslip.recommend.recommend.{name}", few)
     out, options = (
         tmp_path / "recommended.toml",
         {"bandwidth": 20.0, "counts_per_rev": 65536.0, "axes": 1, "confirm": 2},

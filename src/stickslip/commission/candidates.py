@@ -1,6 +1,6 @@
 """Candidates for what to switch on, simulated on the machine as it was identified.
 
-`stickslip.identify.setting.recommend`, which needs a model only, has a rigid axis: a feedback that it finds safe may
+`stickslip.recommend.recommend`, which needs a model only, has a rigid axis: a feedback that it finds safe may
 ring on this one. Here are two inertias on a spring, the friction found with its ripple, the delay and the encoder's
 resolution, run by the procedure that then runs on the machine itself. Friction is not known to better than a few
 percent, so that a candidate must be calm, and is judged, with less and with more than was found.
@@ -24,13 +24,13 @@ from stickslip.control.linear import place
 from stickslip.errors import LimitCrossed
 from stickslip.identify.response.drivetrain import FittedDrivetrain
 from stickslip.identify.response.nyquist import Fastest
-from stickslip.identify.setting.recommend import laws_of
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.contact import Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
+from stickslip.recommend.recommend import laws_of
 from stickslip.record import Record, encoder_step
 from stickslip.rigs.procedures.base import Plan, perform
 from stickslip.rigs.procedures.moves import ROOM

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 
 from stickslip.control.learned import told
-from stickslip.identify.setting.recommend import WORTH, Candidate, Recommendation
 from stickslip.model import Model
+from stickslip.recommend.recommend import WORTH, Candidate, Recommendation
 
 
 def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str]:

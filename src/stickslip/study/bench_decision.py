@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from stickslip.control.catalogue import CATALOGUE, INERTIA, LEVELS, NOTHING
-from stickslip.identify.setting.swings import between_counts
+from stickslip.recommend.swings import between_counts
 from stickslip.study.bench import BenchRun
 
 KNOWLEDGE = ("nothing", "its inertia", "levels of friction", "a friction law")

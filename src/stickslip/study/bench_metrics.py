@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.setting.swings import back_and_forth
+from stickslip.recommend.swings import back_and_forth
 from stickslip.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

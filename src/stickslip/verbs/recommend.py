@@ -17,11 +17,11 @@ from stickslip.control.files import read_controller
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.motion import Motion, motion_of
-from stickslip.identify.setting import recommend as setting
-from stickslip.identify.setting.candidate_run import Drive
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
 from stickslip.readers.reading import read
+from stickslip.recommend import recommend as setting
+from stickslip.recommend.candidate_run import Drive
 from stickslip.verbs.compare import IdentifiedModel, identified_of
 from stickslip.verbs.reading import Log, open_log
 from stickslip.verbs.recommendation import RecommendationResult

@@ -12,9 +12,9 @@ from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.setting.file import setting_table, write_setting
-from stickslip.identify.setting.recommend import Candidate, Recommendation
 from stickslip.model import Model
+from stickslip.recommend.file import setting_table, write_setting
+from stickslip.recommend.recommend import Candidate, Recommendation
 from stickslip.report.recommendation_text import recommendation_lines, reduction, safety
 from stickslip.study.files import prepared_folder
 
@@ -25,7 +25,7 @@ class RecommendationResult:
 
     Attributes
     ----------
-    recommendation : stickslip.identify.setting.recommendation.Recommendation
+    recommendation : stickslip.recommend.recommendation.Recommendation
     identified : stickslip.identify.identified_file.Identified
         What it was made for.
     """

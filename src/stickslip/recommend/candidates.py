@@ -15,9 +15,9 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.identify.fit.parallel import in_turn
 from stickslip.identify.monte_carlo import sliding_torque
-from stickslip.identify.setting.candidate_run import Drive, Trial, dangers, rings, run
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
+from stickslip.recommend.candidate_run import Drive, Trial, dangers, rings, run
 
 FOLLOWS, LIVELY = 3.0, 5.0
 """An axis that the drive's own loop does not hold is not the user's: times the best estimate's error, and swings per

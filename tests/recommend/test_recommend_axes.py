@@ -14,13 +14,13 @@ from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.setting import recommend as recommending
-from stickslip.identify.setting.axes import MOST_STATIC, plants_of
-from stickslip.identify.setting.candidate_run import Plant, run
-from stickslip.identify.setting.candidates import Bench, Candidate, Setting, lost
-from stickslip.identify.setting.notes import notes_on
-from stickslip.identify.setting.recommend import Drive, recommend
 from stickslip.model import Model
+from stickslip.recommend import recommend as recommending
+from stickslip.recommend.axes import MOST_STATIC, plants_of
+from stickslip.recommend.candidate_run import Plant, run
+from stickslip.recommend.candidates import Bench, Candidate, Setting, lost
+from stickslip.recommend.notes import notes_on
+from stickslip.recommend.recommend import Drive, recommend
 
 INERTIA = 4e-4
 LEVEL = {"fc": 0.285, "sigma2": 0.018}

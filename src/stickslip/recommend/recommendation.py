@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from stickslip.identify.setting.beside import Beside
-from stickslip.identify.setting.candidate_run import Drive
-from stickslip.identify.setting.candidates import NEAR, Candidate
-from stickslip.identify.setting.notes import ALLOWANCE, BETTER
 from stickslip.model import Model
+from stickslip.recommend.beside import Beside
+from stickslip.recommend.candidate_run import Drive
+from stickslip.recommend.candidates import NEAR, Candidate
+from stickslip.recommend.notes import ALLOWANCE, BETTER
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 from stickslip.control.linear import Cascade
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.setting.candidate_run import Drive, Trial
-from stickslip.identify.setting.candidates import Bench, Candidate, resistance
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
+from stickslip.recommend.candidate_run import Drive, Trial
+from stickslip.recommend.candidates import Bench, Candidate, resistance
 
 MOSTLY = 0.8
 """Part of the error from which on a lag is most of it."""

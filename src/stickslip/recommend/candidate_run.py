@@ -16,11 +16,11 @@ from stickslip.control.learned import after
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import ParameterError
 from stickslip.identify.motion import HOLD, Motion, sinusoid
-from stickslip.identify.setting.plant import Plant, laid_out
-from stickslip.identify.setting.swings import above, repeats, reversals, turns
 from stickslip.jit import kernel
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
+from stickslip.recommend.plant import Plant, laid_out
+from stickslip.recommend.swings import above, repeats, reversals, turns
 from stickslip.rigs.loop_sample import COLUMNS, Control, control_of, decide, finished
 from stickslip.rigs.rig import Limits, setpoints
 from stickslip.simulation.machine.layout import look, stand_at

@@ -17,16 +17,16 @@ from stickslip.control.catalogue import CATALOGUE, compensated
 from stickslip.control.files import read_controller
 from stickslip.errors import ParameterError, UnknownName
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.setting import beside
-from stickslip.identify.setting import recommend as recommending
-from stickslip.identify.setting.beside import belief_of, tried_beside
-from stickslip.identify.setting.file import write_setting
-from stickslip.identify.setting.recommend import Drive, recommend
-from stickslip.identify.setting.swings import between_counts
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
 from stickslip.model import Model, Reference
+from stickslip.recommend import beside
+from stickslip.recommend import recommend as recommending
+from stickslip.recommend.beside import belief_of, tried_beside
+from stickslip.recommend.file import write_setting
+from stickslip.recommend.recommend import Drive, recommend
+from stickslip.recommend.swings import between_counts
 from stickslip.report.recommendation_text import beside_lines
 from stickslip.simulation.closed_loop import simulate
 from stickslip.study.bench_decision import CHATTER

@@ -19,9 +19,9 @@ from stickslip.errors import ParameterError
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.monte_carlo import draw_models, sliding_torque
-from stickslip.identify.setting.plant import Plant
 from stickslip.machines.machine import Machine
 from stickslip.model import Model
+from stickslip.recommend.plant import Plant
 
 CURRENT_LOOP = (200.0, 2000.0)
 """Hz, bandwidths drawn."""

@@ -17,17 +17,17 @@ from stickslip.cli import main
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
-from stickslip.identify.setting import recommend as recommending
-from stickslip.identify.setting.axes import plants_of
-from stickslip.identify.setting.candidate_run import rings, run, simulated
-from stickslip.identify.setting.plant import Plant
-from stickslip.identify.setting.recommend import Drive, recommend
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.files import machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.model import Model
+from stickslip.recommend import recommend as recommending
+from stickslip.recommend.axes import plants_of
+from stickslip.recommend.candidate_run import rings, run, simulated
+from stickslip.recommend.plant import Plant
+from stickslip.recommend.recommend import Drive, recommend
 
 LUGRE = Model("lugre", sigma0=3.5e4, sigma1=3.0, sigma2=0.018, fs=0.335, fc=0.285, vs=0.01)
 DRY = machine("thesis-dry")

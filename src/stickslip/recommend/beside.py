@@ -20,10 +20,10 @@ from stickslip.control.catalogue import CATALOGUE, LOOPS, compensated
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade
 from stickslip.errors import ParameterError
-from stickslip.identify.setting.candidate_run import AT_REST, Drive, Trial, dangers, simulated
-from stickslip.identify.setting.candidates import NEAR, Bench
-from stickslip.identify.setting.swings import back_and_forth, between_counts
 from stickslip.model import Model
+from stickslip.recommend.candidate_run import AT_REST, Drive, Trial, dangers, simulated
+from stickslip.recommend.candidates import NEAR, Bench
+from stickslip.recommend.swings import back_and_forth, between_counts
 
 RESTS = 20.0
 """s at rest, of which the second half is judged: an integral that is reset on a soft contact cycles in 6 to 12 s."""

@@ -18,10 +18,11 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.monte_carlo import sliding_torque, with_values
-from stickslip.identify.setting.axes import plants_of
-from stickslip.identify.setting.beside import belief_of, limit_cycle, tried_beside
-from stickslip.identify.setting.candidate_run import Drive
-from stickslip.identify.setting.candidates import (
+from stickslip.model import Model
+from stickslip.recommend.axes import plants_of
+from stickslip.recommend.beside import belief_of, limit_cycle, tried_beside
+from stickslip.recommend.candidate_run import Drive
+from stickslip.recommend.candidates import (
     NEAR,
     TRIES,
     Account,
@@ -31,10 +32,9 @@ from stickslip.identify.setting.candidates import (
     on_both,
     rings_alone,
 )
-from stickslip.identify.setting.notes import ALLOWANCE, axes_left_out, lag_of, notes_on, weak_on
-from stickslip.identify.setting.recommendation import Recommendation
-from stickslip.identify.setting.refusals import held, refuse_endless, refuse_unknown, refuse_weak
-from stickslip.model import Model
+from stickslip.recommend.notes import ALLOWANCE, axes_left_out, lag_of, notes_on, weak_on
+from stickslip.recommend.recommendation import Recommendation
+from stickslip.recommend.refusals import held, refuse_endless, refuse_unknown, refuse_weak
 
 GAINS = (0.5, 0.7, 0.8, 0.9, 1.0)
 BEYOND = (1.1, 1.25, 1.5)

@@ -17,10 +17,10 @@ from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.written import tables_of
 from stickslip.errors import ParameterError
-from stickslip.identify.setting import recommend as recommending
-from stickslip.identify.setting.candidates import Setting
-from stickslip.identify.setting.recommend import Drive, recommend
 from stickslip.model import Model
+from stickslip.recommend import recommend as recommending
+from stickslip.recommend.candidates import Setting
+from stickslip.recommend.recommend import Drive, recommend
 
 T = 1e-3
 LAW = Model("coulomb", fc=0.285, sigma2=0.018)

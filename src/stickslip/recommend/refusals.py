@@ -7,8 +7,8 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.setting.candidate_run import Drive, Trial
-from stickslip.identify.setting.candidates import breakaway, resistance
+from stickslip.recommend.candidate_run import Drive, Trial
+from stickslip.recommend.candidates import breakaway, resistance
 
 MOST_STEPS = 1e10
 """Of all simulations together; more would take half a day."""

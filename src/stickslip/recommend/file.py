@@ -1,4 +1,4 @@
-"""recommended.toml of what `stickslip.identify.setting.recommend` found: the law to run with ``[recommended]``."""
+"""recommended.toml of what `stickslip.recommend.recommend` found: the law to run with ``[recommended]``."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.model_file import in_memory, model_content, write_model
-from stickslip.identify.setting.candidates import Setting
-from stickslip.identify.setting.recommend import Recommendation
 from stickslip.machines.servo import ServoAxis
+from stickslip.recommend.candidates import Setting
+from stickslip.recommend.recommend import Recommendation
 
 
 def write_setting(path: str | os.PathLike[str], found: Identified, advice: Recommendation) -> Path:
