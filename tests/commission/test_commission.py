@@ -12,9 +12,8 @@ import tomli_w
 
 from stickslip.analyse.tracking import tracking_metrics
 from stickslip.commission import commission as commissioning
-from stickslip.commission.candidates import Following
 from stickslip.commission.commission import commission, planned, tried
-from stickslip.commission.recommended import write_recommended
+from stickslip.commission.recommended import Following, write_recommended
 from stickslip.commission.resume import claimed
 from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
@@ -125,7 +124,7 @@ def test_a_machine_that_is_not_in_the_library(tmp_path):
     assert done.angle.ripple.order == (1.0, 4.0)
     assert done.angle.ripple.amplitude == pytest.approx((0.08, 0.04), rel=0.05)
     advised = done.recommended
-    assert advised.chosen.kind == "feedforward"
+    assert advised.advice.chosen.setting.kind == "feedforward"
     assert advised.tracked[0].ratio >= 3.0
     # What the file recommends, run as the command line does, is what was measured.
     file = write_recommended(tmp_path / "recommended.toml", advised)

@@ -10,6 +10,7 @@ from stickslip import Model
 from stickslip.commission.headline import headline
 from stickslip.finding import Finding
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.recommend.candidates import Setting
 from stickslip.record import Record
 from stickslip.report.identified import Source, write_identification
 
@@ -45,8 +46,9 @@ def commissioned(**more: Any) -> Any:
 
 def test_five_lines_say_friction_axis_trust_compensator_and_next() -> None:
     tracked = SimpleNamespace(alone=2e-3, helped=4e-4, ratio=5.0, bandwidth=12.0)
-    chosen = SimpleNamespace(kind="feedforward", law="gms", gain=1.0)
-    advice = SimpleNamespace(known=SimpleNamespace(bandwidth=12.0), chosen=chosen, tracked=(tracked,))
+    chosen = SimpleNamespace(setting=Setting("gms", "feedforward", 1.0))
+    known = SimpleNamespace(bandwidth=12.0)
+    advice = SimpleNamespace(known=known, advice=SimpleNamespace(chosen=chosen), tracked=(tracked,))
     said = dict(headline(commissioned(recommended=advice), "stickslip rig run track --rig mine"))
     assert list(said) == ["Friction", "Axis", "Trust", "Compensator", "Next"]
     assert "breaks away at 0.3 N·m [0.294, 0.306] in the positive direction" in said["Friction"]
@@ -60,8 +62,8 @@ def test_five_lines_say_friction_axis_trust_compensator_and_next() -> None:
     assert "fell from 2 to 0.4 mrad RMS, 5 times, with a PD of 12 Hz" in said["Compensator"]
     assert said["Next"] == "stickslip rig run track --rig mine"
     assert dict(headline(commissioned()))["Compensator"].startswith("not looked for")
-    none = SimpleNamespace(known=SimpleNamespace(bandwidth=12.0), chosen=None, tracked=())
-    assert "none is calm" in dict(headline(commissioned(recommended=none), "stickslip x"))["Compensator"]
+    none = SimpleNamespace(known=known, advice=SimpleNamespace(chosen=None), tracked=())
+    assert "none is safe" in dict(headline(commissioned(recommended=none), "stickslip x"))["Compensator"]
 
 
 def test_the_report_of_a_commissioning_begins_with_them(tmp_path: Any) -> None:

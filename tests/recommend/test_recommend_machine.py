@@ -17,7 +17,7 @@ from stickslip.cli import main
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
-from stickslip.machines.contact import Contact
+from stickslip.machines.contact import Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.files import machine
 from stickslip.machines.machine import Machine
@@ -26,8 +26,9 @@ from stickslip.model import Model
 from stickslip.recommend import recommend as recommending
 from stickslip.recommend.axes import plants_of
 from stickslip.recommend.candidate_run import rings, run, simulated
-from stickslip.recommend.plant import Plant
-from stickslip.recommend.recommend import Drive, recommend
+from stickslip.recommend.candidates import Setting
+from stickslip.recommend.plant import Plant, WholeMachine
+from stickslip.recommend.recommend import Drive, recommend, recommend_on
 
 LUGRE = Model("lugre", sigma0=3.5e4, sigma1=3.0, sigma2=0.018, fs=0.335, fc=0.285, vs=0.01)
 DRY = machine("thesis-dry")
@@ -148,3 +149,38 @@ def test_a_loop_feeds_the_inertia_where_its_torque_answers_to_the_acceleration()
         str(OWN), inertia=INERTIA, slope=62.8, torque=0.45, layer=0.5
     )  # a loop that feeds it itself
     assert Controller(loop=own, sample_time=1e-3).answers_to_acceleration is True
+
+
+def measured(level: float) -> WholeMachine:
+    """`DRY` with so many times its friction."""
+    contact = replace(DRY.contact, drift=Drift(level - 1.0, 1e-3) if level != 1.0 else Drift())
+    return WholeMachine.of(replace(DRY.without("encoder-mode"), contact=contact))
+
+
+def test_a_machine_that_was_measured_is_run_as_it_is():
+    """Its law's springs are what the encoder sees, and bearings and direction are its own."""
+    plant = measured(1.0)
+    assert plant.built(1e-3, COUNTS) is plant.machine
+    assert plant.built(1e-3, COUNTS).spring_factor > 1.0
+
+
+def test_what_is_safe_on_every_measured_machine_is_chosen():
+    """Full gain leaves the least error on the friction found, and pushes where there is a seventh less."""
+    drive = Drive(8.0, amplitude=0.01, frequency=0.4, encoder_counts=COUNTS, torque_limit=2.0, machine=DRY)
+    laws = {"gms": DRY.clutch}
+    sure = recommend_on([measured(1.0)], drive, laws, DRY.inertia, (0.9, 1.0))
+    unsure = recommend_on([measured(x) for x in (1.0, 0.85)], drive, laws, DRY.inertia, (0.9, 1.0))
+    assert sure.chosen.setting.gain == 1.0
+    assert (sure.margin, sure.unsafe_gain) == (pytest.approx(1.1), 1.25)
+    assert unsure.chosen.setting.gain == 0.9
+    assert unsure.unsafe_gain == 1.0
+    assert sure.linear_error == unsure.linear_error
+    assert (sure.axes, unsure.axes) == (1, 2)
+
+
+def test_gains_up_to_the_first_that_is_not_safe_are_the_margin():
+    one = Setting("gms", "feedforward", 0.8)
+    others = [replace(one, gain=g) for g in (0.9, 1.0, 1.25)]
+    assert recommending.margin_of(one, [others[2]], others[:2]) == (1.25, 1.25)
+    assert recommending.margin_of(one, [others[1]], others) == (pytest.approx(1.125), 1.0)
+    assert recommending.margin_of(one, [replace(others[1], law="coulomb")], []) == (1.0, math.inf)

@@ -33,7 +33,7 @@ from stickslip.analyse.stability_result import (
     Cycle,
     Map,
     Margins,
-    Recommended,
+    SafeGain,
     Stability,
 )
 from stickslip.control.linear import Gains
@@ -154,7 +154,7 @@ def _margins(name: str, axis: Axis, drive: Drive, model: Model | None) -> Margin
     )  # fmt: skip
 
 
-def _recommended(name: str, axis: Axis, drive: Drive, model: Model) -> Recommended | None:
+def _recommended(name: str, axis: Axis, drive: Drive, model: Model) -> SafeGain | None:
     """The highest gain, and for it the highest filter, that keep the margins.
 
     The loop must be stable at the small amplitude with `RESERVE` times the gain (as far as the stiffness allows it),
@@ -167,7 +167,7 @@ def _recommended(name: str, axis: Axis, drive: Drive, model: Model) -> Recommend
             )
             setting = replace(setting, gain=gain)
             if _safe(drivetrain, setting):
-                return Recommended(name, gain, corner, Loop(drivetrain, setting).poles())
+                return SafeGain(name, gain, corner, Loop(drivetrain, setting).poles())
     return None
 
 

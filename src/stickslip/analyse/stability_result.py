@@ -106,7 +106,7 @@ def _share(value: float) -> str:
 
 
 @dataclass(frozen=True)
-class Recommended:
+class SafeGain:
     """A gain and a filter (Hz, 0 for none) for a compensator, and the least stable pole with them."""
 
     name: str
@@ -144,7 +144,7 @@ class Stability:
         The first without compensation.
     over_time, over_filter : mapping of str to array
         Gain margin at `TIMES` and, with a filter, at `FILTERS`.
-    recommended : mapping of str to Recommended or None
+    recommended : mapping of str to SafeGain or None
         None where nothing tried is safe.
     time_map, filter_map : Map
         Of the stiffest compensator: `GAINS` over `TIMES` without filter, and over `FILTERS`.
@@ -157,7 +157,7 @@ class Stability:
     margins: tuple[Margins, ...]
     over_time: Mapping[str, Array]
     over_filter: Mapping[str, Array]
-    recommended: Mapping[str, Recommended | None]
+    recommended: Mapping[str, SafeGain | None]
     time_map: Map
     filter_map: Map
 
@@ -198,7 +198,7 @@ class Stability:
             *(self._advice(name, found) for name, found in self.recommended.items()),
         ]
 
-    def _advice(self, name: str, found: Recommended | None) -> str:
+    def _advice(self, name: str, found: SafeGain | None) -> str:
         if found:
             sieve = f"a filter of {found.filter_hz:g} Hz" if found.filter_hz else "no filter"
             pole = f"{found.poles.growth:+.1f}/s at {found.poles.frequency:.1f} Hz"

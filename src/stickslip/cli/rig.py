@@ -273,9 +273,8 @@ def write_commissioned(
     records = {s.name: s.performed.record for s in stages}
     data = [described(folder / f"{name}.npz", len(record)) for name, record in records.items()]
     model = write_model(folder / "model.toml", found.result, data=data)
-    advice = found.recommended
-    if advice and advice.chosen:
-        write_recommended(folder / "recommended.toml", advice)
+    if found.recommended and found.recommended.advice.chosen:
+        write_recommended(folder / "recommended.toml", found.recommended)
     sources = [Source(s.name, s.performed.record, findings_of(s.performed)) for s in stages]
     report = write_identification(
         folder / "report.html",

@@ -15,14 +15,10 @@ from typing import Literal
 
 import numpy as np
 
-from stickslip.commission.candidates import Following, Known, resolution_of
 from stickslip.commission.curve import fitted_curve, moving
 from stickslip.commission.friction_lag import lag_of
-from stickslip.commission.recommended import (
-    SLOWER,
-    Recommended,
-    recommend_on,
-)
+from stickslip.commission.known import Known, resolution_of
+from stickslip.commission.recommended import SLOWER, Following, TrackedRecommendation, recommend_and_track
 from stickslip.commission.result import Stage, result_of
 from stickslip.commission.resume import kept, stamped
 from stickslip.commission.stiffness import joined_model, resolved, with_lag, with_stiffness
@@ -91,7 +87,7 @@ class Commissioned:
         LuGre with sigma0 and sigma1 from the stick-slip response.
     angle : AngleMap
         What friction and the torque beside it vary by over a revolution.
-    recommended : Recommended or None
+    recommended : TrackedRecommendation or None
         What to switch on, and what it did.
     stiffness : float
         Total pre-sliding stiffness at the encoder, N·m/rad: contact and shaft in series.
@@ -104,7 +100,7 @@ class Commissioned:
     model: Model
     lugre: Model | None
     angle: AngleMap
-    recommended: Recommended | None
+    recommended: TrackedRecommendation | None
     stiffness: float
     result: Identification
 
@@ -366,7 +362,9 @@ def _stickslip(
 # ---- the whole ------------------------------------------------------------------------------------------------
 
 
-def tried(recommend: Callable[[], Recommended]) -> tuple[Recommended | None, tuple[str, ...]]:
+def tried(
+    recommend: Callable[[], TrackedRecommendation],
+) -> tuple[TrackedRecommendation | None, tuple[str, ...]]:
     """The recommendation; where it fails, why: no stage rests on it, and the model that is had is kept."""
     try:
         return recommend(), ()
@@ -377,7 +375,7 @@ def tried(recommend: Callable[[], Recommended]) -> tuple[Recommended | None, tup
 def _recommended(
     course: _Course, j: float, top: float, fs: float, model: Model, stiffness: float, angle: AngleMap,
     lugre: Model | None,
-) -> Recommended:  # fmt: skip
+) -> TrackedRecommendation:  # fmt: skip
     """The response of the loop, the bandwidth that it bears, the compensator, and what both do."""
     done = course.run(Resonance(speed=0.6 * top, inertia=j, stuck=QUIET * fs))
     sliding, sticking = (loop_response(done.part(label), label) for label in ("sliding", "sticking"))
@@ -389,4 +387,4 @@ def _recommended(
     def follow(procedure: Following, name: str) -> Performed:
         return course.run(procedure, name=name)
 
-    return recommend_on(known, course.rig, lugre, follow)
+    return recommend_and_track(known, course.rig, lugre, follow)

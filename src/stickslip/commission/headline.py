@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from stickslip.commission.recommended import NONE_SAFE
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.monte_carlo import sliding_torque
 
@@ -75,15 +76,15 @@ def trust(found: Commissioned) -> str:
 
 def compensator(found: Commissioned) -> str:
     """What is to be switched on, and what it did on the machine."""
-    advice = found.recommended
-    if advice is None:
+    if found.recommended is None:
         return "not looked for, or not to be had: the notes below say why."
-    if advice.chosen is None:
-        return "none: none is calm on the identified machine and better than the PD alone."
-    c = advice.chosen
+    chosen, tracked = found.recommended.advice.chosen, found.recommended.tracked
+    if chosen is None:
+        return f"none: {NONE_SAFE}."
+    c = chosen.setting
     said = f"{c.kind} of law {c.law!r}, gain {c.gain:g}"
-    if advice.tracked:
-        t = advice.tracked[0]
+    if tracked:
+        t = tracked[0]
         said += (
             f"; on the slow sinusoid the error fell from {1e3 * t.alone:.3g} to {1e3 * t.helped:.3g} mrad RMS, "
             f"{t.ratio:.3g} times, with a PD of {t.bandwidth:.3g} Hz"
@@ -93,7 +94,7 @@ def compensator(found: Commissioned) -> str:
 
 def following(found: Commissioned, command: str) -> str:
     """The next command, or what to measure."""
-    if command and found.recommended and found.recommended.chosen:
+    if command and found.recommended and found.recommended.advice.chosen:
         return command
     if found.result.measure_next:
         return found.result.measure_next[0]

@@ -1,8 +1,8 @@
 """What to switch on: bandwidth, law, structure and gain for a commissioned machine, and what they do on it.
 
 The bandwidth comes from the measured response: `MARGIN` below that from which a PD rings, sliding or sticking. The rest
-is simulated, not on the machine but on what is known of it (`stickslip.commission.candidates`). Then the machine itself
-follows the slow sinusoid with the PD alone and with the compensator, at this bandwidth and at lower ones.
+is chosen as for any model (`stickslip.recommend`), on the machine as it was identified. Then the machine itself follows
+the slow sinusoid with the PD alone and with the compensator, at this bandwidth and at lower ones.
 """
 
 from __future__ import annotations
@@ -17,33 +17,59 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyse.tracking import tracking_metrics
-from stickslip.commission.candidates import (
-    DAMPING,
-    LEVELS,
-    MARGIN,
-    Candidate,
-    Following,
-    Known,
-    candidates_of,
-    chosen_of,
-    controller_of,
-    laws_to_try,
-    simulated,
-    with_lead,
-)
+from stickslip.commission.known import LEVELS, MARGIN, Known, laws_to_try
 from stickslip.control.controller import Controller
-from stickslip.control.recommended import Recommended as Setting
 from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.identify.model_file import write_model
 from stickslip.machines.angle import AngleMap
 from stickslip.model import Model
+from stickslip.recommend.file import recommended_table
+from stickslip.recommend.recommendation import Recommendation
 from stickslip.record import Record
-from stickslip.rigs.procedures.base import Performed
+from stickslip.rigs.procedures.base import Performed, Plan
+from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
+NOTHING = AngleMap()
 SLOWER = (0.75, 0.5)
 """Of the bandwidth: where the gain over the linear controller alone is measured too."""
+NONE_SAFE = "none is safe on the identified machine and better than the PD alone"
+
+
+@dataclass(frozen=True)
+class Following(Track):
+    """`Track` with a controller and a map that are at hand."""
+
+    using: Controller | None = None
+    over: AngleMap = NOTHING
+
+    def made(self, rig: Rig) -> Controller:
+        """The one that was given."""
+        assert self.using is not None
+        return self.using
+
+    def angle(self) -> AngleMap:
+        """The one that was given."""
+        return self.over
+
+    def plan(self, rig: Rig) -> Plan:
+        """As `Track`, with what the controller has."""
+        assert self.using is not None
+        compensator, whole = self.using.compensator, super().plan(rig)
+        what = f"{compensator.name} of law {compensator.model.law.name!r}" if compensator else "the PD alone"
+        return dataclasses.replace(whole, text=(f"follow {self.reference}, {what}",))
+
+    def options(self) -> dict[str, Any]:
+        """Plain data."""
+        assert self.using is not None
+        used = self.using.compensator
+        return {
+            "reference": self.reference, "gains": self.using.numbers(),
+            "compensator": used
+            and {"kind": used.name, "gain": used.gain, "lead": used.lead, **used.model.as_dict()},
+            "angle": self.over.as_dict(),
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -63,65 +89,66 @@ class Tracked:
 
 
 @dataclass(frozen=True, eq=False)
-class Recommended:
-    """What is recommended, why, and what it did.
+class TrackedRecommendation:
+    """What is recommended, and what it did on the machine itself.
 
     Attributes
     ----------
     known : Known
-    candidates : tuple of Candidate
-    chosen : Candidate or None
-        None: none is calm and better than the PD alone.
+    advice : Recommendation
+        On the machine as it was identified.
     model : Model or None
         The law to run, without the ripple (that is `Known.angle`).
-    alone : float
-        RMS error of the PD alone on the identified machine, rad.
     tracked : tuple of Tracked
         On the machine itself, from the recommended bandwidth down.
     runs : mapping of str to Record
         Those at the recommended bandwidth: ``alone``, ``mean``, ``helped``.
-    machine, sample_time : str, float
-        On which it was tried, and the rig's sample time, s.
+    machine : str
+        On which it was tried.
     """
 
     known: Known
-    candidates: tuple[Candidate, ...]
-    chosen: Candidate | None
-    model: Model | None
-    alone: float
+    advice: Recommendation
+    model: Model | None = None
     tracked: tuple[Tracked, ...] = ()
     runs: Mapping[str, Record] = field(default_factory=dict[str, Record])
     machine: str = ""
-    sample_time: float = 0.0
 
     def controllers(self, rig: Rig, bandwidth: float) -> dict[str, tuple[Controller, AngleMap]]:
         """Controller and map by name: the PD alone, with the law's mean, with all that was found."""
-        assert self.chosen is not None
+        assert self.advice.chosen is not None
         assert self.model is not None
-        k, c = self.known, self.chosen
-        flat = dataclasses.replace(k, angle=AngleMap())
+        angle, setting = self.known.angle, self.advice.chosen.setting
+        # The rig measures by its own encoder.
+        alone = dataclasses.replace(
+            self.known.drive(rig, bandwidth).loop(self.known.inertia), encoder_counts=0.0
+        )
         return {
-            "alone": (controller_of(k, rig, bandwidth), AngleMap()),
-            "mean": (controller_of(flat, rig, bandwidth, c.compensation(self.model)), AngleMap()),
-            "helped": (controller_of(k, rig, bandwidth, c.compensation(self.model)), k.angle),
+            "alone": (alone, NOTHING),
+            "mean": (setting.on(alone, self.model), NOTHING),
+            "helped": (setting.on(alone, angle.on(self.model)), angle),
         }
 
     def lines(self) -> Iterator[str]:
         """What people read."""
-        k = self.known
+        k, chosen = self.known, self.advice.chosen
         below = f", a factor of {MARGIN:g} below" if k.fastest.name else ""
         yield f"{k.fastest.sentence} (measured response); recommended: {k.bandwidth:.3g} Hz{below}."
-        if self.chosen is None:
-            yield "No compensator is recommended: none is calm on the identified machine and better than the PD alone."
+        if self.advice.rings:
+            yield f"The PD alone oscillates {self.advice.rings}."
+        if chosen is None:
+            yield f"No compensator is recommended: {NONE_SAFE}."
             return
-        c = self.chosen
+        c, times = chosen.setting, [1.0 / e for e in chosen.errors]
         yield (
             f"Recommended compensator: {c.kind} of law {c.law!r}, gain {c.gain:g}, lead {1e3 * c.lead:g} ms, "
             "with ripple and torque offset over the angle; "
             f"simulated with friction {', '.join(f'{100 * x:g}' for x in LEVELS)} % of that "
-            f"identified: error {', '.join(f'{self.alone / e:.3g}' for e in c.errors)} times smaller than with the "
-            f"PD alone ({1e3 * self.alone:.3g} mrad RMS)."
+            f"identified: error {', '.join(f'{x:.3g}' for x in times)} times smaller than with the "
+            f"PD alone ({1e3 * self.advice.linear_error:.3g} mrad RMS)."
         )
+        if math.isfinite(self.advice.unsafe_gain):
+            yield f"With a gain of {self.advice.unsafe_gain:g} it is not safe there."
         for t in self.tracked:
             yield (
                 f"Measured on the slow sinusoid{self.place}, PD of {t.bandwidth:.3g} Hz: {1e3 * t.alone:.3g} mrad RMS "
@@ -137,30 +164,22 @@ class Recommended:
         start = math.degrees(float(self.runs["alone"]["position"][0])) % 360.0
         return f" from one start angle ({start:.0f} degrees; elsewhere it may be more or less)"
 
-    def table(self) -> dict[str, Any]:
-        """``[recommended]`` of a recommended.toml."""
-        assert self.chosen is not None
-        return Setting(
-            self.chosen.kind, self.chosen.gain, self.known.bandwidth, DAMPING, self.known.inertia, self.chosen.lead,
-            sample_time=self.sample_time, machine=self.machine,
-        ).table()  # fmt: skip
 
-
-def write_recommended(path: Path, found: Recommended) -> Path:
+def write_recommended(path: Path, found: TrackedRecommendation) -> Path:
     """A model.toml of the law to run, with ``[angle]`` and ``[recommended]``: what `stickslip rig run track` takes."""
     assert found.model is not None
     result = Identification("commission", found.model, (), np.eye(0), {}, tuple(found.lines()), details={
         "mechanics": Mechanics(found.known.inertia), "angle": found.known.angle,
     })  # fmt: skip
-    return write_model(path, result, more={"recommended": found.table()})
+    return write_model(path, result, more={"recommended": recommended_table(found.advice, found.machine)})
 
 
 # ---- on the machine ---------------------------------------------------------------------------------------------
 
 
-def recommend_on(
+def recommend_and_track(
     known: Known, rig: Rig, lugre: Model | None, follow: Callable[[Following, str], Performed]
-) -> Recommended:
+) -> TrackedRecommendation:
     """Choose on the identified machine, then track on the rig with the PD alone and with what was chosen.
 
     Parameters
@@ -173,15 +192,10 @@ def recommend_on(
         Performs a `Following` on the rig; also given a name for its record.
     """
     laws = laws_to_try(known.model, lugre)
-    tried = candidates_of(known, rig, laws)
-    alone, _ = simulated(known.machine(rig), controller_of(known, rig, known.bandwidth), known.angle)
-    chosen = chosen_of(tried, alone)
-    if chosen is None:
-        return Recommended(known, tuple(tried), None, None, alone)
-    chosen = with_lead(known, rig, laws[chosen.law], chosen)
-    found = Recommended(
-        known, tuple(tried), chosen, laws[chosen.law], alone, machine=rig.name, sample_time=rig.sample_time
-    )
+    advice = known.recommendation(rig, laws)
+    if advice.chosen is None:
+        return TrackedRecommendation(known, advice)
+    found = TrackedRecommendation(known, advice, laws[advice.chosen.setting.law], machine=rig.name)
     tracked: list[Tracked] = []
     runs: dict[str, Record] = {}
     for share in (1.0, *SLOWER):
@@ -195,7 +209,7 @@ def recommend_on(
     return dataclasses.replace(found, tracked=tuple(tracked), runs=runs)
 
 
-def picture_of_tracking(found: Recommended) -> Picture:
+def picture_of_tracking(found: TrackedRecommendation) -> Picture:
     """The slow sinusoid on the machine itself."""
     traces: list[Trace] = []
     for name, words in (("alone", "PD alone"), ("mean", "without the angle"), ("helped", "recommended")):
@@ -216,18 +230,20 @@ def picture_of_tracking(found: Recommended) -> Picture:
     )  # fmt: skip
 
 
-def picture_of_candidates(found: Recommended) -> Picture:
+def picture_of_candidates(found: TrackedRecommendation) -> Picture:
     """How many times smaller than with the PD alone each candidate's error is, over the friction there is."""
-    traces: list[Trace] = []
     order = np.argsort(LEVELS)
-    for c in found.candidates:
-        if len(c.errors) == len(LEVELS) and c.gain == 1.0:
-            traces.append(Trace(
-                f"{c.law}, {c.kind}" + (" (restless)" if c.restless else ""), 100.0 * np.array(LEVELS)[order],
-                found.alone / np.array(c.errors)[order],
-            ))  # fmt: skip
+    traces = [
+        Trace(
+            f"{c.setting.law}, {c.setting.kind}",
+            100.0 * np.array(LEVELS)[order],
+            1.0 / np.array(c.errors)[order],
+        )
+        for c in found.advice.candidates
+        if not c.unsafe and c.setting.gain == 1.0 and not c.setting.lead
+    ]
     return Picture(
-        "recommended", "Candidates at gain 1 on the identified machine",
-        f"PD of {found.known.bandwidth:.3g} Hz; the error with it alone is {1e3 * found.alone:.3g} mrad RMS",
-        "friction there is over that identified (%)", "times smaller error", tuple(traces),
+        "recommended", "Candidates at gain 1 on the identified machine, as far as they are safe there",
+        f"PD of {found.known.bandwidth:.3g} Hz; the error with it alone is {1e3 * found.advice.linear_error:.3g} mrad "
+        "RMS", "friction there is over that identified (%)", "times smaller error", tuple(traces),
     )  # fmt: skip

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.commission.recommended import Recommended, picture_of_candidates, picture_of_tracking
+from stickslip.commission.recommended import TrackedRecommendation, picture_of_candidates, picture_of_tracking
 from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.position_map import PositionMap
@@ -33,7 +33,7 @@ class Stage:
 
 def result_of(
     stages: Sequence[Stage], model: Model, j: float, stiffness: float, said: tuple[str, ...], angle: AngleMap,
-    recommended: Recommended | None, the_map: PositionMap | None = None,
+    recommended: TrackedRecommendation | None, the_map: PositionMap | None = None,
 ) -> Identification:  # fmt: skip
     """All that the stages found, as one identification of the joined law."""
     estimates: list[Estimate] = []
@@ -55,10 +55,10 @@ def result_of(
             continue
         estimates += [owned(stage, e, model) for e in stage.found.estimates]
         pictures += stage.found.pictures
-        if stage.name != "resonance":  # `Recommended.lines` says it
+        if stage.name != "resonance":  # `TrackedRecommendation.lines` says it
             notes += [f"{stage.name}: {n}" for n in stage.found.notes]
         misfit |= {f"{stage.name}_{k}": float(v) for k, v in stage.found.misfit.items()}
-    if recommended and recommended.chosen:
+    if recommended and recommended.advice.chosen:
         pictures += [picture_of_candidates(recommended), picture_of_tracking(recommended)]
     correlation = blocks([s.found for s in stages if s.found])
     return Identification(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -152,7 +152,7 @@ class Bench:
     """
 
     def __init__(
-        self, plants: Sequence[RigidAxis], linear: Controller, drive: Drive, laws: dict[str, Model],
+        self, plants: Sequence[RigidAxis], linear: Controller, drive: Drive, laws: Mapping[str, Model],
         ran: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self.plants, self.linear, self.drive, self.laws, self.ran = plants, linear, drive, laws, ran
@@ -161,7 +161,7 @@ class Bench:
 
     @staticmethod
     def held(
-        drawn: Iterator[RigidAxis], count: int, linear: Controller, drive: Drive, laws: dict[str, Model],
+        drawn: Iterator[RigidAxis], count: int, linear: Controller, drive: Drive, laws: Mapping[str, Model],
         ran: Callable[[], None] = lambda: None,
     ) -> Bench:  # fmt: skip
         """The best estimate, which is drawn first, and the first `count` others that the linear controller holds."""

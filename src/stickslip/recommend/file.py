@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from stickslip.config import Table
-from stickslip.control.controller import Controller
 from stickslip.control.recommended import Recommended
 from stickslip.control.written import tables_of
 from stickslip.errors import InputError
@@ -17,7 +16,6 @@ from stickslip.identify.estimate import Identification
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.model_file import in_memory, model_content, write_model
 from stickslip.machines.servo import ServoAxis
-from stickslip.recommend.candidates import Setting
 from stickslip.recommend.recommend import Recommendation
 
 
@@ -81,18 +79,21 @@ def _further(advice: Recommendation) -> dict[str, Any]:
         return tables_of(advice.instead.controller)
     assert advice.chosen is not None
     assert advice.model is not None
-    setting, loop = advice.chosen.setting, advice.drive.loop(advice.inertia)
+    loop = advice.drive.loop(advice.inertia)
     if not loop.is_short:
-        return tables_of(setting.on(loop, advice.model))
-    return {"recommended": _recommended(advice, setting, loop)}
+        return tables_of(advice.chosen.setting.on(loop, advice.model))
+    return {"recommended": recommended_table(advice)}
 
 
-def _recommended(advice: Recommendation, setting: Setting, loop: Controller) -> dict[str, Any]:
-    """The table of a setting beside a linear controller."""
-    drive = advice.drive
+def recommended_table(advice: Recommendation, machine: str = "") -> dict[str, Any]:
+    """``[recommended]``: the setting beside a linear controller, and the machine on which it was measured."""
+    assert advice.chosen is not None
+    drive, setting = advice.drive, advice.chosen.setting
+    loop = drive.loop(advice.inertia)
     own = drive.given or drive.linear != "PD"
     return Recommended(
         setting.kind, setting.gain, drive.bandwidth, drive.damping, advice.inertia, setting.lead, setting.deadband,
-        sample_time=drive.sample_time, offset=setting.offset, inertia_feedforward=setting.inertia_feedforward,
+        sample_time=drive.sample_time, machine=machine, offset=setting.offset,
+        inertia_feedforward=setting.inertia_feedforward,
         gains=loop.gains if own else None, velocity_filter=loop.velocity_filter,
     ).table()  # fmt: skip

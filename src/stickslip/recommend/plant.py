@@ -69,6 +69,21 @@ class Plant(RigidAxis):
         )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class WholeMachine(Plant):
+    """A machine with its own friction and inertia, as it is."""
+
+    @classmethod
+    def of(cls, machine: Machine) -> WholeMachine:
+        """The plant that this machine is."""
+        return cls(machine.inertia, machine.friction, machine=machine)
+
+    def built(self, sample_time: float, counts: float) -> Machine:
+        """The machine."""
+        assert self.machine is not None
+        return self.machine
+
+
 def laid_out(plant: RigidAxis, sample_time: float, counts: float) -> Laid:
     """A machine at rest that is this axis, as the machine engine takes it."""
     own = plant if isinstance(plant, Plant) else Plant(plant.inertia, plant.friction)

@@ -10,7 +10,7 @@ controller alone is judged first: what rings without a compensator is not the co
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,6 +33,7 @@ from stickslip.recommend.candidates import (
     rings_alone,
 )
 from stickslip.recommend.notes import ALLOWANCE, axes_left_out, lag_of, notes_on, weak_on
+from stickslip.recommend.plant import Plant
 from stickslip.recommend.recommendation import Recommendation
 from stickslip.recommend.refusals import held, refuse_endless, refuse_unknown, refuse_weak
 
@@ -98,7 +99,7 @@ def recommend(
     laws = laws_of(cautious(found))
     offset = float(found.axis.get("offset", 0.0) or 0.0)
     fed = j if feed_inertia and not linear.answers_to_acceleration else 0.0
-    settings = [replace(setting, offset=offset) for setting in settings_of(laws, drive, fed)]
+    settings = [replace(setting, offset=offset) for setting in settings_of(laws, drive, fed, GAINS)]
     # Each with the linear controller alone; then leads, the guard and the gains beyond.
     more = (axes + 1) * (len(LEADS) + 1 + len(BEYOND)) + (confirm + 1) * (3 + len(BEYOND))
     account = Account(progress, len(settings), axes + 1, more)
@@ -131,6 +132,56 @@ def recommend(
         chosen, laws[chosen.setting.law] if chosen else None, linear.numbers(),
         first.moving["position_rms_rad"], margin, unsafe_gain, tuple(candidates), len(bench.plants),
         tuple(notes), drive, rung, j, beside, hunts,
+    )  # fmt: skip
+
+
+def recommend_on(
+    plants: Sequence[Plant],
+    drive: Drive,
+    laws: Mapping[str, Model],
+    inertia: float,
+    gains: Sequence[float] = GAINS,
+) -> Recommendation:
+    """As `recommend`, on machines that are measured so well that none is drawn: those of a commissioning.
+
+    Parameters
+    ----------
+    plants : sequence of Plant
+        The best estimate first; a setting must be safe on all: they are the guard.
+    drive : Drive
+        With a motion.
+    laws : mapping of str to Model
+        That may be switched on.
+    inertia : float
+        kg·m², that the linear controller is placed with and that is fed forward.
+    gains : sequence of float
+        That are tried.
+
+    Raises
+    ------
+    InputError
+        If the linear controller alone cannot be simulated on the best estimate.
+    """
+    linear = drive.loop(inertia)
+    bench = Bench(plants, linear, drive, laws)
+    first = bench.before(0)
+    if isinstance(first, str):
+        raise InputError(
+            f"the linear controller alone is unstable on the machine that was identified: {first}"
+        )
+    candidates = [bench.judged(s) for s in settings_of(laws, drive, inertia, gains)]
+    chosen, margin, unsafe_gain = best_on_all(candidates), math.nan, math.inf
+    if chosen is not None:
+        chosen = with_lead(chosen, bench)
+        beyond = [bench.judged(replace(chosen.setting, gain=gain)) for gain in BEYOND]
+        unsafe, safe = (
+            [c.setting for c in (*candidates, *beyond) if bool(c.unsafe) is bad] for bad in (True, False)
+        )
+        margin, unsafe_gain = margin_of(chosen.setting, unsafe, safe)
+        candidates += beyond
+    return Recommendation(
+        chosen, laws[chosen.setting.law] if chosen else None, linear.numbers(), first.moving["position_rms_rad"],
+        margin, unsafe_gain, tuple(candidates), len(plants), (), drive, rings_alone(bench, inertia, "N·m"), inertia,
     )  # fmt: skip
 
 
@@ -205,13 +256,15 @@ def line_through(model: Model, scale: float) -> tuple[float, float]:
     return level, max(slope, 0.0)
 
 
-def settings_of(laws: dict[str, Model], drive: Drive, inertia: float) -> Iterator[Setting]:
+def settings_of(
+    laws: Mapping[str, Model], drive: Drive, inertia: float, gains: Sequence[float]
+) -> Iterator[Setting]:
     """All settings that are tried, each with this inertia fed forward, kg·m²."""
     for law in laws:
-        for gain in GAINS:
+        for gain in gains:
             yield Setting(law, "feedforward", gain, inertia_feedforward=inertia)
         for deadband in (0.0, drive.deadband(DEADBAND)) if drive.encoder_counts else (0.0,):
-            for gain in GAINS:
+            for gain in gains:
                 yield Setting(law, "feedback", gain, deadband=deadband, inertia_feedforward=inertia)
 
 
@@ -231,7 +284,9 @@ def picked(
         return None, candidates, math.nan, math.inf
     beyond = [on_both(replace(chosen.setting, gain=gain), bench, others) for gain in BEYOND]
     unsafe += [c.setting for c in beyond if c.unsafe]
-    margin, unsafe_gain = margin_of(chosen.setting, unsafe, [c.setting for c in beyond if not c.unsafe])
+    guarded = replace(chosen.setting, gain=GUARD * chosen.setting.gain)  # it was insisted on
+    safe = [guarded, *(c.setting for c in beyond if not c.unsafe)]
+    margin, unsafe_gain = margin_of(chosen.setting, unsafe, safe)
     return chosen, [*candidates, *beyond], margin, unsafe_gain
 
 
@@ -241,25 +296,31 @@ def alike(one: Setting, other: Setting) -> bool:
 
 
 def margin_of(chosen: Setting, unsafe: Sequence[Setting], safe: Sequence[Setting]) -> tuple[float, float]:
-    """The highest gain up to which all are safe, over the chosen one, and the lowest higher one that is not.
-
-    `safe` are those that are safe on all axes, besides the chosen one with `GUARD` times its gain: it was insisted on.
-    """
+    """The highest safe gain over the chosen one, below the lowest higher one that is not safe; and that one."""
     first = min((s.gain for s in unsafe if alike(s, chosen) and s.gain > chosen.gain), default=math.inf)
-    last = max(g for g in (chosen.gain, GUARD * chosen.gain, *(s.gain for s in safe)) if g < first)
+    last = max(s.gain for s in (chosen, *safe) if alike(s, chosen) and s.gain < first)
     return last / chosen.gain, first
 
 
-def best_of(candidates: Sequence[Candidate]) -> Candidate | None:
-    """The safe candidate with the least worst error; among those alike the lowest gain, feedforward first."""
+def near_best(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The safe candidates with about the least worst error; none where none is worth it."""
     safe = [c for c in candidates if not c.unsafe and c.worst <= WORTH]
-    if not safe:
-        return None
-    least = min(c.worst for c in safe)
-    return min(
-        (c for c in safe if c.worst <= NEAR * least),
-        key=lambda c: (c.setting.kind == "feedback", c.setting.gain, c.worst),
+    return [c for c in safe if c.worst <= NEAR * min(x.worst for x in safe)]
+
+
+def best_of(candidates: Sequence[Candidate]) -> Candidate | None:
+    """Of those near the best the one with the lowest gain, feedforward first, then with the least worst error."""
+    ranked = sorted(
+        near_best(candidates), key=lambda c: (c.setting.kind == "feedback", c.setting.gain, c.worst)
     )
+    return ranked[0] if ranked else None
+
+
+def best_on_all(candidates: Sequence[Candidate]) -> Candidate | None:
+    """As `best_of`, then with the least product of its errors: where every machine is as likely as the others."""
+    near = near_best(candidates)
+    ranked = sorted(near, key=lambda c: (c.setting.kind == "feedback", c.setting.gain, math.prod(c.errors)))
+    return ranked[0] if ranked else None
 
 
 def confirmed(

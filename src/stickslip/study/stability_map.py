@@ -17,7 +17,7 @@ import numpy as np
 from stickslip.analyse.machine_axis import axis_of
 from stickslip.analyse.presliding_loop import Drive, Loop, Poles
 from stickslip.analyse.stability import with_law
-from stickslip.analyse.stability_result import Map, Recommended
+from stickslip.analyse.stability_result import Map, SafeGain
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
@@ -148,7 +148,7 @@ def sieve(filter_hz: float) -> str:
 
 
 def confirmed(
-    machine: Machine, gains: Gains, models: Mapping[str, Model], advice: Mapping[str, Recommended | None],
+    machine: Machine, gains: Gains, models: Mapping[str, Model], advice: Mapping[str, SafeGain | None],
     filters: Sequence[float] = FILTERS, values: Sequence[float] = GAINS, drawn: bool = False,
 ) -> Confirmed:  # fmt: skip
     """Simulate a grid of filters and gains, and the recommended settings.
@@ -161,7 +161,7 @@ def confirmed(
         Of the linear controller.
     models : mapping of str to Model
         Of the compensators.
-    advice : mapping of str to Recommended or None
+    advice : mapping of str to SafeGain or None
     filters, values : sequence of float
         Hz (0 for none), and gains.
     drawn : bool

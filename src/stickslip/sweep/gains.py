@@ -25,7 +25,7 @@ SHARE = LEAST_CASES + 10
 
 
 @dataclass(frozen=True)
-class Recommended:
+class BestGain:
     """What the gain does.
 
     Attributes
@@ -66,10 +66,10 @@ def too_few(drawn: Drawn) -> str:
     )
 
 
-def recommended(folder: Path, sweep: Sweep, run: PlannedRun) -> Recommended:
+def recommended(folder: Path, sweep: Sweep, run: PlannedRun) -> BestGain:
     """The gain with the least 95th percentile of the sweep's first metric, in bins of gain or over a grid's points."""
     if too_few(sweep.drawn):
-        return Recommended(np.zeros(0), np.zeros(0), math.nan, math.nan, math.nan)
+        return BestGain(np.zeros(0), np.zeros(0), math.nan, math.nan, math.nan)
     columns = read(folder, sweep, run, [GAIN, sweep.metrics[0]])
     spread = sweep.drawn.spreads[sweep.drawn.names.index(GAIN)]
     # Drawn may be factors on the run's own gain.
@@ -86,7 +86,7 @@ def recommended(folder: Path, sweep: Sweep, run: PlannedRun) -> Recommended:
     kept = [values[(place == i) & np.isfinite(values)] for i in range(middles.size)]
     known = [i for i, some in enumerate(kept) if some.size >= LEAST_CASES]
     if not known:
-        return Recommended(np.zeros(0), np.zeros(0), math.nan, math.nan, math.nan)
+        return BestGain(np.zeros(0), np.zeros(0), math.nan, math.nan, math.nan)
     gains, high = middles[known], np.array([float(np.percentile(kept[i], 95.0)) for i in known])
     best = int(np.argmin(high))
-    return Recommended(gains, high, float(gains[best]), float(high[best]), width)
+    return BestGain(gains, high, float(gains[best]), float(high[best]), width)
