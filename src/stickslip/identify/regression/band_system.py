@@ -66,15 +66,14 @@ class Candidate:
 
 
 class Products(NamedTuple):
-    """Of the columns with one fall of friction (or none), with each other and with the small ones: no torque changes
-    them."""
+    """Of the columns without a fall of friction, or with one each, with each other and with the small ones: no torque
+    changes them. A first axis counts the falls."""
 
-    level: int
+    levels: tuple[int, ...]
     own: Places
     every: Places
     own_own: Array
     own_small: Array
-    small_own: Array
     every_every: Array
 
 
@@ -86,6 +85,17 @@ def inverse_of(matrix: Array) -> Array:
             return inverse
     sizes, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
     return np.asarray((vectors / np.maximum(sizes, LEAST * sizes[-1])) @ vectors.T, dtype=np.float64)
+
+
+def inverses_of(matrices: Array) -> Array:
+    """As `inverse_of`, of many, shape (n, p, p)."""
+    try:
+        inverses: Array = np.asarray(np.linalg.inv(matrices), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return np.stack([inverse_of(m) for m in matrices])
+    for i in np.flatnonzero(np.diagonal(inverses, axis1=1, axis2=2).min(axis=1) <= 0.0):
+        inverses[i] = inverse_of(matrices[i])
+    return inverses
 
 
 def least_squares(columns: Array, target: Array) -> Array:
@@ -206,39 +216,48 @@ class System:
     @cached_property
     def by_level(self) -> list[Products]:
         """Without a fall of friction, and with every one."""
-        out: list[Products] = []
-        for level in range(-1, len(self.levels)):
-            own = np.array([*range(self.core), *([self.core + level] if level >= 0 else [])])
-            every = np.concatenate([own, self.small])
-            pairs = ((own, own), (own, self.small), (self.small, own), (every, every))
-            out.append(Products(level, own, every, *(self.products[np.ix_(*pair)] for pair in pairs)))
-        return out
+        return [
+            self._products((-1,)),
+            *([self._products(tuple(range(len(self.levels))))] if self.levels else []),
+        ]
+
+    def _products(self, levels: tuple[int, ...]) -> Products:
+        """Those of columns that are as many."""
+        core = list(range(self.core))
+        own = np.array([[*core, *([self.core + level] if level >= 0 else [])] for level in levels])
+        every = np.concatenate([own, np.tile(self.small, (len(levels), 1))], axis=1)
+        pairs = ((own, own), (own, np.tile(self.small, (len(levels), 1))), (every, every))
+        return Products(levels, own, every, *(self.products[x[:, :, None], y[:, None, :]] for x, y in pairs))
 
     def candidates(self, torque: Array, skew: float) -> list[Candidate]:
         """The fit without a fall of friction, and with every one."""
         small = self.small
         seen = self.columns.T @ torque
-        held = np.diag(self.noise * self.memory / (self.std * self.scale[small]) ** 2)
-        inner = inverse_of(self.products[np.ix_(small, small)] + held)
+        held = self.noise * self.memory / (self.std * self.scale[small]) ** 2
+        inner = inverse_of(self.products[np.ix_(small, small)] + np.diag(held))
         power, seen_small = float(torque @ torque), seen[small]
         alone = inner @ seen_small
         # The skew is known to its usual size before the record is looked at.
         known = self.noise * self.memory / (self.inertia * self.skew_size * self.scale[JERK]) ** 2
         moved = known * self.inertia * (skew - self.expected) * self.scale[JERK]
         out: list[Candidate] = []
-        for level, own, every, own_own, own_small, small_own, every_every in self.by_level:
-            mixing = inner @ small_own
+        for levels, own, every, own_own, own_small, every_every in self.by_level:
+            mixing = inner @ own_small.transpose(0, 2, 1)
             matrix = own_own - own_small @ mixing
-            right = seen[own] - mixing.T @ seen_small
-            matrix[JERK, JERK] += known
-            right[JERK] += moved
-            inverse = inverse_of(matrix + 1e-11 * np.trace(matrix) / own.size * np.eye(own.size))
-            values = inverse @ right
-            coefficients = alone - mixing @ values
-            both = np.concatenate([values, coefficients])
-            cost = power - 2.0 * float(seen[every] @ both) + float(both @ every_every @ both)
-            cost += float(coefficients @ held @ coefficients)
-            out.append(Candidate(level, own, mixing, inverse, values, coefficients, cost))
+            right = seen[own] - seen_small @ mixing
+            matrix[:, JERK, JERK] += known
+            right[:, JERK] += moved
+            size = own.shape[1]
+            matrix += 1e-11 / size * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(size)
+            inverse = inverses_of(matrix)
+            values = (inverse @ right[:, :, None])[:, :, 0]
+            coefficients = alone - (mixing @ values[:, :, None])[:, :, 0]
+            both = np.concatenate([values, coefficients], axis=1)
+            cost = power - 2.0 * np.sum(seen[every] * both, axis=1)
+            cost += np.sum(both * (every_every @ both[:, :, None])[:, :, 0], axis=1)
+            cost += coefficients**2 @ held
+            parts = zip(levels, own, mixing, inverse, values, coefficients, cost.tolist(), strict=True)
+            out += [Candidate(*part) for part in parts]
         return out
 
     def beside(self, c: Candidate, orders: int, background: int) -> None:
