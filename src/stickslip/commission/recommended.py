@@ -231,19 +231,20 @@ def picture_of_tracking(found: TrackedRecommendation) -> Picture:
 
 
 def picture_of_candidates(found: TrackedRecommendation) -> Picture:
-    """How many times smaller than with the PD alone each candidate's error is, over the friction there is."""
+    """What the safe candidates leave of the error of the PD alone, over the friction there is."""
     order = np.argsort(LEVELS)
     traces = [
         Trace(
             f"{c.setting.law}, {c.setting.kind}",
             100.0 * np.array(LEVELS)[order],
-            1.0 / np.array(c.errors)[order],
+            100.0 * np.array(c.errors)[order],
         )
         for c in found.advice.candidates
-        if not c.unsafe and c.setting.gain == 1.0 and not c.setting.lead
+        if not (c.unsafe or c.setting.lead or c.setting.deadband) and c.setting.gain == 1.0
     ]
     return Picture(
-        "recommended", "Candidates at gain 1 on the identified machine, as far as they are safe there",
-        f"PD of {found.known.bandwidth:.3g} Hz; the error with it alone is {1e3 * found.advice.linear_error:.3g} mrad "
-        "RMS", "friction there is over that identified (%)", "times smaller error", tuple(traces),
+        "recommended", "What candidates of gain 1 leave of the error on the identified machine",
+        f"Those that are safe there; with the PD of {found.known.bandwidth:.3g} Hz alone it is "
+        f"{1e3 * found.advice.linear_error:.3g} mrad RMS", "friction there is over that identified (%)",
+        "error left (% of the PD's alone)", tuple(traces),
     )  # fmt: skip
