@@ -19,6 +19,8 @@ from stickslip.spec import Law, ReferenceKind
 MODEL_FORMAT = "stickslip-model-1"
 """What a file that `stickslip identify` wrote says it is."""
 
+SHOWN = 6
+"""Numbers of a parameter that are printed one by one, at most."""
 MOST_BREAKS = 200_000
 """Turning points of a reference within a run"""
 
@@ -219,8 +221,16 @@ class Reference:
         return {"kind": self.kind.name, **_plain(self.parameters)}
 
     def __repr__(self) -> str:
-        inside = ", ".join(f"{k}={v!r}" for k, v in self.parameters._asdict().items())
+        inside = ", ".join(f"{k}={_short(v)}" for k, v in self.parameters._asdict().items())
         return f"Reference({self.kind.name!r}, {inside})"
+
+
+def _short(value: Any) -> str:
+    """A parameter as code; of many numbers how many, and their range."""
+    numbers = cast("tuple[float, ...]", value if isinstance(value, tuple) else ())
+    if len(numbers) <= SHOWN:
+        return f"{value!r}"
+    return f"<{len(numbers)} numbers, {min(numbers):g} to {max(numbers):g}>"
 
 
 def monotone_velocities(time: Sequence[float], position: Sequence[float]) -> tuple[float, ...]:

@@ -275,7 +275,7 @@ def test_a_reader_that_leaves_early(folder: Path) -> None:
 
 
 def test_a_chance_that_there_is_not_is_a_dash() -> None:
-    from stickslip.cli.compare import chance
+    from stickslip.identify.compare.text import chance
 
     assert [chance(p) for p in (float("nan"), 0.25, 1e-9)] == ["-", "0.25", "< 1e-06"]
 

@@ -10,6 +10,7 @@ import pytest
 import tomli_w
 from test_recommend_axes import INERTIA, PD, identified
 
+import stickslip as ss
 from stickslip.approval import allow_code
 from stickslip.cli import main
 from stickslip.control.block import ControlBlock
@@ -171,3 +172,16 @@ def test_the_command_writes_a_controller_that_runs_and_is_exported(tmp_path, mon
     assert main(track) == 0
     assert main([*line, "--bandwidth", "20"]) == 2
     assert "--bandwidth cannot be combined with --controller loop.toml" in capsys.readouterr().err
+
+
+def test_a_recommendation_that_is_a_whole_controller_is_exported_as_one(few):
+    """As the object is: no option says so."""
+    given = {"sample_time": T, "torque_limit": 2.0, "amplitude": 0.2, "frequency": 0.5}
+    found, drive = identified(), Drive(controller=Controller(loop=LOOP, sample_time=T), **given)
+    advice = ss.RecommendationResult(recommend(found, drive, axes=1, confirm=2), found)
+    made = ss.export(advice, to="c99")
+    assert made.files == ss.export(advice.controller, to="c99", name=made.name).files
+    assert made.files == ss.export(advice, to="c99", compensator="recommended").files
+    assert made.files == ss.export(advice, to="c99", controller=True).files
+    law = ss.export(advice, to="c99", compensator="ff").files
+    assert law != made.files

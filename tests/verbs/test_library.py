@@ -189,6 +189,9 @@ def test_an_unchanged_axis_compares_as_unchanged(result: ss.IdentificationResult
     twice = ss.compare(result, result)
     assert not [c for c in twice.changes if c.changed]
     assert twice.as_dict() == ss.compare(result.save(tmp_path), result).as_dict()
+    assert repr(twice) == f"<Comparison: {twice.summary}>"
+    assert str(twice).endswith(twice.summary)
+    assert "sliding curve" in twice._repr_html_()
 
 
 @pytest.mark.parametrize(
@@ -241,6 +244,26 @@ def test_a_recommendation_is_that_of_the_command_line_and_runs_in_a_simulation(
     assert errors[0] < 0.5 * errors[1]
     assert "Error reduction" in advice._repr_html_()
     assert str(advice).startswith("law")
+
+
+def test_what_a_run_is_not_made_of_is_said_by_kind() -> None:
+    """Gains in a controller's place, arrays in a reference's, arguments in another order."""
+    axis, gains = ss.RigidAxis(1e-3, ss.Model("coulomb", fc=0.1)), ss.place("PD", 1e-3, 10.0, 1.0)
+    slow, run = ss.Reference("sine", amplitude=0.1, frequency=1.0), ss.Controller(gains)
+    time = np.linspace(0.0, 1.0, 1000)
+    for wrong, words in (
+        ((axis, gains, slow, 1.0), r"controller is a Gains; give a Controller"),
+        ((axis, slow, run, 1.0), r"controller is a Reference; give"),
+        (
+            (axis, run, (time, time), 1.0),
+            r"reference is a tuple; give a Reference, of arrays Reference\.table",
+        ),
+        ((axis, run, slow, "1"), r"duration is a str; give a number of seconds"),
+        ((1e-3, run, slow, 1.0), r"axis is a float; give a RigidAxis, or a Machine"),
+    ):
+        with pytest.raises(ss.InputError, match=words):
+            ss.simulate(*wrong)
+    assert len(repr(ss.Reference.table(time.tolist(), time.tolist()))) < 200
 
 
 def test_an_export_is_that_of_the_command_line(

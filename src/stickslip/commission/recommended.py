@@ -27,13 +27,15 @@ from stickslip.recommend.file import recommended_table
 from stickslip.recommend.recommendation import Recommendation
 from stickslip.record import Record
 from stickslip.rigs.procedures.base import Performed, Plan
-from stickslip.rigs.procedures.track import Track
+from stickslip.rigs.procedures.track import REFERENCES, Track
 from stickslip.rigs.rig import Rig
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
 NOTHING = AngleMap()
 SLOWER = (0.75, 0.5)
 """Of the bandwidth: where the gain over the linear controller alone is measured too."""
+STILL = 0.9
+"""Of the motion's RMS about where it begins, an error with which the axis hardly moves."""
 NONE_SAFE = "none is safe on the identified machine and better than the PD alone"
 
 
@@ -149,6 +151,8 @@ class TrackedRecommendation:
         )
         if math.isfinite(self.advice.unsafe_gain):
             yield f"With a gain of {self.advice.unsafe_gain:g} it is not safe there."
+        if self.tracked and self.tracked[0].alone > STILL * slow_rms():
+            yield "The PD alone hardly moves the axis on this slow motion: it is compared with an axis that stands."
         for t in self.tracked:
             yield (
                 f"Measured on the slow sinusoid{self.place}, PD of {t.bandwidth:.3g} Hz: {1e3 * t.alone:.3g} mrad RMS "
@@ -207,6 +211,14 @@ def recommend_and_track(
                 runs[name] = record
         tracked.append(Tracked(share * known.bandwidth, *errors))
     return dataclasses.replace(found, tracked=tuple(tracked), runs=runs)
+
+
+def slow_rms() -> float:
+    """RMS of the slow sinusoid about where it begins, rad."""
+    reference, seconds = REFERENCES["low"]
+    path = reference.sample(np.linspace(0.0, seconds, 2001))
+    way: np.ndarray[Any, np.dtype[np.float64]] = path[:, 0] - path[0, 0]
+    return float(np.sqrt(np.mean(way**2)))
 
 
 def picture_of_tracking(found: TrackedRecommendation) -> Picture:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,6 +49,14 @@ ON_A_MACHINE = 100.0
 """Tolerances that a sub-step of a machine may be wrong by; what its loop sees is coarser by far."""
 SHORTEST = 1e-9
 """s, of a run: one-sided limits are taken a thousandth of it beside kinks and ends."""
+
+KINDS: tuple[tuple[str, tuple[type, ...], str], ...] = (
+    ("axis", (RigidAxis, Machine), "a RigidAxis, or a Machine as load_machine makes it"),
+    ("controller", (Controller,), "a Controller: of gains, Controller(place('PD', ...)), or of control laws"),
+    ("reference", (Reference,), "a Reference, of arrays Reference.table(time, position)"),
+    ("duration", (Real,), "a number of seconds"),
+)
+"""Arguments of `simulate`: what they must be, and what to give."""
 
 REASONS: dict[int, tuple[type[SimulationError], str]] = {
     case_arrays.DIVERGED: (Divergence, "position or velocity left every reasonable bound"),
@@ -137,6 +146,7 @@ def simulate(
         If the run diverges, leaves the finite numbers or switches without end; it says when and why, and its
         ``record`` holds what was computed.
     """
+    _insist_on_kinds(axis, controller, reference, duration)
     _insist_on_tolerance(tolerance)
     if isinstance(axis, Machine):
         check_machine_run(
@@ -153,6 +163,13 @@ def simulate(
         tolerance=tolerance, slip_rule=slip_rule, output=output, initial=initial, metered=metered,
     )  # fmt: skip
     return run_case(case, integrator, time_step, slip_rule, check=check)
+
+
+def _insist_on_kinds(*given: Any) -> None:
+    """Refuse an argument of another kind than it must be of, such as gains in a controller's place."""
+    for value, (name, kinds, what) in zip(given, KINDS, strict=True):
+        if not isinstance(value, kinds):
+            raise InputError(f"{name} is a {type(value).__name__}; give {what}")
 
 
 def run_case(

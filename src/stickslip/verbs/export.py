@@ -163,7 +163,8 @@ def export(
         The whole sampled controller of a simulation's file; a `Controller` is exported so anyway.
     compensator : {"ff", "fb", "recommended"}, optional
         The law as a compensator that is called every sample: feedforward of the reference velocity, feedback of the
-        measured one, or what was recommended (of a `RecommendationResult` the default, where the target carries it).
+        measured one, or what was recommended (of a `RecommendationResult` the default, where the target carries it; a
+        whole controller where that is what was recommended).
     sample_time : float, optional
         Of the compensator, s; 0.001, or the recommended one.
     substeps : int, optional
@@ -202,9 +203,12 @@ def export(
         sample_time, substeps, gain, lead, deadband, offset, inertia_feedforward, filter_hz
     )
     advised = isinstance(source, RecommendationResult) and chosen.name in CONTROLLER_TARGETS
-    if compensator is None and advised and not options.given:
+    whole = advised and is_whole(source)
+    if whole and compensator == "recommended":
+        compensator = None  # what is recommended is the controller
+    elif compensator is None and advised and not whole and not options.given:
         compensator = "recommended"
-    controller = controller or isinstance(source, Controller) or own_loop(source)
+    controller = controller or isinstance(source, Controller) or (whole and compensator is None)
     refuse_controllers(chosen, controller, compensator)
     content = content_of(source)
     own = name or re.sub(r"[^A-Za-z0-9_]+", "_", Path(content.document.name).stem)
@@ -258,9 +262,11 @@ def exported_law(content: Table, job: Job, chosen: Target, check: bool) -> Expor
     return ExportResult(chosen, job.name, files.files, notes, tried)
 
 
-def own_loop(source: Source) -> bool:
-    """Whether a recommendation is the whole controller, made of control laws."""
-    return isinstance(source, RecommendationResult) and not source.loop.is_short
+def is_whole(source: Source) -> bool:
+    """Whether a recommendation is a whole controller: a loop of control laws, or a compensator of the catalogue."""
+    if not isinstance(source, RecommendationResult):
+        return False
+    return source.recommendation.instead is not None or not source.loop.is_short
 
 
 def saved(result: ExportResult, folder: str | os.PathLike[str] | None) -> ExportResult:
@@ -308,6 +314,8 @@ def controller_in(source: Source) -> Controller:
     """The controller given, or that of a file for `stickslip simulate`."""
     if isinstance(source, Controller):
         return source
+    if isinstance(source, RecommendationResult) and is_whole(source):
+        return source.controller
     if isinstance(source, (Model, IdentificationResult, RecommendationResult, PositionMap)):
         raise InputError(
             f"a {type(source).__name__} has no controller; give a Controller, or leave controller out"

@@ -6,6 +6,7 @@ import importlib
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.compare.levels import Change, common_speeds, levels_of, said_of, unseen
 from stickslip.identify.compare.motor_or_load import on_one_side
+from stickslip.identify.compare.text import lines
 from stickslip.identify.estimate import Estimate, Picture, Trace
 from stickslip.identify.identified_file import Identified, covariance
 from stickslip.identify.monte_carlo import curve_band, sliding_torque
@@ -22,9 +24,9 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 DRAWS = 400
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """The result.
+    """The result; printed, it is what `stickslip compare` prints.
 
     Attributes
     ----------
@@ -63,6 +65,15 @@ class Comparison:
     def largest(self) -> float:
         """The greatest difference of the curves over its band; above 1 the curve has changed."""
         return float(np.max(np.abs(self.difference) / self.band))
+
+    def __str__(self) -> str:
+        return "\n".join(lines(self))
+
+    def __repr__(self) -> str:
+        return f"<Comparison: {self.summary}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
