@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas
@@ -244,6 +245,14 @@ def test_a_recommendation_is_that_of_the_command_line_and_runs_in_a_simulation(
     assert errors[0] < 0.5 * errors[1]
     assert "Error reduction" in advice._repr_html_()
     assert str(advice).startswith("law")
+
+
+@pytest.mark.parametrize("given", [5, None, ss.Model("coulomb", fc=0.1)])
+def test_what_is_no_model_is_said_by_kind(given: Any) -> None:
+    with pytest.raises(ss.InputError, match=rf"a model .* is wanted, not a {type(given).__name__}"):
+        ss.recommend(given)
+    with pytest.raises(ss.InputError, match=rf"is wanted, not a {type(given).__name__}"):
+        ss.compare(given, given)
 
 
 def test_what_a_run_is_not_made_of_is_said_by_kind() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 from stickslip.identify.compare.change import Comparison, compare_models
 from stickslip.identify.identified_file import Identified, read_identified
@@ -26,7 +25,7 @@ def identified_of(given: IdentifiedModel) -> Identified:
         return given.identified()
     if isinstance(given, Identified):
         return given
-    require(given if isinstance(given, str) else Path(given), "model")
+    require(given, "model")
     return read_identified(given)
 
 

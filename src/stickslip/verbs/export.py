@@ -299,7 +299,7 @@ def content_of(source: Source) -> Table:
     if isinstance(source, Controller):
         return Table({}, Document("controller", Path()))
     assert not isinstance(source, PositionMap)
-    require(Path(source), "model", "simulation")
+    require(source, "model", "simulation")
     return read_toml(Path(source))
 
 

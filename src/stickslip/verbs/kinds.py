@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 WORDS = {
     "record": ("a record", "a record (CSV, MAT, HDF5, Parquet, ...)"),
@@ -69,12 +70,13 @@ def kind_of_toml(table: Mapping[str, Any]) -> str:
     return "study" if isinstance(friction, dict) and {"references", "controllers"} & table.keys() else ""
 
 
-def require(path: Path | str, *wanted: str) -> None:
+def require(path: object, *wanted: str) -> None:
     """Refuse a file that is clearly of another kind; one that is not there, or not known, is left to its reader.
 
     Parameters
     ----------
-    path : Path or str
+    path : path
+        Anything else is refused.
     *wanted : str
         Kinds that will do (`WORDS`), the usual one first.
 
@@ -85,7 +87,10 @@ def require(path: Path | str, *wanted: str) -> None:
     """
     from stickslip.errors import InputError
 
-    kind = kind_of(Path(path))
-    if not kind or kind in wanted or not Path(path).exists():
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError(f"{WORDS[wanted[0]][1]}, or its path, is wanted, not a {type(path).__name__}")
+    file = Path(cast("str | os.PathLike[str]", path))
+    kind = kind_of(file)
+    if not kind or kind in wanted or not file.exists():
         return
-    raise InputError(f"{path} is {WORDS[kind][0]}, not {WORDS[wanted[0]][1]}: {TAKEN_BY[kind].format(path)}")
+    raise InputError(f"{file} is {WORDS[kind][0]}, not {WORDS[wanted[0]][1]}: {TAKEN_BY[kind].format(file)}")
