@@ -69,7 +69,10 @@ class Following(Track):
         return {
             "reference": self.reference, "gains": self.using.numbers(),
             "compensator": used
-            and {"kind": used.name, "gain": used.gain, "lead": used.lead, **used.model.as_dict()},
+            and {
+                "kind": used.name, "gain": used.gain, "lead": used.lead, "deadband": used.deadband,
+                "inertia_feedforward": used.inertia_feedforward, **used.model.as_dict(),
+            },
             "angle": self.over.as_dict(),
         }  # fmt: skip
 
