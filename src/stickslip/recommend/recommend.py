@@ -157,6 +157,11 @@ def recommend_on(
     gains : sequence of float
         That are tried.
 
+    Returns
+    -------
+    Recommendation
+        Its errors are those on the machines that the setting was picked on: no promise follows from them.
+
     Raises
     ------
     InputError
@@ -170,7 +175,8 @@ def recommend_on(
             f"the linear controller alone is unstable on the machine that was identified: {first}"
         )
     candidates = [bench.judged(s) for s in settings_of(laws, drive, inertia, gains)]
-    chosen, margin, unsafe_gain = best_on_all(candidates), math.nan, math.inf
+    # Every machine is as likely as the others.
+    chosen, margin, unsafe_gain = best_of(candidates, lambda c: math.prod(c.errors)), math.nan, math.inf
     if chosen is not None:
         chosen = with_lead(chosen, bench)
         beyond = [bench.judged(replace(chosen.setting, gain=gain)) for gain in BEYOND]
@@ -302,25 +308,14 @@ def margin_of(chosen: Setting, unsafe: Sequence[Setting], safe: Sequence[Setting
     return last / chosen.gain, first
 
 
-def near_best(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The safe candidates with about the least worst error; none where none is worth it."""
+def best_of(
+    candidates: Sequence[Candidate], tie: Callable[[Candidate], float] = lambda c: c.worst
+) -> Candidate | None:
+    """Of the safe candidates with about the least worst error the one with the lowest gain, feedforward first; among
+    those alike the one with the least `tie`."""
     safe = [c for c in candidates if not c.unsafe and c.worst <= WORTH]
-    return [c for c in safe if c.worst <= NEAR * min(x.worst for x in safe)]
-
-
-def best_of(candidates: Sequence[Candidate]) -> Candidate | None:
-    """Of those near the best the one with the lowest gain, feedforward first, then with the least worst error."""
-    ranked = sorted(
-        near_best(candidates), key=lambda c: (c.setting.kind == "feedback", c.setting.gain, c.worst)
-    )
-    return ranked[0] if ranked else None
-
-
-def best_on_all(candidates: Sequence[Candidate]) -> Candidate | None:
-    """As `best_of`, then with the least product of its errors: where every machine is as likely as the others."""
-    near = near_best(candidates)
-    ranked = sorted(near, key=lambda c: (c.setting.kind == "feedback", c.setting.gain, math.prod(c.errors)))
-    return ranked[0] if ranked else None
+    near = (c for c in safe if c.worst <= NEAR * min(x.worst for x in safe))
+    return min(near, key=lambda c: (c.setting.kind == "feedback", c.setting.gain, tie(c)), default=None)
 
 
 def confirmed(
