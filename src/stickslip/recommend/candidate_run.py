@@ -186,6 +186,16 @@ class Drive:
         return out
 
     @cached_property
+    def setpoints(self) -> Array:
+        """`reference` for the closed loop (`stickslip.rigs.rig.Setpoint`)."""
+        return setpoints_of(self.reference)
+
+    @cached_property
+    def setpoints_backward(self) -> Array:
+        """`reference_backward` for the closed loop."""
+        return setpoints_of(self.reference_backward)
+
+    @cached_property
     def stops(self) -> float:
         """How often the motion stops or turns, 1/s."""
         side = np.sign(np.diff(self.reference[:, 0]))
@@ -284,8 +294,9 @@ class Trial:
 
 def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
     """The motion and the rest behind it; the reason where it cannot be run to its end."""
-    reference = drive.reference_backward if isinstance(plant, Plant) and plant.backward else drive.reference
-    position, state = followed(plant, controller, reference)
+    backward = isinstance(plant, Plant) and plant.backward
+    reference = drive.reference_backward if backward else drive.reference
+    position, state = followed(plant, controller, drive.setpoints_backward if backward else drive.setpoints)
     if position is None:
         return "position or velocity left every reasonable bound"
     time = controller.sample_time
@@ -306,24 +317,28 @@ def simulated(plant: RigidAxis, controller: Controller, reference: Array, start:
 
     The axis starts at rest at `start`, rad.
     """
-    return followed(plant, controller, reference, start)[0]
+    return followed(plant, controller, setpoints_of(reference), start)[0]
 
 
-def followed(
-    plant: RigidAxis, controller: Controller, reference: Array, start: float = 0.0
-) -> tuple[Array | None, Array]:
-    """As `simulated`, and the state in which it leaves the controller's laws."""
-    control = control_of(controller, UNLIMITED, controller.sample_time)
-    laid = laid_out(plant, controller.sample_time, controller.encoder_counts)
-    stand_at(laid, start)
-    look(laid, control.measured)
-    path = setpoints(
+def setpoints_of(reference: Array) -> Array:
+    """Position, velocity and acceleration of a reference for the closed loop."""
+    return setpoints(
         len(reference),
         position=reference[:, 0],
         velocity=reference[:, 1],
         acceleration=reference[:, 2],
         closed=1.0,
     )
+
+
+def followed(
+    plant: RigidAxis, controller: Controller, path: Array, start: float = 0.0
+) -> tuple[Array | None, Array]:
+    """As `simulated`, along setpoints, and the state in which it leaves the controller's laws."""
+    control = control_of(controller, UNLIMITED, controller.sample_time)
+    laid = laid_out(plant, controller.sample_time, controller.encoder_counts)
+    stand_at(laid, start)
+    look(laid, control.measured)
     positions = np.empty(len(path))
     done = follow(laid, control, path, np.empty(len(COLUMNS)), positions)
     ended = done == len(path) and bool(np.all(np.isfinite(positions)))

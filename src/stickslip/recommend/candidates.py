@@ -158,6 +158,7 @@ class Bench:
         self.plants, self.linear, self.drive, self.laws, self.ran = plants, linear, drive, laws, ran
         self.alone: list[Trial | str] = []
         self.left_out = 0
+        self._judged: dict[Setting, Candidate] = {}
 
     @staticmethod
     def held(
@@ -208,7 +209,12 @@ class Bench:
                 yield plant, where
 
     def judged(self, setting: Setting) -> Candidate:
-        """The setting on every axis, up to the first on which it is not safe."""
+        """The setting on every axis, up to the first on which it is not safe; simulated once."""
+        if setting not in self._judged:
+            self._judged[setting] = self._judge(setting)
+        return self._judged[setting]
+
+    def _judge(self, setting: Setting) -> Candidate:
         controller = setting.on(self.linear, self.laws[setting.law])
         errors: list[float] = []
         for before, after in self.trials(controller):

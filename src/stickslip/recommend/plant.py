@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -47,6 +48,11 @@ class Plant(RigidAxis):
     bandwidth: float = math.inf
     backward: bool = False
     machine: Machine | None = None
+
+    @cached_property
+    def kept(self) -> dict[tuple[float, float], Laid]:
+        """How it was laid out, by the drive's sample time and counts: once for all controllers that are tried on it."""
+        return {}
 
     def built(self, sample_time: float, counts: float) -> Machine:
         """The machine that it is, sampled every `sample_time` s, with an encoder of `counts` where it is rigid."""
@@ -87,8 +93,19 @@ class WholeMachine(Plant):
 def laid_out(plant: RigidAxis, sample_time: float, counts: float) -> Laid:
     """A machine at rest that is this axis, as the machine engine takes it."""
     own = plant if isinstance(plant, Plant) else Plant(plant.inertia, plant.friction)
+    drive = (sample_time, counts)
+    if drive not in own.kept:
+        own.kept[drive] = laid_anew(own, *drive)
+    laid = own.kept[drive]
+    # A run changes all but its flows, which are most of it.
+    copies = {name: value.copy() for name, value in laid._asdict().items() if isinstance(value, np.ndarray)}
+    return laid._replace(**{**copies, "matrix": laid.matrix})
+
+
+def laid_anew(own: Plant, sample_time: float, counts: float) -> Laid:
+    """The same, for a plant that was not yet laid out for such a drive."""
     laid = lay_out_machine(own.built(sample_time, counts))
-    laid.surroundings[1], laid.surroundings[2] = plant.load, plant.temperature
+    laid.surroundings[1], laid.surroundings[2] = own.load, own.temperature
     n = laid.machine
     beside = [(0.0, -own.offset, 0.0), *own.waves]
     known = laid.waves[: 3 * int(n["ripples"] + n["cogs"])]

@@ -88,9 +88,11 @@ def profiles_of(
             target = np.where(seen & (ratio > 0.0), ratio, target)
     reach: dict[tuple[int, float], float] = {}
     family = [best.u]
+    # What the data tell least comes first: a better minimum, after which all begins anew, is met on its profile.
+    order = sorted(range(best.u.size), key=lambda i: -inverse[i, i] if seen[i] else -math.inf)
     # A second round goes on from fits met on other profiles that lie beyond what the first one reached.
     for again in (False, True):
-        for i in range(best.u.size):
+        for i in order:
             valley = inverse[:, i] / inverse[i, i] if inverse[i, i] > 0.0 else np.eye(best.u.size)[i]
             first = math.sqrt(max(float(target[i] * inverse[i, i]), 0.0)) if seen[i] else 1.0
             for side in (-1.0, 1.0):

@@ -47,6 +47,8 @@ BUSY = (0.1, 10.0)
 """Times the Stribeck velocity: between these speeds friction falls and rises, and nearly all error is made there."""
 GRADES = ((0.02, STEP), (0.002, 5e-5))
 """s before and after these speeds, and the longest step there, s; what rings after a stop has died away by then."""
+COARSER = 4.0
+"""Times these steps where only the displacements of parts that stick count: they keep 10 digits of a turn then."""
 DIFFERENCE = 1e-3
 """Of the coordinates, for Jacobians: where a reversal falls between two steps leaves the simulation 7 digits."""
 
@@ -180,12 +182,11 @@ class Simulation:
         ends = fine[2 * self.rows]
         return ends + (ends - coarse[self.rows]) / 3.0
 
-    def graded(self, u: Array, vs: float) -> Simulation:
-        """The same with steps as short as the motion at u asks for."""
+    def graded(self, u: Array, vs: float, coarser: float = 1.0) -> Simulation:
+        """The same with steps as short as the motion at u asks for, times `coarser`."""
         velocity = self.fine.run(self.mechanics, self.vector.law_parameters(u))[2 * self.rows, 1]
-        return Simulation(
-            self.response, self.vector, self.mechanics.inertia, graded(self.response, velocity, vs)
-        )
+        longest = coarser * graded(self.response, velocity, vs)
+        return Simulation(self.response, self.vector, self.mechanics.inertia, longest)
 
 
 def misfit(response: Response, simulation: Simulation) -> Residuals:
@@ -284,14 +285,16 @@ def fit_bristles(
         return lambda u: bristles(stepped.position(u)) - measured
 
     def descended(u: Array) -> tuple[Array, float]:
-        return descend_by_secants(squares_of(vector, apart(simulation.graded(u, vs))), u, tolerance=enough)
+        return descend_by_secants(
+            squares_of(vector, apart(simulation.graded(u, vs, COARSER))), u, tolerance=enough
+        )
 
     # sigma1 hardly matters here, and may end at either of its bounds.
     undamped = vector.start.copy()
     undamped[vector.names.index("sigma1")] = 0.0
     near = min((descended(u) for u in (vector.start, undamped)), key=lambda found: found[1])[0]
     return fit(
-        apart(simulation.graded(near, vs)), vector, noise=noise, size=float(np.max(np.abs(measured))),
+        apart(simulation.graded(near, vs, COARSER)), vector, noise=noise, size=float(np.max(np.abs(measured))),
         starts=near[None, :], tolerance=enough, difference=DIFFERENCE,
     )  # fmt: skip
 
