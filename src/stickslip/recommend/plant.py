@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -98,7 +99,8 @@ def laid_out(plant: RigidAxis, sample_time: float, counts: float) -> Laid:
         own.kept[drive] = laid_anew(own, *drive)
     laid = own.kept[drive]
     # A run changes all but its flows, which are most of it.
-    copies = {name: value.copy() for name, value in laid._asdict().items() if isinstance(value, np.ndarray)}
+    arrays: dict[str, Any] = {name: x for name, x in laid._asdict().items() if isinstance(x, np.ndarray)}
+    copies = {name: x.copy() for name, x in arrays.items()}
     return laid._replace(**{**copies, "matrix": laid.matrix})
 
 
