@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from types import SimpleNamespace
 from typing import Any, Protocol
 
 import numpy as np
@@ -20,7 +19,7 @@ from stickslip.control.linear import Gains
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import FREE, INPUTS, Drivetrain, LinearContact
 from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.simulation.prescribed.motion import Samples, packed_numbers, torque_along
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -45,19 +44,15 @@ def describing(model: Model, amplitude: float, frequency: float) -> LinearContac
     for name, value, unit in (("amplitude", amplitude, "rad"), ("frequency", frequency, "Hz")):
         if not (value > 0.0 and math.isfinite(value)):
             raise ParameterError(f"stability: {name} = {value:g} {unit} must be greater than 0")
-    law, p, w = model.law, model.parameters, 2.0 * math.pi * frequency
-    z, u = law.state(p), SimpleNamespace(**Surroundings()._asdict())
-    dt = 1.0 / (STEPS * frequency)
-    speeds = [amplitude * w * math.cos(2.0 * math.pi * (i + 0.5) / STEPS) for i in range(-1, STEPS)]
-    in_phase = in_step = 0.0
-    for turn in range(2):
-        for i in range(STEPS):
-            # Half-way between zeros of the velocity: a law that jumps there is taken on either side.
-            torque = law.step(speeds[i], speeds[i + 1], dt, z, p, u)
-            if turn == 1:
-                angle = 2.0 * math.pi * (i + 0.5) / STEPS
-                in_phase += torque * math.sin(angle)
-                in_step += torque * math.cos(angle)
+    w = 2.0 * math.pi * frequency
+    # Half-way between zeros of the velocity: a law that jumps there is taken on either side.
+    steps = np.arange(-1, 2 * STEPS)
+    speeds = amplitude * w * np.cos(2.0 * math.pi * (steps + 0.5) / STEPS)
+    times = (steps + 1.0) / (STEPS * frequency)
+    samples = Samples(times, np.zeros(times.size), speeds[:-1].copy(), speeds[1:].copy())
+    torque = torque_along(model.law, packed_numbers(model), model.parameters, samples)[-STEPS:]
+    angle = 2.0 * math.pi * (np.arange(STEPS) + 0.5) / STEPS
+    in_phase, in_step = float(torque @ np.sin(angle)), float(torque @ np.cos(angle))
     scale = 2.0 / (STEPS * amplitude)
     return LinearContact(max(scale * in_phase, 0.0), scale * in_step / w)  # a jump's phase is only rounded
 

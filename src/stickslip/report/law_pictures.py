@@ -17,9 +17,11 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.jit import flat
 from stickslip.model import Model
 from stickslip.report.plots import DATES, DPI, FORMATS, RC, WIDTH, Array, Curve, Panel, Style, save, scaled
-from stickslip.spec import Law, Surroundings
+from stickslip.simulation.prescribed.motion import Samples, packed_numbers, torque_along
+from stickslip.spec import Law
 
 USUAL_VELOCITY = 0.01  # rad/s, for a law that declares no scale: the thesis's Stribeck velocity
 USUAL_DISTANCE = 1e-4  # rad, for a law without pre-sliding
@@ -68,16 +70,11 @@ def follow(model: Model, time: Any, velocity: Any) -> Response:
     time, velocity : array, shape (n,)
         s and rad/s. A time that occurs twice makes a jump of the velocity.
     """
-    law, p = model.law, model.parameters
-    z, x = law.state(p), 0.0
-    position, torque = np.zeros(time.size), np.zeros(time.size)
-    v0, before = float(velocity[0]), float(time[0])
-    for i, (t, v1) in enumerate(zip(time.tolist(), velocity.tolist())):
-        dt = t - before
-        x += 0.5 * (v0 + v1) * dt
-        # A jump is a step of no length from the new velocity: nothing moves while it lasts.
-        torque[i] = law.step(v0 if dt > 0.0 else v1, v1, dt, z, p, Surroundings(position=x))
-        position[i], v0, before = x, v1, t
+    before, after, span = velocity[:-1], velocity[1:], np.diff(time)
+    position = np.concatenate([[0.0], np.cumsum(0.5 * (before + after) * span)])
+    # A jump is a step of no length from the new velocity: nothing moves while it lasts.
+    samples = Samples(flat(time), position, np.where(span > 0.0, before, after), flat(after))
+    torque = torque_along(model.law, packed_numbers(model), model.parameters, samples)
     return Response(np.asarray(time, float), position, np.asarray(velocity, float), torque)
 
 

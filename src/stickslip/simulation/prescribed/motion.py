@@ -37,6 +37,30 @@ def follow(step: int, p: Any, u: Any, samples: Samples, z: Any, out: Any) -> Non
         )  # fmt: skip
 
 
+def torque_along(law: Law, packed: Array, parameters: Any, samples: Samples) -> Array:
+    """Torque of a law at every sample, N·m, shape (n,), from rest with all states zero.
+
+    Parameters
+    ----------
+    law : Law
+    packed : array
+        Its parameters as compiled functions read them.
+    parameters : NamedTuple
+        The same for its plain functions; only the number of elements is read.
+    samples : Samples
+        A time may occur twice: a jump of the velocity, during which nothing moves.
+    """
+    state = np.zeros(max(1, law.state_size(parameters)))
+    out = np.empty(samples.time.size)
+    follow(compiled_law(law).step, flat(packed), np.array(Surroundings()), samples, state, out)
+    return out
+
+
+def packed_numbers(model: Model) -> Array:
+    """The parameters of a model as compiled functions read them."""
+    return np.array(model.law.pack(model.parameters), dtype=np.float64)
+
+
 class Along:
     """A law that is moved along samples, from rest with all states zero.
 
@@ -59,7 +83,7 @@ class Along:
         if np.any(width <= 0.0):
             raise InputError("times must ascend strictly; merge samples of the same time")
         mean = np.diff(position) / width
-        self._law, self._step = law, compiled_law(law).step
+        self._law = law
         before, after = (mean, mean) if velocity is None else (velocity[:-1], velocity[1:])
         self._samples = Samples(flat(time), flat(position), flat(before), flat(after))
 
@@ -79,11 +103,8 @@ class Along:
         parameters : NamedTuple
             The same for the law's plain functions; only the number of elements is read.
         """
-        state = np.zeros(max(1, self._law.state_size(parameters)))
-        out = np.empty(self._samples.time.size)
-        follow(self._step, flat(packed), np.array(Surroundings()), self._samples, state, out)
-        return out
+        return torque_along(self._law, packed, parameters, self._samples)
 
     def of(self, model: Model) -> Array:
         """Torque of a model at every sample, N·m, shape (n,)."""
-        return self.torque(np.array(model.law.pack(model.parameters), dtype=np.float64), model.parameters)
+        return self.torque(packed_numbers(model), model.parameters)
