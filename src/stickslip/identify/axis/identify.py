@@ -29,7 +29,7 @@ from stickslip.identify.axis.law_fit import Evidence, estimated
 from stickslip.identify.axis.output import judged
 from stickslip.identify.axis.result import assembled, narrow_note, noted
 from stickslip.identify.axis.search import Asked, Extras, fitted_axis, require_start
-from stickslip.identify.estimate import Identification, silent
+from stickslip.identify.estimate import Estimate, Identification, silent
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
 from stickslip.identify.regression.regression import Regression, regress_axis
@@ -42,9 +42,9 @@ AUTOMATIC = ("coulomb", "stribeck", "lugre")
 NO_PREDICTION = "The prediction error cannot be had from these records:"
 INTERVALS = ("prediction", "covariance")
 SIMPLEST = (
-    "Law '{simplest}' is given instead of '{law}': the record does not determine the additional parameters of "
-    "'{law}', and no "
-    "fall of friction with velocity shows."
+    "Law '{simplest}' is given instead of '{law}', which may predict reversals and standstills better: of its "
+    "additional parameters ({more}) the record determines none, and no fall of friction with velocity shows where the "
+    "axis slides."
 )
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
@@ -147,17 +147,20 @@ def identify_axis(
         try:
             found = estimated(chosen, own, evidence, notes)
             if automatic and not per_direction and nothing_more(found, {*free, *frozen, *given.values}):
-                return simplest_of(chosen, given, evidence, notes)
+                return simplest_of(found, given, evidence, notes)
             return found
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."
     return by_output_error(chosen, own, evidence, notes, profiles=profiles, lacking=lacking)
 
 
-def simplest_of(law: Law, asked: Asked, evidence: Evidence, notes: Sequence[str]) -> Identification:
+def simplest_of(
+    found: Identification, asked: Asked, evidence: Evidence, notes: Sequence[str]
+) -> Identification:
     """The simplest law in place of one whose additional parameters the record does not determine."""
-    simplest = plugins.law(AUTOMATIC[0])
-    said = [*notes, SIMPLEST.format(law=law.name, simplest=simplest.name)]
+    simplest, more = plugins.law(AUTOMATIC[0]), ", ".join(e.name for e in beside_sliding(found))
+    assert found.model is not None
+    said = [*notes, SIMPLEST.format(law=found.model.law.name, simplest=simplest.name, more=more)]
     return estimated(simplest, asked_of(simplest, asked, [simplest]), evidence, said)
 
 
@@ -210,11 +213,20 @@ def nothing_more(found: Identification, given: Set[str]) -> bool:
 
     What the user named (`given`) is never dropped.
     """
-    estimates = {e.name: e for e in found.estimates}
-    own = {f.name for f in found.model.law.fields} - {*TOLD_BY_SLIDING} if found.model else set[str]()
-    more = {n: e for n, e in estimates.items() if n.partition("[")[0] in own}
+    estimates, more = {e.name: e for e in found.estimates}, beside_sliding(found)
     falls = "fs" in estimates and estimates["fs"].value > estimates["fc"].value
-    return bool(more) and not (own & given or any(e.identified for e in more.values()) or falls)
+    return bool(more) and not (own_of(found) & given or any(e.identified for e in more) or falls)
+
+
+def beside_sliding(found: Identification) -> list[Estimate]:
+    """The estimates of what a law has beside Coulomb's."""
+    own = own_of(found)
+    return [e for e in found.estimates if e.name.partition("[")[0] in own]
+
+
+def own_of(found: Identification) -> set[str]:
+    """The parameters that a law has beside Coulomb's."""
+    return {f.name for f in found.model.law.fields} - {*TOLD_BY_SLIDING} if found.model else set[str]()
 
 
 def judged_laws(
