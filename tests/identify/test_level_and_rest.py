@@ -11,6 +11,7 @@ import pytest
 from stickslip.identify.axis.agreed import BAND_ALONE, told_apart
 from stickslip.identify.axis.falling import AT_REST, widened, with_rest
 from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.axis.result import HELD_BY_FRICTION, constant_torque_told
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter
@@ -134,3 +135,15 @@ def test_a_level_beside_an_untold_slope_is_no_surer_than_a_laws_form() -> None:
     assert with_form(level, told) == level
     assert with_form(level, untold).value == level.value
     assert with_form(level, untold).std == pytest.approx(0.024, rel=0.01)
+
+
+def test_a_constant_torque_is_not_identified_where_friction_is_not() -> None:
+    """An axis that only sticks holds the mean of the torque, though none acts besides: 0.77 [0.767, 0.776] of 0 was
+    called identified beside a friction of 0.008 [0, 0.06] of 0.79."""
+    offset, level = estimate("offset", 0.7716, 0.7669, 0.7763), estimate("fc", 0.008, 0.0, 0.058)
+    untold = replace(level, identified=False, verdict="the data do not distinguish it from 0")
+    refused, _ = constant_torque_told([offset, untold])
+    assert not refused.identified
+    assert refused.verdict == HELD_BY_FRICTION
+    assert constant_torque_told([offset, level]) == (offset, level)
+    assert constant_torque_told([offset]) == (offset,)  # a law without such a level

@@ -38,6 +38,10 @@ ONLY_REVERSALS = (
     "only reversals tell it, and the torque is not known to act from row to row as recorded; log the command at "
     "the drive's own rate"
 )
+HELD_BY_FRICTION = (
+    "friction's level is not told, and friction at rest holds any torque up to its own: a constant torque shows where "
+    "the axis slides both ways"
+)
 STRIBECK = ("fs", "vs", "delta_s")
 LOOP_OFF = 0.3
 """Relative error of the simulated loop's drive signal from which on its gains are doubted."""
@@ -52,6 +56,8 @@ def assembled(
     experiments = result.problem.experiments
     estimates = within_a_turn(estimates, np.concatenate([t.position for t in experiments]))
     judged = judged_load(estimates, inverse, result.mechanics)
+    if sliding is None:
+        judged = constant_torque_told(judged)
     misfit = errors_of(experiments, result.problem.signals, result.misfits(experiments))
     axis, named = result.problem.axis, result.problem.vector.named(result.u)
     if inverse is not None and inverse.has("fc"):
@@ -108,6 +114,17 @@ def evident(
         # No model is to hold a friction at rest that nothing moved against.
         out = [at_level(e, level) if e.name == "fs" else e for e in out]
     return tuple(out)
+
+
+def constant_torque_told(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """The estimates, the offset refused where friction's level is not identified."""
+    levels = [e for e in estimates if e.name in ("fc", "fc_negative")]
+    if not levels or all(e.identified for e in levels):
+        return tuple(estimates)
+    return tuple(
+        replace(e, identified=False, verdict=e.verdict or HELD_BY_FRICTION) if e.name == "offset" else e
+        for e in estimates
+    )
 
 
 def at_level(e: Estimate, level: float) -> Estimate:
