@@ -19,6 +19,7 @@ from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.profile import profiles_of
 from stickslip.identify.fit.selection import criteria, cross_validate
 from stickslip.identify.fit.uncertainty import fit
+from stickslip.simulation.prescribed.steady import Steady
 
 ANY = Par("-", "x", "a number")
 POSITIVE = Par("-", "x", "a number", positive=True)
@@ -92,6 +93,29 @@ def test_rosenbrock_to_the_last_digit() -> None:
     """A curved valley (More, Garbow and Hillstrom 1981, problem 1) has its zero at (1, 1)."""
     out = descend(VALLEY, np.array([-1.2, 1.0]))
     assert out.u == pytest.approx([1.0, 1.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["stribeck", "gms"])
+def test_a_jacobian_of_all_columns_at_once_is_the_one_of_each(name: str) -> None:
+    """Sliding torques by the compiled law, a coordinate held between equal bounds among them."""
+    model = Model(name, **law(name).example)
+    velocity = np.concatenate([np.geomspace(1e-3, 2.0, 12), -np.geomspace(1e-3, 2.0, 12), [0.0]])
+    steady = Steady(model.law, velocity, np.where(velocity < 0.0, -1.0, 1.0))
+    vector = Vector(model)
+    lower, upper = vector.lower, vector.upper
+    lower[0] = upper[0] = vector.start[0]
+
+    def one(u):
+        return steady.torque(vector.packed(u))
+
+    def several(us):
+        return steady.torques(np.array([vector.packed(u) for u in us]))
+
+    alone, together = Squares(one, lower, upper), Squares(one, lower, upper, at_all=several)
+    places = range(vector.size)
+    assert np.array_equal(
+        central_differences(alone, vector.start, places), central_differences(together, vector.start, places)
+    )
 
 
 def test_secants_reach_the_same_minimum_with_fewer_evaluations() -> None:

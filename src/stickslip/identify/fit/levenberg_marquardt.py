@@ -39,6 +39,9 @@ class Squares:
         Of coordinates, for Jacobians; relative above 1. Residuals that are exact to fewer digits need a larger one.
     each : callable
         Computes the columns of a Jacobian; `map`, or `stickslip.identify.fit.parallel.mapped`.
+    at_all : callable, optional
+        The residuals at several coordinates, shape (m, p), at once, shape (m, n): for residuals so cheap that the
+        calls themselves would cost most.
     """
 
     residuals: Residuals
@@ -46,6 +49,7 @@ class Squares:
     upper: Array
     difference: float = STEP
     each: Each = map
+    at_all: Residuals | None = None
 
     def begin(self, start: Array) -> Step:
         """Where a descent begins: the start, moved inside the bounds.
@@ -107,17 +111,27 @@ def cost_of(r: Array) -> float:
 
 def central_differences(squares: Squares, u: Array, free: Sequence[int]) -> Array:
     """Jacobian by central differences inside the bounds, shape (n, p); error about 1e-10 of its scale."""
-    residuals = squares.residuals
+    residuals, step = squares.residuals, squares.difference
 
-    def column(i: int) -> Array:
-        h = squares.difference * max(1.0, abs(float(u[i])))
+    def sides(i: int) -> tuple[Array, Array, float]:
+        h = step * max(1.0, abs(float(u[i])))
         ahead, behind = u.copy(), u.copy()
         ahead[i] = min(u[i] + h, squares.upper[i])
         behind[i] = max(u[i] - h, squares.lower[i])
-        width = ahead[i] - behind[i]
+        return ahead, behind, ahead[i] - behind[i]
+
+    def column(i: int) -> Array:
+        ahead, behind, width = sides(i)
         return (residuals(ahead) - residuals(behind)) / width if width > 0.0 else 0.0 * residuals(u)
 
-    return np.stack(list(squares.each(column, free)), axis=1)
+    if squares.at_all is None:
+        return np.stack(list(squares.each(column, free)), axis=1)
+    ahead, behind, widths = zip(*map(sides, free), strict=True)
+    there = squares.at_all(np.array([*ahead, *behind]))
+    width = np.array(widths)[:, None]
+    difference = there[: len(free)] - there[len(free) :]
+    # Held between equal bounds: the column is 0, or not finite where the residuals are not.
+    return (difference / np.where(width > 0.0, width, 1.0)).T.copy()
 
 
 def descend(

@@ -117,6 +117,10 @@ class Vector:
         self._fixed = {p.name: p.value for p in self.parameters if not p.free}
         self._scales = [(p.name, p.logarithmic, p.scale) for p in self._plain]
         self._flat = _flat_names(model) if model else []
+        # What a fit asks for most, laid out once: the packed array, and which coordinate stands where in it.
+        own = {name: i for i, (name, _, _) in enumerate(self._scales)}
+        self._packed = [self._fixed.get(x, 0.0) if isinstance(x, str) else x for x in self._flat]
+        self._moved = [(place, own[x]) for place, x in enumerate(self._flat) if x in own]
 
     # ---- sizes and bounds ------------------------------------------------------------------------------------
 
@@ -162,8 +166,8 @@ class Vector:
     def named(self, u: Array) -> dict[str, float]:
         """Every parameter by name, frozen ones too."""
         values = dict(self._fixed)
-        for x, (name, logarithmic, scale) in zip(u.tolist(), self._scales, strict=False):
-            values[name] = math.exp(x) if logarithmic else x * scale
+        for x, (name, _, _) in zip(self._plain_values(u), self._scales, strict=True):
+            values[name] = x
         place = len(self._plain)
         for group, whole in zip(self._groups, self._wholes, strict=True):
             ratios = [*u[place : place + len(group) - 1].tolist(), 0.0]
@@ -173,6 +177,13 @@ class Vector:
             factor = whole / math.fsum(parts)
             values.update({p.name: factor * x for p, x in zip(group, parts, strict=True)})
         return values
+
+    def _plain_values(self, u: Array) -> list[float]:
+        """Values of the free parameters that are no shares."""
+        return [
+            math.exp(x) if logarithmic else x * scale
+            for x, (_, logarithmic, scale) in zip(u.tolist(), self._scales, strict=False)
+        ]
 
     def values(self, u: Array) -> Array:
         """Values of the free parameters, shape (number of them,)."""
@@ -202,7 +213,12 @@ class Vector:
 
     def packed(self, u: Array) -> Array:
         """The law's parameters as the flat array that compiled functions read."""
-        return self.packed_named(self.named(u))
+        if self._groups:
+            return self.packed_named(self.named(u))
+        out, values = self._packed.copy(), self._plain_values(u)
+        for place, i in self._moved:
+            out[place] = values[i]
+        return np.array(out, dtype=np.float64)
 
     def packed_values(self, values: Array) -> Array:
         """The same for values of the free parameters."""

@@ -93,6 +93,7 @@ def fit(
     lags: int = 0,
     tolerance: float = 1e-15,
     difference: float = STEP,
+    at_all: Residuals | None = None,
 ) -> Fit:
     """Fit by least squares from many starts, and say what the data determine.
 
@@ -120,6 +121,8 @@ def fit(
         Relative decrease of the sum of squares at which a descent ends.
     difference : float
         Of coordinates, for Jacobians; larger where residuals are exact to fewer digits.
+    at_all : callable, optional
+        ``residuals`` at several coordinates at once (`Squares`).
 
     Returns
     -------
@@ -133,7 +136,7 @@ def fit(
     if not vector.free:
         raise InputError("every parameter is frozen; free at least one")
     known = as_noise(noise)
-    squares = Squares(residuals, vector.lower, vector.upper, difference)
+    squares = Squares(residuals, vector.lower, vector.upper, difference, at_all=at_all)
     if isinstance(starts, int):
         starts = spread_starts(vector.start, vector.lower, vector.upper, starts, reach=reach)
     optima = search(squares, starts, tolerance=tolerance)

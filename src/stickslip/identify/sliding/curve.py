@@ -92,6 +92,9 @@ def fit_sliding(
     def residuals(u: Array) -> Array:
         return weight * steady.torque(vector.packed(u)) - target
 
+    def at_all(several: Array) -> Array:
+        return weight * steady.torques(np.array([vector.packed(u) for u in several])) - target
+
     first = separable_starts(model, target, vector, starts)
     fc = float(np.median(np.abs(points.torque)))
     fast = float(np.max(np.abs(points.velocity)))
@@ -100,7 +103,7 @@ def fit_sliding(
     }
     found = fit(
         residuals, vector, noise=noise, size=float(np.max(np.abs(points.torque))), signed_scale=scales,
-        starts=first, profiles=profiles,
+        starts=first, profiles=profiles, at_all=at_all,
     )  # fmt: skip
     bounded = bounded_verdicts(found.estimates, levels_of(points, vector), "the largest torque recorded")
     bounded = bounded_verdicts(bounded, bends, "the range that was searched")

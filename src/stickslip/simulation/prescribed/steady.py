@@ -28,6 +28,13 @@ def evaluate(steady: int, sliding: int, p: Any, velocity: Any, side: Any, out: A
             out[i] = call_value(steady, side[i] * BARELY, pointer(p, 0))
 
 
+@kernel()
+def evaluate_all(steady: int, sliding: int, p: Any, velocity: Any, side: Any, out: Any) -> None:
+    """The same for every row of parameters."""
+    for k in range(p.shape[0]):
+        evaluate(steady, sliding, p[k], velocity, side, out[k])
+
+
 class Steady:
     """A law at fixed velocities.
 
@@ -50,3 +57,9 @@ class Steady:
         out = np.empty(max(self._count, 1))
         evaluate(self._pointers.steady, self._pointers.sliding, flat(packed), self._velocity, self._side, out)
         return out[: self._count]
+
+    def torques(self, packed: Array) -> Array:
+        """Torque at every velocity for several packed parameters, shape (m, q): N·m, shape (m, n)."""
+        out = np.empty((len(packed), max(self._count, 1)))
+        evaluate_all(self._pointers.steady, self._pointers.sliding, packed, self._velocity, self._side, out)
+        return out[:, : self._count]
