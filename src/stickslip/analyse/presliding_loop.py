@@ -20,7 +20,7 @@ from stickslip.control.linear import Gains
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import FREE, INPUTS, Drivetrain, LinearContact
 from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.spec import Law, Surroundings
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -45,7 +45,12 @@ def describing(model: Model, amplitude: float, frequency: float) -> LinearContac
     for name, value, unit in (("amplitude", amplitude, "rad"), ("frequency", frequency, "Hz")):
         if not (value > 0.0 and math.isfinite(value)):
             raise ParameterError(f"stability: {name} = {value:g} {unit} must be greater than 0")
-    law, p, w = model.law, model.parameters, 2.0 * math.pi * frequency
+    return _describing(model.law, model.parameters, amplitude, frequency)
+
+
+@lru_cache(maxsize=16384)  # a map of gains and filters asks for the same contact again and again
+def _describing(law: Law, p: Any, amplitude: float, frequency: float) -> LinearContact:
+    w = 2.0 * math.pi * frequency
     z, u = law.state(p), SimpleNamespace(**Surroundings()._asdict())
     dt = 1.0 / (STEPS * frequency)
     speeds = [amplitude * w * math.cos(2.0 * math.pi * (i + 0.5) / STEPS) for i in range(-1, STEPS)]
