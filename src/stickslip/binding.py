@@ -6,6 +6,8 @@ what the author wrote.
 
 from __future__ import annotations
 
+import functools
+import operator
 import types
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -16,8 +18,16 @@ NEGATIVE = "_negative"
 
 def negative(p: Any) -> Any:
     """The parameters as they hold for v < 0; in the scalar subset, the callee reads the doubled parameters."""
-    doubled = {name: getattr(p, name + NEGATIVE) for name in p._fields if name + NEGATIVE in p._fields}
-    return p._replace(**doubled)
+    kind = p.__class__
+    return kind._make(_for_negative(kind)(p))
+
+
+@functools.cache
+def _for_negative(kind: Any) -> Callable[[Any], Any]:
+    """What picks from parameters of a kind those that hold for v < 0, in the kind's order."""
+    names: tuple[str, ...] = kind._fields
+    places = [names.index(n + NEGATIVE) if n + NEGATIVE in names else i for i, n in enumerate(names)]
+    return operator.itemgetter(*places) if len(places) > 1 else tuple
 
 
 def rescoped(function: types.FunctionType, scope: dict[str, Any]) -> types.FunctionType:

@@ -28,7 +28,7 @@ from support.sampled_text import Memory, sampled_by, settings
 
 COMPILERS = [c for c in ("gcc", "clang") if shutil.which(c)]
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="needs a C compiler")
-STEPS = 1_000_000
+STEPS = 250_000
 LAWS = registered()
 every_law = pytest.mark.parametrize("law", LAWS, ids=label)
 every_compiler = pytest.mark.parametrize("compiler", COMPILERS)

@@ -70,7 +70,8 @@ BARE = {"time": "time", "position": "position", "velocity": "velocity", "torque"
 def write(path: Path, table: Table, names: dict[str, str]) -> Path:
     columns = [(names.get(k, k), v) for k, v in table.items()]
     lines = [",".join(n for n, _ in columns)]
-    lines += [",".join(f"{x:.12g}" for x in row) for row in np.stack([v for _, v in columns], axis=1)]
+    row = ",".join(["%.12g"] * len(columns))
+    lines += [row % values for values in zip(*(v.tolist() for _, v in columns), strict=True)]
     path.write_text("\n".join(lines) + "\n")
     return path
 

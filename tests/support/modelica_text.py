@@ -4,6 +4,7 @@ The grammar is the part of the specification's appendix A that functions, record
 not be assigned, and every name must be declared.
 """
 
+import functools
 import math
 
 from lark import Lark, Token, Tree
@@ -85,14 +86,18 @@ def copied(value):
     return {k: list(x) if isinstance(x, list) else x for k, x in value.items()}
 
 
+@functools.cache
+def reader():
+    """What reads a package, made of the grammar once."""
+    return Lark(GRAMMAR.replace("WORDS", WORDS), parser="lalr", start="package", maybe_placeholders=True)
+
+
 class Package:
     """Records and functions of an exported package; its models are left out."""
 
     def __init__(self, text):
         inside = text[text.index("\n") + 1 : text.index("  model Contact")]
-        tree = Lark(
-            GRAMMAR.replace("WORDS", WORDS), parser="lalr", start="package", maybe_placeholders=True
-        ).parse(inside)
+        tree = reader().parse(inside)
         self.records, self.functions = {}, {}
         for part in tree.children:
             if part.data == "record":

@@ -6,7 +6,6 @@ in expressions, names have no underscore at the end and no two in a row, real nu
 int, BOOL neither; names know no case, are none of the norm's words, and name one thing.
 """
 
-import copy
 import functools
 import math
 import re
@@ -83,11 +82,24 @@ LIBRARY = {
 COMPARISONS = {"=": "==", "<>": "!="}
 
 
+@functools.cache
+def reader():
+    """What reads a file, made of the grammar once."""
+    return Lark(GRAMMAR, parser="lalr", maybe_placeholders=True)
+
+
+def copied(value):
+    """Variables by value: a call has thousands of them, and `copy.deepcopy` asks each what it is."""
+    if isinstance(value, dict):
+        return {k: copied(x) if isinstance(x, (dict, list)) else x for k, x in value.items()}
+    return [copied(x) if isinstance(x, (dict, list)) else x for x in value]
+
+
 class Program:
     """A file of structured text."""
 
     def __init__(self, text):
-        tree = Lark(GRAMMAR, parser="lalr", maybe_placeholders=True).parse(text)
+        tree = reader().parse(text)
         self.types, self.pous = {}, {}
         for part in tree.children:
             names = [c for c in part.children if isinstance(c, Token)]
@@ -122,7 +134,7 @@ class Program:
 
     def instance(self, name):
         """The variables of a function block at the start."""
-        return copy.deepcopy(self.initial[name.lower()])
+        return copied(self.initial[name.lower()])
 
     def run(self, name, variables):
         """Run the statements of a POU on its variables."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, NamedTuple
@@ -97,6 +98,7 @@ TABLE = Law(
 )
 
 
+@functools.lru_cache(maxsize=32)
 def table_form(count: int, *, both_directions: bool, finish: Finish | None = None) -> Form:
     """A table of at most `count` points, linear between them; `finish` makes of it what a controller can hold."""
 

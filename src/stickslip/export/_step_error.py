@@ -6,6 +6,7 @@ lose most where the motion reverses, and the less the shorter the step is, or th
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
 from collections.abc import Callable, Sequence
@@ -21,6 +22,8 @@ SAMPLE_TIMES = (2e-3, 1e-3, 5e-4, 2.5e-4, 1e-4)  # s
 PHASES = 4  # of the samples against the reversal
 FINE = SAMPLE_TIMES[-1] / (2 * PHASES)  # s, of the steps that stand for the law
 BEFORE, AFTER = 320, 640  # fine steps on either side of the reversal
+AHEAD = [-BEFORE * FINE - 0.25 / FREQUENCY * (1.0 - i / 60.0) for i in range(61)]
+"""s, of the steps up to there."""
 
 
 Step = Callable[..., float]
@@ -53,8 +56,10 @@ def about_steps(model: Model, substeps: str, *, held: bool = False, parts: int =
 
 @functools.lru_cache(maxsize=256)
 def _measured(law: Law, p: Any, held: bool, parts: int) -> tuple[StepError, ...]:
-    exact = _torques(law, p, range(-BEFORE, AFTER + 1), 1, law.step)
+    begun = _sliding(law, p, law.step)
+    exact = _torques(begun, p, range(-BEFORE, AFTER + 1), 1, law.step)
     step = functools.partial(_in_stages, law.step) if held else law.step
+    begun = _sliding(law, p, step) if held else begun
     found: list[StepError] = []
     for sample_time in SAMPLE_TIMES:
         stride = round(sample_time / FINE)
@@ -62,7 +67,7 @@ def _measured(law: Law, p: Any, held: bool, parts: int) -> tuple[StepError, ...]
         for phase in range(PHASES):
             at = range(-BEFORE + phase * stride // PHASES, AFTER + 1, stride)
             for i, count in enumerate((1, parts)):
-                errors = [abs(f - exact[k + BEFORE]) for k, f in zip(at, _torques(law, p, at, count, step))]
+                errors = [abs(f - exact[k + BEFORE]) for k, f in zip(at, _torques(begun, p, at, count, step))]
                 worst[i] = max(worst[i], *errors)
         found.append(StepError(sample_time, *worst))
     return tuple(found)
@@ -76,22 +81,29 @@ def _in_stages(step: Step, v0: float, v1: float, dt: float, z: Any, p: Any, u: A
     return step(v1, v1, part, z, p, u)
 
 
-def _torques(law: Law, p: Any, at: Sequence[int], parts: int, step: Step) -> list[float]:
-    """Torques at these fine steps from the reversal, N·m, after a quarter of the period in one direction."""
-    z, u = law.state(p), Surroundings()
-    # The way there is the same for all, and short of the reversal.
-    ahead = [-BEFORE * FINE - 0.25 / FREQUENCY * (1.0 - i / 60.0) for i in range(61)]
-    v0, last = _speed(ahead[0]), ahead[0]
+def _sliding(law: Law, p: Any, step: Step) -> Any:
+    """The state shortly before the reversal, after a quarter of the period in one direction: the same for all."""
+    z, u, last = law.state(p), Surroundings(), AHEAD[0]
+    for time in AHEAD:
+        step(_speed(last), _speed(time), time - last, z, p, u)
+        last = time
+    return z
+
+
+def _torques(begun: Any, p: Any, at: Sequence[int], parts: int, step: Step) -> list[float]:
+    """Torques at these fine steps from the reversal, N·m, from the state where the axis slides."""
+    z, u = copy.deepcopy(begun), Surroundings()
+    v0, last = _speed(AHEAD[-1]), AHEAD[-1]
     torques: list[float] = []
-    for i, time in enumerate([*ahead, *(k * FINE for k in at)]):
-        count = parts if i >= len(ahead) else 1
-        v1, dt = _speed(time), (time - last) / count
+    for k in at:
+        time = k * FINE
+        v1, dt = _speed(time), (time - last) / parts
         torque = 0.0
-        for j in range(count):
-            torque = step(v0 + (v1 - v0) * j / count, v0 + (v1 - v0) * (j + 1) / count, dt, z, p, u)
+        for j in range(parts):
+            torque = step(v0 + (v1 - v0) * j / parts, v0 + (v1 - v0) * (j + 1) / parts, dt, z, p, u)
         torques.append(torque)
         v0, last = v1, time
-    return torques[len(ahead) :]
+    return torques
 
 
 def _speed(time: float) -> float:

@@ -7,6 +7,7 @@ before 3.1.3132 and 4.29 need; a scaling factor (P-COMP-00045, 0.1 %) keeps the 
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import replace
 from typing import Any
@@ -17,7 +18,7 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.export._points import stiffness, table_form
 from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
-from stickslip.export.nearest import Curve, Form, Nearest, carried
+from stickslip.export.nearest import Curve, Form, Nearest, carried, curve_of
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 
@@ -55,9 +56,9 @@ def listed(job: Job) -> tuple[Nearest, dict[str, Any]]:
     if motion not in UNITS:
         raise InputError(f"--set motion={motion}: choose rotary or linear")
     unit = float(settings["torque_per_unit"])
-    found = carried(job, TARGET.name, [form_of(motion, unit, Curve.of(job.model, job.top_speed).size)])
+    found = carried(job, TARGET.name, [form_of(motion, unit, curve_of(job).size)])
     p = found.model.parameters
-    scaling = scaling_of(unit, Curve.of(job.model, job.top_speed).size)
+    scaling = scaling_of(unit, curve_of(job).size)
     rows = [
         (round(v * UNITS[motion]), round(t / unit * 1000.0 / scaling)) for v, t in zip(p.velocity, p.forward)
     ]
@@ -69,6 +70,7 @@ def listed(job: Job) -> tuple[Nearest, dict[str, Any]]:
     }
 
 
+@functools.lru_cache(maxsize=32)
 def form_of(motion: str, unit: float, size: float) -> Form:
     """The table in whole numbers: 0 at rest, then the curve from the smallest velocity on."""
     speed, torque = UNITS[motion], unit * scaling_of(unit, size) / 1000.0
@@ -108,7 +110,7 @@ def delay_of(job: Job, given: str, motion: str) -> int:
                 f"--set position_delay={given}: it lies between 0 and {LONGEST_DELAY} (P-COMP-00043)"
             )
         return delay
-    curve = Curve.of(job.model, job.top_speed)
+    curve = curve_of(job)
     return min(round(curve.rest[0] / stiffness(curve) * DELAY[motion]), LONGEST_DELAY)
 
 

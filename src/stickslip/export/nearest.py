@@ -41,7 +41,7 @@ DEPENDENCES = {
 # ---- forms -----------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Form:
     """A law that a target has room for.
 
@@ -206,8 +206,8 @@ def carried(job: Job, target: str, forms: Sequence[Form], also_lost: Sequence[st
     CannotCarry
         If all lose something and the job does not ask for the nearest.
     """
-    curve = Curve.of(job.model, job.top_speed, max(form.density for form in forms))
-    near = [found for form in forms if (found := nearest(curve, form)) is not None]
+    one, density = _given(job), max(form.density for form in forms)
+    near = [found for form in forms if (found := _found(one, job.top_speed, density, form)) is not None]
     tried = [replace(found, lost=(*found.lost, *also_lost)) for found in near]
     for found in tried:
         if not found.lost:
@@ -223,6 +223,35 @@ def carried(job: Job, target: str, forms: Sequence[Form], also_lost: Sequence[st
         f"{target} carries {best.form.words}; {job.model.law.name} would lose {'; '.join(best.lost)}. The nearest is "
         f"{best.values}: {best.error}. Take it with --nearest"
     )
+
+
+@dataclass(frozen=True)
+class _Given:
+    """A model, the same as one of the same law and parameters."""
+
+    law: Law
+    parameters: Any
+    model: Model = field(compare=False)
+
+
+def _given(job: Job) -> _Given:
+    return _Given(job.model.law, job.model.parameters, job.model)
+
+
+@functools.lru_cache(maxsize=32)
+def _found(one: _Given, top_speed: float | None, density: int, form: Form) -> Nearest | None:
+    """As `nearest`: what is written is looked for again where it is checked, and where a refusal is overruled."""
+    return nearest(_curve(one, top_speed, density), form)
+
+
+@functools.lru_cache(maxsize=8)
+def _curve(one: _Given, top_speed: float | None, density: int) -> Curve:
+    return Curve.of(one.model, top_speed, density)
+
+
+def curve_of(job: Job) -> Curve:
+    """The sliding curve of the job's model, computed once."""
+    return _curve(_given(job), job.top_speed, 1)
 
 
 def nearest(curve: Curve, form: Form) -> Nearest | None:

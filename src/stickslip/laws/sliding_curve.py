@@ -8,6 +8,7 @@ relax towards the part of friction that they carry.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
@@ -18,6 +19,7 @@ GRID = (0.0, *(10.0 ** (0.02 * i) for i in range(-200, 251)))
 """Multiples of the velocity scale at which a curve is looked at as a whole."""
 
 
+@functools.lru_cache(maxsize=64)  # checks and conditions ask for the same again
 def extremes(curve: Callable[[float, Any], float], p: Any, scale: float) -> tuple[float, float]:
     """Smallest and largest value of a curve, N·m, on velocities up to 1e5 times its scale (rad/s)."""
     values = [curve(x * scale, p) for x in GRID]

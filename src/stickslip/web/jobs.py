@@ -15,7 +15,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from stickslip.errors import InputError
+from stickslip.web.forks import POSSIBLE, Forked, Forks
 from stickslip.web.projects import NotThere
+
+Process = asyncio.subprocess.Process | Forked
 
 LONGEST_LINE = 64 * 2**20
 KEPT = 200
@@ -56,7 +59,7 @@ class Job:
     said: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     result: dict[str, Any] = field(default_factory=dict[str, Any])
     error: str = ""
-    process: asyncio.subprocess.Process | None = None
+    process: Process | None = None
     changed: asyncio.Event = field(default_factory=asyncio.Event)
     began: float = field(default_factory=time.time)
 
@@ -118,6 +121,8 @@ class Jobs:
     def __init__(self, most: int = 2) -> None:
         self._jobs: dict[str, Job] = {}
         self._tasks: set[asyncio.Task[None]] = set()
+        command, environment = worker_command()
+        self._forks = Forks([*command, "--fork"], environment, LONGEST_LINE) if POSSIBLE else None
         self._spare: asyncio.Task[asyncio.subprocess.Process] | None = None
         self._closed = False
         self._places = {"long": asyncio.Semaphore(most), "short": asyncio.Semaphore(2)}
@@ -200,6 +205,8 @@ class Jobs:
             await ended(await self._spare)
         for job in list(self._jobs.values()):
             await self.cancel(job)
+        if self._forks is not None:
+            await self._forks.close()
         for task in list(self._tasks):
             task.cancel()
 
@@ -232,11 +239,20 @@ class Jobs:
             job.say(end=job.state, error=job.error, result=job.result)
 
     def prepare(self) -> None:
-        """Start a process that waits for the next job, so that its imports are not waited for."""
-        if self._spare is None and not self._closed:
+        """Start a process that has loaded what the next job needs, so that its imports are not waited for."""
+        if self._closed:
+            return
+        if self._forks is not None:
+            task: asyncio.Task[Any] = asyncio.create_task(self._forks.prepare())
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
+        elif self._spare is None:
             self._spare = asyncio.create_task(started())
 
-    async def _process(self) -> asyncio.subprocess.Process:
+    async def _process(self) -> Process:
+        if self._forks is not None:
+            with suppress(OSError):
+                return await self._forks.forked()
         spare, self._spare = self._spare, None
         process = await (spare or started())
         self.prepare()
@@ -297,7 +313,7 @@ async def last_of(stream: asyncio.StreamReader) -> str:
     return lines[-1][:300] if lines else ""
 
 
-async def ended(process: asyncio.subprocess.Process, grace: float = GRACE) -> None:
+async def ended(process: Process, grace: float = GRACE) -> None:
     """End a process: asked first, then without asking, its own processes too."""
     if process.returncode is not None:
         return

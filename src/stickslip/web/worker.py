@@ -72,7 +72,7 @@ def main() -> int:
 
 
 def get_ready() -> None:
-    """Load what most jobs need while there is none yet: the server keeps one process waiting."""
+    """Load what most jobs need while there is none yet: the server keeps a process waiting that has done so."""
     for name in ("identify", "doctor", "reading", "recommend", "export", "compare"):
         importlib.import_module(f"stickslip.verbs.{name}")
     importlib.import_module("stickslip.web.tasks")
@@ -106,4 +106,7 @@ def end_with(stream: TextIO) -> None:
 
 
 if __name__ == "__main__":
+    if sys.argv[1:] == ["--fork"]:
+        get_ready()
+        importlib.import_module("stickslip.web.forks").serve()
     sys.exit(main())

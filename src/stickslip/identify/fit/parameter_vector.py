@@ -7,6 +7,7 @@ inside the bounds leaves what the law allows.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -111,16 +112,14 @@ class Vector:
         self._plain = [p for p in self.free if not p.shares]
         groups = dict.fromkeys(p.shares for p in self.free if p.shares)
         self._groups = [[p for p in self.free if p.shares == g] for g in groups]
-        self._wholes = [
-            1.0 - sum(p.value for p in self.parameters if p.shares == g and not p.free) for g in groups
-        ]
+        wholes = [1.0 - sum(p.value for p in self.parameters if p.shares == g and not p.free) for g in groups]
+        self._sums = [(len(group), whole) for group, whole in zip(self._groups, wholes, strict=True)]
         self._fixed = {p.name: p.value for p in self.parameters if not p.free}
-        self._scales = [(p.name, p.logarithmic, p.scale) for p in self._plain]
+        self._scales = [(p.logarithmic, p.scale) for p in self._plain]
+        self._order = [p.name for p in (*self._plain, *itertools.chain(*self._groups))]
         self._flat = _flat_names(model) if model else []
-        # What a fit asks for most, laid out once: the packed array, and which coordinate stands where in it.
-        own = {name: i for i, (name, _, _) in enumerate(self._scales)}
-        self._packed = [self._fixed.get(x, 0.0) if isinstance(x, str) else x for x in self._flat]
-        self._moved = [(place, own[x]) for place, x in enumerate(self._flat) if x in own]
+        self._packed = [self._fixed.get(x, math.nan) if isinstance(x, str) else x for x in self._flat]
+        self._places = [self._flat.index(name) if name in self._flat else None for name in self._order]
 
     # ---- sizes and bounds ------------------------------------------------------------------------------------
 
@@ -166,24 +165,25 @@ class Vector:
     def named(self, u: Array) -> dict[str, float]:
         """Every parameter by name, frozen ones too."""
         values = dict(self._fixed)
-        for x, (name, _, _) in zip(self._plain_values(u), self._scales, strict=True):
-            values[name] = x
-        place = len(self._plain)
-        for group, whole in zip(self._groups, self._wholes, strict=True):
-            ratios = [*u[place : place + len(group) - 1].tolist(), 0.0]
-            place += len(group) - 1
+        values.update(zip(self._order, self._free_values(u), strict=True))
+        return values
+
+    def _free_values(self, u: Array) -> list[float]:
+        """Values of the free parameters, those that share one after the others."""
+        flat = u.tolist()
+        out = [
+            math.exp(x) if logarithmic else x * scale
+            for x, (logarithmic, scale) in zip(flat, self._scales, strict=False)
+        ]
+        place = len(out)
+        for size, whole in self._sums:
+            ratios = [*flat[place : place + size - 1], 0.0]
+            place += size - 1
             top = max(ratios)
             parts = [math.exp(x - top) for x in ratios]
             factor = whole / math.fsum(parts)
-            values.update({p.name: factor * x for p, x in zip(group, parts, strict=True)})
-        return values
-
-    def _plain_values(self, u: Array) -> list[float]:
-        """Values of the free parameters that are no shares."""
-        return [
-            math.exp(x) if logarithmic else x * scale
-            for x, (_, logarithmic, scale) in zip(u.tolist(), self._scales, strict=False)
-        ]
+            out += [factor * x for x in parts]
+        return out
 
     def values(self, u: Array) -> Array:
         """Values of the free parameters, shape (number of them,)."""
@@ -213,11 +213,10 @@ class Vector:
 
     def packed(self, u: Array) -> Array:
         """The law's parameters as the flat array that compiled functions read."""
-        if self._groups:
-            return self.packed_named(self.named(u))
-        out, values = self._packed.copy(), self._plain_values(u)
-        for place, i in self._moved:
-            out[place] = values[i]
+        out = self._packed.copy()
+        for place, value in zip(self._places, self._free_values(u), strict=True):
+            if place is not None:
+                out[place] = value
         return np.array(out, dtype=np.float64)
 
     def packed_values(self, values: Array) -> Array:

@@ -22,7 +22,7 @@ from stickslip.identify.fit.uncertainty import Fit, fit
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.simulation.prescribed.motion import Along
-from stickslip.spec import Par
+from stickslip.spec import Law, Par
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
@@ -104,18 +104,20 @@ def fit_loop(
     offset: bool = True, starts: int | Array = 6, profiles: bool = True, reach: float = 1.5, lags: int = 0,
     tolerance: float = 1e-12, damping: float = 0.0,
 ) -> tuple[Fit, Along]:  # fmt: skip
-    """Fit a law's torque along the motion on some rows; it is simulated over all of them.
+    """Fit a law's torque along the motion on some rows; what is returned is simulated over all of them.
 
     With `damping` (N·m·s/rad) a torque in step with the velocity is fitted along, up to that to either side.
     """
-    along = Along(template.law, loop.time, loop.position, loop.velocity)
+    along = along_until(template.law, loop, loop.time.size)
+    # What comes after the last row changes nothing there.
+    seen = along_until(template.law, loop, int(np.max(rows, initial=0)) + 2)
     level = float(np.sqrt(np.mean(loop.torque[rows] ** 2)))
     extra: tuple[Parameter, ...] = (Parameter("offset", OFFSET, 0.0, scale=level),) if offset else ()
     if damping > 0.0:
         par = Par(DAMPING, "d", "torque in step with the velocity", lower=-damping, upper=damping)
         extra += (Parameter("damping", par, 0.0, scale=damping),)
     vector = Vector(template, frozen=frozen, extra=extra)
-    idle = idle_parameters(along, vector, rows)
+    idle = idle_parameters(seen, vector, rows)
     if len(idle) == vector.size - len(extra):
         raise InputError(
             f"along this motion, of {np.ptp(loop.position):.3g} {loop.unit[0]}, no parameter of {template.law.name!r} "
@@ -126,7 +128,7 @@ def fit_loop(
     target = loop.torque[rows]
 
     def residuals(u: Array) -> Array:
-        return curve_of(along, vector, u)[rows] - target
+        return curve_of(seen, vector, u)[rows] - target
 
     scale = {"offset": level, "damping": damping} if damping > 0.0 else level
     found = fit(
@@ -134,6 +136,12 @@ def fit_loop(
         reach=reach, profiles=profiles, lags=lags, tolerance=tolerance,
     )  # fmt: skip
     return found, along
+
+
+def along_until(law: Law, loop: Loop, end: int) -> Along:
+    """A law that is moved along the first `end` samples of a loop."""
+    velocity = None if loop.velocity is None else loop.velocity[:end]
+    return Along(law, loop.time[:end], loop.position[:end], velocity)
 
 
 def curve_of(along: Along, vector: Vector, u: Array) -> Array:

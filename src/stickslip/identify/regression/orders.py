@@ -6,6 +6,7 @@ what it explains is more than chance would among so many, and helps on the half 
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +28,8 @@ OWN = 0.05
 """Part of a harmonic that no other column explains, at least."""
 SURE = 8.0
 """Beyond twice the logarithm of how many are tried: what a harmonic explains, in variances of the noise."""
+KEPT = 4_000_000
+"""Numbers of harmonics' rows that are kept from one look to the next, at 8 bytes each."""
 HELPS = 0.25
 """Of what a harmonic explains where it was fitted, that it must explain where it was not."""
 
@@ -86,8 +89,11 @@ def shown_orders(
     basis: Array = np.asarray(left[:, singular > 1e-6 * singular[0]], dtype=np.float64)
     residual: Array = np.asarray(torque - basis @ (basis.T @ torque), dtype=np.float64)
     pool: dict[float, Harmonic] = {}
+    rows_of = functools.partial(around, records)
+    if 2 * torque.size * len(candidates) <= KEPT:
+        rows_of = functools.cache(rows_of)
     for order in candidates:
-        pool[order] = Harmonic.of(around(records, order), basis, residual)
+        pool[order] = Harmonic.of(rows_of(order), basis, residual)
     stroke = strokes_of(records)
     piece = pieces_of(stroke, rows_in(PIECE, records))
     found: list[float] = []
@@ -97,7 +103,7 @@ def shown_orders(
         independent = torque.size / memory_of(residual, stroke)
         if power <= 0.0 or independent * explained / power < 2.0 * math.log(len(candidates)) + SURE:
             break
-        rows = around(records, order)
+        rows = rows_of(order)
         own = rows - basis @ (basis.T @ rows)
         if held_out_power(own, residual, piece % 2 == 0) > power - HELPS * explained:
             break
@@ -108,7 +114,7 @@ def shown_orders(
         residual = residual - added @ (added.T @ residual)
         if len(found) < MOST:
             for other, harmonic in pool.items():
-                pool[other] = harmonic.beside(around(records, other), added, residual)
+                pool[other] = harmonic.beside(rows_of(other), added, residual)
     return found
 
 
@@ -119,7 +125,7 @@ def around(records: Sequence[SlidingRows], order: float) -> Array:
 
 @dataclass(frozen=True)
 class Harmonic:
-    """What a harmonic shares with a residual and with the columns before it: its rows need not be kept.
+    """What a harmonic shares with a residual and with the columns before it: of a long record its rows are not kept.
 
     Attributes
     ----------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -87,7 +88,7 @@ class Along:
         before, after = (mean, mean) if velocity is None else (velocity[:-1], velocity[1:])
         self._samples = Samples(flat(time), flat(position), flat(before), flat(after))
 
-    @property
+    @cached_property
     def velocity(self) -> Array:
         """Velocity at every sample, rad/s, shape (n,): the mean of that before and after it."""
         before, after = self._samples.before, self._samples.after
