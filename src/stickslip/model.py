@@ -12,6 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip import plugins
+from stickslip.arguments import numbers_checked
 from stickslip.config import Table, read_toml
 from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
 from stickslip.spec import Law, ReferenceKind
@@ -110,6 +111,7 @@ class Model:
         same = all(self.law.option_of(n) == o for n, o in wanted.items())
         return self if same else Model(self.law, wanted, **self.parameters._asdict())
 
+    @numbers_checked
     def scaled(self, **factors: float) -> Model:
         """This model with some parameters multiplied, ``model.scaled(fs=1.1, fc=1.1)``.
 

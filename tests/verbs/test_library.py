@@ -267,7 +267,7 @@ def test_what_a_run_is_not_made_of_is_said_by_kind() -> None:
             (axis, run, (time, time), 1.0),
             r"reference is a tuple; give a Reference, of arrays Reference\.table",
         ),
-        ((axis, run, slow, "1"), r"duration is a str; give a number of seconds"),
+        ((axis, run, slow, "1"), r"duration = '1' must be a number"),
         ((1e-3, run, slow, 1.0), r"axis is a float; give a RigidAxis, or a Machine"),
     ):
         with pytest.raises(ss.InputError, match=words):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from stickslip.arguments import numbers_checked
 from stickslip.config import Document, Table, read_toml
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
@@ -121,6 +122,7 @@ class CompensatorOptions:
         return [f.name for f in fields(self) if getattr(self, f.name) is not None]
 
 
+@numbers_checked
 def export(
     source: Source,
     to: str,

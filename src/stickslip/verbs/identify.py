@@ -11,6 +11,7 @@ from typing import Any, Literal, Unpack, cast
 import numpy as np
 
 from stickslip import plugins
+from stickslip.arguments import numbers_checked
 from stickslip.errors import InputError
 from stickslip.identify.doctor import Diagnosis, examine
 from stickslip.identify.estimate import Identification, silent
@@ -30,6 +31,7 @@ from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, doctor_of, 
 Loops = str | Mapping[str, float] | Sequence[str | Mapping[str, float]] | None
 
 
+@numbers_checked
 def identify(
     *logs: Log,
     method: str = "axis",

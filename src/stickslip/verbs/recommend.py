@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal, cast
 
 from stickslip.approval import allow_code
+from stickslip.arguments import numbers_checked
 from stickslip.config import named_numbers
 from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.controller import Controller
@@ -27,6 +28,7 @@ from stickslip.verbs.reading import Log, open_log
 from stickslip.verbs.recommendation import RecommendationResult
 
 
+@numbers_checked
 def recommend(
     model: IdentifiedModel,
     *,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.arguments import numbers_checked
 from stickslip.capacity import insist_on_jobs
 from stickslip.errors import InputError
 from stickslip.identify.estimate import silent
@@ -89,6 +90,7 @@ class SweepResult:
         return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
+@numbers_checked
 def sweep(
     file: str | os.PathLike[str] | Sweep,
     folder: str | os.PathLike[str] | None = None,
