@@ -102,7 +102,9 @@ class Model:
             for key in values:
                 if key not in known:
                     raise parameters.error(key, f"is no parameter of this law; {suggestion(key, known)}")
-            return cls(law, choices, **values).warn(file)
+            made = cls(law, choices, **values)
+            # What an identification found was remarked upon there; nobody mistook one number for another.
+            return made if "format" in table.values else made.warn(file)
 
     def having(self, **choices: str) -> Model:
         """This model under other options of its law; options that the law does not have are left out."""
