@@ -68,3 +68,15 @@ def test_the_command_line_says_it_once_in_a_line(tmp_path, capsys):
     assert "lies below fc" in capsys.readouterr().err
     assert main(["law", "gms"]) == 0
     assert not capsys.readouterr().err
+
+
+def test_no_exchange_is_proposed_for_what_was_identified(tmp_path):
+    """Nobody mistook one number for the other: the identification's own notes say that friction rises."""
+    file = tmp_path / "model.toml"
+    file.write_text(f'format = "stickslip-model-1"\nlaw = "lugre"\n[parameters]\n{toml(RISING)}\n')
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert Model.from_file(file).parameters.fs == 0.2
+    file.write_text(f'law = "lugre"\n[parameters]\n{toml(RISING)}\n')
+    with pytest.warns(ModelRemark, match="exchange them"):
+        Model.from_file(file)

@@ -6,6 +6,7 @@ import types
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Self, cast
 
+from stickslip.arguments import is_number, no_number
 from stickslip.description import Choice, Field, Option, fields_of, packed
 from stickslip.errors import ParameterError, UnknownName, suggestion
 
@@ -60,8 +61,8 @@ class Described:
         return self._number(f, value, f.name)
 
     def _number(self, f: Field, value: Any, label: str) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ParameterError(f"{self.name}: {label} = {value!r} must be a number in {f.par.unit}")
+        if isinstance(value, bool) or not is_number(value):
+            raise no_number(self.name, label, value, f.par.unit)
         complaint = f.par.complaint(float(value))
         if complaint:
             unit = "" if f.par.unit == "-" else f" {f.par.unit}"

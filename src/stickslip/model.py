@@ -12,6 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip import plugins
+from stickslip.arguments import numbers_checked
 from stickslip.config import Table, read_toml
 from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
 from stickslip.spec import Law, ReferenceKind
@@ -101,7 +102,9 @@ class Model:
             for key in values:
                 if key not in known:
                     raise parameters.error(key, f"is no parameter of this law; {suggestion(key, known)}")
-            return cls(law, choices, **values).warn(file)
+            made = cls(law, choices, **values)
+            # What an identification found was remarked upon there; nobody mistook one number for another.
+            return made if "format" in table.values else made.warn(file)
 
     def having(self, **choices: str) -> Model:
         """This model under other options of its law; options that the law does not have are left out."""
@@ -110,6 +113,7 @@ class Model:
         same = all(self.law.option_of(n) == o for n, o in wanted.items())
         return self if same else Model(self.law, wanted, **self.parameters._asdict())
 
+    @numbers_checked
     def scaled(self, **factors: float) -> Model:
         """This model with some parameters multiplied, ``model.scaled(fs=1.1, fc=1.1)``.
 

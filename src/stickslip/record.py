@@ -58,6 +58,11 @@ class Record:
     def __len__(self) -> int:
         return int(self.time.size)
 
+    def __repr__(self) -> str:
+        span = f", {self.time[0]:.6g} to {self.time[-1]:.6g} s" if len(self) else ""
+        listed = ", ".join(f"{name} [{self.units[name]}]" for name in self.channels)
+        return f"<Record: {len(self)} rows{span}; {listed}>"
+
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the record as .npz: arrays, and units and meta as JSON (no pickle). Returns the path."""
         target = Path(path)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip import Model
-from stickslip.commission.stiffness import within_total
+from stickslip.commission.stiffness import resolved, within_total
 from stickslip.identify.estimate import Estimate, Identification
 
 LAW = Model("gms", fs=0.3, fc=0.25, vs=0.1, sigma2=0.01, k=[800.0, 400.0], alpha=[0.6, 0.4], c=10.0)
@@ -56,3 +56,16 @@ def test_the_sums_stay_as_sure_as_they_are(together):
 def test_a_correlation_that_is_no_number_counts_as_none():
     unknown = np.full((4, 4), math.nan)
     assert elements_given((0.8, 1.25), unknown)[0] == elements_given((0.8, 1.25), np.eye(4))[0]
+
+
+def test_elements_that_are_left_out_are_said_by_their_torque():
+    """A stiffness of 2.21e-42 N·m/rad was printed, which is what a fit ends at where nothing tells it."""
+    law = Model("gms", fs=0.3, fc=0.25, vs=0.1, sigma2=0.01, k=[800.0, 400.0, 2.21e-42, 50.0],
+                alpha=[0.35, 0.212, 0.433, 0.005], c=10.0)  # fmt: skip
+    found = resolved(Identification("presliding", law, (), np.eye(0), {}), 0.3)
+    assert found.model is not None
+    assert len(found.model.parameters.k) == 2
+    (note,) = found.notes
+    assert "e-42" not in note
+    assert "friction of 0.13 N·m that would build up only far beyond the loop's way" in note
+    assert "elements of 0.0015 N·m, less than 1 % of the loop's torque" in note

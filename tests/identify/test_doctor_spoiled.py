@@ -8,9 +8,11 @@ import re
 import numpy as np
 import pytest
 
+import stickslip as ss
 from stickslip import Record
 from stickslip.cli import main
 from stickslip.identify.doctor import examine
+from stickslip.identify.doctor.units import _binary_counts
 from stickslip.readers import read
 from support.doctor_logs import (
     DEG,
@@ -162,3 +164,34 @@ def test_a_pendulum_in_degrees_under_rad_is_known_by_its_gravity(unit, twist):
     record = Record(t, {"position": size * (q + 1e-3 * noise[0]), "motor_torque": torque + noise[1]}, UNITS)
     codes = {f.code for f in examine(record).warnings}
     assert ("position-unit" in codes) == (unit == "deg" and twist == "gravity")
+
+
+@pytest.mark.parametrize(("turn", "unit"), [(360.0, "deg"), (1.0, "rev"), (2.0 * np.pi, "rad")])
+@pytest.mark.parametrize(("bits", "digits"), [(12, 6), (16, 6), (17, 7)])
+@pytest.mark.parametrize("place", [0.0, 3.0])
+def test_the_grid_of_an_encoder_tells_degrees_and_turns_in_a_rounded_file(turn, unit, bits, digits, place):
+    """The steps from row to row, which are of rounded numbers, did not tell fine encoders; turns nothing told."""
+    t = np.arange(0.0, 6.0, 1e-3)
+    count = 2.0 * np.pi / 2**bits
+    q = count * np.round((place + 2.0 * np.sin(3.1 * t)) / count)
+    torque = 0.3 * np.tanh(np.gradient(q, t) / 0.01)
+    columns = {"time": t, "position [rad]": np.round(q * turn / (2.0 * np.pi), digits), "torque [Nm]": torque}
+    found = [f for f in ss.doctor(columns).findings if f.code == "position-unit"]
+    assert len(found) == (unit != "rad")
+    for finding in found:
+        assert finding.level == "warning"
+        assert f"{2**bits} counts" in finding.message
+        assert f"position=position [rad]:{unit}" in finding.remedy.replace("'", "")
+
+
+def test_no_grid_of_degrees_or_turns_is_seen_in_positions_in_rad():
+    """Of any encoder and gear, rounded or not, and stored as floats of 32 bits."""
+    rng, t = np.random.default_rng(0), np.arange(0.0, 6.0, 1e-3)
+    for _ in range(200):
+        counts = rng.choice([500, 2000, 4096, 10000, 65536, 2**20, int(rng.integers(300, 10**6))])
+        count = 2.0 * np.pi / (counts * rng.choice([1.0, 5.0, 100.0, 0.1]))
+        way = 10 ** rng.uniform(-1.5, 1.8) * np.sin(rng.uniform(0.5, 20.0) * t) + rng.uniform(-5.0, 5.0)
+        q = count * np.round(way / count)
+        for stored in (q, np.round(q, int(rng.integers(3, 8))), q.astype(np.float32).astype(float)):
+            assert not _binary_counts(stored, 360.0)
+            assert not _binary_counts(stored, 1.0)

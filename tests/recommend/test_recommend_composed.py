@@ -16,12 +16,16 @@ from stickslip.cli import main
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
+from stickslip.control.linear import Cascade
+from stickslip.control.recommended import read_recommended
 from stickslip.control.written import tables_of
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 from stickslip.recommend import recommend as recommending
 from stickslip.recommend.candidates import Setting
 from stickslip.recommend.recommend import Drive, recommend
+from stickslip.rigs.procedures.track import Track
+from stickslip.rigs.virtual import virtual_rig
 
 T = 1e-3
 LAW = Model("coulomb", fc=0.285, sigma2=0.018)
@@ -185,3 +189,38 @@ def test_a_recommendation_that_is_a_whole_controller_is_exported_as_one(few):
     assert made.files == ss.export(advice, to="c99", controller=True).files
     law = ss.export(advice, to="c99", compensator="ff").files
     assert law != made.files
+
+
+CASCADE = {"gains": Cascade(40.0, 0.02, 0.4, 0.9), "velocity_filter": 300.0}
+
+
+@pytest.mark.parametrize("given", [CASCADE, {"gains": PD}, {"bandwidth": 15.0}, {"linear": "PID"}])
+def test_the_file_of_a_recommendation_holds_the_whole_controller(given, tmp_path, few):
+    """Limit and encoder among it, which were lost."""
+    found = identified()
+    drive = Drive(
+        sample_time=T, torque_limit=1.5, encoder_counts=262144.0, amplitude=0.2, frequency=0.5, **given
+    )
+    advice = ss.RecommendationResult(recommend(found, drive, axes=1, confirm=2), found)
+    file = advice.save(tmp_path / "recommended.toml")
+    again = read_recommended(file).controller(Model.from_file(str(file)))
+    assert again.as_dict() == advice.controller.as_dict()
+    assert (again.torque_limit, again.encoder_counts) == (1.5, 262144.0)
+    axis, slow = ss.RigidAxis(INERTIA, LAW), ss.Reference("sine", amplitude=0.2, frequency=0.5)
+    one, two = (ss.simulate(axis, c, slow, duration=0.2)["position"] for c in (again, advice.controller))
+    assert np.array_equal(one, two)
+    whole = [ss.export(x, to="c99", controller=True, name="a").files for x in (advice, file)]
+    assert whole[0] == whole[1]
+    assert whole[0] == ss.export(advice.controller, to="c99", name="a").files
+
+
+def test_the_limit_of_a_recommendation_holds_on_a_rig(tmp_path, few):
+    found = identified()
+    drive = Drive(
+        gains=PD, sample_time=T, torque_limit=0.6, encoder_counts=65536.0, amplitude=0.2, frequency=0.5
+    )
+    advice = ss.RecommendationResult(recommend(found, drive, axes=1, confirm=2), found)
+    file = str(advice.save(tmp_path / "recommended.toml"))
+    run = Track(compensator="recommended", model=file)
+    assert run.made(virtual_rig("thesis-dry")).torque_limit == 0.6
+    assert run.made(virtual_rig("thesis-dry")).encoder_counts == 0.0

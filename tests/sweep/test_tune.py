@@ -44,6 +44,9 @@ def test_it_beats_every_point_of_a_grid(found):
 def test_the_same_again(found):
     sweep, tuned = found
     assert np.array_equal(tuning.tune(sweep, sweep.runs[0]).after, tuned.after)
+    said = repr(tuned).splitlines()
+    assert len(said) == 1 + len(tuned.names) + len(tuned.measured)
+    assert said[-1].endswith(f"{sweep.percentile:g} % of the cases below>")
 
 
 def test_a_failed_case_counts_as_the_worst():

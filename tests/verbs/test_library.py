@@ -267,7 +267,7 @@ def test_what_a_run_is_not_made_of_is_said_by_kind() -> None:
             (axis, run, (time, time), 1.0),
             r"reference is a tuple; give a Reference, of arrays Reference\.table",
         ),
-        ((axis, run, slow, "1"), r"duration is a str; give a number of seconds"),
+        ((axis, run, slow, "1"), r"duration = '1' must be a number"),
         ((1e-3, run, slow, 1.0), r"axis is a float; give a RigidAxis, or a Machine"),
     ):
         with pytest.raises(ss.InputError, match=words):
@@ -327,6 +327,9 @@ def test_a_sweep_is_that_of_the_command_line(tmp_path: Path, capsys: pytest.Capt
     assert len(found.to_pandas()) == len(printed)
     assert found.columns(0)[found.sweep.metrics[0]].shape == (4,)
     assert found._repr_html_().count("<tr>") == 1 + len(printed)
+    lines = repr(found).splitlines()
+    assert len(lines) == 2 + len(printed)
+    assert f"{printed[0][found.sweep.metrics[0] + '_p95']:.4g}" in lines[2]
     with pytest.raises(ss.InputError, match="at least 1"):
         ss.sweep(file, tmp_path, cases=0)
     with pytest.raises(ss.InputError, match="has no table"):
@@ -337,3 +340,11 @@ def test_machines_are_loaded_by_name_or_file() -> None:
     assert ss.load_machine("thesis-dry").name == "thesis-dry"
     with pytest.raises(ss.InputError, match="thesis-dry"):
         ss.load_machine("thesis-dri")
+
+
+def test_a_record_prints_short(signals: dict[str, np.ndarray]) -> None:
+    """Its arrays and everything that was read filled pages."""
+    record = ss.read(**signals)
+    assert repr(record).startswith(f"<Record: {len(record)} rows, ")
+    assert "position [rad]" in repr(record)
+    assert len(repr(record)) < 300

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stickslip.study.result import Run, StudyResult
+    from stickslip.sweep.tune import Tuned
 
 COLUMNS = (("position_rms_rad", 1e3, "RMS"), ("position_peak_rad", 1e3, "peak"))
 """Metrics of the table on the terminal, with their factor to mrad."""
@@ -236,30 +237,16 @@ def report_failures(failed: Sequence[tuple[str, str, Path]]) -> int:
 
 def print_sweep(rows: Sequence[Mapping[str, Any]], metric: str, wall: float, written: Sequence[Path]) -> None:
     """A line a run: percentiles of a metric, flagged and missing cases."""
-    width = max(24, *(len(_key(row)) for row in rows))
-    heads = ("5 %", "50 %", "95 %", "worst")
-    print(f"{metric:<{width}}" + "".join(f"{h:>12}" for h in heads) + f"{'flagged':>10}{'missing':>9}")
-    for row in rows:
-        cells = "".join(f"{row[f'{metric}_p{p}']:>12.4g}" for p in (5, 50, 95, 100))
-        flagged = f"{100.0 * row['flagged'] / max(1, row['cases']):.2f} %"
-        print(f"{_key(row):<{width}}{cells}{flagged:>10}{row[f'{metric}_missing']:>9}")
+    from stickslip.sweep.summary import summary_lines
+
+    print(*summary_lines(rows, metric), sep="\n")
     print(f"{sum(row['cases'] for row in rows)} closed loops, {wall:.1f} s")
     for path in written:
         print(path)
 
 
-def _key(row: Mapping[str, Any]) -> str:
-    return "/".join(row[part] for part in ("slip_rule", "reference", "friction", "controller"))
-
-
-def print_tuned(data: Mapping[str, Any], percentile: float, written: Sequence[Path]) -> None:
+def print_tuned(tuned: Tuned, written: Sequence[Path]) -> None:
     """What was chosen for a run, before and after."""
-    print(f"{data['run']}: {data['tried']} settings tried")
-    for name, value in data["settings"].items():
-        print(f"    {name:<32}{data['before'][name]:>12.5g} -> {value:<12.5g}")
-    for name, value in data["metrics"].items():
-        print(
-            f"    {name:<32}{data['metrics_before'][name]:>12.5g} -> {value:<12.5g} {percentile:g} % of the cases below"
-        )
+    print(tuned)
     for path in written:
         print(path)

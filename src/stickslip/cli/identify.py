@@ -121,7 +121,9 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
     parser.add_argument(
         "--loop", action="append", default=[], metavar="kp=..,kd=..",
         help="sampled controller kp e + ki (integral of e) + kr v_ref - kd v whose output is the recorded drive signal "
-        "(of a torque: kp in N·m/rad, kd and kr in N·m·s/rad); omitted gains are 0. limit: of the output; period: "
+        "(of a torque: kp in N·m/rad, kd and kr in N·m·s/rad); omitted gains are 0. Or kv (1/s), kvp (N·m·s/rad), kvi "
+        "(N·m/rad), feed (share of the velocity feedforward, default 1) of a position P loop around a velocity PI "
+        "loop, as for `stickslip recommend`. limit: of the output; filter: velocity low-pass, Hz; period: "
         "sample time, s (0: that of the rows); count: encoder resolution, rad; span: samples per velocity difference, "
         "1 or 2. Repeat once per LOG, in the same order, if the gains differ",
     )  # fmt: skip

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         data = tuned.as_dict()
         found.append(data)
         if not args.json:
-            _output.print_tuned(data, sweep.percentile, files)
+            _output.print_tuned(tuned, files)
     if args.json:
         _output.print_json(found)
     return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -42,10 +43,9 @@ def resolved(found: Identification, amplitude: float) -> Identification:
     total = math.fsum(p.alpha[i] for i in keep)
     values: dict[str, Any] = p._asdict()
     values |= {"k": [p.k[i] for i in keep], "alpha": [p.alpha[i] / total for i in keep]}
-    gone = ", ".join(
-        f"{p.k[i]:.3g} N·m/rad up to {p.alpha[i] * p.fs:.2g} N·m" for i in range(len(p.k)) if i not in keep
-    )
-    note = f"Left out, since the loop does not resolve them: elements of {gone}."
+    gone = [i for i in range(len(p.k)) if i not in keep]
+    note = left_out([p.alpha[i] * p.fs for i in gone if p.k[i] < stiff],
+                    [p.alpha[i] * p.fs for i in gone if p.k[i] >= stiff])  # fmt: skip
     estimates = tuple(e for e in found.estimates if not e.name.startswith(("k[", "alpha[")))
     estimates += tuple(
         scaled(dataclasses.replace(found[f"{n}[{i}]"], name=f"{n}[{keep.index(i)}]"), over)
@@ -57,6 +57,21 @@ def resolved(found: Identification, amplitude: float) -> Identification:
         found, model=Model(found.model.law, {}, **values), estimates=estimates, notes=(*found.notes, note),
         correlation=np.eye(len(estimates)),
     )  # fmt: skip
+
+
+def left_out(soft: Sequence[float], small: Sequence[float]) -> str:
+    """What is said of elements that are left out: too soft, or too small, each by the torque that it carries, N·m."""
+    parts: list[str] = []
+    if soft:
+        torques = ", ".join(f"{x:.2g} N·m" for x in soft)
+        parts.append(
+            f"friction of {torques} that would build up only far beyond the loop's way (stiffness below "
+            f"{100 * SOFTEST:g} % of the whole)"
+        )
+    if small:
+        torques = ", ".join(f"{x:.2g} N·m" for x in small)
+        parts.append(f"elements of {torques}, less than {100 * LEAST:g} % of the loop's torque")
+    return f"Not in the pre-sliding model, since the loop does not tell their stiffness: {'; '.join(parts)}."
 
 
 def scaled(e: Estimate, factor: float) -> Estimate:

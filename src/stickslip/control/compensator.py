@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from stickslip.arguments import insist_on_own
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
@@ -57,6 +58,7 @@ class Compensator:
     velocity: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
+        insist_on_own(self, self.name)
         if not (self.gain >= 0.0 and math.isfinite(self.gain)):
             raise ParameterError(
                 f"{self.name}: gain = {self.gain:g} must be at least 0 and finite; 1 cancels the whole model, and a "

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from stickslip.arguments import insist_on_own
 from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Compensator
 from stickslip.control.composed import Composed
@@ -99,6 +100,7 @@ class Controller(Composed):
             self._refuse_laws()
 
     def _refuse_numbers(self) -> None:
+        insist_on_own(self, "controller")
         if not self.torque_limit > 0.0:
             raise ParameterError(
                 f"controller: torque_limit = {self.torque_limit:g} N·m must be greater than 0"

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 
 from stickslip.config import Table, read_toml
 from stickslip.control.compensator import COMPENSATORS, Compensator
+from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import InputError
 from stickslip.model import Model
@@ -51,6 +53,10 @@ class Recommended:
         s, for which it was tried; 0: not known.
     machine : str
         On which it was measured; empty where it is a model's.
+    torque_limit : float
+        N·m, of the drive that it was tried with; infinite where it had none.
+    encoder_counts : float
+        Counts per revolution of the encoder that it was tried with; 0 measured exactly.
     """
 
     compensator: str
@@ -67,6 +73,8 @@ class Recommended:
     inertia_feedforward: float = 0.0
     gains: Gains | Cascade | None = None
     velocity_filter: float = 0.0
+    torque_limit: float = math.inf
+    encoder_counts: float = 0.0
 
     @property
     def linear(self) -> Gains | Cascade:
@@ -92,6 +100,13 @@ class Recommended:
             self.offset,
             self.inertia_feedforward,
         )
+
+    def controller(self, model: Model) -> Controller:
+        """The loop that it was tried in, with the compensator on its law."""
+        return Controller(
+            self.linear, self.on(model), self.torque_limit, self.sample_time, self.encoder_counts,
+            self.velocity_filter,
+        )  # fmt: skip
 
 
 def read_recommended(path: str | os.PathLike[str]) -> Recommended:
@@ -122,6 +137,8 @@ def recommended_in(whole: Table) -> Recommended:
             given.number("sample_time", "s", 0.0, 0.0), given.text("machine", ""),
             given.number("offset", "N·m", 0.0), given.number("inertia_feedforward", "kg·m²", 0.0, 0.0),
             own, given.number("velocity_filter", "Hz", 0.0, 0.0),
+            given.positive("torque_limit", "N·m", math.inf),
+            given.number("encoder_counts", "counts per revolution", 0.0, 0.0),
         )  # fmt: skip
 
 

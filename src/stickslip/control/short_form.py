@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from stickslip.arguments import is_number, no_number
 from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Compensator
 from stickslip.control.linear import Cascade, Gains
@@ -36,6 +37,8 @@ def refuse_short(gains: Any, compensator: Any, velocity_filter: float, sample_ti
             f"controller: compensator = {compensator!r} is none; give Feedforward(...) or Feedback(...)"
         )
     for name, value in gains._asdict().items() if gains else ():
+        if not is_number(value):
+            raise no_number("controller", name, value, "")
         if not math.isfinite(value) or value < 0.0:
             raise ParameterError(f"controller: {name} = {value:g} must be at least 0")
     if not math.isfinite(velocity_filter) or velocity_filter < 0.0:

@@ -146,7 +146,7 @@ class Experiment:
     @property
     def can_begin_later(self) -> bool:
         """Whether it can be simulated from any row: what a controller has integrated is not recorded."""
-        return not self.closed_loop or (self.loop is not None and self.loop.ki == 0.0)
+        return not self.closed_loop or (self.loop is not None and not self.loop.integrates)
 
     def top_speed(self, rows: Mask) -> float:
         """The highest mean speed over `WINDOW` seconds in these rows, rad/s (m/s)."""

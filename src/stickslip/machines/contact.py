@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, cast
 
+from stickslip.arguments import insist_on_own
 from stickslip.errors import ParameterError
 from stickslip.machines.motor import Harmonics
 from stickslip.model import Model
@@ -33,6 +34,7 @@ class Bearings:
     stiffness: float = 5.0
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "bearings")
         for name in ("coulomb", "viscous"):
             value = getattr(self, name)
             if not (value >= 0.0 and math.isfinite(value)):
@@ -51,6 +53,7 @@ class Drift:
     begin: float = 0.0
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "drift")
         if not -1.0 < self.change <= 10.0:
             raise ParameterError(f"drift: change = {self.change:g} must be above -1 and at most 10")
         if not self.time > 0.0:
@@ -73,6 +76,7 @@ class Heat:
     time: float = 600.0
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "heat")
         if not abs(self.coefficient) <= 0.1:
             raise ParameterError(f"heat: coefficient = {self.coefficient:g} 1/K must be from -0.1 to 0.1")
         if not (self.resistance >= 0.0 and self.time > 0.0):
@@ -106,6 +110,7 @@ class Contact:
     heat: Heat = Heat()
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "contact")
         if math.fsum(self.ripple.amplitude) >= 1.0:
             raise ParameterError(
                 f"contact: its ripple adds up to {math.fsum(self.ripple.amplitude):g} of friction; it must stay below 1"

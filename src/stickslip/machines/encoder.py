@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from stickslip.arguments import insist_on_own
 from stickslip.errors import ParameterError
 
 
@@ -37,6 +38,7 @@ class Encoder:
     mode_share: float = 0.0
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "encoder")
         for name in ("counts", "noise", "mode"):
             value = getattr(self, name)
             if not (value >= 0.0 and math.isfinite(value)):

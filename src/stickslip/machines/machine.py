@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
+from stickslip.arguments import insist_on_own
 from stickslip.errors import ParameterError, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
@@ -95,6 +96,7 @@ class Machine:
     start_angle: float = 0.0
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "machine")
         if not (self.inertia > 0.0 and math.isfinite(self.inertia)):
             raise ParameterError(f"machine: inertia = {self.inertia:g} kg·m² must be greater than 0")
         if self.flexible and abs(self.flexible.inertia / self.inertia - 1.0) > 1e-6:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from stickslip.arguments import insist_on_own
 from stickslip.errors import ParameterError
 
 HIGHEST = 4096
@@ -19,6 +20,7 @@ class Converter:
     range: float = math.inf
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "converter")
         if self.bits < 0 or self.bits > 52:
             raise ParameterError(f"converter: bits = {self.bits} must be from 0 to 52")
         if self.bits and not (self.range > 0.0 and math.isfinite(self.range)):
@@ -59,6 +61,7 @@ class Amplifier:
     monitor_noise: float = 0.0
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "amplifier")
         for name in ("torque_constant", "current_limit", "bandwidth"):
             if not getattr(self, name) > 0.0:
                 raise ParameterError(f"amplifier: {name} = {getattr(self, name):g} must be greater than 0")
@@ -79,6 +82,7 @@ class Harmonics:
     phase: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "harmonics")
         if not len(self.order) == len(self.amplitude) == len(self.phase):
             raise ParameterError(
                 f"harmonics: {len(self.order)} orders, {len(self.amplitude)} amplitudes and {len(self.phase)} phases; "

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
+from stickslip.arguments import insist_on_own, no_number
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
@@ -32,11 +32,11 @@ class RigidAxis:
     temperature: float = 20.0
 
     def __post_init__(self) -> None:
-        value: Any = self.inertia
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ParameterError(f"axis: inertia = {value!r} must be a number in kg·m²")
-        if not math.isfinite(value) or value <= 0.0:
-            raise ParameterError(f"axis: inertia = {value:g} kg·m² must be greater than 0")
+        if isinstance(self.inertia, bool):
+            raise no_number("axis", "inertia", self.inertia, "kg·m²")
+        insist_on_own(self, "axis")
+        if not math.isfinite(self.inertia) or self.inertia <= 0.0:
+            raise ParameterError(f"axis: inertia = {self.inertia:g} kg·m² must be greater than 0")
         if not (math.isfinite(self.load) and self.load >= 0.0):
             raise ParameterError(f"axis: load = {self.load:g} must be a finite number of at least 0")
         if not math.isfinite(self.temperature):

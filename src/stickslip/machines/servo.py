@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from stickslip.arguments import is_number, no_number
 from stickslip.errors import ParameterError
 
 SIDES = ("motor", "load")
@@ -21,8 +22,8 @@ DRIVE_QUANTITIES = ("torque", "current", "rated_torque", "voltage")
 
 def positive(owner: str, name: str, value: Any, unit: str) -> None:
     """Refuse what is not a positive number."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ParameterError(f"{owner}: {name} = {value!r} must be a number in {unit}")
+    if isinstance(value, bool) or not is_number(value):
+        raise no_number(owner, name, value, unit)
     if not (value > 0.0 and math.isfinite(value)):
         raise ParameterError(f"{owner}: {name} = {value:g} {unit} must be greater than 0")
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.arguments import insist_on_own
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
 from stickslip.control.linear import Cascade, Gains, place
@@ -104,6 +105,7 @@ class Drive:
     machine: Machine | None = None
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "drive")
         for name in ("bandwidth", "damping", "sample_time", "torque_limit", "amplitude", "frequency"):
             value = getattr(self, name)
             if value is not None and not value > 0.0:

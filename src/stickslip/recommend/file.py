@@ -96,4 +96,5 @@ def recommended_table(advice: Recommendation, machine: str = "") -> dict[str, An
         sample_time=drive.sample_time, machine=machine, offset=setting.offset,
         inertia_feedforward=setting.inertia_feedforward,
         gains=loop.gains if own else None, velocity_filter=loop.velocity_filter,
+        torque_limit=loop.torque_limit, encoder_counts=loop.encoder_counts,
     ).table()  # fmt: skip

@@ -10,12 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
+from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
 from stickslip.record import Record, encoder_step
 from stickslip.report.after_a_map import after_a_map
 from stickslip.report.sliding_torque import beaten, sliding_of
 
+OWN_LOOP = (*Gains._fields, *Cascade._fields, "filter", "limit")
+"""Numbers of an identification's --loop that a recommendation's has too."""
 OPTIONS = "  # with the options of this run"
 EXPERIMENTS = {
     "inertia": "inertia", "fs": "breakaway", "sigma0": "presliding", "k": "presliding", "alpha": "presliding",
@@ -93,7 +96,7 @@ def drive_in(records: Sequence[Record]) -> str:
     """Options of `stickslip recommend` as far as the records tell them."""
     loops = {str(r.meta.get("loop", "")) for r in records}
     loop = loops.pop() if len(loops) == 1 else ""
-    kept = [p for p in loop.split(",") if p.partition("=")[0] in ("kp", "ki", "kd", "kr", "limit")]
+    kept = [p for p in loop.split(",") if p.partition("=")[0] in OWN_LOOP]
     out = [f"--loop {','.join(kept)}" if kept else "--bandwidth 10"]
     periods = [float(np.median(np.diff(r.time))) for r in records if r.time.size > 1]
     if periods:

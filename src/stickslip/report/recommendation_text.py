@@ -28,7 +28,11 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
     gains = ", ".join(f"{k} {v:.5g}" for k, v in result.gains.items() if v)
     out.append(f"linear controller: {gains}; RMS error alone {result.linear_error:.3g} {unit('rad')}")
     if result.rings:
-        out.append(f"oscillates alone:  {result.rings}")
+        out.append(f"linear alone:      without a compensator it oscillates {result.rings}")
+        if result.chosen:
+            out.append(
+                f"{'':19}below, safe means that the compensator adds no oscillation to this one; it does not end it"
+            )
     c = result.chosen
     if c and result.model:
         out.append(
@@ -103,6 +107,7 @@ def reduction(result: Recommendation) -> str:
     return (
         f"{best} on the best estimate; {100.0 * result.confidence:.0f} % interval {percent(*result.reduction)}, "
         f"safe on all {result.confirmed_on} sampled axes (Monte Carlo)"
+        + (", but for the linear controller's own oscillation" if result.rings else "")
     )
 
 

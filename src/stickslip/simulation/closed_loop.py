@@ -5,12 +5,12 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Mapping, Sequence
-from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import stickslip
+from stickslip.arguments import numbers_checked
 from stickslip.capacity import insist_on_memory
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
@@ -54,7 +54,6 @@ KINDS: tuple[tuple[str, tuple[type, ...], str], ...] = (
     ("axis", (RigidAxis, Machine), "a RigidAxis, or a Machine as load_machine makes it"),
     ("controller", (Controller,), "a Controller: of gains, Controller(place('PD', ...)), or of control laws"),
     ("reference", (Reference,), "a Reference, of arrays Reference.table(time, position)"),
-    ("duration", (Real,), "a number of seconds"),
 )
 """Arguments of `simulate`: what they must be, and what to give."""
 
@@ -79,6 +78,7 @@ REASONS: dict[int, tuple[type[SimulationError], str]] = {
 }
 
 
+@numbers_checked
 def simulate(
     axis: RigidAxis | Machine,
     controller: Controller,
@@ -146,7 +146,7 @@ def simulate(
         If the run diverges, leaves the finite numbers or switches without end; it says when and why, and its
         ``record`` holds what was computed.
     """
-    _insist_on_kinds(axis, controller, reference, duration)
+    _insist_on_kinds(axis, controller, reference)
     _insist_on_tolerance(tolerance)
     if isinstance(axis, Machine):
         check_machine_run(

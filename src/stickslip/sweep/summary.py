@@ -52,6 +52,19 @@ def write_summary(folder: Path, sweep: Sweep, rows: Sequence[Mapping[str, Any]])
     return path
 
 
+def summary_lines(rows: Sequence[Mapping[str, Any]], metric: str) -> list[str]:
+    """A line a run under a heading: percentiles of a metric, flagged and missing cases."""
+    keys = ["/".join(str(row[part]) for part in KEYS) for row in rows]
+    width = max(24, *(len(key) for key in keys))
+    heads = ("5 %", "50 %", "95 %", "worst")
+    out = [f"{metric:<{width}}" + "".join(f"{h:>12}" for h in heads) + f"{'flagged':>10}{'missing':>9}"]
+    for key, row in zip(keys, rows, strict=True):
+        cells = "".join(f"{row[f'{metric}_p{p}']:>12.4g}" for p in PERCENTILES)
+        flagged = f"{100.0 * row['flagged'] / max(1, row['cases']):.2f} %"
+        out.append(f"{key:<{width}}{cells}{flagged:>10}{row[f'{metric}_missing']:>9}")
+    return out
+
+
 # ---- what uncertainty does ---------------------------------------------------------------------------------------
 
 

@@ -46,6 +46,8 @@ class Tuned:
         Every setting, and its percentiles.
     measured : tuple of str
         The sweep's metrics.
+    percentile : float
+        %, of the cases, whose metrics are the scores.
     """
 
     run: PlannedRun
@@ -57,6 +59,7 @@ class Tuned:
     tried: Array
     scores: Array
     measured: tuple[str, ...] = ()
+    percentile: float = math.nan
 
     @property
     def settings(self) -> dict[str, float]:
@@ -75,6 +78,18 @@ class Tuned:
             "metrics": self.metrics, "metrics_before": dict(zip(self.measured, self.scores_before.tolist())),
             "tried": len(self.tried),
         }  # fmt: skip
+
+    def __str__(self) -> str:
+        lines = [f"{self.run.key}: {len(self.tried)} settings tried"]
+        for name, before, after in zip(self.names, self.before, self.after, strict=True):
+            lines.append(f"    {name:<32}{before:>12.5g} -> {after:<12.5g}")
+        for name, before, after in zip(self.measured, self.scores_before, self.scores_after, strict=True):
+            share = f" {self.percentile:g} % of the cases below"
+            lines.append(f"    {name:<32}{before:>12.5g} -> {after:<12.5g}{share}")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<Tuned: {self}>"
 
 
 def tune(sweep: Sweep, run: PlannedRun, progress: Callable[[int, int], None] | None = None) -> Tuned:
@@ -132,7 +147,7 @@ def tune(sweep: Sweep, run: PlannedRun, progress: Callable[[int, int], None] | N
     as_it_was = measured(run, uncertain, sweep.metrics, sweep.drawn.cases).metrics
     return Tuned(
         run, tuple(s.name for s in spreads), before, tried[best], percentiles(as_it_was, sweep.percentile), every[best],
-        np.array(tried), every, tuple(sweep.metrics),
+        np.array(tried), every, tuple(sweep.metrics), sweep.percentile,
     )  # fmt: skip
 
 

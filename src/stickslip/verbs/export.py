@@ -10,12 +10,13 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from stickslip.arguments import numbers_checked
 from stickslip.config import Document, Table, read_toml
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.linear import Gains
-from stickslip.control.recommended import recommended_in
+from stickslip.control.recommended import Recommended, recommended_in
 from stickslip.errors import InputError
 from stickslip.export import CONTROLLER_TARGETS, TARGETS, controller_target, target_named
 from stickslip.export.job import Check, Export, Job
@@ -121,6 +122,7 @@ class CompensatorOptions:
         return [f.name for f in fields(self) if getattr(self, f.name) is not None]
 
 
+@numbers_checked
 def export(
     source: Source,
     to: str,
@@ -206,7 +208,7 @@ def export(
     whole = advised and is_whole(source)
     if whole and compensator == "recommended":
         compensator = None  # what is recommended is the controller
-    elif compensator is None and advised and not whole and not options.given:
+    elif compensator is None and advised and not (whole or controller or options.given):
         compensator = "recommended"
     controller = controller or isinstance(source, Controller) or (whole and compensator is None)
     refuse_controllers(chosen, controller, compensator)
@@ -314,15 +316,17 @@ def controller_in(source: Source) -> Controller:
     """The controller given, or that of a file for `stickslip simulate`."""
     if isinstance(source, Controller):
         return source
-    if isinstance(source, RecommendationResult) and is_whole(source):
+    if isinstance(source, RecommendationResult):
         return source.controller
-    if isinstance(source, (Model, IdentificationResult, RecommendationResult, PositionMap)):
+    if isinstance(source, (Model, IdentificationResult, PositionMap)):
         raise InputError(
             f"a {type(source).__name__} has no controller; give a Controller, or leave controller out"
         )
     whole = read_toml(Path(source))
     if whole.has("controller") and not whole.has("reference"):
         return read_controller(source)  # of `stickslip recommend --controller`, or written by hand
+    if whole.has("recommended"):
+        return recommendation_in(whole).controller(Model.from_table(whole))
     return load_run(Path(source)).control
 
 
@@ -371,7 +375,7 @@ def recommended_on(content: Table, model: Model, options: CompensatorOptions) ->
     ------
     InputError
     """
-    found = recommended_in(content)
+    found = recommendation_in(content)
     for option in options.given:
         if option in NUMBERS:
             raise InputError(
@@ -384,7 +388,11 @@ def recommended_on(content: Table, model: Model, options: CompensatorOptions) ->
             f"--sample-time {asked:g}: {content.document.name} is recommended for {tried:g} s; leave it out, or "
             "run `stickslip recommend` with that sample time"
         )
-    if not found.offset:
-        found = replace(found, offset=constant_torque(content))
     made = replace(found.on(model), substeps=1 if options.substeps is None else options.substeps)
     return Controller(Gains(kp=0.0), made, sample_time=tried or asked or 1e-3)
+
+
+def recommendation_in(content: Table) -> Recommended:
+    """What a file recommends, with the constant torque that it holds of its axis."""
+    found = recommended_in(content)
+    return found if found.offset else replace(found, offset=constant_torque(content))

@@ -47,6 +47,7 @@ def notes_on_controller(
     if read := depends_on(made):
         yield f"friction depends on {read}: set load and temperature in every sample, position and time it keeps itself"
     if compensator is None:
+        yield from angle_left_out(content)
         return
     yield from other_torques(content, offset, {})
     yield f"it gives {given_by(made)}"
@@ -62,13 +63,18 @@ def notes_on_controller(
         what = "the loop of" if found.gains else f"a PD of {found.bandwidth:.4g} Hz:"
         gains = ", ".join(f"{k} {v:.5g}" for k, v in found.linear._asdict().items() if v or k == "feed")
         yield f"it was tried with {what} {gains}; the linear controller is not in the export"
-        if content.has("angle"):
-            yield (
-                "what the file knows of the angle ([angle]) is not in the export but for the mean of the torque beside "
-                "friction: `stickslip rig run track` runs it"
-            )
+        yield from angle_left_out(content)
     else:
         yield from other_recommendation(content)
+
+
+def angle_left_out(content: Table) -> Iterator[str]:
+    """That a recommendation's torque over the angle is not in its export."""
+    if content.has("recommended") and content.has("angle"):
+        yield (
+            "what the file knows of the angle ([angle]) is not in the export but for the mean of the torque beside "
+            "friction: `stickslip rig run track` runs it"
+        )
 
 
 def around_of(chosen: Target, job: Job) -> Iterator[str]:

@@ -163,8 +163,6 @@ class IdentificationResult:
         target = Path(path)
         target = target if target.suffix == ".toml" else target / "model.toml"
         prepared_folder(target.parent)
-        if self.position_map is None or self.identification.model is not None:
-            self.model.warn(str(target))
         return write_model(
             target, self.identification, data=self._data, law=self.law_file, more=self._recorded()
         )

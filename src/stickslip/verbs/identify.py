@@ -11,6 +11,7 @@ from typing import Any, Literal, Unpack, cast
 import numpy as np
 
 from stickslip import plugins
+from stickslip.arguments import insist_on_numbers, numbers_checked
 from stickslip.errors import InputError
 from stickslip.identify.doctor import Diagnosis, examine
 from stickslip.identify.estimate import Identification, silent
@@ -30,6 +31,7 @@ from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, doctor_of, 
 Loops = str | Mapping[str, float] | Sequence[str | Mapping[str, float]] | None
 
 
+@numbers_checked
 def identify(
     *logs: Log,
     method: str = "axis",
@@ -96,8 +98,9 @@ def identify(
     threshold : float, optional
         Velocity that is motion, rad/s or m/s (breakaway); 0.01.
     loop : str or mapping, or a sequence of them, optional
-        The sampled controller that drove the log, ``{"kp": 8.0, "kd": 0.08, "limit": 3.0}`` (also ki, kr, period,
-        count, span): with it and a reference in the log the closed loop is simulated. One for all logs, or one each.
+        The sampled controller that drove the log, ``{"kp": 8.0, "kd": 0.08, "limit": 3.0}`` (also ki, kr, filter,
+        period, count, span; or kv, kvp, kvi, feed of position P around velocity PI, as `recommend` has them): with it
+        and a reference in the log the closed loop is simulated. One for all logs, or one each.
     loop_output : {"torque", "current", "voltage"}, optional
         What its output is where no drive signal is recorded.
     inverse, per_direction, pendulum, drive_gain, resistance, extra_torque, torque_is, delay, harmonics, \
@@ -273,7 +276,10 @@ def loops_of(loop: Loops, count: int) -> list[str]:
         raise InputError(
             f"--loop is given {len(every)} times for {count} LOGs; give it once, or once for each"
         )
-    texts = [x if isinstance(x, str) else ",".join(f"{k}={v!r}" for k, v in x.items()) for x in every]
+    for numbers in every:
+        if not isinstance(numbers, str):
+            insist_on_numbers("loop", dict.fromkeys(numbers, "float"), numbers)
+    texts = [x if isinstance(x, str) else ",".join(f"{k}={float(v)!r}" for k, v in x.items()) for x in every]
     return texts if len(texts) > 1 else texts * count
 
 

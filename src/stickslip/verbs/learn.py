@@ -14,6 +14,7 @@ import numpy as np
 from stickslip.analyse.learning import Convergence, over_angle, over_time, widest
 from stickslip.analyse.machine_axis import axis_of
 from stickslip.analyse.presliding_loop import Axis
+from stickslip.arguments import numbers_checked
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.learning import TimeTable, low_pass
@@ -106,6 +107,7 @@ class LearningResult:
         return target
 
 
+@numbers_checked
 def learn(
     axis: RigidAxis | Machine,
     controller: Controller,

@@ -11,6 +11,7 @@ from typing import Any, Literal, TypedDict, Unpack, cast
 
 from numpy.typing import ArrayLike
 
+from stickslip.arguments import insist_on_numbers
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding
 from stickslip.readers import profiles
@@ -93,6 +94,10 @@ class Reading(TypedDict, total=False):
     unwrap: bool
 
 
+READ_AS = {name: getattr(said, "__forward_arg__", said) for name, said in Reading.__annotations__.items()}
+"""Annotations of `Reading` as they are written."""
+
+
 @dataclass(frozen=True)
 class Opened:
     """A record, the profile that was used, the one that was written, and what is to be said of them; of a file also
@@ -151,15 +156,16 @@ def doctor_of(log: Log | None) -> str:
 
 
 def check_reading(given: Mapping[str, Any]) -> None:
-    """Refuse a name that is none of `Reading`.
+    """Refuse a name that is none of `Reading`, and what is no number where one is meant.
 
     Raises
     ------
-    UnknownName
+    UnknownName, ParameterError
     """
     for name in given:
         if name not in Reading.__annotations__:
             raise UnknownName("argument", name, tuple(Reading.__annotations__))
+    insist_on_numbers("reading", READ_AS, given)
 
 
 def open_log(

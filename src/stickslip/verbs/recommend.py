@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Literal, cast
 
 from stickslip.approval import allow_code
+from stickslip.arguments import numbers_checked
 from stickslip.config import named_numbers
 from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.linear import Cascade, Gains
+from stickslip.control.own_loop import kind_of_loop
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.motion import Motion, motion_of
 from stickslip.machines.files import load_machine
@@ -27,6 +29,7 @@ from stickslip.verbs.reading import Log, open_log
 from stickslip.verbs.recommendation import RecommendationResult
 
 
+@numbers_checked
 def recommend(
     model: IdentifiedModel,
     *,
@@ -253,19 +256,15 @@ def loop_of(given: str | Mapping[str, float]) -> tuple[Gains | Cascade, dict[str
         If a name is unknown, both kinds of loop are mixed, or a number is out of bounds.
     """
     numbers = named_numbers(given.split(",")) if isinstance(given, str) else dict(given)
-    kind = Cascade if "kv" in numbers else Gains
-    names = (*kind._fields, "filter", "limit")
+    kind = kind_of_loop(numbers, ("filter", "limit"))
     for name, value in numbers.items():
-        if name not in names:
-            raise UnknownName(f"number of --loop of a {'cascade' if kind is Cascade else 'PID'}", name, names)
         above = value > 0.0 if name == "limit" else value >= 0.0 and math.isfinite(value)
         if not above:
             raise InputError(
                 f"--loop: {name} = {value:g} must be a number of 0 or more, a limit greater than 0"
             )
-    for name in ("kv", "kvp") if kind is Cascade else ("kp",):
-        if not numbers.get(name, 0.0) > 0.0:
-            raise InputError(f"--loop {given}: give {name}, greater than 0")
+    if kind is Gains and not numbers.get("kp", 0.0) > 0.0:
+        raise InputError(f"--loop {given}: give kp, greater than 0")
     own = {name: numbers.pop(name) for name in ("filter", "limit") if name in numbers}
     return kind(**numbers), own
 

@@ -11,18 +11,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.arguments import numbers_checked
 from stickslip.capacity import insist_on_jobs
 from stickslip.errors import InputError
 from stickslip.identify.estimate import silent
 from stickslip.sweep import dataset, execute
 from stickslip.sweep.gains import too_few
 from stickslip.sweep.plan import MOST_CASES, Sweep, load
-from stickslip.sweep.summary import summarise, write_summary
+from stickslip.sweep.summary import summarise, summary_lines, write_summary
 
 if TYPE_CHECKING:
     import pandas
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+SHOWN = 12
+"""Runs that a printed result shows, at most."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,7 +78,14 @@ class SweepResult:
         return pandas.DataFrame([dict(row) for row in self.rows])
 
     def __repr__(self) -> str:
-        return f"<SweepResult: {self.sweep.name}, {sum(r['cases'] for r in self.rows)} closed loops in {self.folder}>"
+        said = f"<SweepResult: {self.sweep.name}, {sum(r['cases'] for r in self.rows)} closed loops in {self.folder}"
+        lines = summary_lines(self.rows[:SHOWN], self.sweep.metrics[0])
+        more = (
+            [f"and {len(self.rows) - SHOWN} more runs: rows, or to_pandas()"]
+            if len(self.rows) > SHOWN
+            else []
+        )
+        return "\n".join([said, *(f"  {line}" for line in [*lines, *more])]) + ">"
 
     def _repr_html_(self) -> str:
         """A table in a notebook: percentiles of the first metric."""
@@ -89,6 +99,7 @@ class SweepResult:
         return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
+@numbers_checked
 def sweep(
     file: str | os.PathLike[str] | Sweep,
     folder: str | os.PathLike[str] | None = None,

@@ -13,8 +13,8 @@ squares of the recorded signal over reference and position give them, whatever t
 
 `benchmarks/loop_doubted.py`, seeds 20 to 49: of 450 records with the right gains 2 were doubted without the
 controller's period, 1 with it, all with a fifth of its rows; of 720 with all rows and 16384 counts or more, a kd of
-twice the true one, a kp 41 % above it, and kr left out or put in were doubted in 717. A filter of the velocity, of
-which `Loop` knows nothing, is another controller: one at 100 Hz is doubted in some records, slower ones in most.
+twice the true one, a kp 41 % above it, and kr left out or put in were doubted in 717. A filter of the velocity
+that was not given is another controller: one at 100 Hz is doubted in some records, slower ones in most.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.control.linear import Cascade, Gains
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.jackknife import leave_blocks_out
 from stickslip.identify.fit.noise import white_std
@@ -76,6 +77,8 @@ class ShownGains:
     late : int
         Rows by which the reference must be recorded late for the given gains to explain the signal; 0 where they do
         so without, or no such shift helps.
+    cascade : bool
+        Whether a cascade was given: the gains are those of the PID that it is (`as_pid`).
     """
 
     given: Array
@@ -85,6 +88,7 @@ class ShownGains:
     left: float
     missed: float
     late: int = 0
+    cascade: bool = False
 
     @property
     def turned(self) -> bool:
@@ -136,8 +140,9 @@ def doubt(name: str, shown: ShownGains) -> str:
         if shown.turned
         else "check --loop, its period too; a filter or a feedforward in the controller can look like this as well."
     )
+    which = " (as a PID)" if shown.cascade else ""
     return (
-        f"{name} shows another controller than the loop given: {'; '.join(differing)}. The gains given miss the "
+        f"{name} shows another controller than the loop given{which}: {'; '.join(differing)}. The gains given miss the "
         f"recorded signal by {shown.missed:.0%}, those shown by {shown.left:.1%}: {why}"
     )
 
@@ -155,7 +160,7 @@ def shown_gains(experiment: Experiment, gain: float = 1.0) -> ShownGains | None:
     Returns
     -------
     ShownGains or None
-        None where the record lacks one of these, or is too short.
+        None where the record lacks one of these, is too short, or the loop is no such sum.
     """
     if experiment.drive is None or experiment.reference is None or experiment.loop is None:
         return None
@@ -169,7 +174,9 @@ def shown_gains(experiment: Experiment, gain: float = 1.0) -> ShownGains | None:
         velocity_noise = 2.0 * (noise / (max(length, span) * experiment.period)) ** 2
         if velocity_noise < NOISY * own_variance(x, GAINS.index("kd")):
             break
-    given = np.array([getattr(experiment.loop, name) for name in GAINS])
+    if (pid := as_pid(experiment.loop)) is None:
+        return None
+    given = np.array([getattr(pid, name) for name in GAINS])
     tries = {0: delayed(experiment, columns, length, gain)}
     if unexplained(*best_of(tries[0])[:2], given) >= MISSED:
         for late in LATE[1:]:
@@ -182,7 +189,18 @@ def shown_gains(experiment: Experiment, gain: float = 1.0) -> ShownGains | None:
     by_row = {late: min(unexplained(x, u, given) for x, u, _ in some) for late, some in tries.items()}
     late = min(by_row, key=lambda row: by_row[row])
     needed = by_row[late] < bound(left) <= by_row[0]
-    return ShownGains(given, values, half_widths, parts, left, by_row[late], late if needed else 0)
+    cascade = experiment.loop.kv > 0.0
+    return ShownGains(given, values, half_widths, parts, left, by_row[late], late if needed else 0, cascade)
+
+
+def as_pid(loop: Loop) -> Loop | Gains | None:
+    """What has the gains of a sum: the loop itself, or the PID that a cascade is; None where that has one more gain, on
+    the position itself."""
+    if loop.kv == 0.0:
+        return loop
+    if loop.kvi != 0.0 and loop.feed != 1.0:
+        return None
+    return Cascade(loop.kv, loop.kvp, loop.kvi, loop.feed).pid
 
 
 def shifted(experiment: Experiment, late: int) -> Experiment:
@@ -224,7 +242,7 @@ def unexplained(x: Array, u: Array, given: Array) -> float:
 def columns_of(experiment: Experiment, loop: Loop) -> Array:
     """What each gain multiplies, shape (rows, 4): the controller with this gain 1 and no other."""
     assert experiment.reference is not None
-    plain = Loop(velocity_span=loop.velocity_span)
+    plain = Loop(velocity_span=loop.velocity_span, filter=loop.filter)
     columns = np.column_stack([
         control_signal(replace(plain, **{name: 1.0}), experiment.time, experiment.reference, experiment.position)
         for name in GAINS

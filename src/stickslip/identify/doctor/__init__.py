@@ -36,7 +36,8 @@ FIRST: tuple[Callable[[View], Iterator[Finding]], ...] = (
 """What may be asked of any record; the other checks need enough usable rows."""
 CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
     *FIRST, timing.scale, units.assumed, units.counted,
-    units.degrees, units.reference_scale, units.velocity_scale, units.too_fast, units.torque_scale, spikes.spikes,
+    units.degrees, units.turns, units.reference_scale, units.velocity_scale, units.too_fast, units.torque_scale,
+    spikes.spikes,
     signals.wrapped, signals.saturated, signals.supply, signals.quantised, physics.sign, physics.skew, physics.gravity,
     play.backlash, change.changes, change.temperature, excitation.moved,
 )  # fmt: skip

@@ -20,6 +20,13 @@ FOLLOWS, MOVES_ALIKE, THAT_UNIT = 0.95, 5.0, 0.01
 """Correlation with its reference from which on a position follows it; how many times as far, or as little, it may then
 go: a weak loop that holds a weight goes a third of the way; and how near that is to a unit's size: gears of 60 and 6
 are 5 % from degrees and revolutions."""
+BITS = (10, 25)
+FEW_PLACES = 200
+"""Different positions by which a grid is told from one nearly as fine: phases turn once and more over them."""
+LEAST = (0.5, 2.5)
+"""Counts that the nearest two positions may be apart."""
+ON_THE_GRID = 0.8
+"""Mean of the phases' unit vectors on a grid: 0.9 where a file rounds to half a count, 0 by chance."""
 
 
 def assumed(view: View) -> Iterator[Finding]:
@@ -78,9 +85,12 @@ def degrees(view: View) -> Iterator[Finding]:
         return
     level, step = "warning" if view.stated("position") else "error", view.step
     remedy = f"say {view.mapped('position', 'deg')}, if it is so"
-    if step > 0.0 and _counts_of_encoder(360.0 / step) and not _counts_of_encoder(2.0 * math.pi / step):
+    counts = 360.0 / step if step > 0.0 else 0.0
+    if not (_counts_of_encoder(counts) and not _counts_of_encoder(2.0 * math.pi / step)):
+        counts = _binary_counts(view.values("position"), 360.0)
+    if counts:
         message = (
-            f"the position's step of {step:.6g} is a turn of 360 over {360.0 / step:.0f} counts: degrees"
+            f"the position's step of {360.0 / counts:.6g} is a turn of 360 over {counts:.0f} counts: degrees"
             " rather than rad"
         )
         yield Finding(level, "position-unit", message, remedy=remedy)
@@ -88,6 +98,18 @@ def degrees(view: View) -> Iterator[Finding]:
     way = float(np.ptp(view.values("position_reference"))) if view.has("position_reference") else 0.0
     if way > 0.0 and view.record.units["position_reference"] == "rad" and _eighths(way):
         message = f"the reference goes over {way:.6g}, whole eighths of a turn in degrees: degrees, not rad?"
+        yield Finding("warning", "position-unit", message, remedy=remedy)
+
+
+def turns(view: View) -> Iterator[Finding]:
+    """A resolution of 1/1024, 1/2048, ... of the unit: turns. Some drives have such a step in rad, so a warning."""
+    if not view.has("position") or view.record.units["position"] != "rad" or _in_counts(view):
+        return
+    if counts := _binary_counts(view.values("position"), 1.0):
+        message = (
+            f"the position's step of {1.0 / counts:.6g} is 1 over {counts:.0f} counts: turns rather than rad"
+        )
+        remedy = f"say {view.mapped('position', 'rev')}, if it is so"
         yield Finding("warning", "position-unit", message, remedy=remedy)
 
 
@@ -265,6 +287,31 @@ def _counts_of_encoder(count: float) -> bool:
     if near < 100 or abs(count - near) > 2e-4 * near:
         return False
     return near & (near - 1) == 0 or (near % 400 == 0 and near <= 40000 and not _decimal(360.0 / near))
+
+
+def _binary_counts(values: Array, turn: float) -> int:
+    """Counts of an encoder, a power of two, of which every position is a whole number in a unit of which so many are a
+    `turn`; 0 where there are none. A file may round them, by less than half a count."""
+    places: Array = np.unique(values[np.isfinite(values)])
+    size = float(np.max(np.abs(places), initial=0.0))
+    apart = np.diff(places)
+    apart = apart[apart > 1e-9 * size]
+    if apart.size < FEW_PLACES:
+        return 0
+    least = float(np.partition(apart, 2)[2])
+    for bits in range(*BITS):
+        step = turn / 2**bits
+        # What is stored as a float of 32 bits has steps of a power of two as well.
+        told = step > 16.0 * float(np.spacing(np.float32(size)))
+        if told and LEAST[0] * step < least < LEAST[1] * step and _on(places, step):
+            return 2**bits
+    return 0
+
+
+def _on(places: Array, step: float) -> bool:
+    """Whether positions lie on a grid of this step, wherever it begins: by how much its phases agree."""
+    phase: Array = 2.0 * math.pi * places / step
+    return math.hypot(float(np.mean(np.cos(phase))), float(np.mean(np.sin(phase)))) > ON_THE_GRID
 
 
 def _eighths(way: float) -> bool:

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from stickslip.config import named_numbers
+from stickslip.control.linear import Cascade, Gains
+from stickslip.control.own_loop import kind_of_loop
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.experiment import DRIVES, Experiment, experiment_of
 from stickslip.identify.methods.method import Options
@@ -14,8 +16,8 @@ from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Loop
 
-LOOP_NAMES = ("kp", "ki", "kd", "kr", "limit", "period", "count", "span")
-NOT_NEGATIVE = ("kp", "ki", "kd", "kr", "period", "count")
+BESIDE_GAINS = ("limit", "filter", "period", "count", "span")
+NOT_NEGATIVE = (*Gains._fields, *Cascade._fields, "filter", "period", "count")
 RANGES = {"limit": "greater than 0", **dict.fromkeys(NOT_NEGATIVE, "a finite number of 0 or more")}
 
 
@@ -95,11 +97,9 @@ def with_extra(record: Record, channel: str, loop: str) -> Record:
 
 
 def loop_of(given: str | Mapping[str, float]) -> Loop:
-    """The sampled controller of ``kp=..,kd=..``, or of a mapping with these names."""
+    """The sampled controller of ``kp=..,kd=..`` or ``kv=..,kvp=..``, or of a mapping with these names."""
     numbers = named_numbers(given.split(",")) if isinstance(given, str) else dict(given)
-    for name in numbers:
-        if name not in LOOP_NAMES:
-            raise UnknownName("number of --loop", name, LOOP_NAMES)
+    kind_of_loop(numbers, BESIDE_GAINS)
     for name, value in numbers.items():
         above = math.isfinite(value) or name == "limit"
         if not above or (name in NOT_NEGATIVE and value < 0.0) or (name == "limit" and not value > 0.0):

@@ -145,9 +145,11 @@ class Track(Procedure):
         """The controller with a compensator that the options describe."""
         if self.compensator == "recommended":
             loop = read_recommended(self.model)
+            made = self.recommended(rig.name).compensated(rig)
+            # The rig measures by its own encoder, whatever counts it was tried with.
             return dataclasses.replace(
-                self.recommended(rig.name).compensated(rig), gains=loop.linear,
-                velocity_filter=loop.velocity_filter,
+                made, gains=loop.linear, velocity_filter=loop.velocity_filter,
+                torque_limit=min(made.torque_limit, loop.torque_limit),
             )  # fmt: skip
         if self.linear not in LINEAR:
             raise UnknownName("linear controller", self.linear, LINEAR)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.arguments import numbers_checked
 from stickslip.errors import InputError, StepFailure, UnknownName
 from stickslip.jit import compiled_profile, flat
 from stickslip.model import Model, Reference
@@ -21,6 +22,7 @@ METHODS = ("auto", "step", "rate")
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
+@numbers_checked
 def respond(
     model: Model,
     reference: Reference,

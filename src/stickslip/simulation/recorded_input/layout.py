@@ -21,6 +21,8 @@ DRIVE = np.dtype(
             # The controller: gains, samples over which it takes the velocity, limit of its output, its own period, s,
             # and the encoder's count, rad.
             "kp", "ki", "kd", "kr", "span", "limit", "control_period", "count",
+            # A cascade's, where kv is not 0; the corner of the low-pass on the velocity, 1/s.
+            "kv", "kvp", "kvi", "feed", "corner",
             # s of the longest step; rad and rad/s at the start.
             "max_step", "start_position", "start_velocity",
             # The observer: N·m/rad, 1/s, rad within which nothing pulls, share of its memory that a sample replaces.
@@ -43,6 +45,8 @@ MEMORY = np.dtype(
         (name, np.float64) for name in (
             # A sampled controller's: positions and reference of samples before, rad; rad s; rad; 1 after the first.
             "last", "before_last", "last_reference", "error_sum", "last_error", "started",
+            # Of the low-pass, rad/s; a cascade's integral of the velocity error, rad.
+            "filtered", "integral",
             # By how much the axis has lagged behind its goal, behind a low-pass, rad/s.
             "behind",
         )

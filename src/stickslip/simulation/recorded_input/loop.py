@@ -35,6 +35,17 @@ def limited(x: float, limit: float) -> float:
 
 
 @kernel()
+def cascaded(c: Any, m: Any, error: float, dt: float) -> float:
+    """Output of the velocity PI at this error of the velocity: `stickslip.control.laws.cascade` with its conditional
+    integration."""
+    growth = dt * error
+    out = c.kvp * error + c.kvi * (m.integral + growth)
+    if not (abs(c.signal_gain * out) > c.limit and out * growth > 0.0):
+        m.integral += growth
+    return out
+
+
+@kernel()
 def control(c: Any, m: Any, reference: float, position: float, dt: float) -> float:
     """One sample of the controller: its output in the drive's unit, within its limit.
 
@@ -45,13 +56,20 @@ def control(c: Any, m: Any, reference: float, position: float, dt: float) -> flo
         # Before the first sample axis and reference moved at the velocity of the begin.
         m.last, m.before_last = position - c.start_velocity * dt, position - 2.0 * c.start_velocity * dt
         m.last_reference, m.last_error, m.started = reference - c.start_velocity * dt, error, 1.0
+        m.filtered = c.start_velocity
     if c.span == 2.0:
         velocity = 0.5 * (position - m.before_last) / dt
     else:
         velocity = (position - m.last) / dt
+    if c.corner > 0.0:
+        velocity += math.exp(-c.corner * dt) * (m.filtered - velocity)
+        m.filtered = velocity
     reference_rate = (reference - m.last_reference) / dt
-    m.error_sum += 0.5 * dt * (error + m.last_error)
-    out = c.kp * error + c.ki * m.error_sum + c.kr * reference_rate - c.kd * velocity
+    if c.kv > 0.0:
+        out = cascaded(c, m, c.kv * error + c.feed * reference_rate - velocity, dt)
+    else:
+        m.error_sum += 0.5 * dt * (error + m.last_error)
+        out = c.kp * error + c.ki * m.error_sum + c.kr * reference_rate - c.kd * velocity
     m.before_last, m.last = m.last, position
     m.last_reference, m.last_error = reference, error
     return limited(c.signal_gain * out, c.limit)

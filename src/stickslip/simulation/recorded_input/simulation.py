@@ -99,9 +99,13 @@ class Mechanics:
 class Loop:
     """A sampled linear controller: u = gain clip(kp e + ki sum e + kr dr - kd dy), |u| <= limit.
 
+    With a ``kv`` it is position P around velocity PI instead (`stickslip.control.linear.Cascade`):
+    u = gain clip(kvp e_v + kvi sum e_v) with e_v = kv e + feed dr - dy, whose sum rests at the limit.
+
     ``velocity_span`` 1 takes the velocity dy as the difference of neighbouring samples, 2 as that of the means of
     two neighbours (EMPS). ``period`` 0: it acts at the record's times, else every `period` seconds on a reference
-    that is held. ``count`` is the resolution at which it sees the position.
+    that is held. ``count`` is the resolution at which it sees the position, ``filter`` the corner of a first-order
+    low-pass on its velocity, Hz; 0: none.
     """
 
     kp: float = 0.0
@@ -112,6 +116,16 @@ class Loop:
     velocity_span: int = 1
     period: float = 0.0
     count: float = 0.0
+    kv: float = 0.0
+    kvp: float = 0.0
+    kvi: float = 0.0
+    feed: float = 1.0
+    filter: float = 0.0
+
+    @property
+    def integrates(self) -> bool:
+        """Whether it has a sum of errors, which no record holds."""
+        return (self.kvi if self.kv else self.ki) != 0.0
 
 
 @dataclass(frozen=True)
@@ -206,7 +220,7 @@ class Drive:
         k = self.controller or Loop()
         given = vars(k) | vars(self) | {
             "kind": KINDS[self.kind], "signal_gain": self.gain, "span": k.velocity_span, "control_period": k.period,
-            "start_position": self.start[0], "start_velocity": self.start[1],
+            "start_position": self.start[0], "start_velocity": self.start[1], "corner": 2.0 * math.pi * k.filter,
         }  # fmt: skip
         return packed(DRIVE, given)
 

@@ -1,0 +1,93 @@
+"""What is given in a number's place and is none, is said by name, value and remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.machines.encoder import Encoder
+from stickslip.machines.motor import Amplifier
+
+ROOT = Path(__file__).parent
+DEMO = str(Path(ss.__file__).parent / "demo.csv")
+LAW = ss.Model("coulomb", fc=0.3)
+AXIS, GAINS = ss.RigidAxis(1e-3, LAW), ss.place("PD", 1e-3, 10.0)
+LOOP, SINE = ss.Controller(GAINS), ss.Reference("sine", amplitude=0.1, frequency=1.0)
+MODEL = 'law = "coulomb"\n[parameters]\nfc = 0.285\n[axis]\ninertia = 4e-4\n'
+
+CALLS: list[tuple[str, str, Callable[..., Any]]] = [
+    ("place", "inertia", lambda x: ss.place("PD", inertia=x, bandwidth=10.0)),
+    ("pd", "kp", lambda x: ss.pd(x, 0.1)),
+    ("coulomb", "fc", lambda x: ss.Model("coulomb", fc=x)),
+    ("scaled", "fc", lambda x: LAW.scaled(fc=x)),
+    ("sine", "amplitude", lambda x: ss.Reference("sine", amplitude=x, frequency=1.0)),
+    ("axis", "inertia", lambda x: ss.RigidAxis(inertia=x, friction=LAW)),
+    ("axis", "load", lambda x: ss.RigidAxis(1e-3, LAW, load=x)),
+    ("controller", "sample_time", lambda x: ss.Controller(GAINS, sample_time=x)),
+    ("controller", "torque_limit", lambda x: ss.Controller(GAINS, torque_limit=x)),
+    ("controller", "kp", lambda x: ss.Controller(ss.Gains(kp=x))),
+    ("pd", "kp", lambda x: ss.ControlBlock("pd", kp=x, kd=1.0)),
+    ("feedforward", "gain", lambda x: ss.Feedforward(LAW, gain=x)),
+    ("encoder", "counts", Encoder),
+    ("amplifier", "torque_constant", Amplifier),
+    ("simulate", "duration", lambda x: ss.simulate(AXIS, LOOP, SINE, x)),
+    ("simulate", "output", lambda x: ss.simulate(AXIS, LOOP, SINE, 1.0, output=x)),
+    ("simulate", r"initial\[1\]", lambda x: ss.simulate(AXIS, LOOP, SINE, 1.0, initial=(0.0, x))),
+    ("respond", "tolerance", lambda x: ss.respond(LAW, SINE, [0.0, 0.1], tolerance=x)),
+    ("reading", "sample_time", lambda x: ss.identify(DEMO, sample_time=x)),
+    ("reading", "counts_per_rev", lambda x: ss.read(DEMO, counts_per_rev=x)),
+    ("identify", "noise", lambda x: ss.identify(DEMO, noise=x)),
+    ("identify", "harmonics", lambda x: ss.identify(DEMO, harmonics=x)),
+    ("identify", r"values\['fc'\]", lambda x: ss.identify(DEMO, values={"fc": x})),
+    ("export", "gain", lambda x: ss.export(LAW, "c99", compensator="ff", gain=x)),
+    ("sweep", "cases", lambda x: ss.sweep(ROOT / "sweep" / "small.toml", cases=x)),
+    ("compare", "top", lambda x: ss.compare("a.toml", "b.toml", top=x)),
+    ("recommend", "bandwidth", lambda x: ss.recommend("a.toml", bandwidth=x)),
+    ("recommend", r"loop\['kp'\]", lambda x: ss.recommend("a.toml", loop={"kp": x})),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("owner", "name", "call"), CALLS, ids=[f"{o}-{n}" for o, n, _ in CALLS])
+def test_text_in_a_numbers_place_is_refused_by_name_with_the_remedy(
+    owner: str, name: str, call: Callable[..., Any]
+) -> None:
+    with pytest.raises(
+        ss.InputError, match=rf"{owner}: {name} = '0.25' must be .*; write it without quotes, 0.25"
+    ):
+        call("0.25")
+    with pytest.raises(ss.InputError, match=rf"{owner}: {name} = 'much' must be a number[^;]*$"):
+        call("much")
+
+
+@pytest.mark.parametrize("given", [None, [0.1], {}, 1j])
+def test_what_is_no_text_and_no_number_is_refused_too(given: Any) -> None:
+    with pytest.raises(ss.InputError, match=r"place: bandwidth = .* must be a number"):
+        ss.place("PD", 1e-3, given)
+    with pytest.raises(ss.InputError, match=r"controller: encoder_counts = .* must be a number"):
+        ss.Controller(GAINS, sample_time=1e-3, encoder_counts=given)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64, int, Fraction])
+def test_numbers_of_other_kinds_are_numbers(kind: Any) -> None:
+    """NumPy's were none to a law; of single precision, they would have made a run so."""
+    law, axis = ss.Model("coulomb", fc=kind(2)), ss.RigidAxis(kind(2), LAW, load=kind(1))
+    assert law.parameters.fc == 2.0
+    assert type(law.parameters.fc) is float
+    assert isinstance(axis.inertia, (int, float))
+    assert not isinstance(axis.load, np.float32)
+    assert ss.place("PD", kind(2), 10.0).kp == pytest.approx(ss.place("PD", 2.0, 10.0).kp)
+
+
+def test_the_first_error_is_the_wrong_number_and_not_the_missing_file(tmp_path: Path) -> None:
+    model = tmp_path / "model.toml"
+    model.write_text(MODEL)
+    with pytest.raises(
+        ss.InputError, match="recommend: axes = '6' must be a number; write it without quotes, 6"
+    ):
+        ss.recommend(model, amplitude=0.1, axes="6")  # type: ignore[arg-type]
