@@ -90,7 +90,10 @@ def test_cancel_ends_the_work_and_keeps_the_log(page: Any, served: Served) -> No
     page.wait_for_selector(".view.log .findings")
     page.get_by_role("button", name="Identify", exact=True).click()
     page.wait_for_selector(".job .said:not(:has-text('waiting for its turn'))")
-    at_work = [p for p in psutil.Process(served.process.pid).children(recursive=True) if not waits(p)]
+    server, at_work = psutil.Process(served.process.pid), []
+    for _ in range(100):
+        at_work = at_work or [p for p in server.children(recursive=True) if not waits(p)]
+        page.wait_for_timeout(0 if at_work else 20)  # its process is only just forked
     assert at_work
     page.get_by_role("button", name="Cancel").click()
     page.wait_for_selector(".problem:has-text('cancelled')")
@@ -101,7 +104,7 @@ def test_cancel_ends_the_work_and_keeps_the_log(page: Any, served: Served) -> No
 
 
 def waits(process: Any) -> bool:
-    """Whether it is the process that waits for the next job: its first line of stdin has not come."""
+    """Whether it is the process that jobs are forked from, or one whose first line of stdin has not come."""
     return process.num_threads() == 1
 
 
