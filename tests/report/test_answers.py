@@ -23,7 +23,7 @@ from stickslip.report.answers import answers_of, meaning_of, one_number_each
 from stickslip.report.axis_pictures import pictures_of
 from stickslip.report.identified import Source, rendered, symbol, tally
 from stickslip.report.next_steps import counts_of, lacking
-from stickslip.report.result_text import result_lines
+from stickslip.report.result_text import result_lines, result_lines_in_python
 from stickslip.report.sliding_torque import over_all_rows, sliding_of
 from stickslip.report.torque_pictures import friction_points, with_gaps
 
@@ -229,3 +229,11 @@ def test_the_command_line_prints_the_same_in_short() -> None:
     assert "slides for certain" in out[trust + 1]
     assert not [line for line in out if line.startswith("position_")]
     assert out[-2].startswith("next: stickslip recommend model.toml")
+
+
+def test_python_is_told_what_to_do_next_in_python() -> None:
+    found = identified()
+    out = result_lines_in_python(found, answers_of(found, [log()], "model.toml"))
+    assert out[-2].startswith("next: advice = ss.recommend(found, bandwidth=10, sample_time=")
+    assert out[-1] == 'next: ss.export(advice, to="c99")'
+    assert out[:-2] == result_lines(found, answers_of(found, [log()], "model.toml"))[:-2]

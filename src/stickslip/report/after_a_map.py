@@ -8,13 +8,17 @@ from pathlib import Path
 from stickslip.identify.estimate import Identification
 
 
-def after_a_map(found: Identification, model_file: str | Path) -> tuple[str, str]:
-    """What to do, and the command."""
+def after_a_map(found: Identification, model_file: str | Path) -> tuple[str, str, str]:
+    """What to do, and the line to copy in a shell and in Python."""
     waves = any(e.identified for e in found.estimates if e.name.partition("[")[0] in ("even", "odd"))
     if not waves and found.details["map"].form != "table":
-        return "No torque depends on the angle; identify the axis:", "stickslip identify log.csv --out axis"
-    law = " --position-map" if found.model is not None else ""
+        return (
+            "No torque depends on the angle; identify the axis:", "stickslip identify log.csv --out axis",
+            'ss.identify("log.csv")',
+        )  # fmt: skip
+    law, also = (" --position-map", ", position_map=True") if found.model is not None else ("", "")
     return (
         "Write the map for the drive (c99, moteus, odrive, vesc, st, beckhoff or linuxcnc):",
         f"stickslip export {shlex.quote(str(model_file))} --to c99{law} --out cogging",
+        f'ss.export(found, to="c99"{also}, folder="cogging")',
     )

@@ -30,10 +30,14 @@ EXPERIMENTS = {
 
 @dataclass(frozen=True)
 class Step:
-    """A command, or an advice where there is none: what it is for, and the line to copy (empty for none)."""
+    """A command, or an advice where there is none: what it is for, and the line to copy (empty for none).
+
+    In a shell, and in Python, where the result is called ``found``.
+    """
 
     what: str
     command: str = ""
+    python: str = ""
 
 
 def next_steps(
@@ -78,33 +82,38 @@ def forward(found: Identification, records: Sequence[Record], model_file: str) -
     model = shlex.quote(model_file)
     if found.details.get("mechanics") is None and not any(e.name == "inertia" for e in found.estimates):
         return [
-            Step("Identify the axis with this friction, or export the law:", f"stickslip export {model} --to c99")
+            Step("Identify the axis with this friction, or export the law:", f"stickslip export {model} --to c99",
+                 'ss.export(found, to="c99")')
         ]  # fmt: skip
-    setting = shlex.quote(str(Path(model_file).with_name("recommended.toml")))
+    setting, drive = shlex.quote(str(Path(model_file).with_name("recommended.toml"))), drive_in(records)
+    options = " ".join(f"--{name.replace('_', '-')} {value}" for name, value in drive.items())
+    arguments = ", ".join(f"{n}={x!r}" if n == "loop" else f"{n}={x}" for n, x in drive.items())
     return [
         Step(
             "Find the compensator that is safe to switch on, with your drive's loop and sample time in place of these:",
-            f"stickslip recommend {model} {drive_in(records)} --out {setting}",
+            f"stickslip recommend {model} {options} --out {setting}",
+            f"advice = ss.recommend(found, {arguments})",
         ),
         Step(
-            "Write it for the drive:", f"stickslip export {setting} --to c99 --compensator recommended"
+            "Write it for the drive:", f"stickslip export {setting} --to c99 --compensator recommended",
+            'ss.export(advice, to="c99")',
         ),
     ]  # fmt: skip
 
 
-def drive_in(records: Sequence[Record]) -> str:
-    """Options of `stickslip recommend` as far as the records tell them."""
+def drive_in(records: Sequence[Record]) -> dict[str, str]:
+    """Options of a recommendation as far as the records tell them."""
     loops = {str(r.meta.get("loop", "")) for r in records}
     loop = loops.pop() if len(loops) == 1 else ""
     kept = [p for p in loop.split(",") if p.partition("=")[0] in OWN_LOOP]
-    out = [f"--loop {','.join(kept)}" if kept else "--bandwidth 10"]
+    out = {"loop": ",".join(kept)} if kept else {"bandwidth": "10"}
     periods = [float(np.median(np.diff(r.time))) for r in records if r.time.size > 1]
     if periods:
-        out.append(f"--sample-time {min(periods):.3g}")
+        out["sample_time"] = f"{min(periods):.3g}"
     counts = [counts_of(r) for r in records]
     if counts and min(counts) > 0:
-        out.append(f"--counts-per-rev {min(counts)}")
-    return " ".join(out)
+        out["counts_per_rev"] = str(min(counts))
+    return out
 
 
 def counts_of(record: Record) -> int:

@@ -13,6 +13,22 @@ JUDGED = ("force_relative", "inverse_dynamics_relative", "position_", "sliding_r
 
 def result_lines(found: Identification, answers: Answers) -> list[str]:
     """Estimates with 95 % intervals, what is not identified and why, how far the torque is off, and what to do now."""
+    steps = [f"next: {s.command}" if s.command else f"measure next: {s.what}" for s in answers.steps]
+    return [*numbers_and_trust(found, answers), *steps]
+
+
+def result_lines_in_python(found: Identification, answers: Answers) -> list[str]:
+    """The same, what to do now in Python where it can be done there."""
+    steps = [
+        f"next: {s.python}" if s.python
+        else f"next, in a shell: {s.command}" if s.command
+        else f"measure next: {s.what}" for s in answers.steps
+    ]  # fmt: skip
+    return [*numbers_and_trust(found, answers), *steps]
+
+
+def numbers_and_trust(found: Identification, answers: Answers) -> list[str]:
+    """What was found, in lines."""
     law = f": law {found.model.law.name!r}" if found.model else ""
     out = [f"{found.method.replace('_', ' ')}{law}", ""]
     width = max(16, *(len(e.name) + 2 for e in found.estimates)) if found.estimates else 16
@@ -25,9 +41,7 @@ def result_lines(found: Identification, answers: Answers) -> list[str]:
     for name, number in found.misfit.items():
         if not any(name.removeprefix("held_out_").startswith(n) for n in JUDGED):
             out.append(f"{name:<32}{number:>12.5g}  {found.misfit_unit(name)}".rstrip())
-    out += [sentence for sentence in found.notes if sentence not in answers.told]
-    out += [f"next: {s.command}" if s.command else f"measure next: {s.what}" for s in answers.steps]
-    return out
+    return [*out, *(sentence for sentence in found.notes if sentence not in answers.told)]
 
 
 def interval_text(e: Estimate) -> str:

@@ -25,7 +25,7 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 from stickslip.report.answers import Answers, answers_of
 from stickslip.report.identified import Source, files_of, write_identification
-from stickslip.report.result_text import interval_text, result_lines
+from stickslip.report.result_text import interval_text, result_lines_in_python
 from stickslip.study.files import prepared_folder
 
 if TYPE_CHECKING:
@@ -249,7 +249,7 @@ class IdentificationResult:
 
     def summary(self) -> str:
         """Estimates with 95 % intervals, what is not identified and why, how far the torque is off, what to do now."""
-        return "\n".join(result_lines(self.identification, self.answers))
+        return "\n".join(result_lines_in_python(self.identification, self.answers))
 
     def __str__(self) -> str:
         return self.summary()
