@@ -212,8 +212,9 @@ def test_an_address_that_is_none_is_refused_at_once(small, tmp_path, address):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_scheduler_that_is_not_there(small, tmp_path):
+def test_a_scheduler_that_is_not_there(small, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
+    monkeypatch.setattr(execute, "PATIENCE", 1.0)
     with pytest.raises(InputError, match="no Dask scheduler at"):
         execute.run(small, tmp_path, scheduler="tcp://127.0.0.1:9")
 

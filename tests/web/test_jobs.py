@@ -16,7 +16,7 @@ SCRIPT = """
 import json, sys, time
 for line in {first}, {{"tell": "working"}}:
     print(json.dumps(line), flush=True)
-time.sleep(8.0)
+time.sleep(4.0)
 print(json.dumps({{"done": {{"x": 1}}}}), flush=True)
 """
 
@@ -42,9 +42,9 @@ def apart(work: Coroutine[Any, Any, Any]) -> Any:
 
 
 async def ended(first: dict[str, Any]) -> tuple[Job, list[dict[str, Any]]]:
-    """A job of 8 s with a limit of 5 s, when it has ended, and what it showed."""
+    """A job of 4 s with a limit of 2.5 s, when it has ended, and what it showed."""
     jobs, shown = Scripted(first), list[dict[str, Any]]()
-    job = jobs.start("p", "read", "Reading", {}, limit=5.0, meanwhile=shown.append)
+    job = jobs.start("p", "read", "Reading", {}, limit=2.5, meanwhile=shown.append)
     async for _ in job.lines():
         pass
     await jobs.close()
@@ -65,7 +65,7 @@ def test_a_job_that_shows_nothing_is_ended() -> None:
     """A file on which a reader never comes to an end."""
     job, shown = apart(ended({"tell": "reading"}))
     assert job.state == "failed"
-    assert "found no end in 5 s" in job.error
+    assert "found no end in 2 s" in job.error
     assert not shown
     assert job.process is not None
     assert job.process.returncode is not None

@@ -31,6 +31,8 @@ from stickslip.sweep.plan import BLOCK, Sweep, load
 
 ADDRESS = re.compile(r"(?:[a-z]+://)?(?:[^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):\d{1,5}/?|inproc://\S+")
 """Of a Dask scheduler: its client looks for another kind of text in vain, and for long."""
+PATIENCE = 10.0
+"""s that a scheduler has to answer."""
 MOST_TRIES = 5
 """So often workers may be killed before the command gives up; what is done is kept."""
 MAY_CHANGE = ("drawn", "metrics", "check", "step", "device")
@@ -235,7 +237,7 @@ def _cluster(scheduler: str) -> Generator[dict[str, Any]]:
         raise InputError("--scheduler needs Dask; pip install 'stickslip[dask]'") from None
     joblib: Any = importlib.import_module("joblib")
     try:
-        client = distributed.Client(scheduler, timeout=10, set_as_default=False)
+        client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(
             f"no Dask scheduler at {scheduler} ({error}); start one with `dask scheduler`"
