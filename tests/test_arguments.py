@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.errors import ParameterError
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.motor import Amplifier
 
@@ -91,3 +92,16 @@ def test_the_first_error_is_the_wrong_number_and_not_the_missing_file(tmp_path: 
         ss.InputError, match="recommend: axes = '6' must be a number; write it without quotes, 6"
     ):
         ss.recommend(model, amplitude=0.1, axes="6")  # type: ignore[arg-type]
+
+
+def test_a_name_in_place_of_a_list_of_names_is_not_taken_apart() -> None:
+    log = {"t": [0.0, 1.0], "position": [0.0, 1.0], "torque": [0.0, 1.0]}
+    with pytest.raises(ParameterError, match=r"frozen = 'fc' must be a list of names; write \['fc'\]"):
+        ss.identify(**log, frozen="fc")
+
+
+def test_what_is_no_model_is_said_where_it_is_given() -> None:
+    with pytest.raises(ParameterError, match="feedforward: model is of kind str; give a Model"):
+        ss.Feedforward("coulomb")
+    with pytest.raises(ParameterError, match="axis: friction is of kind str; give a Model"):
+        ss.RigidAxis(1e-3, "coulomb")

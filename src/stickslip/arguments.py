@@ -1,7 +1,7 @@
 """Arguments that are numbers: what is none, text such as "0.1" above all, is refused where it is given.
 
 Annotations say which they are: ``float``, ``int``, either with ``| None``, ``tuple[float, float]``, and values of a
-``Mapping[str, float]``.
+``Mapping[str, float]``. A name in place of a list of names (``Sequence[str]``) is refused too.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 from stickslip.errors import ParameterError
 
 NUMBERS = {"float", "int"}
+NAMES = {"Iterable[str]", "Sequence[str]"}
 PAIR, NAMED = "tuple[float, float]", "Mapping[str, float]"
 
 P = ParamSpec("P")
@@ -106,6 +107,9 @@ def _insist(owner: str, name: str, annotation: str, value: Any) -> None:
     if parts & NUMBERS and (parts <= {"None", *NUMBERS} or (isinstance(value, str) and "str" not in parts)):
         if not is_number(value):
             raise no_number(owner, name, value)
+    elif isinstance(value, str) and parts & NAMES and "str" not in parts:
+        # Each of its letters would be taken for a name.
+        raise ParameterError(f"{owner}: {name} = {value!r} must be a list of names; write [{value!r}]")
     elif NAMED in parts and isinstance(value, Mapping):
         for key, number in cast("Mapping[str, Any]", value).items():
             if not is_number(number):

@@ -82,6 +82,9 @@ def test_static_friction_is_no_better_known_than_the_velocity_of_its_fall() -> N
     unsure = replace(fall, identified=False, verdict="wide")
     judged, _ = with_rest([rest, unsure])
     assert (judged.identified, judged.verdict) == (False, AT_REST)
+    # Each direction for itself.
+    back = replace(rest, name="fs_negative"), replace(fall, name="vs_negative")
+    assert with_rest([rest, unsure, *back])[2:] == back
     # A velocity that is no parameter, or given, takes nothing away.
     assert with_rest([rest]) == (rest,)
 

@@ -235,5 +235,5 @@ def test_python_is_told_what_to_do_next_in_python() -> None:
     found = identified()
     out = result_lines_in_python(found, answers_of(found, [log()], "model.toml"))
     assert out[-2].startswith("next: advice = ss.recommend(found, bandwidth=10, sample_time=")
-    assert out[-1] == 'next: ss.export(advice, to="c99")'
+    assert out[-1] == 'next: ss.export(advice, to="c99", folder="c")'
     assert out[:-2] == result_lines(found, answers_of(found, [log()], "model.toml"))[:-2]

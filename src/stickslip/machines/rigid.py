@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from stickslip.arguments import insist_on_own, no_number
 from stickslip.errors import ParameterError
@@ -32,6 +33,11 @@ class RigidAxis:
     temperature: float = 20.0
 
     def __post_init__(self) -> None:
+        given: Any = self.friction
+        if not isinstance(given, Model):
+            raise ParameterError(
+                f"axis: friction is of kind {type(given).__name__}; give a Model, such as Model('coulomb', fc=0.3)"
+            )
         if isinstance(self.inertia, bool):
             raise no_number("axis", "inertia", self.inertia, "kg·m²")
         insist_on_own(self, "axis")

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.axis.agreed import on_timing
+from stickslip.identify.axis.loop_check import OTHER_LOOP
 from stickslip.identify.axis.problem import mechanics_parameters
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.monte_carlo import sliding_torque
@@ -203,6 +204,8 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
     held, own = (found.misfit.get(f"{p}force_relative", math.nan) for p in ("held_out_", ""))
     if held > ELSEWHERE * own:
         out.append(f"on records held out its force error is {percent(held)}, {percent(own)} on those fitted")
+    if any(OTHER_LOOP in note for note in found.notes):
+        out.append("the record shows another controller than the loop given")
     warned = [f for f in found.findings if getattr(f, "level", "") == "warning"]
     if warned:
         out.append(f"the doctor warns of the record{'s' if len(warned) > 1 else ''} ({codes(warned)})")

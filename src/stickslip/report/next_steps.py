@@ -83,7 +83,7 @@ def forward(found: Identification, records: Sequence[Record], model_file: str) -
     if found.details.get("mechanics") is None and not any(e.name == "inertia" for e in found.estimates):
         return [
             Step("Identify the axis with this friction, or export the law:", f"stickslip export {model} --to c99",
-                 'ss.export(found, to="c99")')
+                 'ss.export(found, to="c99", folder="c")')
         ]  # fmt: skip
     setting, drive = shlex.quote(str(Path(model_file).with_name("recommended.toml"))), drive_in(records)
     options = " ".join(f"--{name.replace('_', '-')} {value}" for name, value in drive.items())
@@ -96,7 +96,7 @@ def forward(found: Identification, records: Sequence[Record], model_file: str) -
         ),
         Step(
             "Write it for the drive:", f"stickslip export {setting} --to c99 --compensator recommended",
-            'ss.export(advice, to="c99")',
+            'ss.export(advice, to="c99", folder="c")',
         ),
     ]  # fmt: skip
 

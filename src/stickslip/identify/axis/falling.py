@@ -15,6 +15,8 @@ from stickslip.identify.regression.regression import FALLS, Regression
 
 FALL = ("fs", "vs")
 """What friction's fall with velocity is told by."""
+BEGINS = ("vs", "vs_negative")
+"""The velocity of the fall, in each direction."""
 SAME = 0.05
 """Relative difference of two numbers that is none."""
 MOVED, UNLIKE = 1.3, 0.01
@@ -74,9 +76,10 @@ def widened(e: Estimate, p: Parameter, factor: float) -> Estimate:
 
 def with_rest(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
     """The estimates, friction at rest not identified where the velocity of its fall is not."""
-    untold = any(e.name == "vs" and not e.identified for e in estimates)
+    untold = {e.name.removeprefix("vs") for e in estimates if e.name in BEGINS and not e.identified}
+    at_rest = {f"fs{way}" for way in untold}
     return tuple(
-        replace(e, identified=False, verdict=AT_REST) if untold and e.name == "fs" and e.identified else e
+        replace(e, identified=False, verdict=AT_REST) if e.name in at_rest and e.identified else e
         for e in estimates
     )
 

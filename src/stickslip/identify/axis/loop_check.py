@@ -57,6 +57,7 @@ CUT = 0.98
 """Part of the limit, or of what is exceeded in 0.1 % of the rows, from which on a signal counts as cut off."""
 EXPLAINED, MISSED, WORSE = 0.3, 0.05, 2.0
 """Parts of the signal that the shown gains may leave, and that the given ones must leave, so much more than those."""
+OTHER_LOOP = "shows another controller than the loop given"
 OTHER, FELT = 0.1, 0.03
 """Relative difference of a gain, and its part of the signal, from which on it is told."""
 
@@ -142,7 +143,7 @@ def doubt(name: str, shown: ShownGains) -> str:
     )
     which = " (as a PID)" if shown.cascade else ""
     return (
-        f"{name} shows another controller than the loop given{which}: {'; '.join(differing)}. The gains given miss the "
+        f"{name} {OTHER_LOOP}{which}: {'; '.join(differing)}. The gains given miss the "
         f"recorded signal by {shown.missed:.0%}, those shown by {shown.left:.1%}: {why}"
     )
 

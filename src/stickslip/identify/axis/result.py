@@ -13,6 +13,7 @@ from stickslip.identify.axis.agreed import TOLD_BY_SLIDING
 from stickslip.identify.axis.choice import (
     Candidate,
 )  # fmt: skip
+from stickslip.identify.axis.falling import with_rest
 from stickslip.identify.axis.gravity import within_a_turn
 from stickslip.identify.axis.load_check import ADVICE, judged_load
 from stickslip.identify.axis.loop_check import doubted_loops
@@ -58,6 +59,8 @@ def assembled(
     judged = judged_load(estimates, inverse, result.mechanics)
     if sliding is None:
         judged = constant_torque_told(judged)
+        if any(e.name == "fs_negative" for e in judged):
+            judged = with_rest(judged)  # no certain sliding says more of either direction
     misfit = errors_of(experiments, result.problem.signals, result.misfits(experiments))
     axis, named = result.problem.axis, result.problem.vector.named(result.u)
     if inverse is not None and inverse.has("fc"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from stickslip.errors import InputError
+from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis.agreed import regressed
 from stickslip.identify.axis.identify import AUTOMATIC, identify_axis
 from stickslip.identify.axis.over_angle import over_angle
@@ -19,6 +19,10 @@ from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
+
+BEHIND = {"commanded": -0.5, "actual": 0.0, "mean": 0.5}
+"""Rows by which a column lies behind the torque: a command acts half a row after its row, on average, and a mean over
+the row before acted half a row before it."""
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
@@ -66,9 +70,10 @@ def skew_of(experiments: Sequence[Experiment], options: Options) -> float | None
     """s by which the torque's column lies behind the torque that acted, if the options say so."""
     if options.torque_is is None and options.delay is None:
         return None
-    # A command acts half a row after its row, on average; a mean over the row before acted half a row before it.
-    rows = {"commanded": -0.5, "actual": 0.0, "mean": 0.5}[options.torque_is or "commanded"]
-    return rows * max(t.period for t in experiments) - (options.delay or 0.0)
+    is_what = options.torque_is or "commanded"
+    if is_what not in BEHIND:
+        raise UnknownName("torque_is", is_what, BEHIND)
+    return BEHIND[is_what] * max(t.period for t in experiments) - (options.delay or 0.0)
 
 
 METHOD = Method("axis", "inertia, offset or gravity and friction jointly", identify, driven, holds_out=True)
