@@ -10,11 +10,11 @@ export async function show(box) {
   const models = store.project.models.filter((m) => m.has_model);
   box.append(h("h1", {}, "Has the friction changed?"));
   if (models.length < 2) {
-    const address = location.hash;
     const coming = store.project.jobs.filter((j) => ["waiting", "running"].includes(j.state) && store.project.models.some((m) => m.id === j.item));
-    box.append(h("p", {}, `Two models with a whole law are compared; this project has ${models.length === 1 ? "one" : "none"}. ${coming.length ? "What is being identified joins them when it is done." : "Identify another log, or the rest of this one."}`));
-    // Only where this is still what is looked at: a view of another address keeps what was typed there.
-    for (const job of coming) run(job.id, job.title).then(() => location.hash === address && dispatchEvent(new Event("stickslip-show")));
+    const said = h("p", {}, `Two models with a whole law are compared; this project has ${models.length === 1 ? "one" : "none"}. ${coming.length ? "What is being identified joins them when it is done." : "Identify another log, or the rest of this one."}`);
+    box.append(said);
+    // Once, and only where this is still what is looked at: a view shown since keeps what was typed and compared there.
+    Promise.race(coming.map((job) => run(job.id, job.title))).then(() => said.isConnected && dispatchEvent(new Event("stickslip-show")));
     return undefined;
   }
   let plot = null;
