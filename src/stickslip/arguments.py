@@ -37,7 +37,7 @@ def no_number(owner: str, name: str, value: object, unit: str = "") -> Parameter
     shown = repr(value)
     shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
     said = f"{owner}: {name} = {shown} must be a number{f' in {unit}' if unit else ''}"
-    if isinstance(value, str) and _reads(value):
+    if isinstance(value, str) and says_number(value):
         said += f"; write it without quotes, {value.strip()}"
     return ParameterError(said)
 
@@ -45,6 +45,15 @@ def no_number(owner: str, name: str, value: object, unit: str = "") -> Parameter
 def is_number(value: object) -> bool:
     """Whether it may stand for a number: what has a value as a float, but no text."""
     return hasattr(value, "__float__") and not isinstance(value, (str, bytes))
+
+
+def says_number(text: str) -> bool:
+    """Whether a text says a number, of a file or in a number's place."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def insist_on_numbers(owner: str, annotations: Mapping[str, Any], given: Mapping[str, Any]) -> None:
@@ -133,12 +142,3 @@ def _fields(kind: type[Any]) -> tuple[tuple[str, str], ...]:
 def _parts(annotation: str) -> set[str]:
     """What an annotation allows, one by one."""
     return {part.strip() for part in annotation.split("|")}
-
-
-def _reads(text: str) -> bool:
-    """Whether a text says a number."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

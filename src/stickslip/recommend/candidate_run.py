@@ -324,13 +324,8 @@ def simulated(plant: RigidAxis, controller: Controller, reference: Array, start:
 
 def setpoints_of(reference: Array) -> Array:
     """Position, velocity and acceleration of a reference for the closed loop."""
-    return setpoints(
-        len(reference),
-        position=reference[:, 0],
-        velocity=reference[:, 1],
-        acceleration=reference[:, 2],
-        closed=1.0,
-    )
+    q, v, a = reference.T
+    return setpoints(len(reference), position=q, velocity=v, acceleration=a, closed=1.0)
 
 
 def followed(

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from stickslip import plugins
+from stickslip.arguments import says_number
 from stickslip.config import Table, refuse_endless
 from stickslip.control.controller import Controller
 from stickslip.control.files import Placement, composed, placement
@@ -143,14 +144,14 @@ def _points(table: Table, written: str) -> list[list[float]]:
     except (OSError, ValueError, csv.Error) as error:  # ValueError: not UTF-8, or a NUL in the path
         reason = getattr(error, "strerror", None) or str(error)
         raise table.error("file", f"cannot be read ({reason}); give a CSV file") from None
-    if rows and not _is_number(rows[0][1][0]):
+    if rows and not says_number(rows[0][1][0]):
         rows = rows[1:]
     if len(rows) < 2:
         raise table.error("file", "has fewer than two points; give time, position and perhaps velocity")
     width = len(rows[0][1])
     points: list[list[float]] = []
     for line, row in rows:
-        numbers = [float(x) if _is_number(x) else math.nan for x in row]
+        numbers = [float(x) if says_number(x) else math.nan for x in row]
         if width not in (2, 3) or len(row) != width or not all(map(math.isfinite, numbers)):
             raise InputError(
                 f"{written} line {line}: {','.join(row)[:60]!r} is not 2 or 3 finite numbers "
@@ -158,14 +159,6 @@ def _points(table: Table, written: str) -> list[list[float]]:
             )
         points.append(numbers)
     return [list(column) for column in zip(*points)]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 # ---- controllers ------------------------------------------------------------------------------------------------
