@@ -96,6 +96,16 @@ def test_what_a_record_leaves_of_the_torque_acts_on_drawn_axes_as_cogging() -> N
     assert all(p.waves == () for p in plants_of(identified(), INERTIA, 4, 1))
 
 
+def test_a_fall_of_friction_that_the_law_does_not_have_is_on_drawn_axes() -> None:
+    missing = {"fall_missing_Nm": 0.1, "fall_missing_velocity": 0.9}
+    best, *drawn = plants_of(replace(identified(), misfit=missing), INERTIA, 10, 1)
+    assert best.friction.law.name == "coulomb"
+    for plant in drawn:
+        friction = plant.friction.parameters
+        assert friction.fs - friction.fc == pytest.approx(0.1)
+        assert friction.vs == 0.9
+
+
 @pytest.mark.usefixtures("few")
 def test_a_static_torque_that_is_known_is_level_enough() -> None:
     law = {"k": 50.0, "fs": 0.335, "vs": 0.1}

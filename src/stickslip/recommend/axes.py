@@ -35,6 +35,8 @@ WAVES = 3
 """At most so many at once."""
 LEFT = ("sliding_rms_Nm", "sliding_rms_N")
 """What an identification leaves of the torque where the axis slides for certain: as large they are at most (RMS)."""
+FALL_MISSING = ("fall_missing_Nm", "fall_missing_N")
+"""A fall of friction with velocity that the record shows and the law does not have."""
 BREAKAWAY = (3e-5, 3e-3)
 """rad (a tenth of it in m), displacement at which a contact without springs in its law is taken to break away."""
 LOST = 0.5
@@ -98,7 +100,7 @@ def plants_of(
         part = named.get("inertia", identified) / identified
         own = inertia * min(max(part, 1.0 / (1.0 + known_to)), 1.0 + known_to)
         yield Plant(
-            own, _with_springs(model, own, found.motion, rng), offset=here["offset"],
+            own, _with_springs(_falling(model, found), own, found.motion, rng), offset=here["offset"],
             waves=(
                 *_hanging(here["gravity"], here["gravity_angle"], start),
                 *(() if told_of(machine) else _unmodelled(misfit * float(rng.uniform()), found.motion, rng)),
@@ -196,6 +198,17 @@ def _with_springs(model: Model, inertia: float, motion: str, rng: np.random.Gene
         return Model("lugre", _choices(model), sigma0=stiffness, sigma1=damper, **curve)
     except (ParameterError, TypeError):
         return model
+
+
+def _falling(model: Model, found: Identified) -> Model:
+    """The law with the fall of friction that the record shows, where it has none itself."""
+    fall = next((found.misfit[k] for k in FALL_MISSING if k in found.misfit), 0.0)
+    if not (fall > 0.0 and model.law.name == "coulomb" and _plain(model)):
+        return model
+    own: Any = model.parameters
+    level, velocity = float(own.fc), found.misfit["fall_missing_velocity"]
+    # Of its stiffness nothing is left once springs are drawn.
+    return Model("stribeck", k=level / 1e-3, fs=level + fall, fc=level, vs=velocity, sigma2=float(own.sigma2))
 
 
 def _plain(model: Model) -> bool:

@@ -30,6 +30,8 @@ ELSEWHERE = 1.5
 """Times the force error of the fitted records, from which on that of held-out ones is one of another machine."""
 ROUGH = 0.1
 """Of the torque where the axis slides for certain: what a model misses at most for its form to be taken as right."""
+FALL_MISSING = ("fall_missing_Nm", "fall_missing_N")
+"""A fall of friction with velocity that the law does not have."""
 OWN_WORDS = {
     "fc": "Coulomb torque", "fs": "static (break-away) torque", "fs_positive": "break-away torque, v > 0",
     "stiffness": "stiffness at rest", "fs_negative": "break-away torque, v < 0",
@@ -198,6 +200,12 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
         out.append(f"the model misses {percent(sliding.relative)} of the torque even where the axis slides")
     if sliding is not None and beaten(sliding):
         out.append("plain least squares (--inverse) explains the torque better where the axis slides")
+    fall = next((found.misfit[k] for k in FALL_MISSING if k in found.misfit), 0.0)
+    if fall > 0.0 and found.model is not None:
+        out.append(
+            f"friction falls by {quantity(fall, unit_in(found, 'N·m'))} with velocity, which law "
+            f"{found.model.law.name!r} does not have: take 'stribeck' or 'lugre'"
+        )
     plain = found.misfit.get("inverse_dynamics_relative", math.nan)
     if sliding is None and found.misfit.get("force_relative", 0.0) > WORSE * plain:
         out.append("the model's torque is farther from the measured one than plain least squares'")

@@ -7,7 +7,9 @@ import math
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.report.answers import Answers, meaning_of, one_number_each
 
-JUDGED = ("force_relative", "inverse_dynamics_relative", "position_", "sliding_rms", "rms_Nm", "rms_N")
+JUDGED = (
+    "force_relative", "inverse_dynamics_relative", "position_", "sliding_rms", "fall_missing", "rms_Nm", "rms_N",
+)  # fmt: skip
 """Misfits that sentences say, or that say little (the position of an open loop drifts); all are in `as_dict`."""
 
 

@@ -25,7 +25,7 @@ from stickslip.identify.axis.choice import Candidate
 from stickslip.identify.axis.exponent import predicted_with, with_other
 from stickslip.identify.axis.prediction import axis_prediction
 from stickslip.identify.axis.problem import Problem
-from stickslip.identify.axis.result import assembled, evident, noted, untold_by_reversals
+from stickslip.identify.axis.result import assembled, evident, noted, told_whole, untold_by_reversals
 from stickslip.identify.axis.search import Asked, Extras, FittedAxis, laid_out, starting_models
 from stickslip.identify.axis.settled import ALIKE, settled
 from stickslip.identify.estimate import Estimate, Identification
@@ -89,11 +89,6 @@ def estimated(law: Law, asked: Asked, evidence: Evidence, notes: Sequence[str]) 
         if all(e.identified for e in found.estimates) or not sliding.held_for(HELD):
             return found
     return predicted(law, asked, evidence, notes)
-
-
-def told_whole(law: Law) -> bool:
-    """Whether certain sliding tells every parameter of a law."""
-    return {f.name for f in law.fields} <= set(TOLD_BY_SLIDING)
 
 
 def by_sliding(

@@ -24,11 +24,14 @@ from stickslip.identify.evidence import within_speeds
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import told_by
 from stickslip.identify.fit.parameter_vector import Vector
+from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
+from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
+from stickslip.simulation.recorded_input.simulation import Mechanics
 from stickslip.spec import Law
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -44,6 +47,8 @@ HELD_BY_FRICTION = (
     "the axis slides both ways"
 )
 STRIBECK = ("fs", "vs", "delta_s")
+GAUSSIAN = 2.0
+"""Exponent with which friction falls where nobody named one."""
 LOOP_OFF = 0.3
 """Relative error of the simulated loop's drive signal from which on its gains are doubted."""
 
@@ -67,7 +72,7 @@ def assembled(
         misfit["force_relative"] = force_error(inverse, result.model, named)
         misfit["inverse_dynamics_relative"] = inverse.relative_error
     if sliding is not None:
-        misfit["sliding_rms_Nm"] = sliding.left
+        misfit |= left_where_it_slides(sliding, result.model, result.mechanics)
     if validation:
         misfit |= {f"held_out_{k}": v for k, v in result.held_out(validation).items()}
         if inverse is not None and inverse.has("fc"):
@@ -89,6 +94,31 @@ def assembled(
             "axis": result.problem.axis, "units": result.problem.units,
         },
     )  # fmt: skip
+
+
+def left_where_it_slides(sliding: Regression, model: Model, mechanics: Mechanics) -> dict[str, float]:
+    """RMS of the torque that the model leaves where the axis slides for certain; and a fall of friction with velocity
+    that shows there, but that its law does not have."""
+    if model.law.steady is None:
+        return {"sliding_rms_Nm": sliding.left}
+    weight, angle = mechanics.gravity, mechanics.gravity_angle
+    frictionless = {
+        "inertia": mechanics.inertia, "sigma2": 0.0, "fc": 0.0, "offset": mechanics.offset,
+        "gravity_sin": weight * math.cos(angle), "gravity_cos": -weight * math.sin(angle),
+    }  # fmt: skip
+    speed = stacked(sliding.rows, "speed")
+    left = sliding.remainder(frictionless) - sliding_torque(model, speed)
+    out = {"sliding_rms_Nm": float(np.sqrt(np.mean(left**2)))}
+    if sliding.shows_a_fall and told_whole(model.law):
+        fall = sliding.numbers["fs"].value - sliding.numbers["fc"].value
+        velocity = sliding.falling.get(GAUSSIAN, (0.0, sliding.vs))[1].value
+        out |= {"fall_missing_Nm": fall, "fall_missing_velocity": velocity}
+    return out
+
+
+def told_whole(law: Law) -> bool:
+    """Whether certain sliding tells every parameter of a law."""
+    return {f.name for f in law.fields} <= set(TOLD_BY_SLIDING)
 
 
 def evident(
