@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ import pytest
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.plain import inverse_identification
 from stickslip.identify.estimate import Identification
+from stickslip.identify.evidence import extrapolated
 from stickslip.identify.experiment import Experiment
+from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.identified_file import read_identified
 from stickslip.identify.model_file import write_model
 from stickslip.identify.monte_carlo import draw_models
@@ -129,4 +132,54 @@ def test_an_axis_per_direction_has_a_law_that_differs_and_no_offset(
         "cannot be distinguished from friction that differs by direction" in note for note in found.notes
     )
     p = read_back(found, tmp_path).parameters
-    assert p.fc - p.fc_negative == pytest.approx(FORTH - BACK, abs=0.01)
+    assert (p.fc, p.fc_negative) == pytest.approx((by_name["fc"].value, by_name["fc_negative"].value))
+
+
+@pytest.mark.parametrize(("seed", "cell"), [
+    (2000264, ("mean", 250, "p-pi", "production", "asymmetry")),
+    (2000192, ("actual", 250, "p-pi", "production", "clean")),
+    (2000160, ("actual", 1000, "feedforward", "staircase", "asymmetry")),
+])  # fmt: skip
+def test_each_direction_is_held_against_certain_sliding(logs: Any, seed: int, cell: tuple[Any, ...]) -> None:
+    """Without, of 36 levels called identified 14 % held, of 36 inertias 83 %: wrong by 15 % and 0.7 % (medians), as
+    commands that act late, coarse rows and a fall of friction make them."""
+    log = logs.draw(seed, *cell)
+    axis, record = ServoAxis(drive_side="load"), Experiment("log", log.time, log.position, log.torque)
+    forth, back = log.machine.axis[6], log.machine.axis[7]
+    constant = log.machine.axis[5]
+    truth = {
+        "inertia": log.truth["inertia"], "fc": forth + constant, "fc_negative": back - constant,
+        "sigma2": log.truth["sigma2"], "sigma2_negative": log.truth["sigma2"],
+    }  # fmt: skip
+    found = {e.name: e for e in identify_axis([record], axis, ["coulomb"], per_direction=True).estimates}
+    for name in ("inertia", "fc", "fc_negative"):
+        assert found[name].identified
+        assert found[name].upper - found[name].lower < 0.3 * truth[name]
+    for name, true in truth.items():
+        assert found[name].lower <= true <= found[name].upper
+
+
+def test_both_directions_know_of_each_other(logs: Any) -> None:
+    """Levels are drawn with the correlation that they have: their mean is surer than either."""
+    log = logs.draw(2000160, "actual", 1000, "feedforward", "staircase", "asymmetry")
+    record = Experiment("log", log.time, log.position, log.torque)
+    found = identify_axis([record], ServoAxis(drive_side="load"), ["coulomb"], per_direction=True)
+    names = [e.name for e in found.estimates]
+    assert abs(found.correlation[names.index("fc"), names.index("fc_negative")]) > 0.1
+    assert np.linalg.eigvalsh(found.correlation).min() > -1e-9
+
+
+def test_an_effect_in_one_direction_alone_is_looked_for_there() -> None:
+    """Of v < 0 nothing was ever called extrapolated."""
+    values: dict[str, Any] = {"k": 3e4, "fs": 0.4, "fc": 0.3, "vs": 0.5, "sigma2": 0.02}
+    other: dict[str, Any] = {
+        "fs_negative": 0.4,
+        "fc_negative": 0.3,
+        "vs_negative": 1e-4,
+        "sigma2_negative": 0.02,
+    }
+    slow = Model("stribeck", {"symmetry": "asymmetric"}, **values, **other)
+    vector = Vector(slow)
+    outside = extrapolated(vector, vector.start, np.linspace(0.3, 5.0, 50))
+    assert "fs_negative" in outside
+    assert "fs" not in outside

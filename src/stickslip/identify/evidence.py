@@ -112,8 +112,9 @@ def extrapolated(vector: Vector, u: Array, speeds: Array) -> dict[str, float]:
     slower = np.append(0.0, low * np.logspace(-DECADES, 0.0, number, endpoint=False))
     faster = high * np.logspace(0.0, DECADES, number + 1)
     grid = np.concatenate([slower, np.geomspace(low, high, number), faster])
+    # In both directions, which have parameters of their own in some laws.
     steady, seen = (
-        Steady(vector.base.law, v, np.ones(v.size))
+        Steady(vector.base.law, np.append(v, -v), np.repeat([1.0, -1.0], v.size))
         for v in (grid, np.unique(np.concatenate([speeds, moving])))
     )
     values = vector.values(u)
@@ -124,7 +125,7 @@ def extrapolated(vector: Vector, u: Array, speeds: Array) -> dict[str, float]:
             continue
         more = values.copy()
         more[i] += CHANGE * (abs(values[i]) or p.scale)
-        effect = np.abs(steady.torque(vector.packed_values(more)) - here)
+        effect = np.abs(steady.torque(vector.packed_values(more)) - here).reshape(2, -1).max(axis=0)
         own = np.abs(seen.torque(vector.packed_values(more)) - shown)
         if not np.all(np.isfinite(effect)):
             continue

@@ -25,6 +25,10 @@ FASTER, WINDOW = 1.5, 0.1
 """Times as fast that the end of an experiment must be to be fitted instead of its start; s over which a speed is
 averaged."""
 FEWEST = 50
+ROUNDED = 0.02
+"""Part of a row by which the times of evenly spaced samples may be off as they are written."""
+SPACING = 1e-3
+"""Part of the usual distance between two samples by which equally spaced ones may differ from it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +39,7 @@ class Experiment:
     ----------
     name : str
     time : array, shape (n,)
-        s, strictly ascending; may be irregular.
+        s, strictly ascending; may be irregular. Times that were rounded are made even, as the samples were.
     position : array, shape (n,)
         At the axis's `seen_from`, rad (m).
     drive : array, shape (n,), or None
@@ -82,6 +86,7 @@ class Experiment:
             raise InputError(
                 f"{self.name}: time does not ascend at row {back[0] + 1} (t = {self.time[back[0] + 1]:g} s); sort it"
             )
+        object.__setattr__(self, "time", evened(self.time))
         if self.drive is None and not self.closed_loop:
             raise InputError(
                 f"{self.name}: neither the drive's signal nor a reference position with its controller is known; map "
@@ -167,6 +172,21 @@ class Experiment:
     def _cut(self, rows: slice) -> Experiment:
         arrays = ("time", "position", "drive", "reference", "supply", "used")
         return replace(self, **{n: None if (a := getattr(self, n)) is None else a[rows] for n in arrays})
+
+
+def evened(time: Array) -> Array:
+    """The times; of evenly spaced samples whose times were rounded as they were written, those that were rounded."""
+    if evenly_spaced(time):
+        return time
+    even: Array = np.linspace(float(time[0]), float(time[-1]), time.size, dtype=np.float64)
+    return even if float(np.max(np.abs(time - even))) <= ROUNDED * float(even[1] - even[0]) else time
+
+
+def evenly_spaced(time: Array) -> bool:
+    """Whether every two samples are as far apart as the others, to a thousandth."""
+    steps = np.diff(time)
+    period = float(np.median(steps))
+    return bool(np.max(np.abs(steps - period)) <= SPACING * period)
 
 
 def experiment_of(

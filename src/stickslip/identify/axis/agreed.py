@@ -16,7 +16,7 @@ import numpy as np
 
 from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
-from stickslip.identify.axis.falling import FALL, SAME, fall_together, told, with_rest
+from stickslip.identify.axis.falling import FALL, SAME, fall_together, moved_apart, told, with_rest
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.axis.settled import ALONE, APART, TWO_METHODS
 from stickslip.identify.estimate import Estimate
@@ -36,7 +36,9 @@ KNOWN = 0.5
 AS_GOOD = 1.5
 """Times as much as the regression leaves of the torque in certain sliding, that other values may leave and still
 stand."""
-TOLD_BY_SLIDING = ("inertia", "offset", "gravity", "gravity_angle", "fc", "sigma2")
+TOLD_BY_SLIDING = (
+    "inertia", "offset", "gravity", "gravity_angle", "fc", "sigma2", f"fc{NEGATIVE}", f"sigma2{NEGATIVE}",
+)  # fmt: skip
 DOUBT = "the prediction error, the only evidence for it, contradicts certain sliding on {name}: {other} against {own}"
 
 ONE_BAND = (
@@ -60,13 +62,14 @@ UNDECIDED = (
 
 def regressed(
     experiments: Sequence[Experiment], axis: ServoAxis, skew: float | None, harmonic_period: float | None = None,
-    regress: Regress = regress_axis,
+    regress: Regress = regress_axis, each_way: bool = False,
 ) -> tuple[Regression | None, list[str]]:  # fmt: skip
     """The regression on certain sliding, where the records allow it; else why they do not."""
+    ways = {"each_way": True} if each_way else {}  # what the doctor has asked is asked again
     if any(t.drive is None for t in experiments):
         return None, []
     try:
-        return regress(experiments, axis, skew=skew, harmonic_period=harmonic_period), []
+        return regress(experiments, axis, skew=skew, harmonic_period=harmonic_period, **ways), []
     except InputError as error:
         return None, [f"No regression on certain sliding: {error}."]
 
@@ -135,9 +138,13 @@ def on_creep(found: Regression | None, axis: ServoAxis) -> list[str]:
 
 def sliding_values(found: Regression) -> dict[str, tuple[float, float, float]]:
     """Value and ends of the 95 % interval of every number that certain sliding tells, by the names of estimates."""
-    out: dict[str, tuple[float, float, float]] = {}
-    for name in ("inertia", "offset", "fc", "sigma2"):
-        out[name] = (found.numbers[name].value, *found.interval(name))
+    own = {n: n for n in ("inertia", "offset", "fc", "sigma2")}
+    if found.each_way:
+        own = {
+            "inertia": "inertia", **{n: f"{n}_positive" for n in ("fc", "sigma2")},
+            **{n + NEGATIVE: f"{n}_negative" for n in ("fc", "sigma2")},
+        }  # fmt: skip
+    out = {e: (found.numbers[n].value, *found.interval(n)) for e, n in own.items()}
     if "gravity_sin" in found.numbers:
         sine, cosine = found.numbers["gravity_sin"], found.numbers["gravity_cos"]
         size, angle = hanging(sine.value, cosine.value, stacked(found.rows, "position"))
@@ -179,7 +186,12 @@ def agreed(
         }  # fmt: skip
         notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
     for e in estimates if fine else ():
-        if e.name in FALL and e.name in parameters:
+        if e.name.removesuffix(NEGATIVE) not in FALL or e.name not in parameters:
+            continue
+        if found.each_way:
+            # Certain sliding has one fall for both directions.
+            taken[e.name] = moved_apart(e, parameters[e.name], held=held)
+        else:
             taken[e.name], said = fall_together(e, found, parameters[e.name], exponent_of(vector), held=held)
             notes += said
     out = tuple(taken.get(e.name, e) for e in estimates)
@@ -228,12 +240,17 @@ def of_sliding(
             # Its intervals are narrow, and hold where the torque acted as simulations take it.
             taken[e.name] = e if held and e.identified and not own.identified else own
             continue
-        if fine and abs(e.value - own.value) > SAME * abs(own.value) and e.name in ("inertia", "fc"):
+        if (
+            fine
+            and abs(e.value - own.value) > SAME * abs(own.value)
+            and e.name in ("inertia", "fc", f"fc{NEGATIVE}")
+        ):
             doubts = DOUBT.format(name=e.name, other=f"{e.value:.4g}", own=f"{own.value:.4g} {e.unit}")
         if fine and e.identified and not found.confirmed(e.name):
             own = both_told(own, e, parameters[e.name])
         if stands:
-            own, said = held_together(own, plain_value(e.name, inverse), parameters[e.name], size)
+            plain = plain_each_way(e.name, inverse) if found.each_way else plain_value(e.name, inverse)
+            own, said = held_together(own, plain, parameters[e.name], size)
             notes += said
         taken[e.name] = own
     return taken, notes, doubts
@@ -252,12 +269,13 @@ def told_apart(estimates: Iterable[Estimate], found: Regression) -> tuple[Estima
     clear = {"inertia": True, "fc": high <= RATIO * low, "sigma2": found.slope_told}
 
     def doubt_on(e: Estimate) -> str:
-        alone = clear.get(e.name) and not found.confirmed(e.name)
-        if alone and (e.name != "sigma2" or found.rough or high > ALONE * low):
+        name = e.name.removesuffix(NEGATIVE)
+        alone = clear.get(name) and not found.confirmed(name)
+        if alone and (name != "sigma2" or found.rough or high > ALONE * low):
             return BAND_ALONE
-        if e.name != "fc" or not clear["fc"]:
+        if name != "fc" or not clear["fc"]:
             return ""
-        share = abs(e.value - own) / abs(own)
+        share = 0.0 if found.each_way else abs(e.value - own) / abs(own)
         if not found.level_doubt and share > APART and found.fall_may_hide:
             return TWO_METHODS.format(share=share, own=own, value=e.value, unit=e.unit)
         return found.level_doubt
@@ -276,6 +294,16 @@ def plain_value(name: str, inverse: InverseDynamics | None) -> tuple[float, floa
     if inverse is None or not inverse.has(own):
         return None
     return inverse[own], QUANTILE * float(inverse.robust_std[inverse.names.index(own)])
+
+
+def plain_each_way(name: str, inverse: InverseDynamics | None) -> tuple[float, float] | None:
+    """The same where friction has parameters of its own in each direction, of which the plain inverse dynamics tells
+    inertia and levels: those are Coulomb's torque with the constant one and without it."""
+    level, constant = (plain_value(n, inverse) for n in ("fc", "offset"))
+    if not name.startswith("fc") or level is None or constant is None:
+        return plain_value(name, inverse) if name == "inertia" else None
+    side = -1.0 if name.endswith(NEGATIVE) else 1.0
+    return level[0] + side * constant[0], math.hypot(level[1], constant[1])
 
 
 def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tuple[Estimate, ...]:

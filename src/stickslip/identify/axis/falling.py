@@ -50,7 +50,7 @@ def fall_together(
         )
         value = own.value if found.shows_a_fall else e.value
         e = told(e, p, value, min(e.lower, own.value), max(e.upper, own.value), math.nan)
-    return (widened(e, p, 1.0 if held else MOVED) if e.identified else e), notes
+    return moved_apart(e, p, held=held), notes
 
 
 def number_of(name: str, found: Regression, exponent: float | None) -> Number | None:
@@ -91,6 +91,12 @@ def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale
     value, low, high = (min(max(x, least), p.par.upper) for x in (value, low, high))
     why = verdict_on(p, value, low, high, Noise(1.0, "residual", math.inf), scale)
     return replace(e, value=value, std=std, lower=low, upper=high, identified=not why, verdict=why)
+
+
+def moved_apart(e: Estimate, p: Parameter, *, held: bool) -> Estimate:
+    """Fs or vs in one direction by the prediction error alone, as unsure as a moved torque and the law's form make
+    it."""
+    return widened(e, p, 1.0 if held else MOVED) if e.identified else e
 
 
 def half_width(e: Estimate) -> float:

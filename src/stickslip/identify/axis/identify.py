@@ -25,7 +25,7 @@ from stickslip.identify.axis.agreed import (
 )
 from stickslip.identify.axis.choice import Candidate, asked_of, chosen_of, compared, foreseen, sentence_on
 from stickslip.identify.axis.exponent import is_open, shown
-from stickslip.identify.axis.law_fit import Evidence, estimated
+from stickslip.identify.axis.law_fit import Evidence, against_sliding, estimated
 from stickslip.identify.axis.output import judged
 from stickslip.identify.axis.result import assembled, narrow_note, noted
 from stickslip.identify.axis.search import Asked, Extras, fitted_axis, require_start
@@ -125,7 +125,7 @@ def identify_axis(
     evidence, notes = looked_at(experiments, validation, axis, extras, skew, per_direction, regress)
     if evidence.inverse is None:
         require_start(evidence.experiments, axis, tried, asked)
-    if per_direction or not plain_axis(asked):
+    if not plain_axis(asked) or (per_direction and "offset" not in frozen):
         evidence = replace(evidence, sliding=None)
     automatic, given = tuple(laws) == AUTOMATIC, asked
     if is_open(asked, tried):
@@ -170,9 +170,12 @@ def by_output_error(
     """A law fitted by the output error; ``lacking`` says why the prediction error cannot be had, where it was asked
     for."""
     result = judged(fitted_axis(evidence.experiments, evidence.axis, law, evidence.inverse, own), profiles)
+    fitted, estimates, said = result, result.estimates, list[str]()
+    if lacking:
+        fitted, estimates, said = against_sliding(result, evidence)
     found = assembled(
-        result, result.estimates, result.fit.correlation, evidence.inverse, evidence.validation,
-        evidence.candidates, list(notes),
+        fitted, estimates, result.fit.correlation, evidence.inverse, evidence.validation,
+        evidence.candidates, [*notes, *said], evidence.sliding if lacking else None,
     )  # fmt: skip
     return noted(found, narrow_note(result, ask=not lacking), *filter(None, [lacking]))
 
@@ -184,7 +187,7 @@ def looked_at(
     """What the regressions tell, the torque of every record moved to where it acted; and what is to be said."""
     # A turn is what the regression takes where no period is given: so the doctor has asked before.
     period = None if extras.harmonic_period == Extras().harmonic_period else extras.harmonic_period
-    sliding, notes = regressed(experiments, axis, skew, period, regress)
+    sliding, notes = regressed(experiments, axis, skew, period, regress, per_direction)
     experiments, validation = aligned(experiments, sliding), aligned(validation, sliding)
     inverse, more = first_look(experiments, axis, extras, per_direction)
     unchecked = sliding is None and all(t.drive is not None for t in experiments)

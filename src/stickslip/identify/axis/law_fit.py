@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from stickslip.identify.axis.agreed import (
 )
 from stickslip.identify.axis.choice import Candidate
 from stickslip.identify.axis.exponent import predicted_with, with_other
+from stickslip.identify.axis.output import OutputError
 from stickslip.identify.axis.prediction import axis_prediction
 from stickslip.identify.axis.problem import Problem
 from stickslip.identify.axis.result import assembled, evident, noted, told_whole, untold_by_reversals
@@ -120,7 +121,7 @@ def by_sliding(
     u = vector.coordinates(vector.named(u) | {e.name: e.value for e in estimates})
     found = with_values(experiments, axis, law, vector, u, asked.extras)
     shown = [replace(e, unit=axis.unit(e.unit)) for e in estimates]
-    names, told = [e.name for e in shown], list(sliding.numbers)[:4]
+    names, told = [e.name for e in shown], sliding.correlated
     correlation = np.eye(len(names))
     for i, a in enumerate(names):
         for j, b in enumerate(names):
@@ -201,8 +202,28 @@ def predicted(law: Law, asked: Asked, evidence: Evidence, notes: Sequence[str]) 
     return noted(replace(found, details={**found.details, "prediction": result}))
 
 
-def checked(result: PredictionError, evidence: Evidence) -> tuple[tuple[Estimate, ...], list[str]]:
-    """A prediction error's estimates, held against what else the records tell; and what is to be said."""
+def against_sliding(
+    found: OutputError, evidence: Evidence
+) -> tuple[FittedAxis, tuple[Estimate, ...], list[str]]:
+    """An output error that stands in for the prediction error, held against what else the records tell."""
+    problem = found.problem
+    estimates, said = checked(Fitted(problem.vector, found.u, found.model, found.fit.estimates), evidence)
+    u = problem.vector.coordinates(problem.vector.named(found.u) | {e.name: e.value for e in estimates})
+    shown = tuple(replace(e, unit=problem.axis.unit(e.unit)) for e in estimates)
+    return FittedAxis(problem, u), shown, said
+
+
+class Fitted(NamedTuple):
+    """What a fit by simulation says: parameters, where it ended, and how sure it is."""
+
+    vector: Vector
+    u: Array
+    model: Model
+    estimates: tuple[Estimate, ...]
+
+
+def checked(result: PredictionError | Fitted, evidence: Evidence) -> tuple[tuple[Estimate, ...], list[str]]:
+    """Estimates of a fit by simulation, held against what else the records tell; and what is to be said."""
     experiments, axis, inverse, sliding = (
         evidence.experiments,
         evidence.axis,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.binding import NEGATIVE
 from stickslip.identify.axis.agreed import TOLD_BY_SLIDING
 from stickslip.identify.axis.choice import (
     Candidate,
@@ -138,14 +139,18 @@ def evident(
         above = e.unit == "N·m" and e.name not in ("offset", "gravity") and e.value > largest
         why = f"a level of friction above the largest torque recorded, {largest:.4g}, cannot be"
         out.append(replace(e, identified=False, verdict=why) if above else e)
-    by_name = {e.name: e for e in out}
-    rest, level = (by_name[n].value if n in by_name else math.nan for n in ("fs", "fc"))
-    if rest <= level:
-        why = "no fall of friction with velocity shows: fs is not above fc"
-        out = [replace(e, identified=False, verdict=why) if e.name in STRIBECK else e for e in out]
-    if rest <= level or (rest > largest and level <= largest):
-        # No model is to hold a friction at rest that nothing moved against.
-        out = [at_level(e, level) if e.name == "fs" else e for e in out]
+    for way in ("", NEGATIVE):
+        by_name = {e.name: e for e in out}
+        rest, level = (by_name[n + way].value if n + way in by_name else math.nan for n in ("fs", "fc"))
+        if rest <= level:
+            why, fall = (
+                f"no fall of friction with velocity shows: fs{way} is not above fc{way}",
+                {n + way for n in STRIBECK},
+            )
+            out = [replace(e, identified=False, verdict=why) if e.name in fall else e for e in out]
+        if rest <= level or (rest > largest and level <= largest):
+            # No model is to hold a friction at rest that nothing moved against.
+            out = [at_level(e, level) if e.name == f"fs{way}" else e for e in out]
     return tuple(out)
 
 
@@ -180,7 +185,7 @@ def untold_by_reversals(
 ) -> tuple[Estimate, ...]:
     """The estimates, those refused that only reversals tell: there a part of a row counts for as much as they do."""
     v = np.geomspace(1e-4 * sliding.fastest, sliding.fastest, 40)
-    steady = {*told_by(model, v, ()), *TOLD_BY_SLIDING}
+    steady = {*told_by(model, np.append(-v, v), ()), *TOLD_BY_SLIDING}
     return tuple(
         replace(e, identified=False, verdict=ONLY_REVERSALS)
         if e.identified and e.name.partition("[")[0] not in steady else e for e in estimates

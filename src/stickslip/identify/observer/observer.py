@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.experiment import evenly_spaced
 from stickslip.identify.fit.filters import ZeroPhase, butterworth_poles
 from stickslip.identify.observer.encoder_edges import SeenVelocity, seen_velocity
 from stickslip.simulation.recorded_input.segments import Segments, cut
@@ -224,7 +225,7 @@ def forgotten(way: Array, warm: int) -> Any:
 def checked(motion: Motion, band: float) -> None:
     """Refuse what the filters cannot work on."""
     steps = np.diff(motion.time)
-    if motion.time.size < 200 or np.ptp(steps) > 1e-3 * float(np.median(steps)):
+    if motion.time.size < 200 or not evenly_spaced(motion.time):
         raise InputError(
             f"{motion.time.size} samples between {steps.min():.3g} and {steps.max():.3g} s apart: this method needs at "
             "least 200 that are equally spaced; resample the record"

@@ -11,7 +11,7 @@ The columns, and what no law holds among them, are those of `stickslip.identify.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -32,6 +32,7 @@ from stickslip.identify.regression.strokes import memory_of
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 CORE = 5
+EACH_WAY = ("fc_positive", "fc_negative", "sigma2_positive", "sigma2_negative")
 ROUNDS = 12
 SETTLED = 1e-6  # s: the skew's change at which its search ends
 FARTHEST, STRIDE = 40.0, 4.0  # times the skew's usual size: as far as it is looked for, and in a step
@@ -69,7 +70,8 @@ class BandFit:
         Of the window, Hz.
     numbers : dict of str to Number
         ``inertia``, ``sigma2``, ``fc``, ``offset``, ``skew`` (s by which the torque's column lies behind), ``fs`` (the
-        curve's end at rest), ``gravity_sin``, ``gravity_cos``.
+        curve's end at rest), ``gravity_sin``, ``gravity_cos``; of friction each way ``uneven`` (half of what sigma2 is
+        greater by for v > 0) and the levels and slopes of `EACH_WAY`.
     falls : float
         Probability that friction falls by more than `SHOWN` of Fc.
     probability : array, shape (m,)
@@ -79,7 +81,7 @@ class BandFit:
     harmonics : array, shape (k, 2)
         Cosine and sine of every order taken in, N·m (N).
     correlation : array, shape (p, p)
-        Of inertia, sigma2, fc, offset and gravity's two, in the most probable candidate.
+        Of inertia, sigma2, fc, offset, gravity's two and those of `EACH_WAY`, in the most probable candidate.
     misfit : float
         RMS of what is left, N·m (N).
     relative : float
@@ -103,7 +105,7 @@ class BandFit:
 def fit_band(
     records: Sequence[SlidingRows], tried: Sequence[Fall], *, orders: Sequence[float] = (),
     background: Sequence[float] = (), pendulum: bool = False, skew_size: float = 3e-3, skew: float | None = None,
-    start: float = 0.0, blurred: bool = False,
+    start: float = 0.0, blurred: bool = False, each_way: bool = False,
 ) -> BandFit:  # fmt: skip
     """Fit the rows of certain sliding that one window shows.
 
@@ -125,8 +127,10 @@ def fit_band(
         s: where the search for the skew begins, and what it is expected to be.
     blurred : bool
         Whether the way is too short to tell orders apart: what is near those found is then not small.
+    each_way : bool
+        Whether friction has a level and a slope of its own in each direction.
     """
-    system = System(records, tried, orders, background, pendulum, skew_size)
+    system = System(records, tried, orders, background, pendulum, skew_size, each_way)
     at = start if skew is None else skew
     system.expected = at
     torque = system.torque(at)
@@ -155,7 +159,8 @@ def fit_band(
         )
         torque = system.torque(at)
         candidates = system.candidates(torque, at)
-    out = summed_up(system, torque, candidates, weight, at, tried, len(orders), pendulum)
+    named = combinations(system.core, pendulum, each_way)
+    out = summed_up(system, torque, candidates, weight, at, tried, len(orders), named)
     if not (blurred and orders):
         return out
     most_likely = candidates[int(np.argmax(weight))]
@@ -196,14 +201,30 @@ def brakes(values: Array, covariance: Array) -> tuple[Array, Array]:
     return moved, covariance - np.outer(along, along) * (variance - left)
 
 
-def element(i: int) -> Callable[[Array, Array], tuple[float, float]]:
-    """Picks a value and its variance."""
-    return lambda v, s: (v[i], s[i, i])
+def combinations(core: int, pendulum: bool, each_way: bool) -> dict[str, Array]:
+    """Every number as a combination of the columns' coefficients, shape (core,) each."""
+    unit = np.eye(core)
+    named = {"inertia": unit[INERTIA], "sigma2": unit[VISCOUS], "fc": unit[COULOMB], "offset": unit[OFFSET]}
+    if pendulum:
+        named |= {"gravity_sin": unit[CORE], "gravity_cos": unit[CORE + 1]}
+    if each_way:
+        uneven = unit[CORE + 2 * pendulum]
+        # A constant torque is half of what friction's level is greater by for v > 0.
+        ways = (unit[COULOMB] + unit[OFFSET], unit[COULOMB] - unit[OFFSET],
+                unit[VISCOUS] + uneven, unit[VISCOUS] - uneven)  # fmt: skip
+        named |= {"uneven": uneven, **dict(zip(EACH_WAY, ways, strict=True))}
+    return named
+
+
+def combined(row: Array) -> Callable[[Array, Array], tuple[float, float]]:
+    """A combination of values and its variance."""
+    n = row.size
+    return lambda v, s: (float(row @ v[:n]), float(row @ s[:n, :n] @ row))
 
 
 def summed_up(
     system: System, torque: Array, candidates: Sequence[Candidate], weight: Array, skew: float,
-    tried: Sequence[Fall], orders: int, pendulum: bool,
+    tried: Sequence[Fall], orders: int, named: Mapping[str, Array],
 ) -> BandFit:  # fmt: skip
     """Means over the candidates, their spread among the variances."""
     kept = [(w, c) for w, c in zip(weight, candidates, strict=True) if w > 1e-4]
@@ -222,9 +243,6 @@ def summed_up(
         return Number(float(middle), math.sqrt(max(float(variance), 0.0)))
 
     core = system.core
-    named = {"inertia": INERTIA, "sigma2": VISCOUS, "fc": COULOMB, "offset": OFFSET}
-    if pendulum:
-        named |= {"gravity_sin": CORE, "gravity_cos": CORE + 1}
 
     def late(v: Array, s: Array) -> tuple[float, float]:
         return skew - v[JERK] / v[INERTIA], s[JERK, JERK] / v[INERTIA] ** 2
@@ -234,7 +252,7 @@ def summed_up(
             return v[COULOMB], s[COULOMB, COULOMB]
         return v[COULOMB] + v[core], s[COULOMB, COULOMB] + s[core, core] + 2.0 * s[COULOMB, core]
 
-    numbers = {name: mean(element(i)) for name, i in named.items()}
+    numbers = {name: mean(combined(row)) for name, row in named.items()}
     numbers |= {"skew": mean(late), "fs": mean(at_rest)}
     farthest = FARTHEST * system.skew_size
     found = numbers["skew"]
@@ -248,8 +266,8 @@ def summed_up(
     harmonics = np.array([sum(w * v[i] for (w, _), v in zip(kept, values, strict=True)) / total
                           for i in range(first, core)]).reshape(orders, 2)  # fmt: skip
     misfit = float(np.sqrt(np.mean(residual**2)))
-    places = list(named.values())
-    joint = system.covariance(torque, best)[np.ix_(places, places)]
+    rows = np.array(list(named.values()))
+    joint = rows @ system.covariance(torque, best)[:core, :core] @ rows.T
     each = np.sqrt(np.diag(joint))
     return BandFit(
         system.records[0].window.corner, numbers, float(falls / total), weight,

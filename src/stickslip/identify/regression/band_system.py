@@ -38,6 +38,10 @@ RISE, DEEPEST = -0.05, 2.0  # of Fc: bounds of A
 # Standard deviations of what no law holds, in parts of Fc.
 CURVE, AFTER, UNEVEN, LAGGING, AROUND = 0.002, 0.01, 0.03, 0.013, 0.005
 UNEVEN_FALL = 0.003  # of the fall of friction, which differs by direction as its level does
+EACH_FALL = 0.05  # the same where friction has a level and a slope of its own in each direction
+EACH_SLOPE = (
+    0.1  # of friction at the highest speed: what its slope in one direction makes it differ by from both
+)
 LEANING, LEANS = (
     3,
     0.02,
@@ -120,7 +124,9 @@ def refuted_above(freedom: int) -> float:
     return (1.0 - part - HUNDREDTH * math.sqrt(part)) ** -3
 
 
-def small_columns(records: Sequence[SlidingRows], fc: float, orders: Sequence[float]) -> tuple[Array, Array]:
+def small_columns(
+    records: Sequence[SlidingRows], fc: float, orders: Sequence[float], each_way: bool
+) -> tuple[Array, Array]:
     """Columns of what no law holds, shape (n, k), and the standard deviation of each coefficient."""
     v, gone = stacked(records, "speed"), stacked(records, "gone")
     side, speed = np.sign(v), np.abs(v)
@@ -134,9 +140,10 @@ def small_columns(records: Sequence[SlidingRows], fc: float, orders: Sequence[fl
     for way in np.geomspace(max(near, 1e-12), max(usual, 1e-11), 3).tolist():
         columns.append(side * np.exp(-gone / way))
         std.append(AFTER)
-    # About its mean: the constant torque of a law that is the same in both directions holds the mean of both.
-    columns.append((speed - float(np.mean(speed))) / top)
-    std.append(UNEVEN)
+    if not each_way:
+        # About its mean: the constant torque of a law that is the same in both directions holds the mean of both.
+        columns.append((speed - float(np.mean(speed))) / top)
+        std.append(UNEVEN)
     pull = stacked(records, "fixed")[:, INERTIA]
     pull = pull / max(float(np.sqrt(np.mean(pull**2))), 1e-300)
     for scale in np.geomspace(slow, 0.5 * top, 4)[1:].tolist():
@@ -144,7 +151,7 @@ def small_columns(records: Sequence[SlidingRows], fc: float, orders: Sequence[fl
         columns += [pull * slowly, side * np.abs(pull) * slowly]
         # A fall that is not the same in both directions: the constant torque is half the difference of the levels.
         columns.append(slowly)
-        std += [LAGGING, LAGGING, UNEVEN_FALL]
+        std += [LAGGING, LAGGING, EACH_FALL if each_way else UNEVEN_FALL]
     for order in orders:
         columns += list(np.concatenate([r.around(order) for r in records]).T)
         std += [AROUND] * 2
@@ -163,7 +170,7 @@ class System:
 
     def __init__(
         self, records: Sequence[SlidingRows], falls: Sequence[Fall], orders: Sequence[float], background:
-        Sequence[float], pendulum: bool, skew_size: float,
+        Sequence[float], pendulum: bool, skew_size: float, each_way: bool = False,
     ):  # fmt: skip
         self.records, self.skew_size, self.expected = records, skew_size, 0.0
         self.stroke = strokes_of(records)
@@ -172,6 +179,8 @@ class System:
         if pendulum:
             angle = stacked(records, "position")
             core.append(np.column_stack([np.sin(angle), np.cos(angle)]))
+        if each_way:
+            core.append(np.abs(stacked(records, "speed"))[:, None])
         core += [np.concatenate([r.around(o) for r in records]) for o in orders]
         plain = np.column_stack(core)
         self.core = plain.shape[1]
@@ -179,6 +188,9 @@ class System:
         start = least_squares(plain[:, :JERK], first)
         self.fc = max(abs(float(start[COULOMB])), 1e-3 * float(np.max(np.abs(first))))
         self.inertia = abs(float(start[INERTIA]))
+        self.uneven = JERK + 2 * pendulum + 1 if each_way else -1
+        top = float(np.max(np.abs(stacked(records, "speed"))))
+        self.uneven_std = EACH_SLOPE * (self.fc / top + abs(float(start[VISCOUS])))
         falling = stacked(records, "falling")
         self.levels = [
             k for k in range(falling.shape[1]) if np.count_nonzero(np.abs(falling[:, k]) > 0.3) >= 5
@@ -191,7 +203,7 @@ class System:
         beyond = np.maximum(speed / max(USUAL * often, 1e-300), 1.0)
         before = beyond**-2.0 * np.array([USUAL_EXPONENTS[falls[k].exponent] for k in self.levels])
         self.before = before / max(float(np.sum(before)), 1e-300)
-        small, self.std = small_columns(records, self.fc, background)
+        small, self.std = small_columns(records, self.fc, background, each_way)
         columns = np.column_stack([plain, falling[:, self.levels], small])
         scale = np.linalg.norm(columns, axis=0)
         # A wave that the window damps away is 0: the square of what is left of it would be.
@@ -229,6 +241,11 @@ class System:
         pairs = ((own, own), (own, np.tile(self.small, (len(levels), 1))), (every, every))
         return Products(levels, own, every, *(self.products[x[:, :, None], y[:, None, :]] for x, y in pairs))
 
+    @property
+    def tied(self) -> float:
+        """Weight with which the slopes of both directions are held to their mean."""
+        return self.noise * self.memory / (self.uneven_std * self.scale[self.uneven]) ** 2
+
     def candidates(self, torque: Array, skew: float) -> list[Candidate]:
         """The fit without a fall of friction, and with every one."""
         small = self.small
@@ -246,6 +263,8 @@ class System:
             matrix = own_own - own_small @ mixing
             right = seen[own] - seen_small @ mixing
             matrix[:, JERK, JERK] += known
+            if self.uneven >= 0:
+                matrix[:, self.uneven, self.uneven] += self.tied
             right[:, JERK] += moved
             size = own.shape[1]
             matrix += 1e-11 / size * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(size)
@@ -313,6 +332,9 @@ class System:
         shrunk = self.products[np.ix_(c.columns, self.small)]
         shrunk = shrunk - c.mixing.T @ self.products[np.ix_(self.small, self.small)]
         moved = c.inverse @ shrunk * (self.std * self.scale[self.small])
+        if self.uneven >= 0:
+            tied = self.tied * self.uneven_std * self.scale[self.uneven] * c.inverse[:, self.uneven]
+            moved = np.column_stack([moved, tied])
         rounded = c.inverse @ (self.rounded[:, c.columns] - self.rounded[:, self.small] @ c.mixing).T
         least, plain = self.noise * self.memory * np.diag(c.inverse), np.diag(noise)
         # Whole pieces tell level and slope of friction: where many of them refute the misfit's say, they decide.

@@ -313,7 +313,7 @@ def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:
 def that_tell(name: str, bands: Sequence[BandFit]) -> list[BandFit]:
     """The fits that tell of a number."""
     least = min(b.numbers[name].std for b in bands)
-    signed = name in ROTATED or name in ("skew", "offset")
+    signed = name in ROTATED or name in ("skew", "offset", "uneven")
 
     def tells(n: Number) -> bool:
         return n.std <= max(TELLING * least, 0.0 if signed else NARROW * abs(n.value))

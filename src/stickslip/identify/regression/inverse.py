@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.experiment import Experiment
+from stickslip.identify.experiment import Experiment, evenly_spaced
 from stickslip.identify.fit.filters import decimated, low_pass, spectrum
 from stickslip.identify.fit.profile import inverse_information, long_run
 from stickslip.machines.servo import ServoAxis
@@ -244,10 +244,9 @@ def correlation_lags(residual: Array) -> int:
 
 def uniform(experiment: Experiment) -> tuple[Array, Array, Array, float]:
     """Times, positions and drive signal on a regular grid, and its rate in Hz; unchanged where regular already."""
-    steps = np.diff(experiment.time)
     period = experiment.period
     signal = experiment.signal()
-    if np.max(np.abs(steps - period)) <= 1e-3 * period + 1e-9:
+    if evenly_spaced(experiment.time):
         return experiment.time, experiment.position, signal, 1.0 / period
     rows = float(experiment.time[-1] - experiment.time[0]) / period
     if not rows <= SPARSE * experiment.time.size:
