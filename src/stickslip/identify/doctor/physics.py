@@ -38,6 +38,8 @@ of its value."""
 TENTH, HELD, STRANGE, STRANGE_TIME = 0.1, 0.5, 1.5, 1.5e-3
 """Rows by which a torque acts beside its row that are worth a word; that any hold makes, and to which it must be known
 if it may be one; rows and s from which on no hold explains it."""
+PULLS = 0.5
+"""Of the torque, that a positive inertia takes at least for its sign to be right."""
 RANK = 1e-10
 """Part of the largest singular value below which a direction is not told."""
 
@@ -67,6 +69,9 @@ def sign(view: View) -> Iterator[Finding]:
     exchanged = float(np.mean(np.abs(smooth.torque * smooth.velocity)))
     if not exchanged > 0.0 or fit.explained < 0.2 or not braked + SURE * doubt < -0.1 * exchanged:
         return
+    pull = fit.values[0] * float(np.sqrt(np.mean(smooth.acceleration**2)))
+    if not measured and pull > PULLS * float(np.sqrt(np.mean(smooth.torque**2))):
+        return  # Of a turned torque the inertia would be negative: this one acts late.
     if measured:
         message = "friction is negative where the velocity is positive: it is the force on the moving body"
         remedy = f"say {turned}: here friction opposes positive velocity"

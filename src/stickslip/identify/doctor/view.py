@@ -177,25 +177,25 @@ class View:
         count = min(round(span / self.period) + 1, MAX_ROWS)
         if count < 30:
             return None
-        grid = np.linspace(float(self.time[0]), float(self.time[-1]), count)
         period = span / (count - 1)
-        filtered = ZeroPhase(butterworth_poles(2), 0.08, 2.0, reach=30)
-
-        def at_grid(channel: str) -> Array:
-            return np.interp(grid, self.time, self.values(channel))
-
         with np.errstate(all="ignore"):
             if self.has("position"):
-                raw = at_grid("position")
-                position = filtered(raw - raw[0]) + raw[0]
+                position = self.filtered("position", count)
                 velocity = np.gradient(position, period)
             else:
-                velocity = filtered(at_grid("velocity"))
+                velocity = self.filtered("velocity", count)
                 position = np.cumsum(velocity) * period
-            torque = filtered(at_grid(self.torque_channel)) if self.torque_channel else np.empty(0)
+            torque = self.filtered(self.torque_channel, count) if self.torque_channel else np.empty(0)
             out = Smooth(period, position, velocity, np.gradient(velocity, period), torque)
         every = (out.position, out.velocity, out.acceleration, out.torque)
         return out if all(np.isfinite(values).all() for values in every) else None
+
+    def filtered(self, channel: str, count: int) -> Array:
+        """A channel at so many even times, zero-phase filtered, shape (count,)."""
+        grid = np.linspace(float(self.time[0]), float(self.time[-1]), count)
+        raw = np.interp(grid, self.time, self.values(channel))
+        begin = raw[0] if channel == "position" else 0.0
+        return ZeroPhase(butterworth_poles(2), 0.08, 2.0, reach=30)(raw - begin) + begin
 
 
 def row(index: int, view: View) -> str:
