@@ -32,7 +32,7 @@ CALLS: list[tuple[str, str, Callable[..., Any]]] = [
     ("axis", "load", lambda x: ss.RigidAxis(1e-3, LAW, load=x)),
     ("controller", "sample_time", lambda x: ss.Controller(GAINS, sample_time=x)),
     ("controller", "torque_limit", lambda x: ss.Controller(GAINS, torque_limit=x)),
-    ("controller", "kp", lambda x: ss.Controller(ss.Gains(kp=x))),
+    ("Gains", "kp", lambda x: ss.Controller(ss.Gains(kp=x))),
     ("pd", "kp", lambda x: ss.ControlBlock("pd", kp=x, kd=1.0)),
     ("feedforward", "gain", lambda x: ss.Feedforward(LAW, gain=x)),
     ("encoder", "counts", Encoder),
@@ -41,8 +41,8 @@ CALLS: list[tuple[str, str, Callable[..., Any]]] = [
     ("simulate", "output", lambda x: ss.simulate(AXIS, LOOP, SINE, 1.0, output=x)),
     ("simulate", r"initial\[1\]", lambda x: ss.simulate(AXIS, LOOP, SINE, 1.0, initial=(0.0, x))),
     ("respond", "tolerance", lambda x: ss.respond(LAW, SINE, [0.0, 0.1], tolerance=x)),
-    ("reading", "sample_time", lambda x: ss.identify(DEMO, sample_time=x)),
-    ("reading", "counts_per_rev", lambda x: ss.read(DEMO, counts_per_rev=x)),
+    ("identify", "sample_time", lambda x: ss.identify(DEMO, sample_time=x)),
+    ("read", "counts_per_rev", lambda x: ss.read(DEMO, counts_per_rev=x)),
     ("identify", "noise", lambda x: ss.identify(DEMO, noise=x)),
     ("identify", "harmonics", lambda x: ss.identify(DEMO, harmonics=x)),
     ("identify", r"values\['fc'\]", lambda x: ss.identify(DEMO, values={"fc": x})),
@@ -62,7 +62,7 @@ def test_text_in_a_numbers_place_is_refused_by_name_with_the_remedy(
         ss.InputError, match=rf"{owner}: {name} = '0.25' must be .*; write it without quotes, 0.25"
     ):
         call("0.25")
-    with pytest.raises(ss.InputError, match=rf"{owner}: {name} = 'much' must be a number[^;]*$"):
+    with pytest.raises(ss.InputError, match=rf"{owner}: {name} = 'much' must be a (whole )?number[^;]*$"):
         call("much")
 
 
@@ -89,7 +89,7 @@ def test_the_first_error_is_the_wrong_number_and_not_the_missing_file(tmp_path: 
     model = tmp_path / "model.toml"
     model.write_text(MODEL)
     with pytest.raises(
-        ss.InputError, match="recommend: axes = '6' must be a number; write it without quotes, 6"
+        ss.InputError, match="recommend: axes = '6' must be a whole number; write it without quotes, 6"
     ):
         ss.recommend(model, amplitude=0.1, axes="6")  # type: ignore[arg-type]
 
@@ -101,7 +101,7 @@ def test_a_name_in_place_of_a_list_of_names_is_not_taken_apart() -> None:
 
 
 def test_what_is_no_model_is_said_where_it_is_given() -> None:
-    with pytest.raises(ParameterError, match="feedforward: model is of kind str; give a Model"):
+    with pytest.raises(ParameterError, match="feedforward: model = 'coulomb' must be a Model, such as"):
         ss.Feedforward("coulomb")
-    with pytest.raises(ParameterError, match="axis: friction is of kind str; give a Model"):
+    with pytest.raises(ParameterError, match="axis: friction = 'coulomb' must be a Model, such as"):
         ss.RigidAxis(1e-3, "coulomb")

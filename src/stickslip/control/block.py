@@ -9,6 +9,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+from stickslip.arguments import arguments_checked
 from stickslip.control.registry import control_law
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import ParameterError
@@ -41,6 +42,7 @@ class ControlBlock:
 
     __slots__ = ("friction", "law", "parameters")
 
+    @arguments_checked
     def __init__(
         self,
         law: str | ControlLaw,

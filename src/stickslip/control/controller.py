@@ -6,9 +6,9 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, cast
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import arguments_checked, insist_on_own
 from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Compensator
 from stickslip.control.composed import Composed
@@ -224,6 +224,7 @@ class Controller(Composed):
         """Its numbers by the names that studies and records know: of the short form its gains, else `values`."""
         return dict(self.gains._asdict()) if self.is_short and self.gains else self.values()
 
+    @arguments_checked
     def with_values(self, values: Mapping[str, Any]) -> Controller:
         """The controller with other `values` of parameters, by whole names (``loop_kp``, ``feedforward_friction_fc``).
 
@@ -239,6 +240,7 @@ class Controller(Composed):
                 (own if len(path) == 2 else held)[path[0]][path[-1]] = values[f.name]
         return self.with_blocks(b.with_values(own[part], held[part]) for part, b in self.blocks.items())
 
+    @arguments_checked
     def with_numbers(self, numbers: Mapping[str, Any]) -> Controller:
         """The controller with others of its `numbers`."""
         if not (self.is_short and self.gains):
@@ -263,7 +265,7 @@ class Controller(Composed):
 
 
 def _listed(blocks: Blocks) -> tuple[ControlBlock, ...]:
-    """None, one or several."""
+    """None, one or several; what is neither counts as one."""
     if blocks is None:
         return ()
-    return (blocks,) if isinstance(blocks, ControlBlock) else tuple(blocks)
+    return tuple(blocks) if isinstance(blocks, (list, tuple)) else (cast("ControlBlock", blocks),)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import arguments_checked, insist_on_own
 from stickslip.errors import ParameterError, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
@@ -198,6 +198,7 @@ class Machine:
             bearings=bearings or LinearContact(0.0, self.contact.bearings.viscous),
         )
 
+    @arguments_checked
     def without(self, *names: str) -> Machine:
         """This machine with imperfections switched off.
 

@@ -14,6 +14,7 @@ from stickslip.readers._names import ALIASES, KINDS
 from stickslip.readers._units import SI, parse_unit
 from stickslip.readers.convert import LINEAR
 from stickslip.readers.table_columns import Column, Table
+from stickslip.rules import with_article
 
 FORMAT = "arrays"
 
@@ -79,8 +80,8 @@ def table_in_memory(data: Any) -> Table:
     table = table_of(FORMAT, tree)
     if not table.columns:
         raise InputError(
-            f"a {type(data).__name__} without columns of numbers is no log; give a path, a data frame, a mapping of "
-            "arrays, a Record, or arrays by name (t=..., position=..., torque=...)"
+            f"log: {with_article(type(data).__name__)} without columns of numbers is no log; give a path, a data frame, "
+            "a mapping of arrays, a Record, or arrays by name (t=..., position=..., torque=...)"
         )
     return table
 

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypedDict, Unpack, cast
 
 from numpy.typing import ArrayLike
 
-from stickslip.arguments import insist_on_numbers
+from stickslip.arguments import arguments_checked, insist_on, rules_in, written
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding
 from stickslip.readers import profiles
@@ -94,8 +94,8 @@ class Reading(TypedDict, total=False):
     unwrap: bool
 
 
-READ_AS = {name: getattr(said, "__forward_arg__", said) for name, said in Reading.__annotations__.items()}
-"""Annotations of `Reading` as they are written."""
+READ_AS = rules_in(written(Reading), globals())
+"""What the parts of `Reading` must be."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +115,7 @@ class Opened:
         return any(f.code == "profile" and " = " in f.message for f in self.notes)
 
 
+@arguments_checked
 def read(log: Log | None = None, **reading: Unpack[Reading]) -> Record:
     """Read a log as a record in SI units.
 
@@ -156,7 +157,7 @@ def doctor_of(log: Log | None) -> str:
 
 
 def check_reading(given: Mapping[str, Any]) -> None:
-    """Refuse a name that is none of `Reading`, and what is no number where one is meant.
+    """Refuse a name that is none of `Reading`, and what is of a wild kind.
 
     Raises
     ------
@@ -165,7 +166,7 @@ def check_reading(given: Mapping[str, Any]) -> None:
     for name in given:
         if name not in Reading.__annotations__:
             raise UnknownName("argument", name, tuple(Reading.__annotations__))
-    insist_on_numbers("reading", READ_AS, given)
+    insist_on("reading", READ_AS, given)
 
 
 def open_log(

@@ -13,6 +13,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import change, excitation, physics, play, signals, spikes, timing, units
@@ -94,6 +95,7 @@ class Diagnosis:
         tally = f"<p>{len(self.errors)} errors, {len(self.warnings)} warnings in {len(self.record)} usable rows</p>"
         return f"<table><tbody>{rows}</tbody></table>{tally}"
 
+    @arguments_checked
     def raise_for_errors(self, name: str = "the record") -> None:
         """Refuse an unusable record.
 
