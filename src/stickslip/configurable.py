@@ -107,6 +107,18 @@ class Configurable(Described):
                 fields.setdefault(f.name, f)
         return fields
 
+    def try_example(self) -> None:
+        """Refuse parameters of the example that cannot be.
+
+        Raises
+        ------
+        ParameterError
+        """
+        try:
+            self.parameters(dict(self.example))
+        except ParameterError as error:
+            raise ParameterError(f"{error}, in its example") from None
+
     def option_scope(self) -> dict[str, Any]:
         """What the names that choices replace stand for under the chosen options."""
         scope: dict[str, Any] = {}

@@ -182,7 +182,7 @@ class ControlLaw(Configurable):
         }
         for name, part in parts.items():
             object.__setattr__(self, name, part)
-        self.parameters(dict(self.example))
+        self.try_example()
 
     def holding(self, name: str, law: Law) -> Callable[..., float]:
         """The function of that name with a friction law's functions in their places, in the chosen options too."""

@@ -59,11 +59,12 @@ class Model:
         if (words := self.law.remark(self.parameters)) and not _called_from_within():
             warnings.warn(words, ModelRemark, stacklevel=3)
 
+    @arguments_checked
     def warn(self, origin: str = "") -> Model:
         """This model, with a `ModelRemark` where its parameters are allowed but seldom meant; `origin` says where it
         stands."""
         if words := self.law.remark(self.parameters):
-            warnings.warn(f"{origin}: {words}" if origin else words, ModelRemark, stacklevel=3)
+            warnings.warn(f"{origin}: {words}" if origin else words, ModelRemark, stacklevel=4)
         return self
 
     @classmethod
@@ -79,6 +80,7 @@ class Model:
         return cls.from_table(read_toml(Path(path)))
 
     @classmethod
+    @arguments_checked
     def from_table(cls, table: Table) -> Model:
         """As `from_file`, of the content of a file: a `table` in which the path of a law's file is relative to its
         document's folder."""

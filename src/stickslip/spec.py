@@ -217,7 +217,7 @@ class Law(Configurable):
             parts["odd"] = False
         for name, part in parts.items():
             object.__setattr__(self, name, part)
-        self.parameters(dict(self.example))
+        self.try_example()
 
     written: Mapping[str, Any] = field(init=False, repr=False)
     """What the law's file says, before any option changed it."""

@@ -126,7 +126,9 @@ class Controller(Composed):
             if getattr(self, one) and getattr(self, other):
                 raise ParameterError(f"controller: {one} and {other} exclude each other; give one of them")
         if not self.blocks.keys() - {"estimator"}:
-            raise ParameterError("controller: no control law; give a loop, a feedforward or an observer")
+            raise ParameterError(
+                "controller: no control law; give gains, a loop, a feedforward or an observer"
+            )
         laws = [block.law for place in PLACES for block in self._given(place)]
         adapting = next((law.name for law in laws if law.adapts), "")
         integrates = self.linear.ki > 0.0 or any(law.integrates for law in laws)
@@ -173,6 +175,7 @@ class Controller(Composed):
                 out[place if i == 1 else f"{place}_{i}"] = block
         return out
 
+    @arguments_checked
     def with_blocks(self, blocks: Iterable[ControlBlock]) -> Controller:
         """The controller that is made of the laws `blocks`, each at its own place."""
         own = [*blocks]
@@ -213,6 +216,7 @@ class Controller(Composed):
         """Whether a friction law in it acts on what is measured."""
         return any(b.law.place == "observer" and b.friction for b in self.blocks.values())
 
+    @arguments_checked
     def holding(self, change: Callable[[Model], Model]) -> Controller:
         """The controller whose friction laws are what `change` makes of them."""
         own = {place: [b.holding(change) for b in self._given(place)] for place in MANY}

@@ -168,6 +168,7 @@ class Machine:
         bearings = self.contact.bearings
         return LinearContact(bearings.stiffness if bearings.coulomb > 0.0 else 0.0, bearings.viscous)
 
+    @arguments_checked
     def linear(self, contact: LinearContact = FREE, bearings: LinearContact | None = None) -> Drivetrain:
         """This machine as a linear system: inertias, springs, current loop and encoder, without noise and delay.
 

@@ -244,7 +244,12 @@ def sources_of(
         def doctor(record: Record, log: Log | None = log) -> list[Diagnosis]:
             return examiner.pieces(record, log)
 
-        opened = open_log(log, own, doctor)
+        try:
+            opened = open_log(log, own, doctor)
+        except InputError as error:
+            if number < fitted:
+                raise
+            raise InputError(f"--hold-out: {error}") from None
         if opened.written or opened.tells_numbers:
             for finding in opened.notes[:1]:
                 examiner.tell(f"{name}: {finding.line()}")

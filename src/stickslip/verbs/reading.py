@@ -186,7 +186,8 @@ def open_log(
     signals = {SHORT.get(n, n): said[n] for n in SIGNALS if said.get(n) is not None}
     if signals:
         if log is not None:
-            raise InputError(f"{', '.join(signals)} and a log exclude each other; give one of them")
+            given = [n for n in SIGNALS if said.get(n) is not None]
+            raise InputError(f"{', '.join(given)} and a log exclude each other; give one of them")
         return Opened(_part(_of_signals(signals, reading), reading, "the arrays"))
     if reading.get("units"):
         raise InputError("units is for arrays; give the unit of a column in map, such as q:deg")
@@ -209,7 +210,7 @@ def _of_signals(signals: Mapping[str, ArrayLike], reading: Reading) -> Record:
         if reading.get(name):
             raise InputError(f"{name} applies to columns of files and frames, not to arrays; leave it out")
     units = {SHORT.get(n, n): unit for n, unit in reading.get("units", {}).items()}
-    table, mapping = table_of_signals(signals, units)
+    table, mapping = table_of_signals(signals, units, {channel: n for n, channel in SHORT.items()})
     record = record_of(table, mapping, drive=_drive(reading), sample_time=reading.get("sample_time"))
     return _with_digest(record, digest_of(table))
 
@@ -219,10 +220,14 @@ def _of_data(data: Any, reading: Reading) -> Record:
         raise InputError("beside joins two files; put the columns of both into one table instead")
     table = table_in_memory(data)
     profile = reading.get("profile")
-    record = record_of(
-        table, reading.get("map", ()), drive=_drive(reading), sample_time=reading.get("sample_time"),
-        profile=profiles.load(Path(profile)) if profile else None,
-    )  # fmt: skip
+    kept = profiles.load(Path(profile)) if profile else None
+    period = reading.get("sample_time")
+    try:
+        record = record_of(
+            table, reading.get("map", ()), drive=_drive(reading), sample_time=period, profile=kept
+        )
+    except InputError as error:
+        raise InputError(f"the log: {error}") from None
     return _with_digest(record, digest_of(table))
 
 

@@ -61,7 +61,14 @@ class SweepResult:
         ----------
         row : int
             Of `rows`.
+
+        Raises
+        ------
+        InputError
+            If there is no such row.
         """
+        if not 0 <= row < len(self.sweep.runs):
+            raise InputError(f"columns: row = {row} must be from 0 to {len(self.sweep.runs) - 1}")
         names = [*self.sweep.metrics, "flagged"]
         return dataset.read(self.folder, self.sweep, self.sweep.runs[row], names)
 
