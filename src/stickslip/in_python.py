@@ -80,7 +80,8 @@ def _map(found: list[tuple[str, str]], arrays: bool) -> str:
     said: list[str] = []
     for role, column in every:
         name, unit = SIGNALS.get(role, role), column.rpartition(":")[2] if ":" in column else ""
-        said += [f"{name}=..."] if column.partition(":")[0] in ("COLUMN", "none") else []
+        given = {"COLUMN": "...", "none": "None"}.get(column.partition(":")[0])
+        said += [f"{name}={given}"] if given else []
         said += [f'units={{"{name}": "{unit}"}}'] if unit else []
     return ", ".join(said)
 
