@@ -194,9 +194,9 @@ def _several(item: Rule | None, iterable: bool) -> Rule:
 
     def wrong(value: Any) -> Wrong | None:
         given = value
-        listed = hasattr(given, "__getitem__") and hasattr(given, "__len__")
+        several = hasattr(given, "__iter__") and getattr(given, "ndim", 1) > 0
         if isinstance(given, (str, bytes, abc.Mapping)) or not (
-            listed or (iterable and hasattr(given, "__iter__"))
+            several and (iterable or hasattr(given, "__len__"))
         ):
             return Wrong("", given, words)
         if hasattr(given, "dtype"):
