@@ -65,7 +65,7 @@ def in_python(text: str, function: str = "", arrays: bool = False) -> str:
 def _said(text: str, function: str, arrays: bool) -> str:
     """Of a part that is no command."""
     settings = "settings" if function == "export" else "values"
-    text = PLACE.sub("choose another one", text)
+    text = PLACE.sub("choose another place", text)
     text = MAPS.sub(lambda m: _map(ONE_MAP.findall(m[1]), arrays) + (", " if m[2] else ""), text)
     text = SET.sub(lambda m: f'{settings}={{"{m[1]}": {m[2] or ".."}}}', text)
     text = LOOP.sub(lambda m: "loop={" + ", ".join(_item(x, "=") for x in m[1].split(",")) + "}", text)
