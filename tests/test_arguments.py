@@ -91,7 +91,7 @@ def test_the_first_error_is_the_wrong_number_and_not_the_missing_file(tmp_path: 
     with pytest.raises(
         ss.InputError, match="recommend: axes = '6' must be a whole number; write it without quotes, 6"
     ):
-        ss.recommend(model, amplitude=0.1, axes="6")  # type: ignore[arg-type]
+        ss.recommend(model, amplitude=0.1, axes="6")
 
 
 def test_a_name_in_place_of_a_list_of_names_is_not_taken_apart() -> None:
@@ -149,8 +149,8 @@ def test_what_users_gave_is_said_in_these_words(call: Callable[..., Any], said: 
 
 def test_whole_numbers_of_any_kind_are_whole_numbers() -> None:
     """2.0 for 2 is what a table of numbers gives."""
-    assert ss.Feedforward(LAW, substeps=2.0).substeps == 2  # type: ignore[arg-type]
+    assert ss.Feedforward(LAW, substeps=2.0).substeps == 2
     with pytest.raises(ParameterError, match=r"feedforward: substeps = 2\.5 must be a whole number"):
-        ss.Feedforward(LAW, substeps=2.5)  # type: ignore[arg-type]
+        ss.Feedforward(LAW, substeps=2.5)
     swept = [ss.place("PD", np.int64(1), np.float32(10.0)), ss.place("PD", 1.0, 10.0)]
     assert swept[0] == pytest.approx(swept[1])
